@@ -1,0 +1,89 @@
+#pragma once
+// Typed device memory that knows its name and count and is booked in the device's ledger.
+
+#include <CL/opencl.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "core/ocl/device.hpp"
+
+namespace isowave::ocl {
+
+/// The untyped part of Buffer: allocation, transfers, checks. Messages name the buffer.
+class RawBuffer {
+ public:
+  /// Allocates and touches `bytes` (at least 1 is allocated for 0). Throws Error when the device cannot.
+  RawBuffer(Device &device, std::string name, std::size_t bytes);
+  ~RawBuffer();
+  RawBuffer(RawBuffer &&) noexcept;
+  RawBuffer &operator=(RawBuffer &&) noexcept;
+
+  const std::string &name() const { return name_; }
+  const cl::Buffer &mem() const { return mem_; }
+  Device &device() const { return *device_; }
+
+ protected:
+  void write_bytes(const void *src, std::size_t bytes, std::size_t offset, bool blocking);
+  void read_bytes(void *dst, std::size_t bytes, std::size_t offset, bool blocking, cl::Event *event) const;
+  void fill_bytes(const void *pattern, std::size_t pattern_bytes, std::size_t bytes, std::size_t offset);
+  void check_range(std::size_t count, std::size_t offset, std::size_t size) const;
+
+ private:
+  void release() noexcept;
+  Device *device_ = nullptr;
+  std::string name_;
+  std::size_t bytes_ = 0;
+  cl::Buffer mem_;
+};
+
+/// `count` elements of T on a device. Move-only.
+template <class T>
+class Buffer : public RawBuffer {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  Buffer(Device &device, std::string name, std::size_t count)
+      : RawBuffer(device, std::move(name), count * sizeof(T)), count_(count) {}
+  /// Holds a copy of `data`. Waits.
+  Buffer(Device &device, std::string name, std::span<const T> data) : Buffer(device, std::move(name), data.size()) {
+    write(data);
+  }
+
+  std::size_t size() const { return count_; }
+
+  /// Host -> elements [offset, offset + data.size()). Waits. Throws std::invalid_argument past the end.
+  void write(std::span<const T> data, std::size_t offset = 0) {
+    check_range(data.size(), offset, count_);
+    write_bytes(data.data(), data.size_bytes(), offset * sizeof(T), true);
+  }
+  /// Elements [offset, offset + out.size()) -> host. Waits.
+  void read(std::span<T> out, std::size_t offset = 0) const {
+    check_range(out.size(), offset, count_);
+    read_bytes(out.data(), out.size_bytes(), offset * sizeof(T), true, nullptr);
+  }
+  std::vector<T> read() const {
+    std::vector<T> out(count_);
+    read(out);
+    return out;
+  }
+  /// As read(), but returns at once; `out` is valid when `event` completes and must live until then.
+  void read_async(std::span<T> out, cl::Event &event, std::size_t offset = 0) const {
+    check_range(out.size(), offset, count_);
+    read_bytes(out.data(), out.size_bytes(), offset * sizeof(T), false, &event);
+  }
+  /// Sets elements [offset, offset + count) to `value`, in queue order. Does not wait. sizeof(T) a power of two <= 128.
+  void fill(const T &value, std::size_t offset, std::size_t count) {
+    check_range(count, offset, count_);
+    fill_bytes(&value, sizeof(T), count * sizeof(T), offset * sizeof(T));
+  }
+  void fill(const T &value) { fill(value, 0, count_); }
+
+ private:
+  std::size_t count_;
+};
+
+}  // namespace isowave::ocl

@@ -1,0 +1,94 @@
+#pragma once
+// A device, its one in-order queue, its programs, its memory ledger and its stage timings.
+//
+// Everything that talks to OpenCL goes through this folder. Objects are RAII; a Device must outlive its buffers
+// and kernels. Not thread-safe: one thread drives one Device.
+
+#include <CL/opencl.hpp>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/ocl/memory_ledger.hpp"
+#include "core/ocl/stage_timer.hpp"
+
+namespace isowave::ocl {
+
+enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
+std::string_view to_string(DeviceType type);
+
+/// What a device can do, probed when it is opened or listed. Optional features have tested fallbacks.
+struct Capabilities {
+  bool int64_atomics = false;            ///< cl_khr_int64_base_atomics and extended
+  bool fp64 = false;                     ///< doubles in kernels
+  bool sub_groups = false;               ///< cl_khr_subgroups or OpenCL 2.1+ with sub-groups > 0
+  bool correctly_rounded_divide = false; ///< accepts -cl-fp32-correctly-rounded-divide-sqrt
+  bool denormals = false;                ///< float32 denormals kept
+  std::uint64_t global_memory = 0;       ///< bytes
+  std::uint64_t largest_allocation = 0;  ///< bytes in one buffer
+  std::uint64_t local_memory = 0;        ///< bytes per work-group
+  std::uint32_t max_work_group_size = 0;
+  std::uint32_t compute_units = 0;
+};
+
+struct DeviceInfo {
+  std::uint32_t index = 0;  ///< position in list_devices(), what `--device 2` means
+  std::string name, vendor, platform, device_version, driver_version;
+  DeviceType type = DeviceType::kOther;
+  Capabilities capabilities;
+};
+
+/// Every OpenCL 1.2 device of every platform, in the loader's order. Empty when there is none.
+std::vector<DeviceInfo> list_devices();
+
+/// Picks a device. `selector`: "" (the ISOWAVE_DEVICE environment variable if set, else the first GPU, else the first
+/// CPU, else the first device), an index, a type ("gpu", "cpu", "accelerator") or a case-insensitive fragment of
+/// the device or platform name. Throws Error naming the devices there are.
+DeviceInfo choose_device(std::string_view selector = "");
+
+/// Macro name -> value, passed as -D to a program build.
+using Defines = std::map<std::string, std::string>;
+
+class Device {
+ public:
+  /// Throws Error when the device lacks what core needs: OpenCL 1.2, a compiler, 32 KiB of local memory.
+  /// profiling: record events so that StageTimer reports; costs about 10 us a launch on GPUs.
+  explicit Device(const DeviceInfo &info, bool profiling = false);
+  Device(const Device &) = delete;
+  Device &operator=(const Device &) = delete;
+
+  const DeviceInfo &info() const { return info_; }
+  const Capabilities &capabilities() const { return info_.capabilities; }
+  const cl::Context &context() const { return context_; }
+  cl::CommandQueue &queue() { return queue_; }
+  MemoryLedger &ledger() { return ledger_; }
+  StageTimer &timer() { return timer_; }
+
+  /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per (stem, defines).
+  /// Throws Error with the whole compiler log when it does not build.
+  const cl::Program &program(std::string_view stem, const Defines &defines = {});
+
+  /// Work-groups that keep the device busy: what a grid-stride kernel should launch at most.
+  std::uint32_t max_resident_groups() const;
+
+  /// Waits for everything enqueued.
+  void finish();
+
+ private:
+  DeviceInfo info_;
+  cl::Device device_;
+  cl::Context context_;
+  cl::CommandQueue queue_;
+  MemoryLedger ledger_;
+  StageTimer timer_;
+  std::map<std::pair<std::string, Defines>, cl::Program> programs_;
+};
+
+/// "CL_OUT_OF_RESOURCES (-5)".
+std::string error_name(cl_int code);
+
+}  // namespace isowave::ocl

@@ -1,0 +1,93 @@
+#pragma once
+// A kernel whose arguments are checked by the C++ compiler:
+//
+//   Kernel<In<uint>, uint, Out<uint>> scale_{device, "scale", "scale_values"};
+//   scale_(Range::strided(count, 64, device), input, factor, output);
+
+#include <CL/opencl.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+#include "core/ocl/buffer.hpp"
+#include "core/ocl/device.hpp"
+
+namespace isowave::ocl {
+
+/// Parameter tags for buffers: `global const T *` and `global T *` (or `constant T *`) of the kernel.
+template <class T>
+struct In {
+  In(const Buffer<T> &buffer) : mem(buffer.mem()) {}  // NOLINT(google-explicit-constructor): tags convert
+  const cl::Buffer &mem;
+};
+template <class T>
+struct Out {
+  Out(Buffer<T> &buffer) : mem(buffer.mem()) {}  // NOLINT(google-explicit-constructor)
+  const cl::Buffer &mem;
+};
+/// `local T *` of `count` elements.
+template <class T>
+struct Local {
+  std::size_t count;
+};
+
+/// The one-dimensional shape of a launch: num_groups work-groups of group_size work-items.
+struct Range {
+  std::size_t num_groups = 0;
+  std::size_t group_size = 1;
+
+  /// One work-item per element, rounded up to whole groups.
+  static Range covering(std::size_t count, std::size_t group_size) {
+    return {(count + group_size - 1) / group_size, group_size};
+  }
+  /// For grid-stride kernels: as covering(), but never more groups than keep the device busy.
+  static Range strided(std::size_t max_count, std::size_t group_size, const Device &device);
+};
+
+class RawKernel {
+ public:
+  RawKernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines);
+
+ protected:
+  void check_arity(std::size_t num_params) const;
+  /// Enqueues and does not wait. A range of 0 groups enqueues nothing. Throws Error naming kernel and OpenCL error.
+  void launch(const Range &range);
+  template <class T>
+  void set(cl_uint index, const In<T> &arg) { set_mem(index, arg.mem); }
+  template <class T>
+  void set(cl_uint index, const Out<T> &arg) { set_mem(index, arg.mem); }
+  template <class T>
+  void set(cl_uint index, const Local<T> &arg) { set_bytes(index, arg.count * sizeof(T), nullptr); }
+  template <class T>
+    requires std::is_trivially_copyable_v<T>
+  void set(cl_uint index, const T &value) { set_bytes(index, sizeof(T), &value); }
+
+ private:
+  void set_mem(cl_uint index, const cl::Buffer &mem);
+  void set_bytes(cl_uint index, std::size_t bytes, const void *data);
+
+  Device *device_;
+  std::string name_;
+  cl::Kernel kernel_;
+};
+
+/// Params are In<T>, Out<T>, Local<T> or plain scalars, in the order of the kernel's signature. The constructor
+/// checks their number against the built kernel.
+template <class... Params>
+class Kernel : public RawKernel {
+ public:
+  Kernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines = {})
+      : RawKernel(device, stem, kernel_name, defines) { check_arity(sizeof...(Params)); }
+
+  /// Enqueues one launch in queue order; does not wait.
+  void operator()(const Range &range, const std::type_identity_t<Params> &...args) {
+    cl_uint index = 0;
+    (this->set(index++, args), ...);
+    launch(range);
+  }
+};
+
+}  // namespace isowave::ocl

@@ -1,0 +1,75 @@
+#pragma once
+// Uncompressed volumes: what a file says of its grid, and its voxels as float32, layer by layer.
+//
+// Index space: voxel (i,j,k) at integer coordinates. World = origin + direction * (spacing * index).
+// Voxels are ordered x fastest, then y, then z.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace isowave {
+
+enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
+
+/// "uint8", "int8", ... "float64".
+std::string_view to_string(VoxelType type);
+/// Throws Error naming the accepted types.
+VoxelType voxel_type_from_string(std::string_view name);
+/// Bytes per voxel.
+std::size_t size_of(VoxelType type);
+bool is_integer(VoxelType type);
+
+/// The grid of a volume. Plain data; the defaults are a unit grid at the origin.
+struct VolumeInfo {
+  glm::uvec3 dims{0};         ///< voxels along x, y, z
+  glm::dvec3 spacing{1.0};    ///< world units between voxels along each index axis, > 0
+  glm::dvec3 origin{0.0};     ///< world position of voxel (0,0,0)
+  glm::dmat3 direction{1.0};  ///< column a: unit world direction of index axis a
+  VoxelType type = VoxelType::kFloat32;  ///< as stored in the source file
+
+  std::uint64_t num_voxels() const { return std::uint64_t(dims.x) * dims.y * dims.z; }
+  /// World vector of one index step along each axis, as columns: direction * diag(spacing).
+  glm::dmat3 index_to_world() const;
+};
+
+/// Throws Error if any dimension is below 2 or above kMaxDim, spacing is not finite and positive, the
+/// origin is not finite, or the direction is not invertible. `what` names the file in the message.
+void check_volume_info(const VolumeInfo &info, std::string_view what);
+inline constexpr std::uint32_t kMaxDim = 1u << 16;
+
+/// Reads a volume as float32 without holding all of it. Not thread-safe.
+class VolumeReader {
+ public:
+  virtual ~VolumeReader() = default;
+  const VolumeInfo &info() const { return info_; }
+
+  /// Reads voxel layers [z_begin, z_begin + num_layers) to `out` [num_layers * ny * nx].
+  /// Calls must ask for ascending, non-overlapping layers (gzip streams cannot go back).
+  /// Integer types are converted exactly up to 2^24 and rounded beyond. NaN and Inf pass through.
+  /// Throws Error on a short or unreadable file.
+  virtual void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) = 0;
+
+ protected:
+  VolumeInfo info_;
+};
+
+/// What a raw file's name does not say, or says wrongly. Unset fields come from the name.
+struct RawOverrides {
+  std::optional<glm::uvec3> dims;
+  std::optional<VoxelType> type;
+  std::optional<glm::dvec3> spacing;  ///< also replaces the spacing of other formats
+};
+
+/// Opens Open-SciVis raw (`NAME_XxYxZ_TYPE.raw`, `.raw.gz`), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd) or
+/// NIfTI (.nii, .nii.gz), by its extension. Throws Error: unknown extension, missing file, bad name, zero
+/// dims, truncated or oversized data, more than one component.
+std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path, const RawOverrides &overrides = {});
+
+}  // namespace isowave

@@ -1,0 +1,59 @@
+#pragma once
+// Compressed volumes: a standard zfp stream of 4^3 float32 blocks at a fixed number of bits per block, and
+// what zfp's header cannot say. See docs in README "File format".
+//
+// File: zfp full header (96 bits) | block payload, block (bx,by,bz) at index bx + nbx*(by + nby*bz) |
+//       zero padding to a whole 64-bit word | trailer (JSON + checksum, see zfp_stream.cpp).
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/volume.hpp"
+
+namespace isowave {
+
+/// done and total in voxel layers; called from the calling thread.
+using Progress = std::function<void(std::uint32_t done, std::uint32_t total)>;
+
+struct CompressOptions {
+  std::uint32_t rate = 8;          ///< bits per voxel, 1..32
+  std::optional<float> map_nan{};  ///< replaces NaN and +-Inf; unset: refused with count and first position
+  Progress progress{};
+};
+
+/// A fixed-rate zfp volume in host memory.
+struct CompressedVolume {
+  VolumeInfo info;                      ///< type is that of the source before compression
+  std::uint32_t bits_per_block = 0;     ///< 64 * rate; any fixed-rate value of other writers, 1..2048
+  std::vector<std::uint32_t> words;     ///< payload from bit 0, little endian; two zero words follow the last bit
+  std::array<float, 2> value_range{};   ///< [min, max] of the source voxels; {-inf, inf} when unknown
+  std::optional<double> max_error{};    ///< largest |decoded - source| when it was measured
+
+  glm::uvec3 num_blocks() const { return (info.dims + 3u) / 4u; }
+  std::uint64_t block_count() const {
+    const glm::uvec3 n = num_blocks();
+    return std::uint64_t(n.x) * n.y * n.z;
+  }
+  double rate() const { return bits_per_block / 64.0; }  ///< bits per voxel
+};
+
+/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file).
+CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
+/// As compress(), but straight to a file and in memory O(nx * ny). Writes to a temporary name and renames;
+/// nothing is left behind on an error.
+void compress_to_file(VolumeReader &reader, const CompressOptions &options, const std::filesystem::path &path);
+
+/// Reads a `.zfp` file of ours or any fixed-rate 3D float zfp file with a full header (spacing 1 then).
+/// Throws Error in one line on a broken header, other types or modes, truncation, checksum mismatch.
+CompressedVolume read_zfp_file(const std::filesystem::path &path);
+
+/// Decodes everything with libzfp: [nz][ny][nx] float32. The ground truth of every decoder here.
+std::vector<float> decode_with_libzfp(const CompressedVolume &volume);
+
+}  // namespace isowave

@@ -1,0 +1,17 @@
+# embed_kernels(<target> <file.cl>...) makes an object library that holds every kernel file, joined with the headers it
+# includes, as one string each. Before each part stands `#line 1 "name"`, so a device compiler's message names the
+# file and line that a reader can open. Nothing is read at run time; core/ocl/kernel_sources.hpp declares the lookup.
+
+set(embed_kernels_script ${CMAKE_CURRENT_LIST_DIR}/embed_kernels_script.cmake)
+
+function(embed_kernels target)
+  set(generated ${CMAKE_CURRENT_BINARY_DIR}/generated/${target}.cpp)
+  file(GLOB headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/kernels_cl/*.h)
+  add_custom_command(
+    OUTPUT ${generated}
+    COMMAND ${CMAKE_COMMAND} -D "output=${generated}" -D "kernels=${ARGN}" -P ${embed_kernels_script}
+    DEPENDS ${ARGN} ${headers} ${embed_kernels_script}
+    COMMENT "Embedding OpenCL kernels" VERBATIM)
+  add_library(${target} STATIC ${generated})
+  target_link_libraries(${target} PRIVATE isowave_flags)
+endfunction()

@@ -1,0 +1,68 @@
+# Run by embed_kernels(): -D output=<file.cpp> -D kernels=<a.cl;b.cl>.
+
+# Appends `file` to `result` with each `#include "x.h"` replaced, the first time, by that header's text.
+function(expand file)
+  get_filename_component(name ${file} NAME)
+  get_filename_component(folder ${file} DIRECTORY)
+  file(READ ${file} text)
+  # Brackets and semicolons would be taken as CMake list syntax.
+  string(REPLACE "[" "@OPEN@" text "${text}")
+  string(REPLACE "]" "@CLOSE@" text "${text}")
+  string(REPLACE ";" "@SEMICOLON@" text "${text}")
+  string(REPLACE "\\\n" "@CONTINUED@\n" text "${text}")
+  string(REPLACE "\n" ";" lines "${text}")
+  string(APPEND result "#line 1 \"${name}\"\n")
+  set(line_number 0)
+  foreach(line IN LISTS lines)
+    math(EXPR line_number "${line_number} + 1")
+    if(line MATCHES "^#include \"([a-z0-9_]+\\.h)\"")
+      set(header ${CMAKE_MATCH_1})
+      if(NOT header IN_LIST included)
+        list(APPEND included ${header})
+        expand(${folder}/${header})
+      endif()
+      math(EXPR next_line "${line_number} + 1")
+      string(APPEND result "#line ${next_line} \"${name}\"\n")
+    else()
+      string(APPEND result "${line}\n")
+    endif()
+  endforeach()
+  set(result "${result}" PARENT_SCOPE)
+  set(included "${included}" PARENT_SCOPE)
+endfunction()
+
+set(table "")
+foreach(kernel IN LISTS kernels)
+  get_filename_component(stem ${kernel} NAME_WE)
+  set(result "")
+  set(included "")
+  expand(${kernel})
+  string(REPLACE "@CONTINUED@" "\\" result "${result}")
+  string(REPLACE "@OPEN@" "[" result "${result}")
+  string(REPLACE "@CLOSE@" "]" result "${result}")
+  string(REPLACE "@SEMICOLON@" ";" result "${result}")
+  # Compilers limit the length of one literal (C++ promises 65,536 characters): adjacent pieces are joined.
+  string(LENGTH "${result}" length)
+  set(pieces "")
+  set(begin 0)
+  while(begin LESS length)
+    string(SUBSTRING "${result}" ${begin} 12000 piece)
+    string(APPEND pieces "R\"~kernel~(${piece})~kernel~\"\n")
+    math(EXPR begin "${begin} + 12000")
+  endwhile()
+  string(APPEND table "    {\"${stem}\", ${pieces}},\n")
+endforeach()
+
+file(WRITE ${output} "// Made by tools/cmake/embed_kernels.cmake.
+#include \"core/ocl/kernel_sources.hpp\"
+
+namespace isowave::ocl {
+
+std::span<const KernelSource> kernel_sources() {
+  static constexpr KernelSource sources[] = {
+${table}  };
+  return sources;
+}
+
+}  // namespace isowave::ocl
+")

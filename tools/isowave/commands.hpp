@@ -1,0 +1,16 @@
+#pragma once
+// One function per subcommand, each in the file of its name. It adds the subcommand and its options to `app`; CLI11 calls
+// the action when the command line names it. Actions throw isowave::Error; main prints it.
+
+#include <CLI/CLI.hpp>
+
+namespace isowave::tools {
+
+void add_devices(CLI::App &app);
+void add_info(CLI::App &app);
+void add_generate(CLI::App &app);
+void add_convert(CLI::App &app);
+void add_render(CLI::App &app);
+void add_compare(CLI::App &app);
+
+}  // namespace isowave::tools
