@@ -1,0 +1,65 @@
+/// shared_types.h -- the only structs and constants that cross the host/device border.
+/// Scalars only: no float3 (16 bytes in OpenCL C, 12 in GLM), bool, size_t, pointers or bit-fields.
+#ifndef ISOWAVE_SHARED_TYPES_H
+#define ISOWAVE_SHARED_TYPES_H
+
+#ifdef __OPENCL_C_VERSION__ /* offline clang sets this one, not __OPENCL_VERSION__ */
+#pragma OPENCL FP_CONTRACT OFF /* once, for every kernel: device bits must be host bits */
+#define ISO_CHECK_SIZE(T, n) typedef char T##_has_wrong_size[sizeof(T) == (n) ? 1 : -1]
+#else
+#include <cstdint>
+using uint = std::uint32_t;
+#define ISO_CHECK_SIZE(T, n) static_assert(sizeof(T) == (n), #T " layout changed")
+#endif
+
+#define ISO_INVALID_ID 0xFFFFFFFFu    ///< "no block", "no ray": UINT_MAX in R_BID (Sec. 3.3)
+#define ISO_BLOCK_VOXELS 64u          ///< 4^3
+#define ISO_MAX_SPECULATION 64u       ///< cap of N_spec (Sec. 4)
+
+/// All that a frame's kernels need of grid, camera and isovalue. Written once per frame.
+typedef struct FrameParams {
+  uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
+  uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted
+  uint width, height;                 ///< image [pixels]
+  float eye_x, eye_y, eye_z;          ///< camera position, index space
+  float fwd_x, fwd_y, fwd_z;          ///< camera basis mapped to index space: ray = (fwd + u right + v up) / |.|
+  float right_x, right_y, right_z;
+  float up_x, up_y, up_z;
+  float pixel_scale;                  ///< tan(fovy / 2) / height: half a pixel's step of u and v
+  float isovalue;
+  uint isovalue_index;                ///< the isovalue in the quantile table of macrocells.cl
+  uint max_spec_count;                ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+} FrameParams;
+ISO_CHECK_SIZE(FrameParams, 96);
+
+/// The result of one ray-block pair: which of the block's 64 dual cells the ray hits first, and where.
+typedef struct PairHit {
+  uint cell;  ///< x + 4 y + 16 z in the block; ISO_INVALID_ID: no hit
+  float s;    ///< position between the ray's entry (0) and exit (1) of that cell
+} PairHit;
+ISO_CHECK_SIZE(PairHit, 8);
+
+/// One pixel's hit (design: a hit is cell + local position; t is derived from it).
+typedef struct HitRecord {
+  float t;               ///< distance from the eye [world units]; INFINITY: no hit
+  uint block_id;         ///< bx + blocks_x * (by + blocks_y * bz)
+  uint cell;             ///< x + 4 y + 16 z in the block
+  float x, y, z;         ///< position in the dual cell, [0,1]^3
+  float grad_x, grad_y, grad_z;  ///< gradient of the trilinear field there [value per voxel], index space
+} HitRecord;
+ISO_CHECK_SIZE(HitRecord, 36);
+
+/// What one pass did, counted on the device; the host reads it one pass behind.
+typedef struct PassCounts {
+  uint active_count;     ///< N_Act: rays at work at the start of the pass
+  uint spec_count;       ///< N_Spec of the pass
+  uint pair_count;       ///< ray-block pairs made by traversal
+  uint granted_count;    ///< of those, pairs whose dual grid was in the cache and were intersected
+  uint visible_count;    ///< distinct blocks those belong to
+  uint requested_count;  ///< blocks asked for that were not cached
+  uint decoded_count;    ///< of those, blocks that got a slot
+  uint hit_count;        ///< rays that hit in this pass
+} PassCounts;
+ISO_CHECK_SIZE(PassCounts, 32);
+
+#endif
