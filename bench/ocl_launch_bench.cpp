@@ -14,7 +14,7 @@ namespace {
 /// Launches per wait: enough that the wait does not count.
 constexpr int kBatch = 1000;
 
-void label(benchmark::State &state, const ocl::Device &device) {
+void label(benchmark::State &state, ocl::Device &device) {
   const char *source = device.timer().source() == ocl::TimerSource::kOff ? "timer off" : "timer on";
   state.SetLabel(device.info().name + ", " + source);
 }
