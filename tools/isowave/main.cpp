@@ -9,7 +9,9 @@
 #include "tools/isowave/commands.hpp"
 
 int main(int argc, char **argv) {
-  CLI::App app{"Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on OpenCL devices."};
+  CLI::App app{
+      "Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on OpenCL "
+      "devices."};
   app.name("isowave");
   app.set_version_flag("--version", "isowave 0.1.0");
   app.require_subcommand(1);
@@ -25,6 +27,9 @@ int main(int argc, char **argv) {
     return 0;
   } catch (const CLI::Success &help) {
     return app.exit(help);
+  } catch (
+      const CLI::RuntimeError &status) {  // a result, already printed, that is not success: compare --exact
+    return status.get_exit_code();
   } catch (const std::exception &error) {
     fmt::print(stderr, "isowave: {}\n", error.what());
     return 1;

@@ -1,0 +1,147 @@
+#include "core/io/png.hpp"
+
+#include <png.h>
+
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "core/error.hpp"
+#include "core/io/atomic_file.hpp"
+
+namespace isowave {
+namespace {
+
+// libpng reports errors by longjmp. The functions that call setjmp hold no object with a destructor, return
+// false, and leave the message in Message; their callers own everything and throw.
+
+constexpr std::size_t kSignatureBytes = 8;
+constexpr std::uint64_t kMaxDeflateRatio = 1032;  ///< deflate codes at most 258 bytes in 2 bits
+
+struct Message {
+  char text[120] = "unknown error";
+};
+
+void on_error(png_structp png, png_const_charp text) {
+  auto *message = static_cast<Message *>(png_get_error_ptr(png));
+  std::snprintf(message->text, sizeof message->text, "%s", text);
+  png_longjmp(png, 1);
+}
+
+void on_warning(png_structp, png_const_charp) {}
+
+struct Writer {
+  Message message;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  Writer() {
+    if (info == nullptr) throw std::bad_alloc();
+  }
+  Writer(const Writer &) = delete;
+  Writer &operator=(const Writer &) = delete;
+  ~Writer() { png_destroy_write_struct(&png, &info); }
+};
+
+struct Reader {
+  Message message;
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  Reader() {
+    if (info == nullptr) throw std::bad_alloc();
+  }
+  Reader(const Reader &) = delete;
+  Reader &operator=(const Reader &) = delete;
+  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+bool write_image(Writer &writer, std::FILE *file, const Image8 &image) {
+  png_structp png = writer.png;
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_init_io(png, file);
+  png_set_IHDR(png, writer.info, image.width, image.height, 8,
+               image.channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_sRGB(png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
+  png_write_info(png, writer.info);
+  const std::size_t row_bytes = std::size_t(image.width) * image.channels;
+  for (std::size_t y = 0; y < image.height; ++y) png_write_row(png, image.pixels.data() + y * row_bytes);
+  png_write_end(png, writer.info);
+  return true;
+}
+
+/// Reads everything before the pixels and asks for 8-bit RGB or RGBA.
+bool read_header(Reader &reader, std::FILE *file) {
+  png_structp png = reader.png;
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_init_io(png, file);
+  png_set_sig_bytes(png, kSignatureBytes);
+  png_read_info(png, reader.info);
+  png_set_expand(png);
+  png_set_gray_to_rgb(png);
+  png_set_interlace_handling(png);
+  png_read_update_info(png, reader.info);
+  return true;
+}
+
+bool read_rows(Reader &reader, png_bytepp rows) {
+  if (setjmp(png_jmpbuf(reader.png)) != 0) return false;
+  png_read_image(reader.png, rows);
+  png_read_end(reader.png, nullptr);
+  return true;
+}
+
+}  // namespace
+
+void write_png(const Image8 &image, const std::filesystem::path &path) {
+  if (image.channels != 3 && image.channels != 4)
+    throw std::invalid_argument("write_png: channels is not 3 or 4");
+  if (image.pixels.size() != std::size_t(image.width) * image.height * image.channels) {
+    throw std::invalid_argument("write_png: pixels is not width * height * channels long");
+  }
+  AtomicFile out(path);
+  Writer writer;
+  if (!write_image(writer, out.file(), image)) {
+    throw Error("{}: cannot write the PNG: {}", path.string(), writer.message.text);
+  }
+  out.commit();
+}
+
+Image8 read_png(const std::filesystem::path &path) {
+  const std::string where = path.string();
+  const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(where.c_str(), "rb"), &std::fclose);
+  if (!file) throw Error("{}: cannot open", where);
+  png_byte signature[kSignatureBytes];
+  if (std::fread(signature, 1, sizeof signature, file.get()) != sizeof signature ||
+      png_sig_cmp(signature, 0, sizeof signature) != 0) {
+    throw Error("{}: not a PNG file", where);
+  }
+  Reader reader;
+  if (!read_header(reader, file.get())) throw Error("{}: broken PNG: {}", where, reader.message.text);
+  if (png_get_bit_depth(reader.png, reader.info) != 8) {
+    throw Error("{}: has {} bits per channel, only up to 8 are read", where,
+                png_get_bit_depth(reader.png, reader.info));
+  }
+
+  Image8 image;
+  image.width = png_get_image_width(reader.png, reader.info);
+  image.height = png_get_image_height(reader.png, reader.info);
+  image.channels = png_get_channels(reader.png, reader.info);
+  const std::size_t row_bytes = png_get_rowbytes(reader.png, reader.info);
+  const std::uint64_t bytes = std::uint64_t(row_bytes) * image.height;
+  // A broken header may ask for any size: believe it only as far as the file could hold it, at 1 bit per
+  // pixel at least.
+  if (bytes / 32 / kMaxDeflateRatio > std::filesystem::file_size(path)) {
+    throw Error("{}: broken PNG: {} x {} pixels cannot come from a file this small", where, image.width,
+                image.height);
+  }
+  image.pixels.resize(bytes);
+  std::vector<png_bytep> rows(image.height);
+  for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = image.pixels.data() + y * row_bytes;
+  if (!read_rows(reader, rows.data())) throw Error("{}: broken PNG: {}", where, reader.message.text);
+  return image;
+}
+
+}  // namespace isowave
