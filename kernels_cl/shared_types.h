@@ -3,18 +3,45 @@
 #ifndef ISOWAVE_SHARED_TYPES_H
 #define ISOWAVE_SHARED_TYPES_H
 
-#ifdef __OPENCL_C_VERSION__ /* offline clang sets this one, not __OPENCL_VERSION__ */
+#ifdef __OPENCL_C_VERSION__    /* offline clang sets this one, not __OPENCL_VERSION__ */
 #pragma OPENCL FP_CONTRACT OFF /* once, for every kernel: device bits must be host bits */
 #define ISO_CHECK_SIZE(T, n) typedef char T##_has_wrong_size[sizeof(T) == (n) ? 1 : -1]
+#define ISO_NAMESPACE_BEGIN
+#define ISO_NAMESPACE_END
+#define ISO_GLOBAL global      ///< address space of buffers
+#define ISO_CONSTANT constant  ///< address space of FrameParams and tables
 #else
+#include <cmath>
 #include <cstdint>
-using uint = std::uint32_t;
 #define ISO_CHECK_SIZE(T, n) static_assert(sizeof(T) == (n), #T " layout changed")
+#define ISO_NAMESPACE_BEGIN namespace isowave {
+#define ISO_NAMESPACE_END }
+#define ISO_GLOBAL
+#define ISO_CONSTANT
 #endif
 
-#define ISO_INVALID_ID 0xFFFFFFFFu    ///< "no block", "no ray": UINT_MAX in R_BID (Sec. 3.3)
-#define ISO_BLOCK_VOXELS 64u          ///< 4^3
-#define ISO_MAX_SPECULATION 64u       ///< cap of N_spec (Sec. 4)
+ISO_NAMESPACE_BEGIN
+
+#ifndef __OPENCL_C_VERSION__
+using uint = std::uint32_t;
+using ulong = std::uint64_t;
+using uchar = std::uint8_t;
+using std::fabs;
+using std::floor;
+using std::fma;
+using std::sqrt;
+#endif
+
+#define ISO_INVALID_ID 0xFFFFFFFFu   ///< "no block", "no ray": UINT_MAX in R_BID (Sec. 3.3)
+#define ISO_BLOCK_VOXELS 64u         ///< 4^3
+#define ISO_MAX_SPECULATION 64u      ///< cap of N_spec (Sec. 4)
+#define ISO_MACROCELL_BLOCKS 4       ///< blocks along the edge of a coarse macrocell: 16 voxels
+#define ISO_DUAL_GRID_VERTICES 125u  ///< 5^3
+#define ISO_SCAN_ITEMS 8u            ///< entries per work-item and tile in scan.cl
+#define ISO_RADIX_BITS 4u            ///< key bits per pass of radix_sort.cl
+#define ISO_RADIX_DIGITS 16u
+#define ISO_RADIX_ITEMS 16u  ///< pairs per work-item and tile in radix_sort.cl
+#define ISO_AGE_BUCKETS 64u  ///< ages the LRU tells apart [passes]; older ones count as the oldest
 
 /// All that a frame's kernels need of grid, camera and isovalue. Written once per frame.
 typedef struct FrameParams {
@@ -22,44 +49,54 @@ typedef struct FrameParams {
   uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted
   uint width, height;                 ///< image [pixels]
   float eye_x, eye_y, eye_z;          ///< camera position, index space
-  float fwd_x, fwd_y, fwd_z;          ///< camera basis mapped to index space: ray = (fwd + u right + v up) / |.|
+  float fwd_x, fwd_y, fwd_z;  ///< camera basis mapped to index space, divided by t_scale (see make_ray)
   float right_x, right_y, right_z;
   float up_x, up_y, up_z;
-  float pixel_scale;                  ///< tan(fovy / 2) / height: half a pixel's step of u and v
+  float pixel_scale;  ///< tan(fovy / 2) / height: half a pixel's step of u and v
+  float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
   float isovalue;
-  uint isovalue_index;                ///< the isovalue in the quantile table of macrocells.cl
-  uint max_spec_count;                ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+  uint isovalue_index;  ///< the isovalue in the quantile table of macrocells.cl
+  uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 96);
+ISO_CHECK_SIZE(FrameParams, 100);
+
+#define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses
+#define ISO_NOT_TESTED 65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass
 
 /// The result of one ray-block pair: which of the block's 64 dual cells the ray hits first, and where.
 typedef struct PairHit {
-  uint cell;  ///< x + 4 y + 16 z in the block; ISO_INVALID_ID: no hit
+  uint cell;  ///< x + 4 y + 16 z in the block, ISO_NO_HIT or ISO_NOT_TESTED
   float s;    ///< position between the ray's entry (0) and exit (1) of that cell
 } PairHit;
 ISO_CHECK_SIZE(PairHit, 8);
 
 /// One pixel's hit (design: a hit is cell + local position; t is derived from it).
 typedef struct HitRecord {
-  float t;               ///< distance from the eye [world units]; INFINITY: no hit
-  uint block_id;         ///< bx + blocks_x * (by + blocks_y * bz)
-  uint cell;             ///< x + 4 y + 16 z in the block
-  float x, y, z;         ///< position in the dual cell, [0,1]^3
+  float t;                       ///< distance from the eye [world units]; INFINITY: no hit
+  uint block_id;                 ///< bx + blocks_x * (by + blocks_y * bz)
+  uint cell;                     ///< x + 4 y + 16 z in the block
+  float x, y, z;                 ///< position in the dual cell, [0,1]^3
   float grad_x, grad_y, grad_z;  ///< gradient of the trilinear field there [value per voxel], index space
 } HitRecord;
 ISO_CHECK_SIZE(HitRecord, 36);
 
-/// What one pass did, counted on the device; the host reads it one pass behind.
+/// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input is "the
+/// first n entries" take n from a field of this struct, so that no launch waits for the host.
 typedef struct PassCounts {
-  uint active_count;     ///< N_Act: rays at work at the start of the pass
-  uint spec_count;       ///< N_Spec of the pass
-  uint pair_count;       ///< ray-block pairs made by traversal
-  uint granted_count;    ///< of those, pairs whose dual grid was in the cache and were intersected
-  uint visible_count;    ///< distinct blocks those belong to
-  uint requested_count;  ///< blocks asked for that were not cached
-  uint decoded_count;    ///< of those, blocks that got a slot
-  uint hit_count;        ///< rays that hit in this pass
+  uint pass;               ///< number of the pass since the cache was made, from 1: the LRU's clock
+  uint active_count;       ///< N_Act: rays at work at the start of the pass
+  uint spec_count;         ///< N_Spec of the pass; 0 when no ray is active
+  uint pair_slot_count;    ///< active_count * spec_count: entries of the pair arrays in use
+  uint pair_count;         ///< ray-block pairs made by traversal
+  uint granted_count;      ///< of those, pairs whose dual grid was in the cache and were intersected
+  uint visible_count;      ///< distinct blocks those belong to
+  uint requested_count;    ///< blocks asked for that were not cached
+  uint decoded_count;      ///< of those, blocks that got a slot
+  uint hit_count;          ///< rays that hit in this pass
+  uint next_active_count;  ///< rays left for the next pass
 } PassCounts;
-ISO_CHECK_SIZE(PassCounts, 32);
+ISO_CHECK_SIZE(PassCounts, 44);
+
+ISO_NAMESPACE_END
 
 #endif

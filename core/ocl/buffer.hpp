@@ -2,6 +2,7 @@
 // Typed device memory that knows its name and count and is booked in the device's ledger.
 
 #include <CL/opencl.hpp>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -14,23 +15,31 @@
 namespace isowave::ocl {
 
 /// The untyped part of Buffer: allocation, transfers, checks. Messages name the buffer.
+/// A moved-from buffer holds nothing: size 0, no memory, not in the ledger.
 class RawBuffer {
  public:
-  /// Allocates and touches `bytes` (at least 1 is allocated for 0). Throws Error when the device cannot.
+  /// Allocates `bytes` (at least 1 is allocated for 0), sets them to zero and waits: drivers allocate lazily,
+  /// and a budget counts only what is really there. Throws Error when the device cannot.
   RawBuffer(Device &device, std::string name, std::size_t bytes);
   ~RawBuffer();
   RawBuffer(RawBuffer &&) noexcept;
   RawBuffer &operator=(RawBuffer &&) noexcept;
 
   const std::string &name() const { return name_; }
+  std::size_t bytes() const { return bytes_; }  ///< as asked for; 0 when moved from
   const cl::Buffer &mem() const { return mem_; }
   Device &device() const { return *device_; }
 
  protected:
   void write_bytes(const void *src, std::size_t bytes, std::size_t offset, bool blocking);
+  /// Sets *event, where given, even for 0 bytes.
   void read_bytes(void *dst, std::size_t bytes, std::size_t offset, bool blocking, cl::Event *event) const;
   void fill_bytes(const void *pattern, std::size_t pattern_bytes, std::size_t bytes, std::size_t offset);
   void check_range(std::size_t count, std::size_t offset, std::size_t size) const;
+  /// count * element_bytes; SIZE_MAX, which no device has, instead of an overflow.
+  static std::size_t bytes_of(std::size_t count, std::size_t element_bytes) {
+    return count > SIZE_MAX / element_bytes ? SIZE_MAX : count * element_bytes;
+  }
 
  private:
   void release() noexcept;
@@ -47,43 +56,44 @@ class Buffer : public RawBuffer {
 
  public:
   Buffer(Device &device, std::string name, std::size_t count)
-      : RawBuffer(device, std::move(name), count * sizeof(T)), count_(count) {}
+      : RawBuffer(device, std::move(name), bytes_of(count, sizeof(T))) {}
   /// Holds a copy of `data`. Waits.
-  Buffer(Device &device, std::string name, std::span<const T> data) : Buffer(device, std::move(name), data.size()) {
+  Buffer(Device &device, std::string name, std::span<const T> data)
+      : Buffer(device, std::move(name), data.size()) {
     write(data);
   }
 
-  std::size_t size() const { return count_; }
+  std::size_t size() const { return bytes() / sizeof(T); }
 
   /// Host -> elements [offset, offset + data.size()). Waits. Throws std::invalid_argument past the end.
   void write(std::span<const T> data, std::size_t offset = 0) {
-    check_range(data.size(), offset, count_);
+    check_range(data.size(), offset, size());
     write_bytes(data.data(), data.size_bytes(), offset * sizeof(T), true);
   }
   /// Elements [offset, offset + out.size()) -> host. Waits.
   void read(std::span<T> out, std::size_t offset = 0) const {
-    check_range(out.size(), offset, count_);
+    check_range(out.size(), offset, size());
     read_bytes(out.data(), out.size_bytes(), offset * sizeof(T), true, nullptr);
   }
   std::vector<T> read() const {
-    std::vector<T> out(count_);
+    std::vector<T> out(size());
     read(out);
     return out;
   }
-  /// As read(), but returns at once; `out` is valid when `event` completes and must live until then.
+  /// As read(), but returns at once, with the queue flushed; `out` is valid when `event` completes and must
+  /// live until then.
   void read_async(std::span<T> out, cl::Event &event, std::size_t offset = 0) const {
-    check_range(out.size(), offset, count_);
+    check_range(out.size(), offset, size());
     read_bytes(out.data(), out.size_bytes(), offset * sizeof(T), false, &event);
   }
-  /// Sets elements [offset, offset + count) to `value`, in queue order. Does not wait. sizeof(T) a power of two <= 128.
+  /// Sets elements [offset, offset + count) to `value`, in queue order. Does not wait.
   void fill(const T &value, std::size_t offset, std::size_t count) {
-    check_range(count, offset, count_);
+    static_assert(std::has_single_bit(sizeof(T)) && sizeof(T) <= 128,
+                  "OpenCL fills patterns of 1, 2, 4 .. 128 bytes");
+    check_range(count, offset, size());
     fill_bytes(&value, sizeof(T), count * sizeof(T), offset * sizeof(T));
   }
-  void fill(const T &value) { fill(value, 0, count_); }
-
- private:
-  std::size_t count_;
+  void fill(const T &value) { fill(value, 0, size()); }
 };
 
 }  // namespace isowave::ocl

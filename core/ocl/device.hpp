@@ -1,13 +1,13 @@
 #pragma once
 // A device, its one in-order queue, its programs, its memory ledger and its stage timings.
 //
-// Everything that talks to OpenCL goes through this folder. Objects are RAII; a Device must outlive its buffers
-// and kernels. Not thread-safe: one thread drives one Device.
+// Everything that talks to OpenCL goes through this folder. Objects are RAII; a Device must outlive its
+// buffers and kernels. Not thread-safe: one thread drives one Device.
 
 #include <CL/opencl.hpp>
 #include <cstdint>
 #include <map>
-#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,14 +23,14 @@ std::string_view to_string(DeviceType type);
 
 /// What a device can do, probed when it is opened or listed. Optional features have tested fallbacks.
 struct Capabilities {
-  bool int64_atomics = false;            ///< cl_khr_int64_base_atomics and extended
-  bool fp64 = false;                     ///< doubles in kernels
-  bool sub_groups = false;               ///< cl_khr_subgroups or OpenCL 2.1+ with sub-groups > 0
-  bool correctly_rounded_divide = false; ///< accepts -cl-fp32-correctly-rounded-divide-sqrt
-  bool denormals = false;                ///< float32 denormals kept
-  std::uint64_t global_memory = 0;       ///< bytes
-  std::uint64_t largest_allocation = 0;  ///< bytes in one buffer
-  std::uint64_t local_memory = 0;        ///< bytes per work-group
+  bool int64_atomics = false;             ///< cl_khr_int64_base_atomics and extended
+  bool fp64 = false;                      ///< doubles in kernels
+  bool sub_groups = false;                ///< cl_khr_subgroups or OpenCL 2.1+ with sub-groups > 0
+  bool correctly_rounded_divide = false;  ///< accepts -cl-fp32-correctly-rounded-divide-sqrt
+  bool denormals = false;                 ///< float32 denormals kept
+  std::uint64_t global_memory = 0;        ///< bytes
+  std::uint64_t largest_allocation = 0;   ///< bytes in one buffer
+  std::uint64_t local_memory = 0;         ///< bytes per work-group
   std::uint32_t max_work_group_size = 0;
   std::uint32_t compute_units = 0;
 };
@@ -45,12 +45,16 @@ struct DeviceInfo {
 /// Every OpenCL 1.2 device of every platform, in the loader's order. Empty when there is none.
 std::vector<DeviceInfo> list_devices();
 
-/// Picks a device. `selector`: "" (the ISOWAVE_DEVICE environment variable if set, else the first GPU, else the first
-/// CPU, else the first device), an index, a type ("gpu", "cpu", "accelerator") or a case-insensitive fragment of
-/// the device or platform name. Throws Error naming the devices there are.
+/// Picks a device. `selector`: "" (the ISOWAVE_DEVICE environment variable if set, else the first GPU, else
+/// the first CPU, else the first device), an index, a type ("gpu", "cpu", "accelerator") or a
+/// case-insensitive fragment of the device or platform name. Throws Error naming the devices there are.
 DeviceInfo choose_device(std::string_view selector = "");
+/// The rule of choose_device() alone. `environment` stands for ISOWAVE_DEVICE and counts when `selector` is
+/// empty. Of several matches the first is taken. Returns a reference into `devices`.
+const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
+                              std::string_view environment);
 
-/// Macro name -> value, passed as -D to a program build.
+/// Macro name -> value, passed as -D to a program build. No white space in either.
 using Defines = std::map<std::string, std::string>;
 
 class Device {
@@ -68,8 +72,8 @@ class Device {
   MemoryLedger &ledger() { return ledger_; }
   StageTimer &timer() { return timer_; }
 
-  /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per (stem, defines).
-  /// Throws Error with the whole compiler log when it does not build.
+  /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per (stem,
+  /// defines). Throws Error with the whole compiler log when it does not build.
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
 
   /// Work-groups that keep the device busy: what a grid-stride kernel should launch at most.

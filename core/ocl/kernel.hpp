@@ -53,16 +53,23 @@ class RawKernel {
 
  protected:
   void check_arity(std::size_t num_params) const;
-  /// Enqueues and does not wait. A range of 0 groups enqueues nothing. Throws Error naming kernel and OpenCL error.
+  /// Enqueues and does not wait. A range of 0 groups enqueues nothing. Throws Error naming kernel and OpenCL
+  /// error.
   void launch(const Range &range);
   template <class T>
-  void set(cl_uint index, const In<T> &arg) { set_mem(index, arg.mem); }
+  void set(cl_uint index, const In<T> &arg) {
+    set_mem(index, arg.mem);
+  }
   template <class T>
-  void set(cl_uint index, const Out<T> &arg) { set_mem(index, arg.mem); }
+  void set(cl_uint index, const Out<T> &arg) {
+    set_mem(index, arg.mem);
+  }
   template <class T>
-  void set(cl_uint index, const Local<T> &arg) { set_bytes(index, arg.count * sizeof(T), nullptr); }
+  void set(cl_uint index, const Local<T> &arg) {
+    set_bytes(index, arg.count * sizeof(T), nullptr);
+  }
   template <class T>
-    requires std::is_trivially_copyable_v<T>
+  requires std::is_trivially_copyable_v<T>
   void set(cl_uint index, const T &value) { set_bytes(index, sizeof(T), &value); }
 
  private:
@@ -72,15 +79,18 @@ class RawKernel {
   Device *device_;
   std::string name_;
   cl::Kernel kernel_;
+  std::size_t num_args_ = 0;
 };
 
-/// Params are In<T>, Out<T>, Local<T> or plain scalars, in the order of the kernel's signature. The constructor
-/// checks their number against the built kernel.
+/// Params are In<T>, Out<T>, Local<T> or plain scalars, in the order of the kernel's signature. The
+/// constructor checks their number against the built kernel.
 template <class... Params>
 class Kernel : public RawKernel {
  public:
   Kernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines = {})
-      : RawKernel(device, stem, kernel_name, defines) { check_arity(sizeof...(Params)); }
+      : RawKernel(device, stem, kernel_name, defines) {
+    check_arity(sizeof...(Params));
+  }
 
   /// Enqueues one launch in queue order; does not wait.
   void operator()(const Range &range, const std::type_identity_t<Params> &...args) {

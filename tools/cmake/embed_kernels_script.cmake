@@ -1,4 +1,5 @@
 # Run by embed_kernels(): -D output=<file.cpp> -D kernels=<a.cl;b.cl>.
+cmake_minimum_required(VERSION 3.25)  # a script has no policies of its own
 
 # Appends `file` to `result` with each `#include "x.h"` replaced, the first time, by that header's text.
 function(expand file)

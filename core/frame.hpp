@@ -1,0 +1,26 @@
+#pragma once
+// One frame's constants for kernels and twin: grid, camera in index space, isovalue.
+
+#include <cstdint>
+#include <vector>
+
+#include "core/camera.hpp"
+#include "core/volume.hpp"
+#include "kernels_cl/shared_types.h"
+
+namespace isowave {
+
+struct ImageSize {
+  std::uint32_t width = 1280, height = 720;  ///< pixels
+  std::uint64_t num_pixels() const { return std::uint64_t(width) * height; }
+};
+
+/// Computes the camera basis once, in double, and maps it to index space. isovalue_index and max_spec_count
+/// are left for the renderer. Throws Error: a degenerate camera, an image of 0 or more than 2^28 pixels, a
+/// NaN isovalue.
+FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue);
+
+/// Depth [height * width], world units, INFINITY where nothing is hit.
+std::vector<float> depth_of(const std::vector<HitRecord> &hits);
+
+}  // namespace isowave

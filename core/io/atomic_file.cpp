@@ -1,0 +1,69 @@
+#include "core/io/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "core/error.hpp"
+
+namespace isowave {
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void fail(const fs::path &target, int error_number) {
+  throw Error("{}: cannot write: {}", target.string(), std::strerror(error_number));
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(const fs::path &target) : target_(target) {
+  if (target_.filename().empty()) throw Error("'{}': cannot write: no file name", target.string());
+  std::error_code ignored;
+  const fs::file_status status = fs::status(target_, ignored);
+  // rename() would replace a device such as /dev/null, and fails on a folder only after all the work.
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    throw Error("{}: cannot write: it exists and is not a regular file", target.string());
+  }
+  // Through a symbolic link to the file itself, so that the link survives.
+  if (fs::is_symlink(target_, ignored) && fs::exists(status)) target_ = fs::canonical(target_);
+
+  static std::atomic<unsigned> next_id{0};
+  const std::string name =
+      fmt::format(".{}.{}.{}.tmp", target_.filename().string(), ::getpid(), next_id.fetch_add(1));
+  temporary_ = target_.parent_path() / name;
+  const int fd = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (fd < 0) fail(target_, errno);
+  file_ = ::fdopen(fd, "wb");
+  if (file_ == nullptr) {
+    const int error_number = errno;
+    ::close(fd);
+    ::unlink(temporary_.c_str());
+    fail(target_, error_number);
+  }
+}
+
+AtomicFile::~AtomicFile() {
+  if (file_ != nullptr) std::fclose(file_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::write(std::span<const std::byte> bytes) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail(target_, errno);
+}
+
+void AtomicFile::commit() {
+  errno = 0;
+  const bool failed_before = std::ferror(file_) != 0;
+  const bool failed_now = std::fclose(std::exchange(file_, nullptr)) != 0;
+  if (failed_before || failed_now) fail(target_, errno != 0 ? errno : EIO);
+  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, errno);
+  temporary_.clear();
+}
+
+}  // namespace isowave

@@ -1,0 +1,39 @@
+#pragma once
+// Output files that appear whole or not at all.
+
+#include <cstddef>
+#include <cstdio>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+namespace isowave {
+
+/// Writes to a temporary name beside the target; commit() renames it over the target. Destroyed without
+/// commit(), it removes what it wrote. A target that exists stays as it was until commit().
+/// Every failure throws Error in one line with the target's name and the system's reason.
+class AtomicFile {
+ public:
+  /// Opens the temporary file. Throws Error: folder missing or not writable, target not a regular file.
+  explicit AtomicFile(const std::filesystem::path &target);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile &) = delete;
+  AtomicFile &operator=(const AtomicFile &) = delete;
+
+  /// Appends all bytes. Throws Error (disk full and such).
+  void write(std::span<const std::byte> bytes);
+  void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+  /// For libraries that want a C stream (libpng); errors set on it are found by commit().
+  std::FILE *stream() { return file_; }
+
+  /// Flushes, closes and renames. Throws Error if any write failed. Call once, nothing may follow.
+  void commit();
+
+  const std::filesystem::path &target() const { return target_; }
+
+ private:
+  std::filesystem::path target_, temporary_;
+  std::FILE *file_ = nullptr;
+};
+
+}  // namespace isowave

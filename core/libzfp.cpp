@@ -1,0 +1,35 @@
+#include "core/libzfp.hpp"
+
+#include <bit>
+#include <cstring>
+#include <stdexcept>
+
+namespace isowave {
+
+static_assert(std::endian::native == std::endian::little, "zfp streams are read as little-endian words");
+
+ZfpStream make_zfp_stream(std::uint32_t bits_per_block) {
+  ZfpStream stream(zfp_stream_open(nullptr), &zfp_stream_close);
+  if (!stream ||
+      !zfp_stream_set_params(stream.get(), bits_per_block, bits_per_block, ZFP_MAX_PREC, ZFP_MIN_EXP)) {
+    throw std::invalid_argument("make_zfp_stream: libzfp refuses this number of bits per block");
+  }
+  return stream;
+}
+
+ZfpHeader make_zfp_header(const glm::uvec3 &dims, std::uint32_t bits_per_block) {
+  std::array<std::uint64_t, 4> buffer{};
+  const ZfpBits bits(stream_open(buffer.data(), sizeof(buffer)), &stream_close);
+  const ZfpStream stream = make_zfp_stream(bits_per_block);
+  zfp_stream_set_bit_stream(stream.get(), bits.get());
+  const ZfpField field(zfp_field_3d(nullptr, zfp_type_float, dims.x, dims.y, dims.z), &zfp_field_free);
+  if (zfp_write_header(stream.get(), field.get(), ZFP_HEADER_FULL) != 32 * kZfpHeaderWords) {
+    throw std::invalid_argument("make_zfp_header: no short header for these dims and rate");
+  }
+  stream_flush(bits.get());
+  ZfpHeader header;
+  std::memcpy(header.data(), buffer.data(), sizeof(header));
+  return header;
+}
+
+}  // namespace isowave

@@ -1,0 +1,157 @@
+#include "core/ocl/buffer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <stdexcept>
+
+#include "core/error.hpp"
+
+namespace isowave::ocl {
+
+namespace {
+
+double mebibytes(std::uint64_t bytes) {
+  return static_cast<double>(bytes) / (1 << 20);
+}
+
+/// What a buffer's OpenCL call failed with, as the Error to throw.
+Error failure(const std::string &name, const char *action, const cl::Error &error) {
+  return Error("cannot {} buffer '{}': {}: {}", action, name, error.what(), error_name(error.err()));
+}
+
+template <std::size_t kBytes>
+void enqueue_fill(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern, std::size_t bytes,
+                  std::size_t offset, cl::Event *event) {
+  std::array<std::byte, kBytes> value;
+  std::memcpy(value.data(), pattern, kBytes);
+  queue.enqueueFillBuffer(mem, value, offset, bytes, nullptr, event);
+}
+
+/// The C++ bindings take the pattern's size from a type.
+void enqueue_fill(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern,
+                  std::size_t pattern_bytes, std::size_t bytes, std::size_t offset, cl::Event *event) {
+  switch (pattern_bytes) {
+    case 1:
+      return enqueue_fill<1>(queue, mem, pattern, bytes, offset, event);
+    case 2:
+      return enqueue_fill<2>(queue, mem, pattern, bytes, offset, event);
+    case 4:
+      return enqueue_fill<4>(queue, mem, pattern, bytes, offset, event);
+    case 8:
+      return enqueue_fill<8>(queue, mem, pattern, bytes, offset, event);
+    case 16:
+      return enqueue_fill<16>(queue, mem, pattern, bytes, offset, event);
+    case 32:
+      return enqueue_fill<32>(queue, mem, pattern, bytes, offset, event);
+    case 64:
+      return enqueue_fill<64>(queue, mem, pattern, bytes, offset, event);
+    case 128:
+      return enqueue_fill<128>(queue, mem, pattern, bytes, offset, event);
+    default:
+      throw std::invalid_argument(
+          fmt::format("a fill pattern has 1, 2, 4 .. 128 bytes, not {}", pattern_bytes));
+  }
+}
+
+}  // namespace
+
+RawBuffer::RawBuffer(Device &device, std::string name, std::size_t bytes)
+    : device_(&device), name_(std::move(name)) {
+  const std::size_t allocated = std::max<std::size_t>(bytes, 1);  // OpenCL has no empty buffers
+  const std::uint64_t largest = device.capabilities().largest_allocation;
+  if (allocated > largest) {
+    throw Error("buffer '{}' wants {:.1f} MiB, device '{}' gives at most {:.1f} MiB to one buffer", name_,
+                mebibytes(allocated), device.info().name, mebibytes(largest));
+  }
+  try {
+    cl::Buffer mem(device.context(), CL_MEM_READ_WRITE, allocated);
+    // Not through the timer: allocating belongs to no stage. Wide patterns are faster where they fit.
+    constexpr std::array<std::byte, 4> kZero{};
+    const std::size_t pattern_bytes = allocated % kZero.size() == 0 ? kZero.size() : 1;
+    enqueue_fill(device.queue(), mem, kZero.data(), pattern_bytes, allocated, 0, nullptr);
+    device.queue().finish();
+    device.ledger().add(name_, allocated);
+    mem_ = std::move(mem);
+    bytes_ = bytes;
+  } catch (const cl::Error &error) {
+    throw Error("device '{}' cannot allocate {:.1f} MiB for buffer '{}' beside the {:.1f} MiB in use: {}: {}",
+                device.info().name, mebibytes(allocated), name_, mebibytes(device.ledger().current()),
+                error.what(), error_name(error.err()));
+  }
+}
+
+RawBuffer::~RawBuffer() {
+  release();
+}
+
+RawBuffer::RawBuffer(RawBuffer &&other) noexcept
+    : device_(other.device_),
+      name_(other.name_),  // copied: the empty one still says who it was
+      bytes_(std::exchange(other.bytes_, 0)),
+      mem_(std::move(other.mem_)) {}
+
+RawBuffer &RawBuffer::operator=(RawBuffer &&other) noexcept {
+  if (this == &other) return *this;
+  release();
+  device_ = other.device_;
+  name_.swap(other.name_);
+  bytes_ = std::exchange(other.bytes_, 0);
+  mem_ = std::move(other.mem_);
+  return *this;
+}
+
+void RawBuffer::release() noexcept {
+  if (mem_() == nullptr) return;
+  device_->ledger().remove(name_, std::max<std::size_t>(bytes_, 1));
+  // Dies here instead of being overwritten: the bindings' assignment can throw, their destructor cannot.
+  const cl::Buffer dying(std::move(mem_));
+  bytes_ = 0;
+}
+
+void RawBuffer::write_bytes(const void *src, std::size_t bytes, std::size_t offset, bool blocking) {
+  if (bytes == 0) return;  // an error in OpenCL 1.2
+  try {
+    device_->queue().enqueueWriteBuffer(mem_, blocking, offset, bytes, src, nullptr,
+                                        device_->timer().next_event());
+  } catch (const cl::Error &error) {
+    throw failure(name_, "write", error);
+  }
+}
+
+void RawBuffer::read_bytes(void *dst, std::size_t bytes, std::size_t offset, bool blocking,
+                           cl::Event *event) const {
+  try {
+    cl::CommandQueue &queue = device_->queue();
+    if (bytes == 0) {
+      if (event) queue.enqueueMarkerWithWaitList(nullptr, event);
+    } else {
+      cl::Event *timed = device_->timer().next_event();
+      queue.enqueueReadBuffer(mem_, blocking, offset, bytes, dst, nullptr, event ? event : timed);
+      if (event && timed) *timed = *event;
+    }
+    // A host may poll the event, and OpenCL promises no progress before a flush.
+    if (!blocking) queue.flush();
+  } catch (const cl::Error &error) {
+    throw failure(name_, "read", error);
+  }
+}
+
+void RawBuffer::fill_bytes(const void *pattern, std::size_t pattern_bytes, std::size_t bytes,
+                           std::size_t offset) {
+  if (bytes == 0) return;
+  try {
+    enqueue_fill(device_->queue(), mem_, pattern, pattern_bytes, bytes, offset,
+                 device_->timer().next_event());
+  } catch (const cl::Error &error) {
+    throw failure(name_, "fill", error);
+  }
+}
+
+void RawBuffer::check_range(std::size_t count, std::size_t offset, std::size_t size) const {
+  if (offset <= size && count <= size - offset) return;
+  throw std::invalid_argument(
+      fmt::format("{} elements from {} on do not fit buffer '{}' of {}", count, offset, name_, size));
+}
+
+}  // namespace isowave::ocl

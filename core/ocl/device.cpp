@@ -1,0 +1,118 @@
+#include "core/ocl/device.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <stdexcept>
+
+#include "core/error.hpp"
+#include "core/ocl/device_list.hpp"
+#include "core/ocl/kernel_sources.hpp"
+
+namespace isowave::ocl {
+
+namespace {
+
+constexpr std::uint64_t kNeededLocalMemory = 32u << 10;
+
+/// True when the queue's events carry times. Mesa rusticl 22.3 accepts profiling and reports 0 for
+/// everything.
+bool reports_event_times(const cl::Context &context, const cl::CommandQueue &queue) {
+  constexpr std::size_t kBytes = 4096;
+  const cl::Buffer buffer(context, CL_MEM_READ_WRITE, kBytes);
+  cl::Event event;
+  queue.enqueueFillBuffer(buffer, cl_uint{0}, 0, kBytes, nullptr, &event);
+  queue.finish();
+  try {
+    return event.getProfilingInfo<CL_PROFILING_COMMAND_START>() != 0 &&
+           event.getProfilingInfo<CL_PROFILING_COMMAND_END>() != 0;
+  } catch (const cl::Error &) {
+    return false;
+  }
+}
+
+std::string_view kernel_text(std::string_view stem) {
+  for (const KernelSource &source : kernel_sources()) {
+    if (source.stem == stem) return source.text;
+  }
+  throw std::invalid_argument(fmt::format("no kernel file '{}.cl' is part of this program", stem));
+}
+
+/// Bits agree between devices only under these options (README "Arithmetic").
+std::string build_options(const Capabilities &capabilities, const Defines &defines) {
+  std::string options = "-cl-std=CL1.2";
+  if (capabilities.correctly_rounded_divide) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+  const auto has_space = [](const std::string &text) {
+    return std::ranges::any_of(text, [](unsigned char c) { return std::isspace(c) != 0; });
+  };
+  for (const auto &[name, value] : defines) {
+    if (has_space(name) || has_space(value)) {
+      throw std::invalid_argument(fmt::format("define '{}={}' contains white space", name, value));
+    }
+    options += fmt::format(" -D {}={}", name, value);
+  }
+  return options;
+}
+
+}  // namespace
+
+Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(device_handle(info)) {
+  const Capabilities &can = info_.capabilities;
+  try {
+    if (!device_.getInfo<CL_DEVICE_COMPILER_AVAILABLE>()) {
+      throw Error("device '{}' has no OpenCL C compiler: choose another with --device", info_.name);
+    }
+    if (can.local_memory < kNeededLocalMemory) {
+      throw Error("device '{}' has {} KiB of local memory, {} are needed: choose another with --device",
+                  info_.name, can.local_memory >> 10, kNeededLocalMemory >> 10);
+    }
+    context_ = cl::Context(device_);
+    TimerSource source = TimerSource::kOff;
+    if (profiling) {
+      queue_ = cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE);
+      source = reports_event_times(context_, queue_) ? TimerSource::kEvents : TimerSource::kWallClock;
+    }
+    if (source != TimerSource::kEvents) queue_ = cl::CommandQueue(context_, device_);
+    timer_.start(source, queue_);
+  } catch (const cl::Error &error) {
+    throw Error("cannot open device '{}' ({}): {}: {}", info_.name, info_.platform, error.what(),
+                error_name(error.err()));
+  }
+}
+
+const cl::Program &Device::program(std::string_view stem, const Defines &defines) {
+  auto key = std::make_pair(std::string(stem), defines);
+  if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
+
+  const std::string options = build_options(info_.capabilities, defines);
+  try {
+    cl::Program program(context_, std::string(kernel_text(stem)));
+    program.build(device_, options.c_str());
+    return programs_.emplace(std::move(key), std::move(program)).first->second;
+  } catch (const cl::BuildError &error) {
+    std::string log;
+    for (const auto &[device, text] : error.getBuildLog()) log += text;
+    throw Error("{}.cl does not build on '{}' with {}: {}\n{}", stem, info_.name, options,
+                error_name(error.err()), log.empty() ? "(the compiler left no log)" : log);
+  } catch (const cl::Error &error) {
+    throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info_.name, options, error.what(),
+                error_name(error.err()));
+  }
+}
+
+std::uint32_t Device::max_resident_groups() const {
+  // A GPU's compute unit holds up to 2048 work-items and hides memory latency behind them: 16 groups of 64 to
+  // 128. A CPU driver runs the groups of a unit one after the other; a few per unit even out groups of
+  // unequal work.
+  const std::uint32_t groups_per_unit = info_.type == DeviceType::kGpu ? 16 : 4;
+  return std::max(1u, info_.capabilities.compute_units * groups_per_unit);
+}
+
+void Device::finish() {
+  try {
+    queue_.finish();
+  } catch (const cl::Error &error) {
+    throw Error("device '{}' failed: {}: {}", info_.name, error.what(), error_name(error.err()));
+  }
+}
+
+}  // namespace isowave::ocl

@@ -1,0 +1,240 @@
+// Which devices there are, what they can do, and which one to take.
+
+#include "core/ocl/device_list.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstdlib>
+#include <optional>
+
+#include "core/error.hpp"
+
+namespace isowave::ocl {
+
+namespace {
+
+struct ListedDevice {
+  cl::Device handle;
+  DeviceInfo info;
+};
+
+/// Drivers pad their strings with spaces and zeros.
+std::string trimmed(std::string text) {
+  const auto is_padding = [](char c) { return c == '\0' || std::isspace(static_cast<unsigned char>(c)); };
+  while (!text.empty() && is_padding(text.back())) text.pop_back();
+  text.erase(text.begin(), std::find_if_not(text.begin(), text.end(), is_padding));
+  return text;
+}
+
+std::string lower_case(std::string_view text) {
+  std::string result(text);
+  std::ranges::transform(result, result.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return result;
+}
+
+/// The whole text as a number, or nothing.
+std::optional<std::uint32_t> parse_number(std::string_view text) {
+  std::uint32_t number = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (code != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+/// "OpenCL 1.2 ..." -> 102; 0 when the text is something else.
+std::uint32_t parse_version(std::string_view text) {
+  constexpr std::string_view kPrefix = "OpenCL ";
+  if (!text.starts_with(kPrefix)) return 0;
+  text.remove_prefix(kPrefix.size());
+  text = text.substr(0, text.find(' '));
+  const std::size_t dot = text.find('.');
+  if (dot == std::string_view::npos) return 0;
+  const auto major = parse_number(text.substr(0, dot)), minor = parse_number(text.substr(dot + 1));
+  return major && minor ? *major * 100 + *minor : 0;
+}
+
+DeviceType device_type(cl_device_type bits) {
+  if (bits & CL_DEVICE_TYPE_GPU) return DeviceType::kGpu;
+  if (bits & CL_DEVICE_TYPE_ACCELERATOR) return DeviceType::kAccelerator;
+  if (bits & CL_DEVICE_TYPE_CPU) return DeviceType::kCpu;
+  return DeviceType::kOther;
+}
+
+/// Sub-groups became core in OpenCL 2.1 and optional in 3.0, where a count of 0 says that there are none.
+bool probe_sub_groups(const cl::Device &device, std::string_view extensions, std::uint32_t version) {
+  if (has_word(extensions, "cl_khr_subgroups")) return true;
+  if (version < 201) return false;
+  constexpr cl_device_info kMaxNumSubGroups = 0x105C;  // CL_DEVICE_MAX_NUM_SUB_GROUPS, not in 1.2's headers
+  cl_uint count = 0;
+  try {
+    device.getInfo(kMaxNumSubGroups, &count);
+  } catch (const cl::Error &) {
+    return false;
+  }
+  return count > 0;
+}
+
+Capabilities probe(const cl::Device &device, std::uint32_t version) {
+  const std::string extensions = device.getInfo<CL_DEVICE_EXTENSIONS>();
+  const cl_device_fp_config floats = device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>();
+  Capabilities result;
+  result.int64_atomics = has_word(extensions, "cl_khr_int64_base_atomics") &&
+                         has_word(extensions, "cl_khr_int64_extended_atomics");
+  result.fp64 = has_word(extensions, "cl_khr_fp64") || device.getInfo<CL_DEVICE_DOUBLE_FP_CONFIG>() != 0;
+  result.sub_groups = probe_sub_groups(device, extensions, version);
+  result.correctly_rounded_divide = (floats & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
+  result.denormals = (floats & CL_FP_DENORM) != 0;
+  result.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+  result.largest_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+  result.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
+  result.max_work_group_size = static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
+  result.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+  return result;
+}
+
+/// Appends one platform's devices. Mesa lists platforms without devices, and some of OpenCL 1.1.
+void append_devices(const cl::Platform &platform, std::vector<ListedDevice> &result) {
+  std::vector<cl::Device> devices;
+  platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
+  const std::string platform_name = trimmed(platform.getInfo<CL_PLATFORM_NAME>());
+  for (const cl::Device &device : devices) {
+    DeviceInfo info;
+    info.device_version = trimmed(device.getInfo<CL_DEVICE_VERSION>());
+    const std::uint32_t version = parse_version(info.device_version);
+    if (version < 102 || !device.getInfo<CL_DEVICE_AVAILABLE>()) continue;
+    info.index = static_cast<std::uint32_t>(result.size());
+    info.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
+    info.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
+    info.platform = platform_name;
+    info.driver_version = trimmed(device.getInfo<CL_DRIVER_VERSION>());
+    info.type = device_type(device.getInfo<CL_DEVICE_TYPE>());
+    info.capabilities = probe(device, version);
+    result.push_back({device, std::move(info)});
+  }
+}
+
+std::vector<ListedDevice> enumerate() {
+  std::vector<cl::Platform> platforms;
+  try {
+    cl::Platform::get(&platforms);
+  } catch (const cl::Error &) {
+    return {};  // the loader's way of saying that no driver is installed
+  }
+  std::vector<ListedDevice> result;
+  for (const cl::Platform &platform : platforms) {
+    try {
+      append_devices(platform, result);
+    } catch (const cl::Error &) {
+      // A driver that cannot name its devices cannot run them; the other drivers still can.
+    }
+  }
+  return result;
+}
+
+/// "0 'name' (cpu, platform), 1 ..."
+std::string describe(std::span<const DeviceInfo> devices) {
+  std::string text;
+  for (const DeviceInfo &info : devices) {
+    if (!text.empty()) text += ", ";
+    text += fmt::format("{} '{}' ({}, {})", info.index, info.name, to_string(info.type), info.platform);
+  }
+  return text;
+}
+
+std::optional<DeviceType> type_named(std::string_view name) {
+  for (const DeviceType type : {DeviceType::kCpu, DeviceType::kGpu, DeviceType::kAccelerator}) {
+    if (name == to_string(type)) return type;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string_view to_string(DeviceType type) {
+  switch (type) {
+    case DeviceType::kCpu:
+      return "cpu";
+    case DeviceType::kGpu:
+      return "gpu";
+    case DeviceType::kAccelerator:
+      return "accelerator";
+    case DeviceType::kOther:
+      break;
+  }
+  return "other";
+}
+
+bool has_word(std::string_view list, std::string_view word) {
+  for (std::size_t begin = 0; begin < list.size();) {
+    const std::size_t end = std::min(list.find(' ', begin), list.size());
+    if (list.substr(begin, end - begin) == word) return true;
+    begin = end + 1;
+  }
+  return false;
+}
+
+std::vector<DeviceInfo> list_devices() {
+  std::vector<DeviceInfo> result;
+  for (ListedDevice &device : enumerate()) result.push_back(std::move(device.info));
+  return result;
+}
+
+cl::Device device_handle(const DeviceInfo &info) {
+  for (const ListedDevice &device : enumerate()) {
+    if (device.info.index == info.index && device.info.name == info.name &&
+        device.info.platform == info.platform) {
+      return device.handle;
+    }
+  }
+  throw Error("device {} '{}' ({}) is not there any more: list the devices again", info.index, info.name,
+              info.platform);
+}
+
+const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
+                              std::string_view environment) {
+  if (devices.empty()) {
+    throw Error(
+        "no OpenCL 1.2 device found: install a driver, for the CPU the package pocl-opencl-icd "
+        "(apt install pocl-opencl-icd)");
+  }
+  const std::string_view source = selector.empty() ? " (from ISOWAVE_DEVICE)" : "";
+  const std::string wanted = lower_case(selector.empty() ? environment : selector);
+  const auto first = [&](auto &&matches) -> const DeviceInfo * {
+    const auto found = std::ranges::find_if(devices, matches);
+    return found == devices.end() ? nullptr : &*found;
+  };
+  const auto first_of_type = [&](DeviceType type) {
+    return first([type](const DeviceInfo &info) { return info.type == type; });
+  };
+
+  if (wanted.empty()) {
+    if (const DeviceInfo *gpu = first_of_type(DeviceType::kGpu)) return *gpu;
+    if (const DeviceInfo *cpu = first_of_type(DeviceType::kCpu)) return *cpu;
+    return devices.front();
+  }
+  const DeviceInfo *match = nullptr;
+  if (const auto index = parse_number(wanted)) {
+    match = first([&](const DeviceInfo &info) { return info.index == *index; });
+  } else if (const auto type = type_named(wanted)) {
+    match = first_of_type(*type);
+  } else {
+    match = first([&](const DeviceInfo &info) {
+      return lower_case(info.name).find(wanted) != std::string::npos ||
+             lower_case(info.platform).find(wanted) != std::string::npos;
+    });
+  }
+  if (!match) {
+    throw Error("no device is '{}'{}; there are: {}", selector.empty() ? environment : selector, source,
+                describe(devices));
+  }
+  return *match;
+}
+
+DeviceInfo choose_device(std::string_view selector) {
+  const char *environment = std::getenv("ISOWAVE_DEVICE");
+  const std::vector<DeviceInfo> devices = list_devices();
+  return pick_device(devices, selector, environment ? environment : "");
+}
+
+}  // namespace isowave::ocl

@@ -1,0 +1,109 @@
+#include "core/volume.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <system_error>
+#include <utility>
+
+#include "core/error.hpp"
+#include "core/io/itk_reader.hpp"
+#include "core/io/raw_reader.hpp"
+
+namespace isowave {
+namespace fs = std::filesystem;
+
+namespace {
+
+struct TypeEntry {
+  VoxelType type;
+  std::string_view name;
+  std::size_t size;
+};
+constexpr std::array<TypeEntry, 8> kTypes{{{VoxelType::kUint8, "uint8", 1},
+                                           {VoxelType::kInt8, "int8", 1},
+                                           {VoxelType::kUint16, "uint16", 2},
+                                           {VoxelType::kInt16, "int16", 2},
+                                           {VoxelType::kUint32, "uint32", 4},
+                                           {VoxelType::kInt32, "int32", 4},
+                                           {VoxelType::kFloat32, "float32", 4},
+                                           {VoxelType::kFloat64, "float64", 8}}};
+
+const TypeEntry &entry(VoxelType type) {
+  return kTypes.at(std::size_t(type));
+}
+
+}  // namespace
+
+std::string_view to_string(VoxelType type) {
+  return entry(type).name;
+}
+std::size_t size_of(VoxelType type) {
+  return entry(type).size;
+}
+bool is_integer(VoxelType type) {
+  return type != VoxelType::kFloat32 && type != VoxelType::kFloat64;
+}
+
+VoxelType voxel_type_from_string(std::string_view name) {
+  for (const TypeEntry &candidate : kTypes) {
+    if (candidate.name == name) return candidate.type;
+  }
+  throw Error("unknown voxel type '{}': use uint8, int8, uint16, int16, uint32, int32, float32 or float64",
+              name);
+}
+
+glm::dmat3 VolumeInfo::index_to_world() const {
+  return glm::dmat3(direction[0] * spacing.x, direction[1] * spacing.y, direction[2] * spacing.z);
+}
+
+void check_volume_info(const VolumeInfo &info, std::string_view what) {
+  const auto finite = [](const glm::dvec3 &v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    if (info.dims[axis] < 2 || info.dims[axis] > kMaxDim) {
+      throw Error("{}: dims {}x{}x{}: each must be 2 to {}", what, info.dims.x, info.dims.y, info.dims.z,
+                  kMaxDim);
+    }
+  }
+  if (!finite(info.spacing) || glm::any(glm::lessThanEqual(info.spacing, glm::dvec3(0.0)))) {
+    throw Error("{}: spacing {} {} {}: each must be finite and above 0", what, info.spacing.x, info.spacing.y,
+                info.spacing.z);
+  }
+  if (!finite(info.origin)) throw Error("{}: the origin is not finite", what);
+  const double determinant = glm::determinant(info.direction);
+  if (!(std::abs(determinant) > 1e-6) || !std::isfinite(determinant)) {
+    throw Error("{}: the direction matrix is singular or not finite", what);
+  }
+}
+
+std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) throw Error("{}: no such file", path.string());
+  if (!fs::is_regular_file(status)) throw Error("{}: not a regular file", path.string());
+
+  std::string name = path.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
+  const auto ends_with = [&](std::initializer_list<std::string_view> endings) {
+    return std::any_of(endings.begin(), endings.end(),
+                       [&](std::string_view ending) { return name.ends_with(ending); });
+  };
+  if (ends_with({".raw", ".raw.gz"})) return open_raw(path, overrides);
+
+  std::optional<ItkFormat> format;
+  if (ends_with({".nrrd", ".nhdr"})) format = ItkFormat::kNrrd;
+  if (ends_with({".mha", ".mhd"})) format = ItkFormat::kMetaImage;
+  if (ends_with({".nii", ".nii.gz"})) format = ItkFormat::kNifti;
+  if (!format) {
+    throw Error("{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
+                path.string());
+  }
+  if (overrides.dims || overrides.type) {
+    throw Error("{}: --dims and --type are for raw files; this file's header gives its own", path.string());
+  }
+  return open_with_itk(path, *format, overrides.spacing);
+}
+
+}  // namespace isowave

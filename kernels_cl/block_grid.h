@@ -1,0 +1,40 @@
+/// block_grid.h -- block ids, their coordinates, and the blocks that make a dual grid.
+#ifndef ISOWAVE_BLOCK_GRID_H
+#define ISOWAVE_BLOCK_GRID_H
+
+#include "shared_types.h"
+
+ISO_NAMESPACE_BEGIN
+
+/// Page table entries that are no cache slot.
+#define ISO_BLOCK_ABSENT 0xFFFFFFFFu     ///< not in the cache
+#define ISO_BLOCK_REQUESTED 0xFFFFFFFEu  ///< not in the cache, on this pass's request list
+#define ISO_MAX_CACHE_SLOTS 0x40000000u
+
+typedef struct BlockCoords {
+  uint x, y, z;
+} BlockCoords;
+
+static inline BlockCoords block_coords(ISO_CONSTANT const FrameParams *frame, uint block_id) {
+  BlockCoords b;
+  b.x = block_id % frame->blocks_x;
+  b.y = block_id / frame->blocks_x % frame->blocks_y;
+  b.z = block_id / frame->blocks_x / frame->blocks_y;
+  return b;
+}
+
+static inline uint block_id_at(ISO_CONSTANT const FrameParams *frame, uint x, uint y, uint z) {
+  return x + frame->blocks_x * (y + frame->blocks_y * z);
+}
+
+/// The dual grid of block b needs b and its +x, +y, +z neighbours, as far as there are any: corner x + 2y +
+/// 4z of 0..7 is the block (b.x + x, b.y + y, b.z + z), or ISO_INVALID_ID outside the volume.
+static inline uint dual_grid_block(ISO_CONSTANT const FrameParams *frame, BlockCoords b, uint corner) {
+  const uint x = b.x + (corner & 1u), y = b.y + (corner >> 1 & 1u), z = b.z + (corner >> 2);
+  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z ? block_id_at(frame, x, y, z)
+                                                                           : ISO_INVALID_ID;
+}
+
+ISO_NAMESPACE_END
+
+#endif

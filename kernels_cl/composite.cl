@@ -1,0 +1,56 @@
+/// composite.cl -- the closest of a ray's N_Spec results becomes its hit; the other rays go on (Sec. 4.4).
+/// A ray's blocks come in ray order, so the closest hit is the one with the lowest index, provided that all
+/// before it were tested: no distances are compared.
+#include "block_grid.h"
+#include "cell_intersect.h"
+
+/// The corners of dual cell (x,y,z) from the cache, minus the isovalue; corner x + 2y + 4z. All its blocks
+/// are cached.
+inline void load_corners(constant FrameParams *frame, global const uint *page_table,
+                         global const float *cache_values, int x, int y, int z, float *w) {
+  for (int corner = 0; corner < 8; ++corner) {
+    const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
+               vz = (uint)(z + (corner >> 2));
+    const uint slot = page_table[block_id_at(frame, vx >> 2, vy >> 2, vz >> 2)];
+    w[corner] =
+        cache_values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] - frame->isovalue;
+  }
+}
+
+/// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block without
+/// slots; ray_active_mask [active_count] = 1 where it goes on. Grid-stride.
+kernel void composite(constant FrameParams *frame, global PassCounts *counts,
+                      global const uint *active_ray_ids, global const uint *pair_block_ids,
+                      global const PairHit *pair_hits, global const uint *page_table,
+                      global const float *cache_values, global uint *ray_block_ids, global HitRecord *hits,
+                      global uint *ray_active_mask) {
+  const LastPlanes last = last_planes(frame);
+  const uint active_count = counts->active_count, spec_count = counts->spec_count;
+  for (uint a = get_global_id(0); a < active_count; a += get_global_size(0)) {
+    const uint ray_id = active_ray_ids[a];
+    uint goes_on = ray_block_ids[ray_id] != ISO_INVALID_ID;
+    for (uint pair = a * spec_count; pair < (a + 1) * spec_count; ++pair) {
+      const uint block_id = pair_block_ids[pair];
+      const PairHit pair_hit = pair_hits[pair];
+      if (block_id == ISO_INVALID_ID) break;
+      if (pair_hit.cell == ISO_NO_HIT) continue;
+      goes_on = pair_hit.cell == ISO_NOT_TESTED;
+      if (goes_on) {
+        ray_block_ids[ray_id] = block_id;
+      } else {
+        const Ray ray = make_ray(frame, ray_id);
+        const BlockCoords b = block_coords(frame, block_id);
+        const int x = (int)(4 * b.x + (pair_hit.cell & 3)), y = (int)(4 * b.y + (pair_hit.cell >> 2 & 3)),
+                  z = (int)(4 * b.z + (pair_hit.cell >> 4));
+        const GridWalk cell = walk_from(&ray, x, y, z, 1, last);
+        float w[8];
+        load_corners(frame, page_table, cache_values, x, y, z, w);
+        hits[ray_id] = make_hit(frame, &ray, w, x, y, z, region_entry(&ray, x, y, z, 1, last),
+                                walk_exit(&cell), pair_hit.s);
+        atomic_inc(&counts->hit_count);
+      }
+      break;
+    }
+    ray_active_mask[a] = goes_on;
+  }
+}

@@ -1,0 +1,248 @@
+/// grid_dda.h -- rays in index space and exact walks through grids of cells, blocks and macrocells
+/// (Sec. 3.3).
+///
+/// Portable: OpenCL C 1.2 and C++; kernels and the scalar twin run these very lines.
+///
+/// No walk here accumulates anything. The moment a ray crosses a grid plane is a pure function of (ray, axis,
+/// plane), in two-float arithmetic (about 45 bits). All crossings of a ray have one total order: by t, then
+/// axis x < y < z; the ray's start, t = 0, comes after planes at t = 0. "The cell after an event" is the
+/// number of planes of each axis that are not later than the event. So walking cell by cell, skipping by
+/// macrocells, and resuming at a block pass through the same cells with the same bits, and a ray's state
+/// between passes is just a block.
+#ifndef ISOWAVE_GRID_DDA_H
+#define ISOWAVE_GRID_DDA_H
+
+#include "shared_types.h"
+
+ISO_NAMESPACE_BEGIN
+
+#define ISO_AXIS_START 3  ///< axis of the event "the ray starts here"
+#define ISO_SMALLEST_DIRECTION \
+  0x1p-40f  ///< smaller direction components count as 0: no denormals behind them
+
+/// hi + lo, |lo| <= ulp(hi) / 2.
+typedef struct TwoFloat {
+  float hi, lo;
+} TwoFloat;
+
+/// One axis of a ray. Position = o + t d.
+typedef struct RayAxis {
+  float o;         ///< eye, index space [voxels]
+  float d;         ///< direction [voxels per t]; exactly 0 or at least ISO_SMALLEST_DIRECTION
+  TwoFloat inv_d;  ///< 1 / d; unused where d = 0
+} RayAxis;
+
+typedef struct Ray {
+  RayAxis x, y, z;
+} Ray;
+
+/// A crossing of a plane of `axis` (0..2), or the start of the ray.
+typedef struct RayEvent {
+  TwoFloat t;
+  int axis;
+} RayEvent;
+
+static inline int t_less(TwoFloat a, TwoFloat b) {
+  return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);
+}
+
+static inline int event_before(RayEvent a, RayEvent b) {
+  return t_less(a.t, b.t) || (!t_less(b.t, a.t) && a.axis < b.axis);
+}
+
+static inline RayEvent make_event(TwoFloat t, int axis) {
+  RayEvent e;
+  e.t = t;
+  e.axis = axis;
+  return e;
+}
+
+static inline RayEvent start_event(void) {
+  TwoFloat zero;
+  zero.hi = 0.0f;
+  zero.lo = 0.0f;
+  return make_event(zero, ISO_AXIS_START);
+}
+
+static inline RayAxis make_ray_axis(float o, float d) {
+  RayAxis a;
+  a.o = o;
+  a.d = fabs(d) < ISO_SMALLEST_DIRECTION ? 0.0f : d;
+  a.inv_d.hi = a.d == 0.0f ? 0.0f : 1.0f / a.d;
+  a.inv_d.lo = a.d == 0.0f ? 0.0f : fma(-a.inv_d.hi, a.d, 1.0f) / a.d;
+  return a;
+}
+
+/// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) / sqrt(1 + u^2 +
+/// v^2), mapped to index space; t * frame->t_scale is the distance from the eye in world units.
+static inline Ray make_ray(ISO_CONSTANT const FrameParams *frame, uint pixel) {
+  const int column = (int)(pixel % frame->width);
+  const int row = (int)(pixel / frame->width);
+  const float u = (float)(2 * column + 1 - (int)frame->width) * frame->pixel_scale;
+  const float v = (float)((int)frame->height - 1 - 2 * row) * frame->pixel_scale;
+  const float length = sqrt(fma(u, u, fma(v, v, 1.0f)));
+  Ray r;
+  r.x = make_ray_axis(frame->eye_x, fma(v, frame->up_x, fma(u, frame->right_x, frame->fwd_x)) / length);
+  r.y = make_ray_axis(frame->eye_y, fma(v, frame->up_y, fma(u, frame->right_y, frame->fwd_y)) / length);
+  r.z = make_ray_axis(frame->eye_z, fma(v, frame->up_z, fma(u, frame->right_z, frame->fwd_z)) / length);
+  return r;
+}
+
+/// t at which the ray crosses the plane (a pure function; the order of crossings rests on it). Needs d != 0.
+/// plane - o is exact as a pair (Knuth's two-sum); it is multiplied by the two-float 1 / d.
+static inline TwoFloat plane_t(RayAxis a, int plane) {
+  const float p = (float)plane; /* exact: dims are far below 2^24 */
+  const float s = p - a.o;
+  const float back = s - p;
+  const float e = (p - (s - back)) - (a.o + back);
+  const float h = s * a.inv_d.hi;
+  const float l = fma(s, a.inv_d.hi, -h) + fma(s, a.inv_d.lo, e * a.inv_d.hi);
+  TwoFloat t;
+  t.hi = h + l;
+  t.lo = l - (t.hi - h);
+  return t;
+}
+
+/// Regions are slabs [size c, size (c+1)] of planes along one axis, cut at the domain's last plane.
+/// Where the ray leaves region c: never, if it runs within the slab.
+static inline TwoFloat far_t(RayAxis a, int c, int size, int last_plane) {
+  TwoFloat never;
+  int plane = a.d > 0.0f ? size * (c + 1) : size * c;
+  never.hi = INFINITY;
+  never.lo = 0.0f;
+  if (a.d == 0.0f) return never;
+  return plane_t(a, plane > last_plane ? last_plane : plane);
+}
+
+/// The later of `e` and the crossing by which the ray enters region c of this axis.
+static inline RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int size, int last_plane) {
+  int plane = a.d > 0.0f ? size * c : size * (c + 1);
+  RayEvent near;
+  if (a.d == 0.0f) return e;
+  near = make_event(plane_t(a, plane > last_plane ? last_plane : plane), axis);
+  return event_before(e, near) ? near : e;
+}
+
+/// Has the ray crossed the plane when event `e` has happened? The event itself counts.
+static inline int crossed(RayAxis a, int axis, int plane, RayEvent e) {
+  return !event_before(e, make_event(plane_t(a, plane), axis));
+}
+
+/// The region along one axis, within [first, last], that the ray is in just after event `e`. The position is
+/// only a first guess; comparing crossings decides.
+static inline int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
+  const float x =
+      (a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o)) / (float)size; /* size is a power of two: exact */
+  int c = x <= (float)first ? first : (x >= (float)last ? last : (int)floor(x));
+  if (a.d > 0.0f) {
+    while (c < last && crossed(a, axis, size * (c + 1), e)) ++c;
+    while (c > first && !crossed(a, axis, size * c, e)) --c;
+  } else if (a.d < 0.0f) {
+    while (c > first && crossed(a, axis, size * c, e)) --c;
+    while (c < last && !crossed(a, axis, size * (c + 1), e)) ++c;
+  }
+  return c;
+}
+
+/// Position along one axis at t, relative to the integer plane c: (o - c) + t d with the cancellation done
+/// exactly, clamped to the cell [0,1].
+static inline float local_position(RayAxis a, TwoFloat t, int c) {
+  const float cf = (float)c;
+  const float s = a.o - cf;
+  const float sb = a.o - s;
+  const float se = (a.o - (s + sb)) + (sb - cf);
+  const float p = t.hi * a.d;
+  const float pe = fma(t.lo, a.d, fma(t.hi, a.d, -p));
+  const float r = s + p;
+  const float rb = r - s;
+  const float re = (s - (r - rb)) + (p - rb);
+  const float x = r + (re + (pe + se));
+  return x <= 0.0f ? 0.0f : (x >= 1.0f ? 1.0f : x);
+}
+
+/// A walk through regions of one size. `first` and `last` bound the regions that belong to the walk.
+typedef struct GridWalk {
+  int x, y, z;          ///< the region the ray is in
+  TwoFloat fx, fy, fz;  ///< where it would leave it through each axis
+} GridWalk;
+
+/// Number of the domain's last plane along each axis: dims - 1.
+typedef struct LastPlanes {
+  int x, y, z;
+} LastPlanes;
+
+static inline LastPlanes last_planes(ISO_CONSTANT const FrameParams *frame) {
+  LastPlanes last;
+  last.x = (int)frame->dims_x - 1;
+  last.y = (int)frame->dims_y - 1;
+  last.z = (int)frame->dims_z - 1;
+  return last;
+}
+
+/// Starts (or restarts) a walk in region (x,y,z).
+static inline GridWalk walk_from(const Ray *r, int x, int y, int z, int size, LastPlanes last) {
+  GridWalk w;
+  w.x = x;
+  w.y = y;
+  w.z = z;
+  w.fx = far_t(r->x, x, size, last.x);
+  w.fy = far_t(r->y, y, size, last.y);
+  w.fz = far_t(r->z, z, size, last.z);
+  return w;
+}
+
+/// The event by which the ray entered region (x,y,z): the last of its three near planes, or the start.
+static inline RayEvent region_entry(const Ray *r, int x, int y, int z, int size, LastPlanes last) {
+  RayEvent e = start_event();
+  e = later_entry(e, r->x, 0, x, size, last.x);
+  e = later_entry(e, r->y, 1, y, size, last.y);
+  return later_entry(e, r->z, 2, z, size, last.z);
+}
+
+/// The event by which the ray leaves the walk's region: the first of the three; ties in the order x, y, z.
+static inline RayEvent walk_exit(const GridWalk *w) {
+  RayEvent e = make_event(w->fx, 0);
+  if (t_less(w->fy, e.t)) e = make_event(w->fy, 1);
+  if (t_less(w->fz, e.t)) e = make_event(w->fz, 2);
+  return e;
+}
+
+/// Goes through the region's exit into the next region, which may lie outside the grid.
+static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
+  if (exit.axis == 0) {
+    w->x += r->x.d > 0.0f ? 1 : -1;
+    w->fx = far_t(r->x, w->x, size, last.x);
+  } else if (exit.axis == 1) {
+    w->y += r->y.d > 0.0f ? 1 : -1;
+    w->fy = far_t(r->y, w->y, size, last.y);
+  } else {
+    w->z += r->z.d > 0.0f ? 1 : -1;
+    w->fz = far_t(r->z, w->z, size, last.z);
+  }
+}
+
+/// Shrinks [*enter, *exit] to one axis of the domain box. Returns 0 if the ray runs beside the box.
+static inline int clip_to_slab(RayAxis a, int axis, int last_plane, RayEvent *enter, RayEvent *exit) {
+  RayEvent near, far;
+  if (a.d == 0.0f) return a.o >= 0.0f && a.o <= (float)last_plane;
+  near = make_event(plane_t(a, a.d > 0.0f ? 0 : last_plane), axis);
+  far = make_event(plane_t(a, a.d > 0.0f ? last_plane : 0), axis);
+  if (event_before(*enter, near)) *enter = near;
+  if (event_before(far, *exit)) *exit = far;
+  return 1;
+}
+
+/// Where the ray enters the domain [0, dims-1], or starts in it. Returns 0 if it never does.
+static inline int domain_entry(const Ray *r, LastPlanes last, RayEvent *enter) {
+  RayEvent exit;
+  exit.t.hi = INFINITY;
+  exit.t.lo = 0.0f;
+  exit.axis = ISO_AXIS_START;
+  *enter = start_event();
+  return clip_to_slab(r->x, 0, last.x, enter, &exit) && clip_to_slab(r->y, 1, last.y, enter, &exit) &&
+         clip_to_slab(r->z, 2, last.z, enter, &exit) && event_before(*enter, exit);
+}
+
+ISO_NAMESPACE_END
+
+#endif

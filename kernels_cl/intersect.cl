@@ -1,0 +1,67 @@
+/// intersect.cl -- a block's rays against its dual grid (Sec. 3.7, 4.3).
+#include "block_grid.h"
+#include "cell_intersect.h"
+
+/// The first change of inside in the cells of block b. dual_grid [125]: vertex x + 5y + 25z minus the
+/// isovalue.
+inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, local const float *dual_grid) {
+  const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
+  const int end_x = min(x0 + 4, last.x), end_y = min(y0 + 4, last.y), end_z = min(z0 + 4, last.z);
+  RayEvent enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  GridWalk cell =
+      walk_from(ray, locate(ray->x, 0, enter, 1, x0, end_x - 1), locate(ray->y, 1, enter, 1, y0, end_y - 1),
+                locate(ray->z, 2, enter, 1, z0, end_z - 1), 1, last);
+  PairHit hit;
+  hit.cell = ISO_NO_HIT;
+  hit.s = 0.0f;
+  while (cell.x >= x0 && cell.x < end_x && cell.y >= y0 && cell.y < end_y && cell.z >= z0 && cell.z < end_z) {
+    const RayEvent exit = walk_exit(&cell);
+    const int vertex = (cell.x - x0) + 5 * (cell.y - y0) + 25 * (cell.z - z0);
+    float w[8];
+    for (int corner = 0; corner < 8; ++corner) {
+      w[corner] = dual_grid[vertex + (corner & 1) + 5 * (corner >> 1 & 1) + 25 * (corner >> 2)];
+    }
+    if (intersect_cell(ray, w, cell.x, cell.y, cell.z, enter, exit, &hit.s)) {
+      hit.cell = (uint)((cell.x - x0) + 4 * (cell.y - y0) + 16 * (cell.z - z0));
+      break;
+    }
+    walk_step(&cell, ray, exit, 1, last);
+    enter = exit;
+  }
+  return hit;
+}
+
+/// One work-group per visible block, striding over them. pair_ids, slots [granted_count]: pairs sorted by the
+/// slot of their block; block_ray_offsets [visible_count]: where each block's pairs begin. pair_hits [pair
+/// slots]: written for every pair.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
+    constant FrameParams *frame, global const PassCounts *counts, global const uint *pair_ids,
+    global const uint *slots, global const uint *block_ray_offsets, global const uint *slot_block_ids,
+    global const uint *page_table, global const float *cache_values, global const uint *active_ray_ids,
+    global PairHit *pair_hits) {
+  local float dual_grid[ISO_DUAL_GRID_VERTICES];
+  const LastPlanes last = last_planes(frame);
+  const uint visible_count = counts->visible_count, spec_count = counts->spec_count;
+  for (uint visible = get_group_id(0); visible < visible_count; visible += get_num_groups(0)) {
+    const uint begin = block_ray_offsets[visible];
+    const uint end = visible + 1 < visible_count ? block_ray_offsets[visible + 1] : counts->granted_count;
+    const BlockCoords b = block_coords(frame, slot_block_ids[slots[begin]]);
+    for (uint vertex = get_local_id(0); vertex < ISO_DUAL_GRID_VERTICES; vertex += ISO_GROUP_SIZE) {
+      const uint x = vertex % 5, y = vertex / 5 % 5, z = vertex / 25;
+      const uint owner = dual_grid_block(frame, b, (x >> 2) + 2 * (y >> 2) + 4 * (z >> 2));
+      float value = 0.0f; /* beyond the volume: no cell of the block uses it */
+      if (owner != ISO_INVALID_ID) {
+        value = cache_values[page_table[owner] * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] -
+                frame->isovalue;
+      }
+      dual_grid[vertex] = value;
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint i = begin + get_local_id(0); i < end; i += ISO_GROUP_SIZE) {
+      const uint pair = pair_ids[i];
+      const Ray ray = make_ray(frame, active_ray_ids[pair / spec_count]);
+      pair_hits[pair] = intersect_block(&ray, b, last, dual_grid);
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+}

@@ -1,0 +1,148 @@
+/// macrocells.cl -- value ranges of blocks and coarse macrocells, and what an isovalue touches (Sec. 3.1).
+///
+/// A block's range is that of its dual cells: its own decoded voxels and the first layers of its +x/+y/+z
+/// neighbours. Every block is decoded once: macrocell_partials keeps the ranges of the eight sub-lattices
+/// that a block gives to itself and to its seven -x/-y/-z neighbours, one layer of blocks (in z) at a time;
+/// macrocell_ranges joins them.
+///
+/// Ranges are stored in 8 bits through `thresholds` [256], ascending from -INFINITY to INFINITY: low = the
+/// last threshold
+/// <= min, high = the first >= max. So they only ever grow: no block is skipped wrongly. With a = the first
+/// threshold
+/// >= isovalue (FrameParams.isovalue_index): some value may be below the isovalue iff low < a, and some at or
+/// above iff high >= a. Both: active. Coarse macrocells of 4^3 blocks hold the union of their blocks.
+#include "block_grid.h"
+#include "zfp_codec.h"
+
+typedef struct ValueRange {
+  float min, max; /* min > max: empty */
+} ValueRange;
+
+inline ValueRange join(ValueRange a, ValueRange b) {
+  ValueRange r;
+  r.min = a.min < b.min ? a.min : b.min;
+  r.max = a.max > b.max ? a.max : b.max;
+  return r;
+}
+
+/// partials [num_blocks * 8]: entry 8 b + m is the range of the block's voxels with x = 0 if m & 1, y = 0 if
+/// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is first_block + i * stride. Grid-stride.
+kernel void macrocell_partials(constant FrameParams *frame, global const uint *words, uint bits_per_block,
+                               uint first_block, uint stride, uint num_blocks, global ValueRange *partials) {
+  for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
+    const uint block_id = first_block + i * stride;
+    const BlockCoords b = block_coords(frame, block_id);
+    const uint size_x = min(4u, frame->dims_x - 4 * b.x), size_y = min(4u, frame->dims_y - 4 * b.y),
+               size_z = min(4u, frame->dims_z - 4 * b.z);
+    float values[ISO_BLOCK_VOXELS];
+    zfp_decode_block(words, (ulong)block_id * bits_per_block, bits_per_block, values);
+    for (uint lattice = 0; lattice < 8; ++lattice) {
+      const uint end_x = lattice & 1 ? 1 : size_x, end_y = lattice & 2 ? 1 : size_y,
+                 end_z = lattice & 4 ? 1 : size_z;
+      ValueRange range;
+      range.min = INFINITY;
+      range.max = -INFINITY;
+      for (uint z = 0; z < end_z; ++z) {
+        for (uint y = 0; y < end_y; ++y) {
+          for (uint x = 0; x < end_x; ++x) {
+            const float value = values[x + 4 * y + 16 * z];
+            range.min = value < range.min ? value : range.min;
+            range.max = value > range.max ? value : range.max;
+          }
+        }
+      }
+      partials[8 * i + lattice] = range;
+    }
+  }
+}
+
+/// The 8-bit range of every block of layer `layer` (in z): ranges [blocks], low in bits 0..7, high in
+/// bits 8..15; low > high in blocks that own no dual cell. below, above: the partials of this layer and the
+/// next, [blocks_x * blocks_y * 8]; above is not read in the last layer. Grid-stride.
+kernel void macrocell_ranges(constant FrameParams *frame, uint layer, global const ValueRange *below,
+                             global const ValueRange *above, global const float *thresholds,
+                             global ushort *ranges) {
+  const uint layer_blocks = frame->blocks_x * frame->blocks_y;
+  for (uint i = get_global_id(0); i < layer_blocks; i += get_global_size(0)) {
+    const uint x = i % frame->blocks_x, y = i / frame->blocks_x;
+    const int owns_cells =
+        4 * x + 1 < frame->dims_x && 4 * y + 1 < frame->dims_y && 4 * layer + 1 < frame->dims_z;
+    ValueRange range;
+    uint low = 255, high = 0;
+    range.min = INFINITY;
+    range.max = -INFINITY;
+    for (uint corner = 0; corner < 8; ++corner) {
+      const uint nx = x + (corner & 1), ny = y + (corner >> 1 & 1);
+      if (nx >= frame->blocks_x || ny >= frame->blocks_y || layer + (corner >> 2) >= frame->blocks_z)
+        continue;
+      range = join(range, (corner & 4 ? above : below)[8 * (nx + frame->blocks_x * ny) + corner]);
+    }
+    if (owns_cells) {
+      /* Bisection: thresholds[low] <= min < thresholds[low + 1], and the first threshold >= max. */
+      uint end = 255;
+      low = 0;
+      while (end - low > 1) {
+        const uint middle = (low + end) / 2;
+        if (thresholds[middle] <= range.min)
+          low = middle;
+        else
+          end = middle;
+      }
+      uint begin = 0;
+      high = 255;
+      while (high - begin > 1) {
+        const uint middle = (begin + high) / 2;
+        if (thresholds[middle] >= range.max)
+          high = middle;
+        else
+          begin = middle;
+      }
+    }
+    ranges[i + layer_blocks * layer] = (ushort)(low | high << 8);
+  }
+}
+
+/// The block of bit 0..63 of a coarse macrocell, or ISO_INVALID_ID outside the volume.
+inline uint macrocell_block(constant FrameParams *frame, uint coarse, uint bit) {
+  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  const uint x = 4 * (coarse % coarse_x) + (bit & 3), y = 4 * (coarse / coarse_x % coarse_y) + (bit >> 2 & 3),
+             z = 4 * (coarse / coarse_x / coarse_y) + (bit >> 4);
+  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z ? block_id_at(frame, x, y, z)
+                                                                           : ISO_INVALID_ID;
+}
+
+/// coarse_ranges [num_coarse]: the union of each coarse macrocell's block ranges. Once per volume.
+/// Grid-stride.
+kernel void macrocell_coarse_ranges(constant FrameParams *frame, uint num_coarse, global const ushort *ranges,
+                                    global ushort *coarse_ranges) {
+  for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {
+    uint low = 255, high = 0;
+    for (uint bit = 0; bit < 64; ++bit) {
+      const uint block_id = macrocell_block(frame, coarse, bit);
+      if (block_id == ISO_INVALID_ID) continue;
+      low = min(low, (uint)ranges[block_id] & 255u);
+      high = max(high, (uint)ranges[block_id] >> 8);
+    }
+    coarse_ranges[coarse] = (ushort)(low | high << 8);
+  }
+}
+
+/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. Once per isovalue.
+/// Grid-stride.
+kernel void macrocell_masks(constant FrameParams *frame, uint num_coarse, global const ushort *ranges,
+                            global const ushort *coarse_ranges, global uint *masks) {
+  const uint a = frame->isovalue_index;
+  for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {
+    uint words[2] = {0, 0};
+    if ((coarse_ranges[coarse] & 255u) < a && (uint)coarse_ranges[coarse] >> 8 >= a) {
+      for (uint bit = 0; bit < 64; ++bit) {
+        const uint block_id = macrocell_block(frame, coarse, bit);
+        if (block_id == ISO_INVALID_ID) continue;
+        if (((uint)ranges[block_id] & 255u) < a && (uint)ranges[block_id] >> 8 >= a)
+          words[bit >> 5] |= 1u << (bit & 31);
+      }
+    }
+    masks[2 * coarse] = words[0];
+    masks[2 * coarse + 1] = words[1];
+  }
+}

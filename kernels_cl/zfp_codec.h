@@ -1,0 +1,148 @@
+/// zfp_codec.h -- decodes one zfp block of 4^3 float32 values, bit-exact with libzfp 1.0 [Lindstrom 2014].
+///
+/// Portable: OpenCL C 1.2 and C++. Block layout, in bits: 1 "not all zero" | 8 exponent + 127 | bit planes
+/// 31, 30, ... of 64 negabinary coefficients, each plane: n bits verbatim, then group-tested runs; cut at
+/// max_bits.
+#ifndef ISOWAVE_ZFP_CODEC_H
+#define ISOWAVE_ZFP_CODEC_H
+
+#include "shared_types.h"
+
+ISO_NAMESPACE_BEGIN
+
+/// Coefficients travel in order of total sequency i + j + k, then i^2 + j^2 + k^2: stream position -> i + 4 j
+/// + 16 k.
+ISO_CONSTANT static const uchar iso_zfp_order[64] = {
+    0,  1,  4,  16, 20, 17, 5,  2,  8,  32, 21, 6,  18, 24, 9,  33, 36, 3,  12, 48, 22, 25,
+    37, 40, 34, 10, 7,  19, 28, 13, 49, 52, 41, 38, 26, 23, 29, 53, 11, 35, 44, 14, 50, 56,
+    42, 27, 39, 45, 30, 54, 57, 60, 51, 15, 43, 46, 58, 61, 55, 31, 62, 59, 47, 63};
+
+/// Reads bits from 32-bit little-endian words, lowest bit first.
+typedef struct BitReader {
+  ISO_GLOBAL const uint *words;  ///< the next word
+  ulong buffer;                  ///< bits read ahead, the next one lowest
+  uint buffered;                 ///< how many, 0..32
+} BitReader;
+
+static inline uint read_bit(BitReader *r) {
+  uint bit;
+  if (r->buffered == 0u) {
+    r->buffer = *r->words++;
+    r->buffered = 32u;
+  }
+  bit = (uint)r->buffer & 1u;
+  r->buffer >>= 1;
+  --r->buffered;
+  return bit;
+}
+
+/// The next `count` bits, 0..64.
+static inline ulong read_bits(BitReader *r, uint count) {
+  ulong value = 0;
+  uint done = 0;
+  while (done < count) {
+    uint take = count - done;
+    if (r->buffered == 0u) {
+      r->buffer = *r->words++;
+      r->buffered = 32u;
+    }
+    if (take > r->buffered) take = r->buffered;
+    value |= (r->buffer & (((ulong)1 << take) - 1u)) << done;
+    r->buffer >>= take;
+    r->buffered -= take;
+    done += take;
+  }
+  return value;
+}
+
+static inline BitReader open_bits(ISO_GLOBAL const uint *words, ulong first_bit) {
+  BitReader r;
+  r.words = words + (first_bit >> 5);
+  r.buffer = 0;
+  r.buffered = 0;
+  read_bits(&r, (uint)(first_bit & 31u));
+  return r;
+}
+
+/// Inverse of zfp's lifted 4-point transform, in place on v[0], v[stride], ... Sums wrap, shifts right keep
+/// the sign:
+///   1/4 *  ( 4  6 -4 -1)
+///          ( 4  2  4  5)
+///          ( 4 -2  4 -5)
+///          ( 4 -6 -4  1)
+static inline void inverse_lift(uint *v, int stride) {
+  uint x = v[0], y = v[stride], z = v[2 * stride], w = v[3 * stride];
+  y += (uint)((int)w >> 1);
+  w -= (uint)((int)y >> 1);
+  y += w;
+  w <<= 1;
+  w -= y;
+  z += x;
+  x <<= 1;
+  x -= z;
+  y += z;
+  z <<= 1;
+  z -= y;
+  w += x;
+  x <<= 1;
+  x -= w;
+  v[0] = x;
+  v[stride] = y;
+  v[2 * stride] = z;
+  v[3 * stride] = w;
+}
+
+/// 2^e for e in [-149, 127]; 0 below.
+static inline float power_of_two(int e) {
+  union {
+    uint u;
+    float f;
+  } bits;
+  bits.u = e >= -126 ? (uint)(e + 127) << 23 : (e >= -149 ? 1u << (e + 149) : 0u);
+  return bits.f;
+}
+
+/// Decodes the block that starts at `first_bit` of `words` and has max_bits bits.
+/// values [64]: x + 4 y + 16 z. Reads at most one word past the block's last bit.
+static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
+                                    float *values) {
+  BitReader r = open_bits(words, first_bit);
+  uint coefficients[64];
+  float scale;
+  uint bits, plane, n, i;
+  for (i = 0; i < 64u; ++i) coefficients[i] = 0u;
+  if (!read_bit(&r)) {
+    for (i = 0; i < 64u; ++i) values[i] = 0.0f;
+    return;
+  }
+  scale = power_of_two((int)read_bits(&r, 8) - 127 - 30);
+  bits = max_bits - 9u;
+  n = 0; /* coefficients known to be significant: their bits come verbatim */
+  for (plane = 32; bits > 0u && plane-- > 0u;) {
+    const uint verbatim = n < bits ? n : bits;
+    ulong x = read_bits(&r, verbatim);
+    bits -= verbatim;
+    while (n < 64u && bits > 0u) {
+      --bits;
+      if (!read_bit(&r)) break; /* group test: no more ones in this plane */
+      while (n < 63u && bits > 0u) {
+        --bits;
+        if (read_bit(&r)) break;
+        ++n;
+      }
+      x += (ulong)1 << n++;
+    }
+    for (i = 0; x != 0; ++i, x >>= 1) {
+      if (x & 1u) coefficients[iso_zfp_order[i]] += 1u << plane;
+    }
+  }
+  for (i = 0; i < 64u; ++i) coefficients[i] = (coefficients[i] ^ 0xAAAAAAAAu) - 0xAAAAAAAAu; /* negabinary */
+  for (i = 0; i < 16u; ++i) inverse_lift(coefficients + i, 16);
+  for (i = 0; i < 16u; ++i) inverse_lift(coefficients + (i & 3u) + 16u * (i >> 2), 4);
+  for (i = 0; i < 16u; ++i) inverse_lift(coefficients + 4u * i, 1);
+  for (i = 0; i < 64u; ++i) values[i] = (float)(int)coefficients[i] * scale;
+}
+
+ISO_NAMESPACE_END
+
+#endif

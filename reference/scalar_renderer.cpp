@@ -1,0 +1,69 @@
+#include "reference/scalar_renderer.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <stdexcept>
+#include <thread>
+
+#include "kernels_cl/cell_intersect.h"
+
+namespace isowave {
+
+namespace {
+
+/// The eight corners of dual cell (x,y,z), minus the isovalue; corner x + 2y + 4z.
+void load_corners(const FrameParams &frame, const float *voxels, int x, int y, int z, float *w) {
+  const std::size_t row = frame.dims_x, layer = row * frame.dims_y;
+  const float *v = voxels + static_cast<std::size_t>(x) + row * static_cast<std::size_t>(y) +
+                   layer * static_cast<std::size_t>(z);
+  const std::size_t offsets[8] = {0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1};
+  for (int corner = 0; corner < 8; ++corner) w[corner] = v[offsets[corner]] - frame.isovalue;
+}
+
+HitRecord trace(const FrameParams &frame, const float *voxels, std::uint32_t pixel) {
+  const Ray ray = make_ray(&frame, pixel);
+  const LastPlanes last = last_planes(&frame);
+  RayEvent enter;
+  if (!domain_entry(&ray, last, &enter)) return no_hit();
+  GridWalk cell =
+      walk_from(&ray, locate(ray.x, 0, enter, 1, 0, last.x - 1), locate(ray.y, 1, enter, 1, 0, last.y - 1),
+                locate(ray.z, 2, enter, 1, 0, last.z - 1), 1, last);
+  while (cell.x >= 0 && cell.x < last.x && cell.y >= 0 && cell.y < last.y && cell.z >= 0 && cell.z < last.z) {
+    const RayEvent exit = walk_exit(&cell);
+    float w[8];
+    float s;
+    load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
+    if (intersect_cell(&ray, w, cell.x, cell.y, cell.z, enter, exit, &s)) {
+      return make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit, s);
+    }
+    walk_step(&cell, &ray, exit, 1, last);
+    enter = exit;
+  }
+  return no_hit();
+}
+
+}  // namespace
+
+std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
+                                     unsigned threads) {
+  if (voxels.size() != std::size_t{frame.dims_x} * frame.dims_y * frame.dims_z) {
+    throw std::invalid_argument("render_scalar: the voxels do not fit the frame's dims");
+  }
+  std::vector<HitRecord> hits(std::size_t{frame.width} * frame.height);
+  std::atomic<std::uint32_t> next_row{0};
+  const auto trace_rows = [&] {
+    for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
+      for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel) {
+        hits[pixel] = trace(frame, voxels.data(), pixel);
+      }
+    }
+  };
+  std::vector<std::jthread> pool;
+  const unsigned num_threads = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+  for (unsigned i = 1; i < num_threads; ++i) pool.emplace_back(trace_rows);
+  trace_rows();
+  pool.clear();
+  return hits;
+}
+
+}  // namespace isowave

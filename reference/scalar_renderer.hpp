@@ -1,0 +1,21 @@
+#pragma once
+// The twin: the same portable headers as the kernels in plain loops over every cell that a ray passes. No
+// macrocells, no cache, no speculation, no wavefront. A device's frame must equal it bit for bit, so that any
+// difference is a scheduling bug and not rounding. What it cannot find - a wrong formula in the shared
+// headers - the oracles must.
+
+#include <span>
+#include <vector>
+
+#include "kernels_cl/shared_types.h"
+
+namespace isowave {
+
+/// voxels   [nz][ny][nx] decoded values, x fastest (decode_with_libzfp).
+/// threads  0: one per core.
+/// Returns the hits [height * width], row 0 at the top. Throws std::invalid_argument when voxels do not fit
+/// the frame.
+std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
+                                     unsigned threads = 0);
+
+}  // namespace isowave

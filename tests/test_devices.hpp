@@ -1,0 +1,43 @@
+#pragma once
+// The devices that tests of kernels run on.
+//
+//   class ScanTest : public testing::TestWithParam<ocl::DeviceInfo> {};
+//   INSTANTIATE_TEST_SUITE_P(Devices, ScanTest, testing::ValuesIn(devices_under_test()), device_test_name);
+
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <cstdlib>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "core/ocl/device.hpp"
+
+namespace isowave {
+
+namespace ocl {
+/// What GoogleTest prints as the parameter.
+inline void PrintTo(const DeviceInfo &info, std::ostream *out) {
+  *out << info.index << " '" << info.name << "' (" << info.platform << ")";
+}
+}  // namespace ocl
+
+/// The device that ISOWAVE_DEVICE chooses when it is set, else every device. Empty when there is none:
+/// GoogleTest then fails the suite, since a suite that is instantiated with nothing is an error.
+inline std::vector<ocl::DeviceInfo> devices_under_test() {
+  const char *chosen = std::getenv("ISOWAVE_DEVICE");
+  if (chosen && *chosen) return {ocl::choose_device()};
+  return ocl::list_devices();
+}
+
+/// "0_rusticl": a device as the suffix of a test's name.
+inline std::string device_test_name(const testing::TestParamInfo<ocl::DeviceInfo> &info) {
+  std::string name = std::to_string(info.param.index) + "_";
+  for (const char c : info.param.platform) {
+    if (std::isalnum(static_cast<unsigned char>(c))) name += c;
+  }
+  return name;
+}
+
+}  // namespace isowave
