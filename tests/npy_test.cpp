@@ -28,7 +28,7 @@ using testing::Not;
 class NpyTest : public testing::Test {
  protected:
   std::filesystem::path write_bytes(const std::string &bytes) {
-    const std::filesystem::path path = folder_ / "image.npy";
+    std::filesystem::path path = folder_ / "image.npy";
     std::ofstream(path, std::ios::binary) << bytes;
     return path;
   }

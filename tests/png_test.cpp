@@ -35,7 +35,7 @@ class PngTest : public testing::Test {
   }
 
   std::filesystem::path write_bytes(const std::string &bytes) {
-    const std::filesystem::path path = folder_ / "image.png";
+    std::filesystem::path path = folder_ / "image.png";
     std::ofstream(path, std::ios::binary) << bytes;
     return path;
   }

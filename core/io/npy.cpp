@@ -2,9 +2,9 @@
 
 #include <bit>
 #include <charconv>
-#include <cstdio>
 #include <fstream>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -22,10 +22,6 @@ constexpr std::string_view kMagic = "\x93NUMPY";
 constexpr std::size_t kPreamble = kMagic.size() + 4;
 constexpr std::size_t kAlignment = 64;          ///< numpy starts the voxels at a multiple of this
 constexpr std::uint32_t kMaxHeader = 1u << 20;  ///< no header of a plain array comes near
-
-void write_all(std::FILE *file, const void *data, std::size_t bytes, const std::filesystem::path &path) {
-  if (std::fwrite(data, 1, bytes, file) != bytes) throw Error("{}: cannot write (disk full?)", path.string());
-}
 
 /// What stands after `'key':` in the header, a Python dictionary in text, up to the end of the header.
 std::string_view value_of(std::string_view header, std::string_view key, const std::string &where) {
@@ -64,13 +60,13 @@ void write_npy(const FloatImage &image, const std::filesystem::path &path) {
   header.append(kAlignment - 1 - (kPreamble + header.size()) % kAlignment, ' ');
   header += '\n';
   const auto length = static_cast<std::uint16_t>(header.size());
-  const char preamble[4] = {1, 0, static_cast<char>(length & 0xff), static_cast<char>(length >> 8)};
+  const char preamble[] = {1, 0, static_cast<char>(length & 0xff), static_cast<char>(length >> 8)};
 
   AtomicFile out(path);
-  write_all(out.file(), kMagic.data(), kMagic.size(), path);
-  write_all(out.file(), preamble, sizeof preamble, path);
-  write_all(out.file(), header.data(), header.size(), path);
-  write_all(out.file(), image.pixels.data(), image.pixels.size() * sizeof(float), path);
+  out.write(kMagic);
+  out.write(std::string_view(preamble, sizeof preamble));
+  out.write(header);
+  out.write(std::as_bytes(std::span(image.pixels)));
   out.commit();
 }
 

@@ -103,7 +103,7 @@ void write_png(const Image8 &image, const std::filesystem::path &path) {
   }
   AtomicFile out(path);
   Writer writer;
-  if (!write_image(writer, out.file(), image)) {
+  if (!write_image(writer, out.stream(), image)) {
     throw Error("{}: cannot write the PNG: {}", path.string(), writer.message.text);
   }
   out.commit();
