@@ -28,10 +28,10 @@ bool is_integer(VoxelType type);
 
 /// The grid of a volume. Plain data; the defaults are a unit grid at the origin.
 struct VolumeInfo {
-  glm::uvec3 dims{0};         ///< voxels along x, y, z
-  glm::dvec3 spacing{1.0};    ///< world units between voxels along each index axis, > 0
-  glm::dvec3 origin{0.0};     ///< world position of voxel (0,0,0)
-  glm::dmat3 direction{1.0};  ///< column a: unit world direction of index axis a
+  glm::uvec3 dims{0};                    ///< voxels along x, y, z
+  glm::dvec3 spacing{1.0};               ///< world units between voxels along each index axis, > 0
+  glm::dvec3 origin{0.0};                ///< world position of voxel (0,0,0)
+  glm::dmat3 direction{1.0};             ///< column a: unit world direction of index axis a
   VoxelType type = VoxelType::kFloat32;  ///< as stored in the source file
 
   std::uint64_t num_voxels() const { return std::uint64_t(dims.x) * dims.y * dims.z; }
@@ -70,6 +70,7 @@ struct RawOverrides {
 /// Opens Open-SciVis raw (`NAME_XxYxZ_TYPE.raw`, `.raw.gz`), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd) or
 /// NIfTI (.nii, .nii.gz), by its extension. Throws Error: unknown extension, missing file, bad name, zero
 /// dims, truncated or oversized data, more than one component.
-std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path, const RawOverrides &overrides = {});
+std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path,
+                                          const RawOverrides &overrides = {});
 
 }  // namespace isowave

@@ -1,6 +1,7 @@
 /// shared_types.cl -- tells the host what the device's compiler makes of shared_types.h.
 /// Only shared_types_test runs it: sizes and offsets must be the host's.
 #include "shared_types.h"
+#include "shared_types_fields.h"
 
 /// sizes[0..3]: sizeof FrameParams, PairHit, HitRecord, PassCounts. One work-item.
 kernel void shared_type_sizes(global uint *sizes) {
@@ -8,4 +9,27 @@ kernel void shared_type_sizes(global uint *sizes) {
   sizes[1] = sizeof(PairHit);
   sizes[2] = sizeof(HitRecord);
   sizes[3] = sizeof(PassCounts);
+}
+
+// OpenCL C has no offsetof.
+#define ISO_WRITE_OFFSET(field) *offsets++ = (uint)((const uchar *)&object.field - (const uchar *)&object);
+
+/// offsets[0..]: the byte offset of every field, in the order of the structs above. One work-item.
+kernel void shared_type_offsets(global uint *offsets) {
+  {
+    FrameParams object;
+    ISO_FRAME_PARAMS_FIELDS(ISO_WRITE_OFFSET)
+  }
+  {
+    PairHit object;
+    ISO_PAIR_HIT_FIELDS(ISO_WRITE_OFFSET)
+  }
+  {
+    HitRecord object;
+    ISO_HIT_RECORD_FIELDS(ISO_WRITE_OFFSET)
+  }
+  {
+    PassCounts object;
+    ISO_PASS_COUNTS_FIELDS(ISO_WRITE_OFFSET)
+  }
 }

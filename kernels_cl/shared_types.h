@@ -83,6 +83,7 @@ ISO_CHECK_SIZE(HitRecord, 36);
 /// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input is "the
 /// first n entries" take n from a field of this struct, so that no launch waits for the host.
 typedef struct PassCounts {
+  uint pixel_count;        ///< width * height, set by the host
   uint pass;               ///< number of the pass since the cache was made, from 1: the LRU's clock
   uint active_count;       ///< N_Act: rays at work at the start of the pass
   uint spec_count;         ///< N_Spec of the pass; 0 when no ray is active
@@ -95,7 +96,7 @@ typedef struct PassCounts {
   uint hit_count;          ///< rays that hit in this pass
   uint next_active_count;  ///< rays left for the next pass
 } PassCounts;
-ISO_CHECK_SIZE(PassCounts, 44);
+ISO_CHECK_SIZE(PassCounts, 48);
 
 ISO_NAMESPACE_END
 

@@ -8,20 +8,62 @@
 #include <vector>
 
 #include "core/ocl/kernel.hpp"
+#include "kernels_cl/shared_types_fields.h"
 #include "tests/test_devices.hpp"
 
 namespace isowave {
 namespace {
 
-class SharedTypesTest : public testing::TestWithParam<ocl::DeviceInfo> {};
+class SharedTypesTest : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  ocl::Device device_{GetParam()};
+};
+
+#define ISO_ADD_OFFSET(field)                                    \
+  offsets.push_back(static_cast<uint>(offsetof(Object, field))); \
+  listed_bytes += sizeof(Object::field);
+
+/// The fields' offsets in the order of shared_types.cl. Fails when a struct has fields that are not listed:
+/// there is no padding in any of them, so the listed sizes must add up.
+std::vector<uint> host_offsets() {
+  std::vector<uint> offsets;
+  std::size_t listed_bytes = 0;
+  {
+    using Object = FrameParams;
+    ISO_FRAME_PARAMS_FIELDS(ISO_ADD_OFFSET)
+    EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "FrameParams";
+  }
+  {
+    using Object = PairHit;
+    ISO_PAIR_HIT_FIELDS(ISO_ADD_OFFSET)
+    EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "PairHit";
+  }
+  {
+    using Object = HitRecord;
+    ISO_HIT_RECORD_FIELDS(ISO_ADD_OFFSET)
+    EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "HitRecord";
+  }
+  {
+    using Object = PassCounts;
+    ISO_PASS_COUNTS_FIELDS(ISO_ADD_OFFSET)
+    EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "PassCounts";
+  }
+  return offsets;
+}
 
 TEST_P(SharedTypesTest, SizesAreTheHosts) {
-  ocl::Device device(GetParam());
   const std::vector<uint> expected = {sizeof(FrameParams), sizeof(PairHit), sizeof(HitRecord),
                                       sizeof(PassCounts)};
-  ocl::Buffer<uint> sizes(device, "sizes", expected.size());
-  ocl::Kernel<ocl::Out<uint>>{device, "shared_types", "shared_type_sizes"}({1, 1}, sizes);
+  ocl::Buffer<uint> sizes(device_, "sizes", expected.size());
+  ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_sizes"}({1, 1}, sizes);
   EXPECT_EQ(sizes.read(), expected);
+}
+
+TEST_P(SharedTypesTest, OffsetsAreTheHosts) {
+  const std::vector<uint> expected = host_offsets();
+  ocl::Buffer<uint> offsets(device_, "offsets", expected.size());
+  ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_offsets"}({1, 1}, offsets);
+  EXPECT_EQ(offsets.read(), expected);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, SharedTypesTest, testing::ValuesIn(devices_under_test()), device_test_name);

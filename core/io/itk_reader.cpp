@@ -120,7 +120,8 @@ VolumeInfo volume_info(const itk::ImageIOBase &io, const fs::path &path) {
     const double spacing = io.GetSpacing(axis);
     const std::vector<double> direction = io.GetDirection(axis);
     for (unsigned row = 0; row < 3; ++row) {
-      info.direction[int(axis)][int(row)] = spacing < 0 ? -direction.at(row) : direction.at(row);
+      // + 0.0: no negative zeros in what people read.
+      info.direction[int(axis)][int(row)] = (spacing < 0 ? -direction.at(row) : direction.at(row)) + 0.0;
     }
     info.spacing[int(axis)] = std::abs(spacing);
   }

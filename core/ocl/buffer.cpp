@@ -21,33 +21,46 @@ Error failure(const std::string &name, const char *action, const cl::Error &erro
 }
 
 template <std::size_t kBytes>
-void enqueue_fill(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern, std::size_t bytes,
-                  std::size_t offset, cl::Event *event) {
+void enqueue_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern, std::size_t bytes,
+                     std::size_t offset, cl::Event *event) {
   std::array<std::byte, kBytes> value;
   std::memcpy(value.data(), pattern, kBytes);
   queue.enqueueFillBuffer(mem, value, offset, bytes, nullptr, event);
 }
 
-/// The C++ bindings take the pattern's size from a type.
-void enqueue_fill(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern,
-                  std::size_t pattern_bytes, std::size_t bytes, std::size_t offset, cl::Event *event) {
-  switch (pattern_bytes) {
+/// Oclgrind 21.10 takes filled memory for uninitialized and would report every read of it. What the host
+/// writes counts.
+void write_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern,
+                   std::size_t pattern_bytes, std::size_t bytes, std::size_t offset, cl::Event *event) {
+  std::vector<std::byte> values(bytes);
+  for (std::size_t i = 0; i < bytes; i += pattern_bytes) std::memcpy(&values[i], pattern, pattern_bytes);
+  queue.enqueueWriteBuffer(mem, CL_TRUE, offset, bytes, values.data(), nullptr, event);
+}
+
+/// Fills mem's bytes [offset, offset + bytes) with copies of the pattern; both are multiples of its size.
+void enqueue_fill(Device &device, const cl::Buffer &mem, const void *pattern, std::size_t pattern_bytes,
+                  std::size_t bytes, std::size_t offset, cl::Event *event) {
+  cl::CommandQueue &queue = device.queue();
+  if (device.info().platform == "Oclgrind") {
+    return write_pattern(queue, mem, pattern, pattern_bytes, bytes, offset, event);
+  }
+  switch (pattern_bytes) {  // the C++ bindings take the pattern's size from a type
     case 1:
-      return enqueue_fill<1>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<1>(queue, mem, pattern, bytes, offset, event);
     case 2:
-      return enqueue_fill<2>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<2>(queue, mem, pattern, bytes, offset, event);
     case 4:
-      return enqueue_fill<4>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<4>(queue, mem, pattern, bytes, offset, event);
     case 8:
-      return enqueue_fill<8>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<8>(queue, mem, pattern, bytes, offset, event);
     case 16:
-      return enqueue_fill<16>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<16>(queue, mem, pattern, bytes, offset, event);
     case 32:
-      return enqueue_fill<32>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<32>(queue, mem, pattern, bytes, offset, event);
     case 64:
-      return enqueue_fill<64>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<64>(queue, mem, pattern, bytes, offset, event);
     case 128:
-      return enqueue_fill<128>(queue, mem, pattern, bytes, offset, event);
+      return enqueue_pattern<128>(queue, mem, pattern, bytes, offset, event);
     default:
       throw std::invalid_argument(
           fmt::format("a fill pattern has 1, 2, 4 .. 128 bytes, not {}", pattern_bytes));
@@ -69,7 +82,7 @@ RawBuffer::RawBuffer(Device &device, std::string name, std::size_t bytes)
     // Not through the timer: allocating belongs to no stage. Wide patterns are faster where they fit.
     constexpr std::array<std::byte, 4> kZero{};
     const std::size_t pattern_bytes = allocated % kZero.size() == 0 ? kZero.size() : 1;
-    enqueue_fill(device.queue(), mem, kZero.data(), pattern_bytes, allocated, 0, nullptr);
+    enqueue_fill(device, mem, kZero.data(), pattern_bytes, allocated, 0, nullptr);
     device.queue().finish();
     device.ledger().add(name_, allocated);
     mem_ = std::move(mem);
@@ -141,8 +154,7 @@ void RawBuffer::fill_bytes(const void *pattern, std::size_t pattern_bytes, std::
                            std::size_t offset) {
   if (bytes == 0) return;
   try {
-    enqueue_fill(device_->queue(), mem_, pattern, pattern_bytes, bytes, offset,
-                 device_->timer().next_event());
+    enqueue_fill(*device_, mem_, pattern, pattern_bytes, bytes, offset, device_->timer().next_event());
   } catch (const cl::Error &error) {
     throw failure(name_, "fill", error);
   }

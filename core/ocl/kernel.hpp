@@ -94,7 +94,7 @@ class Kernel : public RawKernel {
 
   /// Enqueues one launch in queue order; does not wait.
   void operator()(const Range &range, const std::type_identity_t<Params> &...args) {
-    cl_uint index = 0;
+    [[maybe_unused]] cl_uint index = 0;  // a kernel may have no parameters
     (this->set(index++, args), ...);
     launch(range);
   }

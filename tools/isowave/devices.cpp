@@ -41,13 +41,18 @@ std::string features(const ocl::Capabilities &can) {
   return text.empty() ? "-" : text;
 }
 
+/// "OpenCL 3.0" of "OpenCL 3.0 PoCL HSTR: ...": --json has the rest.
+std::string short_version(const std::string &version) {
+  return version.substr(0, version.find(' ', version.find(' ') + 1));
+}
+
 Row table_row(const ocl::DeviceInfo &info, bool is_default) {
   const ocl::Capabilities &can = info.capabilities;
   return {fmt::format("{} {}", is_default ? '*' : ' ', info.index),
           std::string(to_string(info.type)),
           info.name,
           info.platform,
-          info.device_version,
+          short_version(info.device_version),
           std::to_string(can.compute_units),
           mebibytes(can.global_memory),
           mebibytes(can.largest_allocation),

@@ -1,0 +1,27 @@
+#pragma once
+// The closest of each ray's N_Spec results -> hit buffer; the rays that go on -> the next wavefront
+// (Sec. 4.4).
+
+#include "core/block_cache.hpp"
+#include "core/ocl/kernel.hpp"
+#include "core/scan.hpp"
+#include "core/wavefront.hpp"
+
+namespace isowave {
+
+class Composite {
+ public:
+  Composite(ocl::Device &device, std::uint64_t num_pixels);
+
+  /// Out: rays.hits, rays.ray_block_ids (where rays without slots wait), rays.next_active_ray_ids,
+  /// counts.hit_count and counts.next_active_count. Asynchronous.
+  void operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction);
+
+ private:
+  ocl::Range range_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<PairHit>,
+              ocl::In<uint>, ocl::In<float>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>>
+      kernel_;
+};
+
+}  // namespace isowave

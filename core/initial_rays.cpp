@@ -1,0 +1,21 @@
+#include "core/initial_rays.hpp"
+
+#include <utility>
+
+namespace isowave {
+
+namespace {
+constexpr std::uint32_t kGroupSize = 64;
+}
+
+InitialRays::InitialRays(ocl::Device &device, std::uint64_t num_pixels)
+    : range_(ocl::Range::strided(num_pixels, kGroupSize, device)),
+      kernel_(device, "initial_rays", "initial_rays") {}
+
+void InitialRays::operator()(Wavefront &rays, Compaction &compaction) {
+  kernel_(range_, rays.frame, rays.hits, rays.ray_block_ids, rays.active_ray_ids, rays.mask);
+  compaction.values(rays.mask, rays.active_ray_ids, rays.counts, ISO_COUNT_FIELD(pixel_count),
+                    rays.next_active_ray_ids, ISO_COUNT_FIELD(next_active_count));
+}
+
+}  // namespace isowave

@@ -1,0 +1,24 @@
+#pragma once
+// Camera -> the first block of every pixel's ray and the first wavefront (Sec. 3.2).
+
+#include "core/ocl/kernel.hpp"
+#include "core/scan.hpp"
+#include "core/wavefront.hpp"
+
+namespace isowave {
+
+class InitialRays {
+ public:
+  explicit InitialRays(ocl::Device &device, std::uint64_t num_pixels);
+
+  /// In: rays.frame. Out: hits (none), ray_block_ids, next_active_ray_ids and counts.next_active_count.
+  /// Asynchronous.
+  void operator()(Wavefront &rays, Compaction &compaction);
+
+ private:
+  ocl::Range range_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+      kernel_;
+};
+
+}  // namespace isowave

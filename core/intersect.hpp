@@ -1,0 +1,24 @@
+#pragma once
+// A block's rays against its dual grid -> a result per ray-block pair (Sec. 3.7, 4.3).
+
+#include "core/group.hpp"
+#include "core/ocl/kernel.hpp"
+#include "core/wavefront.hpp"
+
+namespace isowave {
+
+class Intersect {
+ public:
+  Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size);
+
+  /// Out: rays.pair_hits of every pair in `groups`. Asynchronous.
+  void operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays);
+
+ private:
+  ocl::Range range_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              ocl::In<uint>, ocl::In<uint>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>>
+      kernel_;
+};
+
+}  // namespace isowave

@@ -1,0 +1,102 @@
+#include "core/macrocells.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace isowave {
+
+namespace {
+
+constexpr std::uint32_t kNumThresholds = 256;
+constexpr std::uint32_t kMaxSamples = 1u << 14;  ///< blocks decoded for the quantile table
+constexpr std::uint32_t kGroupSize = 64;
+
+std::uint32_t block_count(const FrameParams &f) {
+  return f.blocks_x * f.blocks_y * f.blocks_z;
+}
+
+std::uint32_t coarse_count(const FrameParams &f) {
+  return (f.blocks_x + 3) / 4 * ((f.blocks_y + 3) / 4) * ((f.blocks_z + 3) / 4);
+}
+
+}  // namespace
+
+Macrocells::Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, const FrameParams &params,
+                       const ocl::Buffer<uint> &words, std::uint32_t bits_per_block)
+    : num_coarse_(coarse_count(params)),
+      coarse_range_(ocl::Range::strided(num_coarse_, kGroupSize, device)),
+      ranges_(device, "block ranges", block_count(params)),
+      coarse_ranges_(device, "macrocell ranges", num_coarse_),
+      masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
+      masks_kernel_(device, "macrocells", "macrocell_masks") {
+  const auto stage = device.timer().stage("macrocells");
+  frame.write({&params, 1});
+  PartialsKernel partials_kernel(device, "macrocells", "macrocell_partials");
+  thresholds_ = sample_thresholds(device, frame, params, words, bits_per_block, partials_kernel);
+
+  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
+              ocl::Out<cl_ushort>>
+      ranges_kernel(device, "macrocells", "macrocell_ranges");
+  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_kernel(
+      device, "macrocells", "macrocell_coarse_ranges");
+  const ocl::Buffer<float> thresholds(device, "range thresholds", std::span<const float>(thresholds_));
+  const std::uint32_t layer_blocks = params.blocks_x * params.blocks_y;
+  ocl::Buffer<ValueRange> below(device, "range partials, layer below", 8 * std::size_t{layer_blocks});
+  ocl::Buffer<ValueRange> above(device, "range partials, layer above", 8 * std::size_t{layer_blocks});
+  const ocl::Range layer_range = ocl::Range::strided(layer_blocks, kGroupSize, device);
+
+  partials_kernel(layer_range, frame, words, bits_per_block, 0, 1, layer_blocks, below);
+  for (std::uint32_t layer = 0; layer < params.blocks_z; ++layer) {
+    if (layer + 1 < params.blocks_z) {
+      partials_kernel(layer_range, frame, words, bits_per_block, (layer + 1) * layer_blocks, 1, layer_blocks,
+                      above);
+    }
+    ranges_kernel(layer_range, frame, layer, below, above, thresholds, ranges_);
+    std::swap(below, above);
+  }
+  coarse_kernel(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_);
+  device.finish();
+}
+
+/// Quantiles of the block minima and maxima of an even sample of blocks, so that one outlier does not coarsen
+/// the rest.
+std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, ocl::Buffer<FrameParams> &frame,
+                                                 const FrameParams &params, const ocl::Buffer<uint> &words,
+                                                 std::uint32_t bits_per_block,
+                                                 PartialsKernel &partials_kernel) {
+  const std::uint32_t num_blocks = block_count(params);
+  const std::uint32_t stride = (num_blocks + kMaxSamples - 1) / kMaxSamples;
+  const std::uint32_t num_samples = (num_blocks + stride - 1) / stride;
+  ocl::Buffer<ValueRange> partials(device, "range samples", 8 * std::size_t{num_samples});
+  partials_kernel(ocl::Range::strided(num_samples, kGroupSize, device), frame, words, bits_per_block, 0,
+                  stride, num_samples, partials);
+  const std::vector<ValueRange> samples = partials.read();
+  std::vector<float> values;
+  values.reserve(2 * std::size_t{num_samples});
+  for (std::size_t i = 0; i < samples.size(); i += 8) {  // entry 0 of 8: the whole block
+    values.push_back(samples[i].min);
+    values.push_back(samples[i].max);
+  }
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+
+  std::vector<float> thresholds(kNumThresholds, std::numeric_limits<float>::infinity());
+  thresholds[0] = -std::numeric_limits<float>::infinity();
+  const std::size_t num_inner = std::min<std::size_t>(values.size(), kNumThresholds - 2);
+  for (std::size_t i = 0; i < num_inner; ++i) {  // the smallest and the largest are always among them
+    thresholds[1 + i] = values[num_inner == 1 ? 0 : i * (values.size() - 1) / (num_inner - 1)];
+  }
+  return thresholds;
+}
+
+std::uint32_t Macrocells::isovalue_index(float isovalue) const {
+  return static_cast<std::uint32_t>(std::lower_bound(thresholds_.begin(), thresholds_.end(), isovalue) -
+                                    thresholds_.begin());
+}
+
+void Macrocells::select(ocl::Buffer<FrameParams> &frame) {
+  masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_);
+}
+
+}  // namespace isowave

@@ -1,0 +1,106 @@
+#pragma once
+// Draws isosurfaces of one compressed volume on one device: the main loop of the program.
+//
+// camera -> rays -> [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]* -> hits ->
+// picture
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/block_cache.hpp"
+#include "core/composite.hpp"
+#include "core/frame.hpp"
+#include "core/group.hpp"
+#include "core/initial_rays.hpp"
+#include "core/intersect.hpp"
+#include "core/macrocells.hpp"
+#include "core/shade.hpp"
+#include "core/speculation.hpp"
+#include "core/traverse.hpp"
+#include "core/wavefront.hpp"
+#include "core/zfp_decode.hpp"
+#include "core/zfp_stream.hpp"
+
+namespace isowave {
+
+struct RendererOptions {
+  ImageSize size;
+  std::uint32_t cache_slots = 0;       ///< decoded blocks kept, at least 8; 0: default_cache_slots()
+  std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
+  std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
+};
+
+/// What one pass did: the counts of the device, and what follows from them.
+struct PassStats {
+  PassCounts counts{};
+  double utilization_percent = 0;          ///< ray-block pairs that were intersected, of width * height
+  double completed_percent = 0;            ///< pixels whose rays have ended, of width * height
+  std::map<std::string, double> stage_ms;  ///< by stage; empty unless the device was opened with profiling
+};
+
+struct FrameStats {
+  std::vector<PassStats> passes;
+  double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
+  std::uint64_t rays_hit = 0;
+  bool cancelled = false;  ///< on_pass said so; the hit buffer holds the picture so far
+};
+
+/// Called after each pass, the last included; hits() and shade() show the picture so far. Return false to
+/// stop. With a callback, or with profiling, the host waits after each pass; without, it stays a pass ahead.
+using OnPass = std::function<bool(const PassStats &)>;
+
+/// 2^18 slots (64 MiB), or all blocks if those are fewer: a 720p frame of a 1024^3 volume touches about as
+/// many.
+std::uint32_t default_cache_slots(const CompressedVolume &volume);
+
+class Renderer {
+ public:
+  /// Uploads the volume, builds its macrocell ranges and every buffer of the frame; nothing is allocated
+  /// later. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
+  /// renderer; `volume` need not.
+  Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
+
+  /// Draws one frame and waits for it. Decoded blocks stay in the cache for the next frame, whatever its
+  /// isovalue.
+  FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
+
+  /// The hit buffer [height * width], row 0 at the top. Waits.
+  std::vector<HitRecord> hits() const { return rays_.hits.read(); }
+  /// The picture of the hit buffer. Waits.
+  Image8 shade(const Appearance &appearance = {});
+
+  const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
+  const Macrocells &macrocells() const { return macrocells_; }
+  double setup_ms() const { return setup_ms_; }  ///< upload, kernel builds, macrocell ranges
+
+ private:
+  void begin_frame(const Camera &camera, float isovalue);
+  void enqueue_pass();
+  PassStats stats_of(const PassCounts &counts);
+
+  ocl::Device &device_;
+  std::chrono::steady_clock::time_point setup_begin_;
+  RendererOptions options_;
+  VolumeInfo info_;
+  FrameParams frame_{};
+  std::optional<float> selected_isovalue_;  ///< what the macrocell masks stand for
+  DeviceStream stream_;
+  Wavefront rays_;
+  Macrocells macrocells_;
+  BlockCache cache_;
+  Compaction compaction_;
+  InitialRays initial_rays_;
+  Speculation speculation_;
+  Traverse traverse_;
+  ZfpDecode zfp_decode_;
+  Group group_;
+  Intersect intersect_;
+  Composite composite_;
+  Shade shade_;
+  double setup_ms_ = 0;
+};
+
+}  // namespace isowave

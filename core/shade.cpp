@@ -1,0 +1,74 @@
+#include "core/shade.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace isowave {
+
+namespace {
+
+constexpr std::uint32_t kGroupSize = 64;
+
+/// GLM's columns -> rows, scaled so that the largest entry is 1: only directions count.
+void store_rows(const glm::dmat3 &m, float *rows) {
+  double largest = 0.0;
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) largest = std::max(largest, std::abs(m[column][row]));
+  }
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      rows[3 * row + column] = static_cast<float>(m[column][row] / largest);
+  }
+}
+
+Image8 rgb_image(const FrameParams &frame, const std::vector<uint> &packed) {
+  Image8 image{frame.width, frame.height, 3, {}};
+  image.pixels.reserve(3 * packed.size());
+  for (const uint rgba : packed) {
+    for (int shift = 0; shift < 24; shift += 8)
+      image.pixels.push_back(static_cast<std::uint8_t>(rgba >> shift));
+  }
+  return image;
+}
+
+}  // namespace
+
+ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance) {
+  ShadeParams params{};
+  const glm::dmat3 index_to_world = info.index_to_world();
+  store_rows(glm::transpose(glm::inverse(index_to_world)), params.normal);
+  store_rows(index_to_world, params.view);
+  params.surface_r = appearance.surface.r;
+  params.surface_g = appearance.surface.g;
+  params.surface_b = appearance.surface.b;
+  params.background_r = appearance.background.r;
+  params.background_g = appearance.background.g;
+  params.background_b = appearance.background.b;
+  params.ambient = appearance.ambient;
+  params.diffuse = appearance.diffuse;
+  params.specular = appearance.specular;
+  return params;
+}
+
+Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits) {
+  std::vector<uint> packed(hits.size());
+  for (uint pixel = 0; pixel < packed.size(); ++pixel) {
+    const HitRecord &hit = hits[pixel];
+    packed[pixel] = shade_pixel(&frame, &params, pixel, hit.t, hit.grad_x, hit.grad_y, hit.grad_z);
+  }
+  return rgb_image(frame, packed);
+}
+
+Shade::Shade(ocl::Device &device, std::uint64_t num_pixels)
+    : range_(ocl::Range::strided(num_pixels, kGroupSize, device)),
+      params_(device, "shading", 1),
+      image_(device, "framebuffer", num_pixels),
+      kernel_(device, "shade", "shade") {}
+
+Image8 Shade::operator()(const FrameParams &frame, const ShadeParams &params, Wavefront &rays) {
+  params_.write({&params, 1});
+  kernel_(range_, rays.frame, params_, rays.hits, image_);
+  return rgb_image(frame, image_.read());
+}
+
+}  // namespace isowave

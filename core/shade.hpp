@@ -1,0 +1,40 @@
+#pragma once
+// Hit buffer -> framebuffer: headlight Blinn-Phong on the gradient of the trilinear field.
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "core/io/png.hpp"
+#include "core/ocl/kernel.hpp"
+#include "core/wavefront.hpp"
+#include "kernels_cl/shade.h"
+
+namespace isowave {
+
+/// Colours are display values, [0,1].
+struct Appearance {
+  glm::vec3 surface{0.86f, 0.74f, 0.53f};
+  glm::vec3 background{1.0f, 1.0f, 1.0f};
+  float ambient = 0.15f, diffuse = 0.75f, specular = 0.25f;
+};
+
+ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
+
+/// The picture of a hit buffer [height * width] on the host: the twin's. Same bits as Shade.
+Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits);
+
+class Shade {
+ public:
+  Shade(ocl::Device &device, std::uint64_t num_pixels);
+
+  /// Shades rays.hits and waits. RGB.
+  Image8 operator()(const FrameParams &frame, const ShadeParams &params, Wavefront &rays);
+
+ private:
+  ocl::Range range_;
+  ocl::Buffer<ShadeParams> params_;
+  ocl::Buffer<uint> image_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<ShadeParams>, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
+};
+
+}  // namespace isowave

@@ -1,0 +1,19 @@
+#include "core/zfp_decode.hpp"
+
+namespace isowave {
+
+namespace {
+constexpr std::uint32_t kGroupSize = 64;
+}
+
+ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks)
+    : range_(ocl::Range::strided(max_blocks, kGroupSize, device)),
+      kernel_(device, "zfp_decode", "zfp_decode") {}
+
+void ZfpDecode::operator()(const DeviceStream &stream, const CountsBuffer &counts,
+                           const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
+                           ocl::Buffer<float> &values) {
+  kernel_(range_, stream.words, stream.bits_per_block, counts, block_ids, slots, values);
+}
+
+}  // namespace isowave

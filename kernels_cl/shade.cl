@@ -1,0 +1,11 @@
+/// shade.cl -- hit buffer -> framebuffer. Never changes which hit was chosen.
+#include "shade.h"
+
+/// image [height * width]: RGBA, 8 bits each. Grid-stride.
+kernel void shade(constant FrameParams *frame, constant ShadeParams *params, global const HitRecord *hits,
+                  global uint *image) {
+  for (uint pixel = get_global_id(0); pixel < frame->width * frame->height; pixel += get_global_size(0)) {
+    image[pixel] = shade_pixel(frame, params, pixel, hits[pixel].t, hits[pixel].grad_x, hits[pixel].grad_y,
+                               hits[pixel].grad_z);
+  }
+}

@@ -1,0 +1,62 @@
+/// shade.h -- one pixel's colour from its hit: a headlight at the eye, Blinn-Phong, both sides of the surface
+/// alike. Portable: OpenCL C 1.2 and C++, so that pictures of devices and of the twin are the same files. No
+/// pow.
+#ifndef ISOWAVE_SHADE_H
+#define ISOWAVE_SHADE_H
+
+#include "cell_intersect.h"
+
+ISO_NAMESPACE_BEGIN
+
+/// Colours are display values, [0,1].
+typedef struct ShadeParams {
+  float normal[9];  ///< row-major: gradient in index space -> normal in world space (up to a factor)
+  float view[9];    ///< row-major: ray direction in index space -> world space (up to a factor)
+  float surface_r, surface_g, surface_b;
+  float background_r, background_g, background_b;
+  float ambient, diffuse, specular;  ///< weights; the highlight is white
+} ShadeParams;
+ISO_CHECK_SIZE(ShadeParams, 108);
+
+static inline uint to_byte(float c) {
+  return c <= 0.0f ? 0u : (c >= 1.0f ? 255u : (uint)fma(c, 255.0f, 0.5f));
+}
+
+static inline uint pack_rgb(float r, float g, float b) {
+  return to_byte(r) | to_byte(g) << 8 | to_byte(b) << 16 | 0xFF000000u;
+}
+
+/// RGBA, 8 bits each, red in bits 0..7.
+static inline uint shade_pixel(ISO_CONSTANT const FrameParams *frame, ISO_CONSTANT const ShadeParams *p,
+                               uint pixel, float t, float gx, float gy, float gz) {
+  const Ray ray = make_ray(frame, pixel);
+  float nx, ny, nz, vx, vy, vz, lengths, cosine, highlight, light;
+  float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
+  int i;
+  if (t == INFINITY) return pack_rgb(p->background_r, p->background_g, p->background_b);
+  largest = fabs(gz) > largest ? fabs(gz) : largest;
+  if (largest > 0.0f) { /* only its direction counts: squares of huge or tiny values would not survive */
+    gx /= largest;
+    gy /= largest;
+    gz /= largest;
+  }
+  nx = fma(p->normal[0], gx, fma(p->normal[1], gy, p->normal[2] * gz));
+  ny = fma(p->normal[3], gx, fma(p->normal[4], gy, p->normal[5] * gz));
+  nz = fma(p->normal[6], gx, fma(p->normal[7], gy, p->normal[8] * gz));
+  vx = fma(p->view[0], ray.x.d, fma(p->view[1], ray.y.d, p->view[2] * ray.z.d));
+  vy = fma(p->view[3], ray.x.d, fma(p->view[4], ray.y.d, p->view[5] * ray.z.d));
+  vz = fma(p->view[6], ray.x.d, fma(p->view[7], ray.y.d, p->view[8] * ray.z.d));
+  lengths = sqrt(fma(nx, nx, fma(ny, ny, nz * nz))) * sqrt(fma(vx, vx, fma(vy, vy, vz * vz)));
+  /* The light is at the eye, so the half vector is the view vector and one cosine does for both terms. */
+  cosine = lengths > 0.0f ? fabs(fma(nx, vx, fma(ny, vy, nz * vz))) / lengths : 1.0f;
+  highlight = cosine;
+  for (i = 0; i < 5; ++i) highlight *= highlight; /* cosine^32 */
+  light = fma(p->diffuse, cosine, p->ambient);
+  highlight *= p->specular;
+  return pack_rgb(fma(p->surface_r, light, highlight), fma(p->surface_g, light, highlight),
+                  fma(p->surface_b, light, highlight));
+}
+
+ISO_NAMESPACE_END
+
+#endif

@@ -1,0 +1,22 @@
+/// shared_types_fields.h -- the fields of every struct of shared_types.h, in order, for what must visit them
+/// all. ISO_<STRUCT>_FIELDS(X) expands X(field) for each; shared_types_test fails when one is missing.
+#ifndef ISOWAVE_SHARED_TYPES_FIELDS_H
+#define ISOWAVE_SHARED_TYPES_FIELDS_H
+// Lists that read as lists:
+// clang-format off
+
+#define ISO_FRAME_PARAMS_FIELDS(X)                                          \
+  X(dims_x) X(dims_y) X(dims_z) X(blocks_x) X(blocks_y) X(blocks_z)         \
+  X(width) X(height)                                                        \
+  X(eye_x) X(eye_y) X(eye_z) X(fwd_x) X(fwd_y) X(fwd_z)                     \
+  X(right_x) X(right_y) X(right_z) X(up_x) X(up_y) X(up_z)                  \
+  X(pixel_scale) X(t_scale) X(isovalue) X(isovalue_index) X(max_spec_count)
+#define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
+#define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)
+#define ISO_PASS_COUNTS_FIELDS(X)                                           \
+  X(pass) X(active_count) X(spec_count) X(pair_slot_count) X(pair_count)    \
+  X(granted_count) X(visible_count) X(requested_count) X(decoded_count)     \
+  X(hit_count) X(next_active_count)
+
+// clang-format on
+#endif

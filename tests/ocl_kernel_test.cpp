@@ -1,0 +1,146 @@
+// core/ocl/kernel: arguments of every kind, launch shapes, errors.
+
+#include "core/ocl/kernel.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "core/error.hpp"
+#include "kernels_cl/shared_types.h"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+using ocl::In;
+using ocl::Local;
+using ocl::Out;
+using ocl::Range;
+using testing::AllOf;
+using testing::HasSubstr;
+
+using ScaleKernel = ocl::Kernel<In<uint>, uint, uint, Out<uint>>;
+
+// The C++ compiler refuses other arguments.
+static_assert(
+    std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint, ocl::Buffer<uint> &>);
+static_assert(
+    !std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<float> &, uint, uint, ocl::Buffer<uint> &>);
+static_assert(
+    !std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint, const ocl::Buffer<uint> &>);
+static_assert(!std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, ocl::Buffer<uint> &>);
+
+class OclKernelTest : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  ocl::Device device_{GetParam()};
+};
+
+TEST_P(OclKernelTest, ScalesAtAwkwardCounts) {
+  ScaleKernel scale(device_, "launch_probe", "scale_values");
+  for (const uint count : {0u, 1u, 63u, 64u, 65u, 1000u}) {
+    std::vector<uint> values(count);
+    std::iota(values.begin(), values.end(), 1u);
+    const ocl::Buffer<uint> input(device_, "input", values);
+    ocl::Buffer<uint> output(device_, "output", count);
+    scale(Range::strided(count, 64, device_), input, count, 3, output);
+    for (uint &value : values) value *= 3;
+    EXPECT_EQ(output.read(), values) << count;
+  }
+}
+
+TEST_P(OclKernelTest, LocalMemoryAndGroups) {
+  constexpr std::size_t kGroupSize = 32, kNumGroups = 5;
+  std::vector<uint> values(kGroupSize * kNumGroups);
+  std::iota(values.begin(), values.end(), 0u);
+  ocl::Buffer<uint> buffer(device_, "values", values);
+  ocl::Kernel<Out<uint>, Local<uint>> reverse(device_, "launch_probe", "reverse_groups");
+  reverse(Range::covering(values.size(), kGroupSize), buffer, {kGroupSize});
+  for (std::size_t group = 0; group < kNumGroups; ++group) {
+    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(group * kGroupSize);
+    std::reverse(begin, begin + kGroupSize);
+  }
+  EXPECT_EQ(buffer.read(), values);
+}
+
+TEST_P(OclKernelTest, StructsPassByValue) {
+  ocl::Buffer<PairHit> stored(device_, "stored", 1);
+  ocl::Kernel<PairHit, Out<PairHit>>(device_, "launch_probe", "store_pair_hit")({1, 1}, {42, 0.25f}, stored);
+  EXPECT_EQ(stored.read().front().cell, 42u);
+  EXPECT_EQ(stored.read().front().s, 0.25f);
+}
+
+TEST_P(OclKernelTest, KernelsOfOneProgramKeepTheirOwnArguments) {
+  const ocl::Buffer<uint> input(device_, "input", std::vector<uint>{1});
+  ocl::Buffer<uint> twice(device_, "twice", 1), thrice(device_, "thrice", 1);
+  ScaleKernel first(device_, "launch_probe", "scale_values"), second(device_, "launch_probe", "scale_values");
+  first({1, 1}, input, 1, 2, twice);
+  second({1, 1}, input, 1, 3, thrice);
+  EXPECT_EQ(twice.read().front(), 2u);
+  EXPECT_EQ(thrice.read().front(), 3u);
+}
+
+TEST_P(OclKernelTest, NoGroupsEnqueueNothing) {
+  ocl::Kernel<> empty(device_, "launch_probe", "launch_empty");
+  EXPECT_NO_THROW(empty({0, 64}));
+  EXPECT_NO_THROW(empty({1, 1}));
+  device_.finish();
+}
+
+TEST_P(OclKernelTest, WrongArityIsAnInvalidArgument) {
+  try {
+    ocl::Kernel<In<uint>, uint>(device_, "launch_probe", "scale_values");
+    FAIL() << "two of four parameters were accepted";
+  } catch (const std::invalid_argument &error) {
+    EXPECT_STREQ(error.what(), "kernel 'scale_values' takes 4 arguments, its C++ type names 2");
+  }
+}
+
+TEST_P(OclKernelTest, MissingKernelIsAnError) {
+  try {
+    ocl::Kernel<>(device_, "launch_probe", "no_such_kernel");
+    FAIL() << "a missing kernel was made";
+  } catch (const Error &error) {
+    EXPECT_THAT(error.what(),
+                AllOf(HasSubstr("'no_such_kernel'"), HasSubstr("CL_INVALID_KERNEL_NAME (-46)")));
+  }
+}
+
+TEST_P(OclKernelTest, MovedFromBufferIsAnInvalidArgument) {
+  ScaleKernel scale(device_, "launch_probe", "scale_values");
+  ocl::Buffer<uint> input(device_, "input", 1), output(device_, "output", 1);
+  const ocl::Buffer<uint> moved(std::move(output));
+  // NOLINTNEXTLINE(bugprone-use-after-move): what the test is about
+  EXPECT_THROW(scale({1, 1}, input, 1, 1, output), std::invalid_argument);
+}
+
+TEST_P(OclKernelTest, LaunchErrorsNameKernelAndCode) {
+  ocl::Kernel<> empty(device_, "launch_probe", "launch_empty");
+  try {
+    empty({1, std::size_t(device_.capabilities().max_work_group_size) * 2});
+    FAIL() << "a group twice too large was started";
+  } catch (const Error &error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("'launch_empty'"), HasSubstr("CL_INVALID_WORK_")));
+  }
+}
+
+TEST_P(OclKernelTest, Ranges) {
+  EXPECT_EQ(Range::covering(0, 64).num_groups, 0u);
+  EXPECT_EQ(Range::covering(1, 64).num_groups, 1u);
+  EXPECT_EQ(Range::covering(64, 64).num_groups, 1u);
+  EXPECT_EQ(Range::covering(65, 64).num_groups, 2u);
+  EXPECT_EQ(Range::strided(0, 64, device_).num_groups, 0u);
+  EXPECT_EQ(Range::strided(65, 64, device_).num_groups, 2u);
+  EXPECT_EQ(Range::strided(1u << 30, 64, device_).num_groups, device_.max_resident_groups());
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, OclKernelTest, testing::ValuesIn(devices_under_test()), device_test_name);
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,52 @@
+// isowave generate: writes a synthetic volume in the Open-SciVis naming.
+
+#include "core/generate.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "core/error.hpp"
+#include "tools/isowave/commands.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+struct Options {
+  std::string field, type = "uint8", output = ".";
+  std::vector<std::uint32_t> dims;
+  GenerateOptions generate;
+};
+
+void run(const Options &options) {
+  GenerateOptions generate = options.generate;
+  generate.field = field_from_string(options.field);
+  generate.type = voxel_type_from_string(options.type);
+  generate.dims = to_dims(options.dims);
+  const std::filesystem::path path =
+      generate_to_file(generate, options.output, make_progress_bar("generating"));
+  fmt::print("{}: {}x{}x{} {}, {} bytes\n", path.string(), generate.dims.x, generate.dims.y, generate.dims.z,
+             to_string(generate.type), with_commas(std::filesystem::file_size(path)));
+}
+
+}  // namespace
+
+void add_generate(CLI::App &app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App *command = app.add_subcommand("generate", "Write a synthetic volume as raw voxels");
+  command->add_option("FIELD", options->field, fmt::format("one of {}", fmt::join(field_names(), ", ")))
+      ->required();
+  command->add_option("--dims", options->dims, "voxels: X Y Z, or N for a cube")->expected(1, 3)->required();
+  command->add_option("--type", options->type, "voxel type")->capture_default_str();
+  command->add_option("--seed", options->generate.seed, "of mixing_layer's noise")->capture_default_str();
+  command->add_option("--threads", options->generate.num_threads, "0: one per processor")
+      ->capture_default_str();
+  command
+      ->add_option("-o,--output", options->output, "file (.raw), or a folder for a file FIELD_XxYxZ_TYPE.raw")
+      ->capture_default_str();
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace isowave::tools

@@ -1,0 +1,133 @@
+// isowave info: what is known of a volume file, as text or JSON.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "core/zfp_stream.hpp"
+#include "tools/isowave/commands.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct Options {
+  std::string input;
+  VolumeOptions volume;
+  bool json = false, no_scan = false;
+};
+
+ordered_json describe_grid(const VolumeInfo &info) {
+  ordered_json result;
+  result["dims"] = {info.dims.x, info.dims.y, info.dims.z};
+  result["type"] = to_string(info.type);
+  result["voxels"] = info.num_voxels();
+  result["voxel_bytes"] = info.num_voxels() * size_of(info.type);
+  result["spacing"] = {info.spacing.x, info.spacing.y, info.spacing.z};
+  result["origin"] = {info.origin.x, info.origin.y, info.origin.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    result["direction"].push_back({info.direction[axis].x, info.direction[axis].y, info.direction[axis].z});
+  }
+  return result;
+}
+
+ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
+  // Reading all of it checks the checksum; the words are not needed afterwards.
+  CompressedVolume volume = no_scan ? read_zfp_file_info(path) : read_zfp_file(path);
+  if (overrides.spacing) volume.info.spacing = *overrides.spacing;
+  ordered_json result = describe_grid(volume.info);
+  const glm::uvec3 blocks = volume.num_blocks();
+  result["blocks"] = {blocks.x, blocks.y, blocks.z};
+  result["block_count"] = volume.block_count();
+  result["bits_per_block"] = volume.bits_per_block;
+  result["rate"] = volume.rate();
+  if (std::isfinite(volume.value_range[0])) result["value_range"] = volume.value_range;
+  if (volume.max_error) result["max_error"] = *volume.max_error;
+  return result;
+}
+
+/// Reads all voxels, a few layers at a time.
+void add_value_range(VolumeReader &reader, ordered_json &result) {
+  const glm::uvec3 dims = reader.info().dims;
+  const std::uint64_t layer_size = std::uint64_t(dims.x) * dims.y;
+  const auto chunk = std::uint32_t(std::clamp<std::uint64_t>((1u << 22) / layer_size, 1, dims.z));
+  const Progress progress = make_progress_bar("reading");
+  std::vector<float> voxels;
+  std::uint64_t bad_count = 0;
+  float min = std::numeric_limits<float>::infinity(), max = -min;
+  for (std::uint32_t z = 0; z < dims.z; z += chunk) {
+    const std::uint32_t layers = std::min(chunk, dims.z - z);
+    voxels.resize(layer_size * layers);
+    reader.read_layers(z, layers, voxels);
+    for (const float value : voxels) {
+      if (!std::isfinite(value)) {
+        ++bad_count;
+        continue;
+      }
+      min = std::min(min, value);
+      max = std::max(max, value);
+    }
+    if (progress) progress(z + layers, dims.z);
+  }
+  if (min <= max) result["value_range"] = {min, max};
+  if (bad_count > 0) result["nan_or_inf"] = bad_count;
+}
+
+std::string to_text(const ordered_json &value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_unsigned()) return with_commas(value.get<std::uint64_t>());
+  if (!value.is_array()) return value.dump();
+  std::string text;
+  for (const ordered_json &element : value) {
+    const bool is_row = element.is_array();
+    if (!text.empty()) text += is_row ? " | " : " ";
+    text += is_row ? to_text(element) : element.dump();
+  }
+  return text;
+}
+
+void run(const Options &options) {
+  const RawOverrides overrides = to_overrides(options.volume);
+  ordered_json result;
+  result["file"] = options.input;
+  if (std::filesystem::is_regular_file(options.input)) {
+    result["file_bytes"] = std::filesystem::file_size(options.input);
+  }
+  if (is_zfp_name(options.input)) {
+    result["format"] = "zfp, fixed rate";
+    result.update(describe_zfp(options.input, overrides, options.no_scan));
+  } else {
+    const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);
+    result["format"] = "voxels";
+    result.update(describe_grid(reader->info()));
+    if (!options.no_scan) add_value_range(*reader, result);
+  }
+  if (options.json) {
+    fmt::print("{}\n", result.dump(2));
+    return;
+  }
+  for (const auto &[key, value] : result.items()) fmt::print("{:<15}{}\n", key, to_text(value));
+}
+
+}  // namespace
+
+void add_info(CLI::App &app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App *command = app.add_subcommand("info", "Print everything known of a volume file");
+  command->add_option("FILE", options->input, std::string(kVolumeHelp) + ", or .zfp")->required();
+  command->add_flag("--json", options->json, "print JSON");
+  command->add_flag("--no-scan", options->no_scan,
+                    "look at the header only: no value range, no checksum of the data");
+  add_volume_options(*command, options->volume);
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace isowave::tools

@@ -1,0 +1,135 @@
+#include "tools/isowave/volume_options.hpp"
+
+#include <unistd.h>
+
+#include <charconv>
+#include <cstdio>
+
+#include "core/error.hpp"
+#include "core/generate.hpp"
+#include "core/io/raw_reader.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+constexpr std::string_view kGenerate = "generate:";
+
+GenerateOptions parse_generator(std::string_view text) {
+  const auto fail = [&] {
+    throw Error("'{}{}': write generate:FIELD_XxYxZ_TYPE or generate:FIELD_XxYxZ_TYPE:SEED", kGenerate, text);
+  };
+  const std::size_t colon = text.find(':');
+  const std::optional<RawName> name = parse_raw_name(text.substr(0, colon));
+  if (!name) fail();
+  GenerateOptions options;
+  options.field = field_from_string(name->name);
+  options.dims = name->dims;
+  options.type = name->type;
+  if (colon != std::string_view::npos) {
+    const std::string_view seed = text.substr(colon + 1);
+    const auto [end, error] = std::from_chars(seed.data(), seed.data() + seed.size(), options.seed);
+    if (error != std::errc{} || end != seed.data() + seed.size()) fail();
+  }
+  return options;
+}
+
+/// Gives a generated volume the spacing asked for.
+class RespacedReader : public VolumeReader {
+ public:
+  RespacedReader(std::unique_ptr<VolumeReader> source, const glm::dvec3 &spacing)
+      : source_(std::move(source)) {
+    info_ = source_->info();
+    info_.spacing = spacing;
+  }
+  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
+    source_->read_layers(z_begin, num_layers, out);
+  }
+
+ private:
+  std::unique_ptr<VolumeReader> source_;
+};
+
+}  // namespace
+
+void add_volume_options(CLI::App &command, VolumeOptions &options) {
+  command
+      .add_option("--dims", options.dims,
+                  "voxels of a raw file whose name does not say: X Y Z, or N for a cube")
+      ->expected(1, 3);
+  command.add_option("--type", options.type, "voxel type of a raw file: uint8, int8, ... float32, float64");
+  command.add_option("--spacing", options.spacing, "world units between voxels: X Y Z or one for all")
+      ->expected(1, 3);
+}
+
+glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers) {
+  if (numbers.size() == 1) return glm::uvec3(numbers[0]);
+  if (numbers.size() == 3) return {numbers[0], numbers[1], numbers[2]};
+  throw Error("--dims: need X Y Z, or N for a cube, got {} numbers", numbers.size());
+}
+
+RawOverrides to_overrides(const VolumeOptions &options) {
+  RawOverrides overrides;
+  if (!options.dims.empty()) overrides.dims = to_dims(options.dims);
+  if (!options.type.empty()) overrides.type = voxel_type_from_string(options.type);
+  const std::vector<double> &spacing = options.spacing;
+  if (spacing.size() == 1) overrides.spacing = glm::dvec3(spacing[0]);
+  if (spacing.size() == 2) throw Error("--spacing: need X Y Z, or one number for all, got 2 numbers");
+  if (spacing.size() == 3) overrides.spacing = {spacing[0], spacing[1], spacing[2]};
+  return overrides;
+}
+
+std::unique_ptr<VolumeReader> open_any_volume(const std::string &path, const RawOverrides &overrides) {
+  if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
+  if (overrides.dims || overrides.type)
+    throw Error("{}: it says dims and type itself: leave --dims and --type", path);
+  std::unique_ptr<VolumeReader> reader =
+      open_generated(parse_generator(std::string_view(path).substr(kGenerate.size())));
+  if (!overrides.spacing) return reader;
+  return std::make_unique<RespacedReader>(std::move(reader), *overrides.spacing);
+}
+
+bool is_zfp_name(const std::string &path) {
+  return path.ends_with(".zfp");
+}
+
+CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate) {
+  if (is_zfp_name(path)) {
+    if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
+    CompressedVolume volume = read_zfp_file(path);
+    if (overrides.spacing) volume.info.spacing = *overrides.spacing;
+    check_volume_info(volume.info, path);
+    return volume;
+  }
+  const std::unique_ptr<VolumeReader> reader = open_any_volume(path, overrides);
+  CompressOptions options;
+  options.rate = rate;
+  options.progress = make_progress_bar("compressing");
+  return compress(*reader, options);
+}
+
+Progress make_progress_bar(std::string_view label) {
+  if (::isatty(STDERR_FILENO) == 0) return {};
+  // The line is erased when the last copy goes, be it after the work or after an error.
+  const std::shared_ptr<void> eraser(nullptr, [](void *) { fmt::print(stderr, "\r\x1b[K"); });
+  return [eraser, text = std::string(label), shown = -1](std::uint32_t done, std::uint32_t total) mutable {
+    constexpr int kWidth = 40;
+    if (done == total) {
+      fmt::print(stderr, "\r\x1b[K");
+      return;
+    }
+    const int percent = int(std::uint64_t(done) * 100 / total);
+    if (percent == std::exchange(shown, percent)) return;
+    const int filled = percent * kWidth / 100;
+    fmt::print(stderr, "\r{} [{:#<{}}{:.<{}}] {}%", text, "", filled, "", kWidth - filled, percent);
+    std::fflush(stderr);
+  };
+}
+
+std::string with_commas(std::uint64_t number) {
+  std::string text = std::to_string(number);
+  for (std::size_t at = text.size(); at > 3; at -= 3) text.insert(at - 3, 1, ',');
+  return text;
+}
+
+}  // namespace isowave::tools

@@ -1,0 +1,50 @@
+#pragma once
+// What the subcommands share about volumes: options that say what a raw file's name does not, opening any
+// kind of volume, and the progress bar.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/volume.hpp"
+#include "core/zfp_stream.hpp"
+
+namespace isowave::tools {
+
+/// Options as typed; to_overrides() checks them.
+struct VolumeOptions {
+  std::vector<std::uint32_t> dims;  ///< one number (a cube) or three
+  std::string type;
+  std::vector<double> spacing;  ///< one number or three
+};
+
+/// Adds --dims, --type and --spacing.
+void add_volume_options(CLI::App &command, VolumeOptions &options);
+/// Throws Error in one line on two numbers, unknown types.
+RawOverrides to_overrides(const VolumeOptions &options);
+/// N or X Y Z. Throws Error on another count.
+glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers);
+
+/// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
+std::unique_ptr<VolumeReader> open_any_volume(const std::string &path, const RawOverrides &overrides);
+/// The help text of such an argument.
+inline constexpr const char *kVolumeHelp =
+    "a volume: .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, or generate:FIELD_XxYxZ_TYPE[:SEED]";
+
+/// Whether the name ends in .zfp.
+bool is_zfp_name(const std::string &path);
+/// Reads a .zfp file (its spacing may be overridden), or compresses any other volume at `rate` bits per
+/// voxel.
+CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate);
+
+/// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with the last.
+Progress make_progress_bar(std::string_view label);
+
+/// 1,234,567
+std::string with_commas(std::uint64_t number);
+
+}  // namespace isowave::tools
