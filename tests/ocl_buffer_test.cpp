@@ -38,7 +38,7 @@ TEST(MemoryLedger, CountsCurrentAndPeakInAllAndByName) {
   EXPECT_EQ(ledger.current(), 0u) << "never below zero";
 }
 
-class OclBufferTest : public testing::TestWithParam<ocl::DeviceInfo> {
+class OclBufferOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   ocl::Device device_{GetParam()};
 };
@@ -49,12 +49,12 @@ std::vector<std::uint32_t> counting(std::size_t count) {
   return values;
 }
 
-TEST_P(OclBufferTest, StartsAsZeros) {
+TEST_P(OclBufferOnDevice, StartsAsZeros) {
   EXPECT_THAT(ocl::Buffer<std::uint32_t>(device_, "words", 1000).read(), Each(0u));
   EXPECT_THAT(ocl::Buffer<std::uint8_t>(device_, "bytes", 1003).read(), Each(0u));
 }
 
-TEST_P(OclBufferTest, WritesAndReadsParts) {
+TEST_P(OclBufferOnDevice, WritesAndReadsParts) {
   std::vector<std::uint32_t> expected = counting(100);
   ocl::Buffer<std::uint32_t> buffer(device_, "values", expected);
   EXPECT_EQ(buffer.read(), expected);
@@ -67,7 +67,7 @@ TEST_P(OclBufferTest, WritesAndReadsParts) {
   EXPECT_EQ(buffer.read(), expected);
 }
 
-TEST_P(OclBufferTest, RefusesRangesPastTheEnd) {
+TEST_P(OclBufferOnDevice, RefusesRangesPastTheEnd) {
   ocl::Buffer<std::uint32_t> buffer(device_, "ray_ids", 10);
   std::vector<std::uint32_t> values(4);
   cl::Event event;
@@ -99,7 +99,7 @@ void expect_fill(ocl::Device &device) {
       << kWords << " words";
 }
 
-TEST_P(OclBufferTest, FillsWithPatternsOfEverySize) {
+TEST_P(OclBufferOnDevice, FillsWithPatternsOfEverySize) {
   expect_fill<1>(device_);
   expect_fill<2>(device_);
   expect_fill<4>(device_);
@@ -114,7 +114,7 @@ TEST_P(OclBufferTest, FillsWithPatternsOfEverySize) {
   EXPECT_THAT(shorts.read(), Each(0x1234u));
 }
 
-TEST_P(OclBufferTest, AsyncReadsArriveInQueueOrder) {
+TEST_P(OclBufferOnDevice, AsyncReadsArriveInQueueOrder) {
   ocl::Buffer<std::uint32_t> buffer(device_, "counts", counting(64));
   std::vector<std::uint32_t> before(64), after(32);
   cl::Event before_event, after_event;
@@ -127,7 +127,7 @@ TEST_P(OclBufferTest, AsyncReadsArriveInQueueOrder) {
   EXPECT_THAT(after, Each(5u));
 }
 
-TEST_P(OclBufferTest, EmptyBuffersWork) {
+TEST_P(OclBufferOnDevice, EmptyBuffersWork) {
   ocl::Buffer<std::uint32_t> buffer(device_, "none", 0);
   EXPECT_EQ(buffer.size(), 0u);
   EXPECT_TRUE(buffer.read().empty());
@@ -139,7 +139,7 @@ TEST_P(OclBufferTest, EmptyBuffersWork) {
   EXPECT_EQ(device_.ledger().current(), 1u) << "OpenCL has no empty buffers";
 }
 
-TEST_P(OclBufferTest, LedgerFollowsMoves) {
+TEST_P(OclBufferOnDevice, LedgerFollowsMoves) {
   ocl::MemoryLedger &ledger = device_.ledger();
   {
     ocl::Buffer<std::uint32_t> a(device_, "a", counting(100));
@@ -167,7 +167,7 @@ TEST_P(OclBufferTest, LedgerFollowsMoves) {
   EXPECT_EQ(ledger.by_name().at("a").peak, 400u);
 }
 
-TEST_P(OclBufferTest, SwapKeepsTheBooks) {
+TEST_P(OclBufferOnDevice, SwapKeepsTheBooks) {
   ocl::Buffer<std::uint32_t> a(device_, "a", 10), b(device_, "b", 20);
   std::swap(a, b);
   EXPECT_EQ(a.name(), "b");
@@ -176,7 +176,7 @@ TEST_P(OclBufferTest, SwapKeepsTheBooks) {
   EXPECT_EQ(device_.ledger().by_name().at("b").current, 80u);
 }
 
-TEST_P(OclBufferTest, TooLargeIsRefusedBeforeAnyWork) {
+TEST_P(OclBufferOnDevice, TooLargeIsRefusedBeforeAnyWork) {
   const std::uint64_t largest = device_.capabilities().largest_allocation;
   for (const std::size_t count : {std::size_t(largest / 4 + 1), std::numeric_limits<std::size_t>::max()}) {
     try {
@@ -191,7 +191,7 @@ TEST_P(OclBufferTest, TooLargeIsRefusedBeforeAnyWork) {
   EXPECT_EQ(device_.ledger().peak(), 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclBufferTest, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclBufferOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
 
 }  // namespace
 }  // namespace isowave

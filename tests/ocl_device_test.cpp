@@ -123,7 +123,7 @@ TEST(ErrorName, KnownAndUnknownCodes) {
   EXPECT_EQ(ocl::error_name(-9999), "unknown OpenCL error (-9999)");
 }
 
-class OclDeviceTest : public testing::TestWithParam<ocl::DeviceInfo> {};
+class OclDeviceOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
 
 /// The line of `text` in a kernel file, 1 for the first.
 int line_of(const std::string &file, const std::string &text) {
@@ -137,25 +137,25 @@ int line_of(const std::string &file, const std::string &text) {
   return 0;
 }
 
-TEST_P(OclDeviceTest, CapabilitiesAreEnoughForCore) {
+TEST_P(OclDeviceOnDevice, CapabilitiesAreEnoughForCore) {
   const ocl::Device device(GetParam());
   EXPECT_GE(device.capabilities().local_memory, 32u << 10);
   EXPECT_GT(device.max_resident_groups(), 0u);
 }
 
-TEST_P(OclDeviceTest, VanishedDeviceIsAnError) {
+TEST_P(OclDeviceOnDevice, VanishedDeviceIsAnError) {
   ocl::DeviceInfo info = GetParam();
   info.name = "renamed";
   EXPECT_THAT(message_of<Error>([&] { ocl::Device device(info); }), HasSubstr("renamed"));
 }
 
-TEST_P(OclDeviceTest, TooLittleLocalMemoryIsRefused) {
+TEST_P(OclDeviceOnDevice, TooLittleLocalMemoryIsRefused) {
   ocl::DeviceInfo info = GetParam();
   info.capabilities.local_memory = 16 << 10;
   EXPECT_THAT(message_of<Error>([&] { ocl::Device device(info); }), HasSubstr("16 KiB of local memory"));
 }
 
-TEST_P(OclDeviceTest, ProgramsAreBuiltOncePerDefines) {
+TEST_P(OclDeviceOnDevice, ProgramsAreBuiltOncePerDefines) {
   ocl::Device device(GetParam());
   const cl::Program &first = device.program("launch_probe");
   const cl::Program &other = device.program("launch_probe", {{"ISO_SOME_DEFINE", "1"}});
@@ -164,7 +164,7 @@ TEST_P(OclDeviceTest, ProgramsAreBuiltOncePerDefines) {
   EXPECT_NE(&first, &other);
 }
 
-TEST_P(OclDeviceTest, BuildErrorsNameFileAndLine) {
+TEST_P(OclDeviceOnDevice, BuildErrorsNameFileAndLine) {
   ocl::Device device(GetParam());
   const auto build = [&](const char *define) {
     return message_of<Error>([&] { device.program("shared_types", {{define, "1+"}}); });
@@ -185,14 +185,14 @@ TEST_P(OclDeviceTest, BuildErrorsNameFileAndLine) {
               HasSubstr(fmt::format("shared_types.h:{}:", line_of("shared_types.h", "uint isovalue_index"))));
 }
 
-TEST_P(OclDeviceTest, MisuseIsAnInvalidArgument) {
+TEST_P(OclDeviceOnDevice, MisuseIsAnInvalidArgument) {
   ocl::Device device(GetParam());
   EXPECT_THAT(message_of<std::invalid_argument>([&] { device.program("no_such_stem"); }),
               HasSubstr("no_such_stem.cl"));
   EXPECT_THROW(device.program("launch_probe", {{"ISO_A", "1 -cl-fast-relaxed-math"}}), std::invalid_argument);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclDeviceTest, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclDeviceOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
 
 }  // namespace
 }  // namespace isowave

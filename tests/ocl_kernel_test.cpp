@@ -37,12 +37,12 @@ static_assert(
     !std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint, const ocl::Buffer<uint> &>);
 static_assert(!std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, ocl::Buffer<uint> &>);
 
-class OclKernelTest : public testing::TestWithParam<ocl::DeviceInfo> {
+class OclKernelOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   ocl::Device device_{GetParam()};
 };
 
-TEST_P(OclKernelTest, ScalesAtAwkwardCounts) {
+TEST_P(OclKernelOnDevice, ScalesAtAwkwardCounts) {
   ScaleKernel scale(device_, "launch_probe", "scale_values");
   for (const uint count : {0u, 1u, 63u, 64u, 65u, 1000u}) {
     std::vector<uint> values(count);
@@ -55,7 +55,7 @@ TEST_P(OclKernelTest, ScalesAtAwkwardCounts) {
   }
 }
 
-TEST_P(OclKernelTest, LocalMemoryAndGroups) {
+TEST_P(OclKernelOnDevice, SmallLocalMemoryAndGroups) {
   constexpr std::size_t kGroupSize = 32, kNumGroups = 5;
   std::vector<uint> values(kGroupSize * kNumGroups);
   std::iota(values.begin(), values.end(), 0u);
@@ -69,14 +69,14 @@ TEST_P(OclKernelTest, LocalMemoryAndGroups) {
   EXPECT_EQ(buffer.read(), values);
 }
 
-TEST_P(OclKernelTest, StructsPassByValue) {
+TEST_P(OclKernelOnDevice, SmallStructsPassByValue) {
   ocl::Buffer<PairHit> stored(device_, "stored", 1);
   ocl::Kernel<PairHit, Out<PairHit>>(device_, "launch_probe", "store_pair_hit")({1, 1}, {42, 0.25f}, stored);
   EXPECT_EQ(stored.read().front().cell, 42u);
   EXPECT_EQ(stored.read().front().s, 0.25f);
 }
 
-TEST_P(OclKernelTest, KernelsOfOneProgramKeepTheirOwnArguments) {
+TEST_P(OclKernelOnDevice, SmallKernelsOfOneProgramKeepTheirOwnArguments) {
   const ocl::Buffer<uint> input(device_, "input", std::vector<uint>{1});
   ocl::Buffer<uint> twice(device_, "twice", 1), thrice(device_, "thrice", 1);
   ScaleKernel first(device_, "launch_probe", "scale_values"), second(device_, "launch_probe", "scale_values");
@@ -86,14 +86,14 @@ TEST_P(OclKernelTest, KernelsOfOneProgramKeepTheirOwnArguments) {
   EXPECT_EQ(thrice.read().front(), 3u);
 }
 
-TEST_P(OclKernelTest, NoGroupsEnqueueNothing) {
+TEST_P(OclKernelOnDevice, NoGroupsEnqueueNothing) {
   ocl::Kernel<> empty(device_, "launch_probe", "launch_empty");
   EXPECT_NO_THROW(empty({0, 64}));
   EXPECT_NO_THROW(empty({1, 1}));
   device_.finish();
 }
 
-TEST_P(OclKernelTest, WrongArityIsAnInvalidArgument) {
+TEST_P(OclKernelOnDevice, WrongArityIsAnInvalidArgument) {
   try {
     ocl::Kernel<In<uint>, uint>(device_, "launch_probe", "scale_values");
     FAIL() << "two of four parameters were accepted";
@@ -102,7 +102,7 @@ TEST_P(OclKernelTest, WrongArityIsAnInvalidArgument) {
   }
 }
 
-TEST_P(OclKernelTest, MissingKernelIsAnError) {
+TEST_P(OclKernelOnDevice, MissingKernelIsAnError) {
   try {
     ocl::Kernel<>(device_, "launch_probe", "no_such_kernel");
     FAIL() << "a missing kernel was made";
@@ -112,7 +112,7 @@ TEST_P(OclKernelTest, MissingKernelIsAnError) {
   }
 }
 
-TEST_P(OclKernelTest, MovedFromBufferIsAnInvalidArgument) {
+TEST_P(OclKernelOnDevice, MovedFromBufferIsAnInvalidArgument) {
   ScaleKernel scale(device_, "launch_probe", "scale_values");
   ocl::Buffer<uint> input(device_, "input", 1), output(device_, "output", 1);
   const ocl::Buffer<uint> moved(std::move(output));
@@ -120,7 +120,7 @@ TEST_P(OclKernelTest, MovedFromBufferIsAnInvalidArgument) {
   EXPECT_THROW(scale({1, 1}, input, 1, 1, output), std::invalid_argument);
 }
 
-TEST_P(OclKernelTest, LaunchErrorsNameKernelAndCode) {
+TEST_P(OclKernelOnDevice, LaunchErrorsNameKernelAndCode) {
   ocl::Kernel<> empty(device_, "launch_probe", "launch_empty");
   try {
     empty({1, std::size_t(device_.capabilities().max_work_group_size) * 2});
@@ -130,7 +130,7 @@ TEST_P(OclKernelTest, LaunchErrorsNameKernelAndCode) {
   }
 }
 
-TEST_P(OclKernelTest, Ranges) {
+TEST_P(OclKernelOnDevice, Ranges) {
   EXPECT_EQ(Range::covering(0, 64).num_groups, 0u);
   EXPECT_EQ(Range::covering(1, 64).num_groups, 1u);
   EXPECT_EQ(Range::covering(64, 64).num_groups, 1u);
@@ -140,7 +140,7 @@ TEST_P(OclKernelTest, Ranges) {
   EXPECT_EQ(Range::strided(1u << 30, 64, device_).num_groups, device_.max_resident_groups());
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclKernelTest, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclKernelOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
 
 }  // namespace
 }  // namespace isowave

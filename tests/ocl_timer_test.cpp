@@ -18,7 +18,7 @@ using testing::Contains;
 using testing::Key;
 using testing::UnorderedElementsAre;
 
-class OclTimerTest : public testing::TestWithParam<ocl::DeviceInfo> {
+class OclTimerOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Enough work to take measurable time.
   static void work(ocl::Device &device) {
@@ -30,7 +30,7 @@ class OclTimerTest : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 };
 
-TEST_P(OclTimerTest, OffKeepsNothing) {
+TEST_P(OclTimerOnDevice, OffKeepsNothing) {
   ocl::Device device(GetParam());
   EXPECT_EQ(device.timer().source(), ocl::TimerSource::kOff);
   EXPECT_EQ(device.timer().next_event(), nullptr);
@@ -41,7 +41,7 @@ TEST_P(OclTimerTest, OffKeepsNothing) {
   EXPECT_TRUE(device.timer().collect().empty());
 }
 
-TEST_P(OclTimerTest, OnBooksTheInnermostStage) {
+TEST_P(OclTimerOnDevice, OnBooksTheInnermostStage) {
   ocl::Device device(GetParam(), true);
   ASSERT_NE(device.timer().source(), ocl::TimerSource::kOff);
   {
@@ -63,7 +63,7 @@ TEST_P(OclTimerTest, OnBooksTheInnermostStage) {
   EXPECT_TRUE(device.timer().collect().empty()) << "collect() starts again";
 }
 
-TEST_P(OclTimerTest, OutsideOfStages) {
+TEST_P(OclTimerOnDevice, OutsideOfStages) {
   ocl::Device device(GetParam(), true);
   work(device);
   const std::map<std::string, double> times = device.timer().collect();
@@ -74,7 +74,7 @@ TEST_P(OclTimerTest, OutsideOfStages) {
   }
 }
 
-TEST_P(OclTimerTest, CollectInsideAStageCountsEveryMomentOnce) {
+TEST_P(OclTimerOnDevice, CollectInsideAStageCountsEveryMomentOnce) {
   ocl::Device device(GetParam(), true);
   const auto stage = device.timer().stage("work");
   work(device);
@@ -83,7 +83,7 @@ TEST_P(OclTimerTest, CollectInsideAStageCountsEveryMomentOnce) {
   EXPECT_THAT(device.timer().collect(), Contains(Key("work")));
 }
 
-TEST_P(OclTimerTest, TransfersAndAsyncReadsAreBooked) {
+TEST_P(OclTimerOnDevice, TransfersAndAsyncReadsAreBooked) {
   ocl::Device device(GetParam(), true);
   ocl::Buffer<uint> buffer(device, "values", 1000);
   EXPECT_TRUE(device.timer().collect().empty()) << "allocating belongs to no stage";
@@ -99,7 +99,7 @@ TEST_P(OclTimerTest, TransfersAndAsyncReadsAreBooked) {
   EXPECT_THAT(device.timer().collect(), UnorderedElementsAre(Key("transfer")));
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclTimerTest, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclTimerOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
 
 }  // namespace
 }  // namespace isowave

@@ -14,7 +14,7 @@
 namespace isowave {
 namespace {
 
-class SharedTypesTest : public testing::TestWithParam<ocl::DeviceInfo> {
+class SharedTypesOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   ocl::Device device_{GetParam()};
 };
@@ -51,7 +51,7 @@ std::vector<uint> host_offsets() {
   return offsets;
 }
 
-TEST_P(SharedTypesTest, SizesAreTheHosts) {
+TEST_P(SharedTypesOnDevice, SmallSizesAreTheHosts) {
   const std::vector<uint> expected = {sizeof(FrameParams), sizeof(PairHit), sizeof(HitRecord),
                                       sizeof(PassCounts)};
   ocl::Buffer<uint> sizes(device_, "sizes", expected.size());
@@ -59,14 +59,14 @@ TEST_P(SharedTypesTest, SizesAreTheHosts) {
   EXPECT_EQ(sizes.read(), expected);
 }
 
-TEST_P(SharedTypesTest, OffsetsAreTheHosts) {
+TEST_P(SharedTypesOnDevice, SmallOffsetsAreTheHosts) {
   const std::vector<uint> expected = host_offsets();
   ocl::Buffer<uint> offsets(device_, "offsets", expected.size());
   ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_offsets"}({1, 1}, offsets);
   EXPECT_EQ(offsets.read(), expected);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, SharedTypesTest, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, SharedTypesOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
 
 }  // namespace
 }  // namespace isowave

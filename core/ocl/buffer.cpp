@@ -100,7 +100,7 @@ RawBuffer::~RawBuffer() {
 
 RawBuffer::RawBuffer(RawBuffer &&other) noexcept
     : device_(other.device_),
-      name_(other.name_),  // copied: the empty one still says who it was
+      name_(other.name_),  // NOLINT(performance-move-constructor-init): the empty one still says who it was
       bytes_(std::exchange(other.bytes_, 0)),
       mem_(std::move(other.mem_)) {}
 
