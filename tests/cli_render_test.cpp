@@ -1,5 +1,6 @@
 // `isowave render`, run as a user runs it: what it writes, and how it fails.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -21,7 +22,7 @@ const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
 const std::string kGyroid = "generate:gyroid_20x21x22_uint8";
 
 std::string quoted(const std::filesystem::path &path) {
-  return "'" + path.string() + "'";
+  return fmt::format("'{}'", path.string());
 }
 
 std::set<std::string> names_in(const std::filesystem::path &folder) {
@@ -116,8 +117,8 @@ TEST(CliRender, ReferenceIsTheSamePicture) {
   for (const char *frame : {"_iso60_view0", "_iso60_view1", "_iso150_view0", "_iso150_view1"}) {
     for (const char *extension : {".png", ".npy"}) {
       const auto compare =
-          run_isowave("compare --exact " + quoted(folder / (std::string("device") + frame + extension)) +
-                      " " + quoted(folder / (std::string("twin") + frame + extension)));
+          run_isowave("compare --exact " + quoted(folder / (fmt::format("device{}{}", frame, extension))) +
+                      " " + quoted(folder / (fmt::format("twin{}{}", frame, extension))));
       EXPECT_EQ(compare.status, 0) << frame << extension << "\n" << compare.out << compare.err;
       EXPECT_NE(compare.out.find("equal"), std::string::npos) << compare.out;
     }

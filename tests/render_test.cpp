@@ -1,5 +1,6 @@
 // Whole frames on every device: the hit buffer must equal the twin's bit for bit, whatever is drawn.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"

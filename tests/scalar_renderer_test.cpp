@@ -3,6 +3,7 @@
 
 #include "reference/scalar_renderer.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -161,7 +162,9 @@ TEST(ScalarRenderer, SphereIsSecondOrder) {
     }
     const double h = info.spacing.x;
     EXPECT_LE(worst, h * h / 8 * 2 / (radius - 2 * h) / 0.6 * 1.1) << n;
-    if (n > 17) EXPECT_GT(previous / worst, 3.0) << "from " << n / 2 + 1 << " to " << n;
+    if (n > 17) {
+      EXPECT_GT(previous / worst, 3.0) << "from " << n / 2 + 1 << " to " << n;
+    }
     previous = worst;
   }
 }
