@@ -149,15 +149,12 @@ inline std::size_t expect_first_changes(const std::vector<HitRecord> &hits, cons
     const OracleInterval box = oracle_interval(ray, info);
     const glm::dvec3 eye = (ray.eye - info.origin) / info.spacing, direction = ray.direction / info.spacing;
     const auto edge = [&](double t) { return 64 * 0x1p-24 * (std::abs(t) + glm::length(info.spacing)); };
-    if (std::abs(box.exit - box.enter) < edge(box.enter)) {
-      ++num_ambiguous;
-      continue;
-    }
     std::vector<double> roots = field.roots(eye, direction);
     std::sort(roots.begin(), roots.end());
     bool ambiguous = false;
     double first = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < roots.size() && box.enter < box.exit && !std::isfinite(first); ++i) {
+    for (std::size_t i = 0;
+         i < roots.size() && box.exit > box.enter - edge(box.enter) && !std::isfinite(first); ++i) {
       const double t = roots[i];
       const double error = depth_tolerance(field, info, ray, t);
       ambiguous |= std::abs(t - box.enter) < error + edge(t) || std::abs(t - box.exit) < error + edge(t);
