@@ -6,6 +6,7 @@
 
 #include "core/error.hpp"
 #include "core/pass_readback.hpp"
+#include "kernels_cl/block_grid.h"
 
 namespace isowave {
 

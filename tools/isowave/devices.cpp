@@ -15,6 +15,7 @@
 #include "core/error.hpp"
 #include "core/ocl/device.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/render_stats.hpp"
 
 namespace isowave::tools {
 
@@ -80,25 +81,9 @@ void print_table(const std::vector<ocl::DeviceInfo> &devices, std::optional<std:
 void print_json(const std::vector<ocl::DeviceInfo> &devices, std::optional<std::uint32_t> default_index) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const ocl::DeviceInfo &info : devices) {
-    const ocl::Capabilities &can = info.capabilities;
-    list.push_back({{"index", info.index},
-                    {"default", info.index == default_index},
-                    {"type", to_string(info.type)},
-                    {"name", info.name},
-                    {"vendor", info.vendor},
-                    {"platform", info.platform},
-                    {"device_version", info.device_version},
-                    {"driver_version", info.driver_version},
-                    {"int64_atomics", can.int64_atomics},
-                    {"fp64", can.fp64},
-                    {"sub_groups", can.sub_groups},
-                    {"correctly_rounded_divide", can.correctly_rounded_divide},
-                    {"denormals", can.denormals},
-                    {"global_memory", can.global_memory},
-                    {"largest_allocation", can.largest_allocation},
-                    {"local_memory", can.local_memory},
-                    {"max_work_group_size", can.max_work_group_size},
-                    {"compute_units", can.compute_units}});
+    nlohmann::ordered_json entry = device_json(info);
+    entry["default"] = info.index == default_index;
+    list.push_back(std::move(entry));
   }
   // Driver strings need not be UTF-8; nothing else could make dump() throw.
   fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));

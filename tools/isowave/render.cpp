@@ -1,0 +1,328 @@
+// isowave render: pictures, depth and statistics of isosurfaces, on an OpenCL device or by the scalar twin.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <charconv>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "core/error.hpp"
+#include "core/io/npy.hpp"
+#include "core/renderer.hpp"
+#include "reference/scalar_renderer.hpp"
+#include "tools/isowave/commands.hpp"
+#include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string input;
+  VolumeOptions volume;
+  std::uint32_t rate = 8;
+  std::vector<float> isovalues;
+  std::string size;
+  std::uint32_t orbit = 0;
+  std::string cameras;
+  std::string device;
+  std::string speculation = "global";
+  RendererOptions renderer;
+  bool reference = false, no_stage_times = false;
+  std::string color = "#DBBD87", background = "#FFFFFF";
+  std::string image, depth, stats, progress_dir;
+};
+
+/// What is drawn: the same for device and twin.
+struct Scene {
+  CompressedVolume volume;
+  std::vector<Camera> cameras;
+  ImageSize size;
+  Appearance appearance;
+};
+
+ImageSize parse_size(const std::string &text) {
+  ImageSize size;
+  const char *end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width);
+  if (width.ec == std::errc{} && width.ptr != end && *width.ptr == 'x') {
+    const auto height = std::from_chars(width.ptr + 1, end, size.height);
+    if (height.ec == std::errc{} && height.ptr == end) return size;
+  }
+  throw Error("--size {}: give WIDTHxHEIGHT in pixels, such as 1280x720", text);
+}
+
+/// "#RRGGBB" -> [0,1]^3.
+glm::vec3 parse_color(const char *option, const std::string &text) {
+  std::uint32_t rgb = 0;
+  const char *end = text.data() + text.size();
+  if (text.size() == 7 && text[0] == '#') {
+    const auto parsed = std::from_chars(text.data() + 1, end, rgb, 16);
+    if (parsed.ec == std::errc{} && parsed.ptr == end) {
+      return {float(rgb >> 16) / 255.0f, float(rgb >> 8 & 255u) / 255.0f, float(rgb & 255u) / 255.0f};
+    }
+  }
+  throw Error("{} {}: give a colour as #RRGGBB", option, text);
+}
+
+std::string dims_text(const glm::uvec3 &dims) {
+  return fmt::format("{}x{}x{}", dims.x, dims.y, dims.z);
+}
+
+Scene load_scene(const Options &options) {
+  Scene scene;
+  std::optional<CameraFile> file;
+  if (!options.cameras.empty()) file = read_camera_file(options.cameras);
+  scene.volume = load_volume(options.input, to_overrides(options.volume), options.rate);
+  const VolumeInfo &info = scene.volume.info;
+  if (file && file->dims && *file->dims != info.dims) {
+    throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims),
+                options.input, dims_text(info.dims));
+  }
+  if (file && file->spacing &&
+      glm::any(glm::greaterThan(glm::abs(*file->spacing - info.spacing), 1e-3 * info.spacing))) {
+    throw Error("{} is for a spacing of {} {} {}, but {} has {} {} {}: give --spacing", options.cameras,
+                file->spacing->x, file->spacing->y, file->spacing->z, options.input, info.spacing.x,
+                info.spacing.y, info.spacing.z);
+  }
+  scene.cameras = file ? file->cameras : orbit_cameras(info, std::max(1u, options.orbit));
+  if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
+  if (!options.size.empty()) scene.size = parse_size(options.size);
+  scene.appearance.surface = parse_color("--color", options.color);
+  scene.appearance.background = parse_color("--background", options.background);
+  return scene;
+}
+
+/// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT.
+fs::path frame_path(const fs::path &path, const Scene &scene, const Options &options, float isovalue,
+                    std::size_t view) {
+  if (scene.cameras.size() * options.isovalues.size() == 1) return path;
+  fs::path result = path;
+  result.replace_filename(
+      fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view, path.extension().string()));
+  return result;
+}
+
+/// Draws one frame; the writing of files asks for what it needs afterwards.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
+  virtual std::vector<HitRecord> hits() = 0;
+  virtual Image8 shade() = 0;
+};
+
+class DeviceFrames : public FrameSource {
+ public:
+  DeviceFrames(ocl::Device &device, const Scene &scene, const RendererOptions &options)
+      : renderer_(device, scene.volume, options), appearance_(scene.appearance) {}
+  FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
+    return renderer_.render(camera, isovalue, on_pass);
+  }
+  std::vector<HitRecord> hits() override { return renderer_.hits(); }
+  Image8 shade() override { return renderer_.shade(appearance_); }
+  const Renderer &renderer() const { return renderer_; }
+
+ private:
+  Renderer renderer_;
+  Appearance appearance_;
+};
+
+class TwinFrames : public FrameSource {
+ public:
+  explicit TwinFrames(const Scene &scene) : scene_(scene), voxels_(decode_with_libzfp(scene.volume)) {}
+  FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
+    const auto begin = Clock::now();
+    frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
+    hits_ = render_scalar(frame_, voxels_);
+    FrameStats stats;
+    stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+    for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
+    return stats;
+  }
+  std::vector<HitRecord> hits() override { return hits_; }
+  Image8 shade() override {
+    return shade_scalar(frame_, make_shade_params(scene_.volume.info, scene_.appearance), hits_);
+  }
+
+ private:
+  const Scene &scene_;
+  std::vector<float> voxels_;
+  FrameParams frame_{};
+  std::vector<HitRecord> hits_;
+};
+
+void write_outputs(const Options &options, const Scene &scene, FrameSource &frames, float isovalue,
+                   std::size_t view) {
+  if (!options.image.empty()) {
+    write_png(frames.shade(), frame_path(options.image, scene, options, isovalue, view));
+  }
+  if (!options.depth.empty()) {
+    write_npy({scene.size.width, scene.size.height, depth_of(frames.hits())},
+              frame_path(options.depth, scene, options, isovalue, view));
+  }
+}
+
+/// Writes the picture after every pass to --progress-dir, if that was asked for.
+OnPass progress_writer(const Options &options, const Scene &scene, FrameSource &frames, float isovalue,
+                       std::size_t view) {
+  if (options.progress_dir.empty()) return {};
+  return [&options, &scene, &frames, isovalue, view, pass = 0](const PassStats &) mutable {
+    const fs::path name = fs::path(options.progress_dir) / fmt::format("pass{:04}.png", ++pass);
+    write_png(frames.shade(), frame_path(name, scene, options, isovalue, view));
+    return true;
+  };
+}
+
+nlohmann::ordered_json draw_frames(const Options &options, const Scene &scene, FrameSource &frames) {
+  nlohmann::ordered_json result = nlohmann::ordered_json::array();
+  for (const float isovalue : options.isovalues) {
+    for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
+      const Camera &camera = scene.cameras[view];
+      const FrameStats stats =
+          frames.render(camera, isovalue, progress_writer(options, scene, frames, isovalue, view));
+      write_outputs(options, scene, frames, isovalue, view);
+      fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
+                 with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
+      result.push_back(frame_json(isovalue, view, camera, stats));
+    }
+  }
+  return result;
+}
+
+nlohmann::ordered_json options_json(const Options &options, const Scene &scene) {
+  return {{"size", {scene.size.width, scene.size.height}},
+          {"views", scene.cameras.size()},
+          {"isovalues", options.isovalues},
+          {"reference", options.reference},
+          {"speculation", options.speculation},
+          {"max_speculation", options.renderer.max_speculation},
+          {"cache_slots", options.renderer.cache_slots},
+          {"group_size", options.renderer.group_size}};
+}
+
+nlohmann::ordered_json volume_json(const Options &options, const CompressedVolume &volume) {
+  const VolumeInfo &info = volume.info;
+  return {{"file", options.input},
+          {"dims", {info.dims.x, info.dims.y, info.dims.z}},
+          {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
+          {"type", to_string(info.type)},
+          {"rate", volume.rate()},
+          {"blocks", volume.block_count()},
+          {"stream_bytes", volume.words.size() * sizeof(std::uint32_t)}};
+}
+
+/// Outputs go to folders that exist, but for --progress-dir, which is made. Found out before any work is
+/// done.
+void check_outputs(const Options &options) {
+  for (const std::string &output : {options.image, options.depth, options.stats}) {
+    const fs::path folder = fs::path(output).parent_path();
+    if (!folder.empty() && !fs::is_directory(folder))
+      throw Error("cannot write {}: {} is no folder", output, folder.string());
+  }
+  if (options.progress_dir.empty()) return;
+  std::error_code failure;
+  fs::create_directories(options.progress_dir, failure);
+  if (failure) throw Error("cannot make the folder {}: {}", options.progress_dir, failure.message());
+}
+
+ocl::Device open_device(const Options &options) {
+  const ocl::DeviceInfo info = ocl::choose_device(options.device);
+  fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index, info.name,
+             info.platform);
+  if (!info.capabilities.correctly_rounded_divide) {
+    spdlog::warn(
+        "{} does not promise correctly rounded division: pictures may differ from other devices' in last "
+        "bits",
+        info.name);
+  }
+  return ocl::Device(info, !options.stats.empty() && !options.no_stage_times);
+}
+
+void run_render(Options options) {
+  check_outputs(options);
+  if (options.speculation == "off") options.renderer.max_speculation = 1;
+  const Scene scene = load_scene(options);
+  options.renderer.size = scene.size;
+  nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
+                                     {"volume", volume_json(options, scene.volume)}};
+  if (options.reference) {
+    if (!options.progress_dir.empty()) throw Error("--reference has no passes: leave out --progress-dir");
+    TwinFrames frames(scene);
+    document["options"] = options_json(options, scene);
+    document["frames"] = draw_frames(options, scene, frames);
+  } else {
+    ocl::Device device = open_device(options);
+    DeviceFrames frames(device, scene, options.renderer);
+    options.renderer = frames.renderer().options();
+    document["device"] = device_json(device.info());
+    document["options"] = options_json(options, scene);
+    document["setup_ms"] = frames.renderer().setup_ms();
+    document["frames"] = draw_frames(options, scene, frames);
+    document["memory"] = memory_json(device.ledger());
+    fmt::print("setup {:.0f} ms; device memory: peak {:.1f} MiB\n", frames.renderer().setup_ms(),
+               double(device.ledger().peak()) / (1 << 20));
+  }
+  if (!options.stats.empty()) write_json(document, options.stats);
+}
+
+}  // namespace
+
+void add_render(CLI::App &app) {
+  CLI::App *command = app.add_subcommand("render", "Draw isosurfaces: PNG pictures, depth and statistics");
+  const auto options = std::make_shared<Options>();
+  command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))->required();
+  command
+      ->add_option("--isovalue,-i", options->isovalues,
+                   "isovalue; repeat it for more surfaces, each drawn from all views")
+      ->required();
+  add_volume_options(*command, options->volume);
+  command
+      ->add_option("--rate", options->rate,
+                   "bits per voxel when an uncompressed volume is compressed on the fly")
+      ->capture_default_str();
+  command->add_option("--size", options->size, "picture size WxH [1280x720, or the camera file's]");
+  const auto *orbit = command->add_option("--orbit", options->orbit, "draw N views around the volume [1]")
+                          ->check(CLI::Range(1u, 100000u));
+  command->add_option("--cameras", options->cameras, "camera file (JSON)")
+      ->excludes(const_cast<CLI::Option *>(orbit));
+  command->add_option("--device", options->device,
+                      "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
+  command
+      ->add_option("--speculation", options->speculation,
+                   "blocks a ray looks ahead: off, or global (W*H / active rays)")
+      ->check(CLI::IsMember({"off", "global"}))
+      ->capture_default_str();
+  command
+      ->add_option("--max-speculation", options->renderer.max_speculation,
+                   "most blocks a ray looks ahead, 1..64")
+      ->capture_default_str();
+  command
+      ->add_option("--cache-slots", options->renderer.cache_slots,
+                   "decoded blocks kept on the device, at least 8 [2^18 or all]")
+      ->check(CLI::Range(8u, 1u << 30));
+  command->add_option("--group-size", options->renderer.group_size, "work-items per work-group, 8..256")
+      ->capture_default_str();
+  command->add_flag("--reference", options->reference, "use the scalar C++ reference instead of a device");
+  command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
+  command->add_option("--background", options->background, "background colour #RRGGBB")
+      ->capture_default_str();
+  command->add_option("--output,-o", options->image,
+                      "PNG; NAME_isoV_viewK.png when there are several frames");
+  command->add_option("--depth", options->depth,
+                      "float32 .npy [H,W]: distance from the eye, inf where nothing is hit");
+  command->add_option("--stats", options->stats, "JSON statistics of every frame and pass");
+  command->add_flag("--no-stage-times", options->no_stage_times,
+                    "leave ms per stage out of --stats: measuring them makes the host wait after each pass");
+  command->add_option("--progress-dir", options->progress_dir, "folder for the picture after every pass");
+  command->callback([options] { run_render(*options); });
+}
+
+}  // namespace isowave::tools

@@ -1,0 +1,86 @@
+#include "tools/isowave/render_stats.hpp"
+
+#include "core/io/atomic_file.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+/// Driver strings need not be UTF-8; nothing else could make dump() throw.
+std::string dump(const ordered_json &document) {
+  return document.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+ordered_json vec_json(const glm::dvec3 &v) {
+  return {v.x, v.y, v.z};
+}
+
+ordered_json pass_json(const PassStats &pass) {
+  ordered_json result = {
+      {"active_rays", pass.counts.active_count},         {"n_spec", pass.counts.spec_count},
+      {"ray_block_pairs", pass.counts.pair_count},       {"intersected_pairs", pass.counts.granted_count},
+      {"visible_blocks", pass.counts.visible_count},     {"requested_blocks", pass.counts.requested_count},
+      {"decoded_blocks", pass.counts.decoded_count},     {"rays_hit", pass.counts.hit_count},
+      {"utilization_percent", pass.utilization_percent}, {"completed_percent", pass.completed_percent}};
+  if (!pass.stage_ms.empty()) result["stage_ms"] = pass.stage_ms;
+  return result;
+}
+
+}  // namespace
+
+ordered_json device_json(const ocl::DeviceInfo &info) {
+  const ocl::Capabilities &can = info.capabilities;
+  return {{"index", info.index},
+          {"type", to_string(info.type)},
+          {"name", info.name},
+          {"vendor", info.vendor},
+          {"platform", info.platform},
+          {"device_version", info.device_version},
+          {"driver_version", info.driver_version},
+          {"int64_atomics", can.int64_atomics},
+          {"fp64", can.fp64},
+          {"sub_groups", can.sub_groups},
+          {"correctly_rounded_divide", can.correctly_rounded_divide},
+          {"denormals", can.denormals},
+          {"global_memory", can.global_memory},
+          {"largest_allocation", can.largest_allocation},
+          {"local_memory", can.local_memory},
+          {"max_work_group_size", can.max_work_group_size},
+          {"compute_units", can.compute_units}};
+}
+
+ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera, const FrameStats &stats) {
+  ordered_json result = {{"isovalue", isovalue},
+                         {"view", view},
+                         {"camera",
+                          {{"eye", vec_json(camera.eye)},
+                           {"at", vec_json(camera.at)},
+                           {"up", vec_json(camera.up)},
+                           {"fovy_deg", camera.fovy_deg}}},
+                         {"passes", stats.passes.size()},
+                         {"total_ms", stats.total_ms},
+                         {"rays_hit", stats.rays_hit},
+                         {"cancelled", stats.cancelled}};
+  ordered_json passes = ordered_json::array();
+  for (const PassStats &pass : stats.passes) passes.push_back(pass_json(pass));
+  result["per_pass"] = std::move(passes);
+  return result;
+}
+
+ordered_json memory_json(const ocl::MemoryLedger &ledger) {
+  ordered_json by_name;
+  for (const auto &[name, entry] : ledger.by_name()) {
+    by_name[name] = {{"current", entry.current}, {"peak", entry.peak}};
+  }
+  return {{"current", ledger.current()}, {"peak", ledger.peak()}, {"by_name", std::move(by_name)}};
+}
+
+void write_json(const ordered_json &document, const std::string &path) {
+  AtomicFile file(path);
+  file.write(dump(document));
+  file.commit();
+}
+
+}  // namespace isowave::tools

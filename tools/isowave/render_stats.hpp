@@ -1,0 +1,25 @@
+#pragma once
+// The statistics file of `render`: what was drawn, with what, pass by pass.
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/camera.hpp"
+#include "core/renderer.hpp"
+
+namespace isowave::tools {
+
+/// A device and what it can do.
+nlohmann::ordered_json device_json(const ocl::DeviceInfo &info);
+
+/// One frame: isovalue, view, camera, totals and passes.
+nlohmann::ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera,
+                                  const FrameStats &stats);
+
+/// Bytes of device memory: current, peak, and by buffer name.
+nlohmann::ordered_json memory_json(const ocl::MemoryLedger &ledger);
+
+/// Writes the document whole or not at all. Throws Error.
+void write_json(const nlohmann::ordered_json &document, const std::string &path);
+
+}  // namespace isowave::tools
