@@ -103,7 +103,10 @@ static inline int first_change(Cubic c, float *s_hit) {
   int step;
   if (in0 == in1 && in0 == in2 && in0 == in3) return 0;
   if (in0 == in3 || (in1 != in0 && in2 == in0)) {
-    const float d0 = c.b1 - c.b0, d1 = c.b2 - c.b1, d2 = c.b3 - c.b2;
+    const float e0 = c.b1 - c.b0, e1 = c.b2 - c.b1, e2 = c.b3 - c.b2;
+    const float e01 = fabs(e0) > fabs(e1) ? fabs(e0) : fabs(e1), largest = fabs(e2) > e01 ? fabs(e2) : e01;
+    /* Squares of huge or tiny values would not survive; only the ratios of the three count. */
+    const float d0 = e0 / largest, d1 = e1 / largest, d2 = e2 / largest;
     const float d02 = d0 * d2;
     const float discriminant = fma(d1, d1, -d02) + fma(-d0, d2, d02); /* Kahan: exact to an ulp or two */
     if (discriminant > 0.0f) {
