@@ -155,6 +155,11 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   return stats;
 }
 
+void Renderer::clear_cache() {
+  cache_.clear();
+  device_.finish();
+}
+
 Image8 Renderer::shade(const Appearance &appearance) {
   return shade_(frame_, make_shade_params(info_, appearance), rays_);
 }

@@ -67,6 +67,10 @@ class Renderer {
   /// isovalue.
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
 
+  /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture depends
+  /// on it. Waits.
+  void clear_cache();
+
   /// The hit buffer [height * width], row 0 at the top. Waits.
   std::vector<HitRecord> hits() const { return rays_.hits.read(); }
   /// The picture of the hit buffer. Waits.
