@@ -120,7 +120,7 @@ void register_parts(Distribution distribution, std::int64_t width, std::int64_t 
   }
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   for (const Distribution distribution : kDistributions) {
     for (const std::int64_t width : kWidths) register_parts(distribution, width, 18);
     register_parts(distribution, kWidths.back(), 27);

@@ -103,7 +103,7 @@ void compact(benchmark::State &state, Distribution distribution, bool indices) {
       [&] { indices ? in.keep_indices() : in.keep_values(); });
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   stage_benchmark("scan/exclusive", exclusive_scan)
       ->ArgName("entries")
       ->ArgsProduct({{640 * 360 / 512, 1280 * 720 / 512, 1280 * 720 / 1024 * 16}})
