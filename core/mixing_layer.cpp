@@ -11,6 +11,7 @@
 // in x, the same for all voxels of a lattice cell. So a row needs four hashes per lattice node, not eight
 // per voxel.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -21,13 +22,13 @@ namespace isowave {
 
 namespace {
 
-constexpr double kThickness = 0.05;           // of the step, in heights of the volume
-constexpr double kDisplacement = 0.16;        // amplitude, in heights
-constexpr double kDisplacementFrequency = 3;  // noise cells per height
+constexpr double kThickness = 0.06;             // of the step, in heights of the volume
+constexpr double kDisplacement = 0.3;           // amplitude, in heights
+constexpr double kDisplacementFrequency = 2.5;  // noise cells per height
 constexpr std::uint32_t kDisplacementOctaves = 2;
-constexpr double kStrength = 2.4;            // amplitude of the turbulence, in thicknesses
-constexpr double kTurbulenceFrequency = 8;   // of the first octave
-constexpr double kEnvelope = 0.16;           // half width of the turbulent zone, in heights
+constexpr double kStrength = 2.6;            // amplitude of the turbulence, in thicknesses
+constexpr double kTurbulenceFrequency = 10;  // of the first octave
+constexpr double kEnvelope = 0.14;           // half width of the turbulent zone, in heights
 constexpr double kFinestCell = 4;            // voxels: the noise of the finest octave is resolved
 constexpr double kAmplitudeRatio = 0.79370;  // of an octave to the one below: 2^(-1/3)
 
@@ -52,8 +53,10 @@ class Octave {
  public:
   Octave(std::uint32_t nx, double cells_per_voxel, double amplitude, std::uint64_t seed)
       : cells_per_voxel_(cells_per_voxel), amplitude_(amplitude), seed_(mix(seed)), columns_(nx) {
+    // Octaves that shared lattice nodes, where noise is 0, would show the lattice.
+    shift_ = double(seed_ >> 40) * 0x1p-24;
     for (std::uint32_t x = 0; x < nx; ++x) {
-      const double position = x * cells_per_voxel;
+      const double position = x * cells_per_voxel + shift_;
       const double cell = std::floor(position);
       columns_[x] = {std::uint32_t(cell), position - cell, fade(position - cell)};
     }
@@ -61,7 +64,7 @@ class Octave {
 
   /// Adds the row (y, z) to `row` [nx]; `lines` is scratch.
   void add(std::uint32_t y, std::uint32_t z, std::span<double> row, std::vector<Line> &lines) const {
-    const double position_y = y * cells_per_voxel_, position_z = z * cells_per_voxel_;
+    const double position_y = y * cells_per_voxel_ + shift_, position_z = z * cells_per_voxel_ + shift_;
     const double cell_y = std::floor(position_y), cell_z = std::floor(position_z);
     lines.resize(columns_.back().cell + 2);
     for (std::uint32_t plane = 0; plane < lines.size(); ++plane) {
@@ -105,7 +108,7 @@ class Octave {
     return index < 8 ? glm::dvec3(a, 0, b) : glm::dvec3(0, a, b);
   }
 
-  double cells_per_voxel_, amplitude_;
+  double cells_per_voxel_, amplitude_, shift_ = 0;
   std::uint64_t seed_;
   std::vector<Column> columns_;
 };
@@ -130,14 +133,18 @@ class MixingLayer : public FieldRows {
 
   void evaluate(std::uint32_t y, std::uint32_t z, std::span<double> row) const override {
     thread_local std::vector<Line> lines;
+    thread_local std::vector<double> turbulence;
     const double from_middle = y / height_ - 0.5;
-    const double distance = from_middle / kEnvelope;
-    const double envelope = 1 / ((1 + distance * distance) * (1 + distance * distance));
-    std::fill(row.begin(), row.end(), 0.0);
-    for (const Octave &octave : turbulence_) octave.add(y, z, row, lines);
-    for (double &value : row) value = envelope * value + from_middle / kThickness;
+    turbulence.assign(row.size(), 0.0);
+    for (const Octave &octave : turbulence_) octave.add(y, z, turbulence, lines);
+    std::fill(row.begin(), row.end(), from_middle / kThickness);
     for (const Octave &octave : displacement_) octave.add(y, z, row, lines);
-    for (double &value : row) value = 0.5 + 0.5 * (value / std::sqrt(1 + value * value));
+    for (std::size_t x = 0; x < row.size(); ++x) {
+      const double distance = row[x] * (kThickness / kEnvelope);
+      const double decay = 1 + distance * distance, envelope = 1 / (decay * decay);
+      const double step = row[x] + envelope * turbulence[x];
+      row[x] = 0.5 + 0.5 * (step / std::sqrt(1 + step * step));
+    }
   }
 
  private:

@@ -6,7 +6,8 @@
 
 namespace isowave {
 
-/// Threads used for `requested`: 0 means one per processor.
+inline constexpr std::uint32_t kMaxThreads = 1024;
+/// Threads used for `requested`: 0 means one per processor; never more than kMaxThreads.
 std::uint32_t thread_count(std::uint32_t requested);
 
 /// Calls body(item, thread) once for each item in [0, num_items), in any order, from up to `num_threads`

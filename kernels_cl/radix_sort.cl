@@ -11,16 +11,11 @@ inline uint digit_of(uint key, uint shift) {
   return (key >> shift) & (ISO_RADIX_DIGITS - 1);
 }
 
-inline uint read_count(global const PassCounts *counts, uint count_field) {
-  return ((global const uint *)counts)[count_field];
-}
-
 /// Counts the digits of each tile. Groups stride over tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_histogram(
-    global const uint *keys, global const PassCounts *counts, uint count_field, uint shift,
-    global uint *table) {
+    global const uint *keys, global const uint *counts, uint count_field, uint shift, global uint *table) {
   local uint histogram[ISO_RADIX_DIGITS];
-  const uint count = read_count(counts, count_field);
+  const uint count = counts[count_field];
   const uint num_tiles = (count + TILE - 1) / TILE;
   for (uint tile = get_group_id(0); tile < num_tiles; tile += get_num_groups(0)) {
     for (uint digit = get_local_id(0); digit < ISO_RADIX_DIGITS; digit += ISO_GROUP_SIZE)
@@ -40,10 +35,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_hi
 
 /// Moves the pairs of each tile to their places. table: scanned.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_scatter(
-    global const uint *keys, global const uint *values, global const PassCounts *counts, uint count_field,
+    global const uint *keys, global const uint *values, global const uint *counts, uint count_field,
     uint shift, global const uint *table, global uint *out_keys, global uint *out_values) {
   local ushort ranks[ISO_RADIX_DIGITS * ISO_GROUP_SIZE]; /* [digit][work-item]: counts, then first ranks */
-  const uint count = read_count(counts, count_field);
+  const uint count = counts[count_field];
   const uint num_tiles = (count + TILE - 1) / TILE;
   const uint item = get_local_id(0);
   for (uint tile = get_group_id(0); tile < num_tiles; tile += get_num_groups(0)) {

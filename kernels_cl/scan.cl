@@ -1,15 +1,12 @@
 /// scan.cl -- exclusive prefix sum and stream compaction (Sec. 3.6, 4.2).
-/// Counts live on the device: `count_field` names the uint of PassCounts that says how many entries there
-/// are. Compaction = compact_count -> scan_exclusive of the tile sums -> compact_values or compact_indices. A
-/// tile is ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever waits for
-/// another one.
+/// Counts live on the device: `counts` are the uints of PassCounts, `count_field` says which of them is the
+/// number of entries. (A cast from the struct is what Mesa rusticl gets wrong: README "Devices".) Compaction
+/// = compact_count -> scan_exclusive of the tile sums -> compact_values or compact_indices. A tile is
+/// ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever waits for another
+/// one.
 #include "shared_types.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
-
-inline uint read_count(global const PassCounts *counts, uint count_field) {
-  return ((global const uint *)counts)[count_field];
-}
 
 /// Exclusive prefix sum of one value per work-item; *total gets the sum. sums [ISO_GROUP_SIZE]. All items
 /// must call it.
@@ -33,10 +30,10 @@ inline uint group_scan(local uint *sums, uint value, uint *total) {
 /// values[i] = sum of values[0..i), in place, for ceil(count / divisor) * multiplier entries; their sum goes
 /// to total_field, unless that is ISO_INVALID_ID. One work-group: made for tables of tiles, which are short.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exclusive(
-    global uint *values, global PassCounts *counts, uint count_field, uint divisor, uint multiplier,
+    global uint *values, global uint *counts, uint count_field, uint divisor, uint multiplier,
     uint total_field) {
   local uint sums[ISO_GROUP_SIZE];
-  const uint count = (read_count(counts, count_field) + divisor - 1) / divisor * multiplier;
+  const uint count = (counts[count_field] + divisor - 1) / divisor * multiplier;
   uint carry = 0;
   for (uint tile = 0; tile < count; tile += TILE) {
     const uint begin = tile + get_local_id(0) * ISO_SCAN_ITEMS;
@@ -53,14 +50,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exc
     }
     carry += total;
   }
-  if (get_local_id(0) == 0 && total_field != ISO_INVALID_ID) ((global uint *)counts)[total_field] = carry;
+  if (get_local_id(0) == 0 && total_field != ISO_INVALID_ID) counts[total_field] = carry;
 }
 
 /// tile_sums[tile] = number of nonzero mask entries of the tile.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_count(
-    global const uint *mask, global const PassCounts *counts, uint count_field, global uint *tile_sums) {
+    global const uint *mask, global const uint *counts, uint count_field, global uint *tile_sums) {
   local uint sums[ISO_GROUP_SIZE];
-  const uint count = read_count(counts, count_field);
+  const uint count = counts[count_field];
   for (uint tile = get_group_id(0); tile * TILE < count; tile += get_num_groups(0)) {
     uint sum = 0, total;
     for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
@@ -75,7 +72,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_
 /// The two compactions differ in what they write for entry i: VALUE.
 #define COMPACT(VALUE)                                                                      \
   local uint sums[ISO_GROUP_SIZE];                                                          \
-  const uint count = read_count(counts, count_field);                                       \
+  const uint count = counts[count_field];                                                   \
   for (uint tile = get_group_id(0); tile * TILE < count; tile += get_num_groups(0)) {       \
     const uint begin = tile * TILE + get_local_id(0) * ISO_SCAN_ITEMS;                      \
     uint sum = 0, total;                                                                    \
@@ -88,12 +85,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_
 
 /// out = values[i] of every i with mask[i] != 0, in order. tile_offsets: scanned sums of compact_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_values(
-    global const uint *mask, global const uint *values, global const PassCounts *counts, uint count_field,
+    global const uint *mask, global const uint *values, global const uint *counts, uint count_field,
     global const uint *tile_offsets, global uint *out){COMPACT(values[i])}
 
 /// out = every i with mask[i] != 0, in order.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_indices(
-    global const uint *mask, global const PassCounts *counts, uint count_field,
-    global const uint *tile_offsets, global uint *out) {
+    global const uint *mask, global const uint *counts, uint count_field, global const uint *tile_offsets,
+    global uint *out) {
   COMPACT(i)
 }

@@ -37,20 +37,29 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(target) {
   const std::string name =
       fmt::format(".{}.{}.{}.tmp", target_.filename().string(), ::getpid(), next_id.fetch_add(1));
   temporary_ = target_.parent_path() / name;
-  const int fd = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  int fd = -1;
+#ifdef O_TMPFILE
+  // commit() names the file through /proc.
+  if (::access("/proc/self/fd", X_OK) == 0) {
+    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
+    fd = ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+    nameless_ = fd >= 0;
+  }
+#endif
+  if (fd < 0) fd = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (fd < 0) fail(target_, errno);
   file_ = ::fdopen(fd, "wb");
   if (file_ == nullptr) {
     const int error_number = errno;
     ::close(fd);
-    ::unlink(temporary_.c_str());
+    if (!nameless_) ::unlink(temporary_.c_str());
     fail(target_, error_number);
   }
 }
 
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr) std::fclose(file_);
-  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  if (!nameless_ && !temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
@@ -59,9 +68,14 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
 
 void AtomicFile::commit() {
   errno = 0;
-  const bool failed_before = std::ferror(file_) != 0;
-  const bool failed_now = std::fclose(std::exchange(file_, nullptr)) != 0;
-  if (failed_before || failed_now) fail(target_, errno != 0 ? errno : EIO);
+  if (std::ferror(file_) != 0 || std::fflush(file_) != 0) fail(target_, errno != 0 ? errno : EIO);
+  if (nameless_) {
+    const std::string self = fmt::format("/proc/self/fd/{}", ::fileno(file_));
+    if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW) != 0)
+      fail(target_, errno);
+    nameless_ = false;
+  }
+  if (std::fclose(std::exchange(file_, nullptr)) != 0) fail(target_, errno);
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, errno);
   temporary_.clear();
 }

@@ -9,8 +9,9 @@
 
 namespace isowave {
 
-/// Writes to a temporary name beside the target; commit() renames it over the target. Destroyed without
-/// commit(), it removes what it wrote. A target that exists stays as it was until commit().
+/// Writes to a temporary file beside the target; commit() renames it over the target. Destroyed without
+/// commit(), it removes what it wrote. A target that exists stays as it was until commit(). Where the system
+/// has files without a name (Linux, most file systems), not even a killed program leaves anything behind.
 /// Every failure throws Error in one line with the target's name and the system's reason.
 class AtomicFile {
  public:
@@ -34,6 +35,7 @@ class AtomicFile {
  private:
   std::filesystem::path target_, temporary_;
   std::FILE *file_ = nullptr;
+  bool nameless_ = false;  ///< the file has no name yet; temporary_ is the one that commit() will give it
 };
 
 }  // namespace isowave

@@ -3,6 +3,7 @@
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
+#include <nifti1_io.h>
 
 #include <algorithm>
 #include <iostream>
@@ -43,6 +44,10 @@ std::string one_line(std::string text) {
       text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
   const auto both_spaces = [](char a, char b) { return a == ' ' && b == ' '; };
   text.erase(std::unique(text.begin(), text.end(), both_spaces), text.end());
+  // "ITK ERROR: Class(address): ...": the address helps nobody; of nrrd's call stack the innermost line does.
+  if (const std::size_t at = text.find("): "); at != std::string::npos) text.erase(0, at + 3);
+  if (const std::size_t at = text.rfind("[nrrd] "); at != std::string::npos) text.erase(0, at + 7);
+  while (text.ends_with(' ')) text.pop_back();
   return text;
 }
 
@@ -132,6 +137,7 @@ class ItkReader : public VolumeReader {
  public:
   ItkReader(const fs::path &path, ItkFormat format, const std::optional<glm::dvec3> &spacing)
       : path_(path), io_(make_image_io(format)) {
+    check_before_itk(path_, format);
     with_itk(path_, "broken header", [&] {
       io_->SetFileName(path_.string());
       io_->ReadImageInformation();
@@ -139,8 +145,8 @@ class ItkReader : public VolumeReader {
     });
     if (spacing) info_.spacing = *spacing;
     check_volume_info(info_, path_.string());
-    const bool uncompressed = check_voxel_data(path_, format, info_);
-    by_layer_ = uncompressed && format == ItkFormat::kMetaImage;
+    data_ = find_voxel_data(path_, format, info_);
+    by_layer_ = format == ItkFormat::kMetaImage && data_.encoding == VoxelEncoding::kRaw;
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
@@ -156,7 +162,10 @@ class ItkReader : public VolumeReader {
       load(z_begin, num_layers);
       convert_to_float(info_.type, voxels_, out);
     } else {
-      if (voxels_.empty()) load(0, info_.dims.z);
+      if (voxels_.empty()) {
+        verify_deflated(data_);
+        load(0, info_.dims.z);
+      }
       convert_to_float(info_.type,
                        std::span(voxels_).subspan(z_begin * layer_bytes, num_layers * layer_bytes), out);
     }
@@ -180,6 +189,7 @@ class ItkReader : public VolumeReader {
 
   fs::path path_;
   itk::ImageIOBase::Pointer io_;
+  VoxelData data_;
   std::vector<std::byte> voxels_;  ///< all of them, or the layers of one call
   std::uint32_t next_layer_ = 0;
   bool by_layer_ = false;

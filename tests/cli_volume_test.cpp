@@ -1,0 +1,161 @@
+// The program's volume subcommands, run as a user runs them: what they print, and how they fail.
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/zfp_stream.hpp"
+#include "tests/run_program.hpp"
+
+namespace isowave {
+namespace {
+
+using test::expect_one_line_error;
+using test::run_isowave;
+using test::TemporaryFolder;
+using test::write_file;
+
+const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
+
+std::string quoted(const std::filesystem::path &path) {
+  return "'" + path.string() + "'";
+}
+
+TEST(Cli, ConvertAndInfo) {
+  const TemporaryFolder folder;
+  const std::string zfp = quoted(folder / "n.zfp");
+  const auto convert = run_isowave("convert " + kNucleon + " --rate 4 --spacing 1 2 3 -o " + zfp);
+  EXPECT_EQ(convert.status, 0) << convert.err;
+  EXPECT_EQ(convert.err, "") << "quiet in a pipe";
+  EXPECT_EQ(std::count(convert.out.begin(), convert.out.end(), '\n'), 1) << convert.out;
+  for (const char *text : {"41x41x41 uint8", "68,921", "4 bits per voxel", "max error"}) {
+    EXPECT_NE(convert.out.find(text), std::string::npos) << convert.out;
+  }
+  const auto info = run_isowave("info --json " + zfp);
+  ASSERT_EQ(info.status, 0) << info.err;
+  const auto json = nlohmann::json::parse(info.out);
+  EXPECT_EQ(json["dims"], (std::array{41, 41, 41}));
+  EXPECT_EQ(json["spacing"], (std::array{1, 2, 3}));
+  EXPECT_EQ(json["type"], "uint8");
+  EXPECT_EQ(json["rate"], 4.0);
+  EXPECT_EQ(json["block_count"], 11 * 11 * 11);
+  EXPECT_EQ(json["value_range"], (std::array{0, 249}));
+  EXPECT_GT(json["max_error"], 0.0);
+  EXPECT_EQ(json["file_bytes"], std::filesystem::file_size(folder / "n.zfp"));
+
+  const auto text = run_isowave("info " + kNucleon);
+  EXPECT_EQ(text.status, 0) << text.err;
+  EXPECT_NE(text.out.find("value_range    0.0 249.0"), std::string::npos) << text.out;
+}
+
+TEST(Cli, GeneratedFilesAndGeneratorsAreTheSameVolume) {
+  const TemporaryFolder folder;
+  const auto generate =
+      run_isowave("generate gyroid --dims 20 21 22 --type uint8 -o " + quoted(folder.path()));
+  ASSERT_EQ(generate.status, 0) << generate.err;
+  EXPECT_EQ(generate.err, "");
+  ASSERT_TRUE(std::filesystem::exists(folder / "gyroid_20x21x22_uint8.raw")) << generate.out;
+  ASSERT_EQ(run_isowave("convert " + quoted(folder / "gyroid_20x21x22_uint8.raw") + " -o " +
+                        quoted(folder / "a.zfp"))
+                .status,
+            0);
+  ASSERT_EQ(run_isowave("convert generate:gyroid_20x21x22_uint8 -o " + quoted(folder / "b.zfp")).status, 0);
+  EXPECT_EQ(test::read_file(folder / "a.zfp"), test::read_file(folder / "b.zfp"));
+  EXPECT_EQ(run_isowave("info generate:mixing_layer_20x21x22_uint8:7").status, 0);
+}
+
+TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
+  const TemporaryFolder folder;
+  const TemporaryFolder out;
+  const std::string to = " -o " + quoted(out / "a.zfp");
+  const auto file = [&](const std::string &name, const std::string &bytes) {
+    write_file(folder / name, bytes);
+    return quoted(folder / name);
+  };
+  const std::string cube(64, 'x');
+  expect_one_line_error("convert " + file("a_4x4x4_uint8.raw", cube.substr(1)) + to,
+                        "need 64 bytes, found 63");
+  expect_one_line_error("convert " + file("b_4x4x4_uint8.raw", cube + "x") + to, "need 64 bytes, found 65");
+  expect_one_line_error("convert " + file("b_4x4x4_uint8.raw.gz", cube) + to, "not a gzip file");
+  expect_one_line_error("convert " + file("c.raw", cube) + to, "--dims and --type");
+  expect_one_line_error("convert " + file("d_0x4x4_uint8.raw", cube) + to, "0x4x4");
+  expect_one_line_error("convert " + file("e_4x4x4_uint7.raw", cube) + to, "e_4x4x4_uint7.raw");
+  expect_one_line_error("convert " + file("f.xyz", cube) + to, "unknown kind");
+  expect_one_line_error("convert " + file("g.nrrd", cube) + to, "g.nrrd");
+  expect_one_line_error("convert " + file("h.mha", cube) + to, "h.mha");
+  expect_one_line_error("convert " + file("i.nii", cube) + to, "i.nii");
+  expect_one_line_error("convert " + file("j.nii.gz", cube) + to, "j.nii.gz");
+  expect_one_line_error("convert " + quoted(folder / "missing.raw") + to, "no such file");
+  expect_one_line_error("convert " + file("k_4x4x4_uint8.raw", cube) + " --rate 40" + to, "1 to 32");
+  expect_one_line_error("convert " + quoted(folder / "k_4x4x4_uint8.raw") + " --dims 4 4" + to, "--dims");
+  expect_one_line_error("convert " + quoted(folder / "k_4x4x4_uint8.raw") + " --spacing 1 0 1" + to,
+                        "spacing 1 0 1");
+  expect_one_line_error("convert " + quoted(folder / "k_4x4x4_uint8.raw") + " -o " + quoted(out / "a.raw"),
+                        ".zfp");
+  expect_one_line_error("convert generate:cube_4x4x4_uint8" + to, "unknown field");
+  expect_one_line_error("convert generate:sphere" + to, "FIELD_XxYxZ_TYPE");
+  expect_one_line_error("convert", "required");
+  expect_one_line_error("generate cube --dims 8" + to, "unknown field");
+  expect_one_line_error("generate sphere --dims 8 --type uint12 -o " + quoted(out.path()),
+                        "unknown voxel type");
+  expect_one_line_error("generate sphere --dims 0 -o " + quoted(out.path()), "0x0x0");
+  expect_one_line_error("generate sphere --dims 8 -o " + quoted(out / "a_8x8x9_uint8.raw"), "8x8x9");
+  expect_one_line_error("generate sphere --dims x -o " + quoted(out.path()), "--dims");
+  EXPECT_EQ(out.num_files(), 0u);
+
+  std::vector<float> voxels(64, 1.0f);
+  voxels[21] = NAN;
+  write_file(folder / "l_4x4x4_float32.raw", voxels);
+  expect_one_line_error("convert " + quoted(folder / "l_4x4x4_float32.raw") + to, "(1,1,1)");
+  EXPECT_EQ(out.num_files(), 0u);
+  EXPECT_EQ(run_isowave("convert " + quoted(folder / "l_4x4x4_float32.raw") + " --map-nan 0" + to).status, 0);
+}
+
+TEST(Cli, DamagedZfpFilesAreOneLine) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 1 -o " + quoted(folder / "a.zfp")).status, 0);
+  const std::string right = test::read_file(folder / "a.zfp");
+  const auto damaged = [&](std::size_t byte) {
+    std::string wrong = right;
+    wrong[byte] = char(wrong[byte] ^ 16);
+    write_file(folder / "b.zfp", wrong);
+    return "info " + quoted(folder / "b.zfp");
+  };
+  expect_one_line_error(damaged(0), "not a zfp file");
+  expect_one_line_error(damaged(7), "b.zfp");
+  expect_one_line_error(damaged(5000), "checksum of its stream");
+  expect_one_line_error(damaged(right.size() - 100), "checksum of its trailer");
+  expect_one_line_error(damaged(right.size() - 1), "unknown bytes after the zfp stream");
+  write_file(folder / "b.zfp", right.substr(0, 5000));
+  expect_one_line_error("info " + quoted(folder / "b.zfp"), "truncated");
+  write_file(folder / "b.zfp", std::string_view(""));
+  expect_one_line_error("info " + quoted(folder / "b.zfp"), "not a zfp file");
+}
+
+TEST(Cli, UnwritableOutputIsOneLine) {
+  const TemporaryFolder folder;
+  expect_one_line_error("convert " + kNucleon + " -o " + quoted(folder / "missing" / "a.zfp"),
+                        "cannot write");
+  std::filesystem::create_directory(folder / "folder.zfp");
+  expect_one_line_error("convert " + kNucleon + " -o " + quoted(folder / "folder.zfp"), "not a regular file");
+  expect_one_line_error("generate sphere --dims 8 -o /dev/full", "/dev/full");
+  EXPECT_EQ(folder.num_files(), 1u);
+}
+
+TEST(Cli, FullDiskLeavesNothingAndKeepsTheOldFile) {
+  const TemporaryFolder folder;
+  write_file(folder / "a.raw", std::string_view("old"));
+  // A limit on file size stands in for a full disk; the signal that comes with it must be ignored first.
+  const auto result =
+      test::run_command("trap '' XFSZ; ulimit -f 64; '" ISOWAVE_PROGRAM "' generate sphere --dims 128 -o " +
+                        quoted(folder / "a.raw"));
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_NE(result.err.find("cannot write"), std::string::npos) << result.err;
+  EXPECT_EQ(test::read_file(folder / "a.raw"), "old");
+  EXPECT_EQ(folder.num_files(), 1u);
+}
+
+}  // namespace
+}  // namespace isowave
