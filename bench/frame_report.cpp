@@ -29,6 +29,7 @@ Spread spread_of(const std::vector<double> &values) {
 template <class Value>
 std::vector<double> each(const std::vector<FrameStats> &frames, const Value &value) {
   std::vector<double> values;
+  values.reserve(frames.size());
   for (const FrameStats &frame : frames) values.push_back(value(frame));
   return values;
 }
