@@ -81,7 +81,7 @@ void intersect_blocks(benchmark::State &state) {
   state.counters["rays/block"] = pairs / blocks;
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   stage_benchmark("intersect", intersect_blocks)
       ->ArgNames({"width", "rays_per_block"})
       ->ArgsProduct({{640}, {1, 4, 16, 100, 1000}})

@@ -93,7 +93,6 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   const uint item = get_local_id(0);
   const int scarce = requested > num_slots - in_use;
   const uint searched = scarce ? requested : 0;
-  barrier(CLK_GLOBAL_MEM_FENCE); /* all have read the histogram before it is zeroed */
   if (item == 0) {
     const uint block_id = pair_block_ids[0]; /* invalid: that ray is leaving the volume and needs nothing */
     num_first_missing = 0;
@@ -135,8 +134,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     selection->num_collected = 0;
     selection->num_cutoff = 0;
     counts->decoded_count = granted;
-    for (age = 0; age < ISO_AGE_BUCKETS; ++age) age_histogram[age] = 0;
   }
+  barrier(CLK_GLOBAL_MEM_FENCE); /* the histogram has been read */
+  for (uint age = item; age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) age_histogram[age] = 0;
 }
 
 /// Lists the slots that are freed. Grid-stride over slots.
