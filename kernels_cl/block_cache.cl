@@ -66,10 +66,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
     global uint *age_histogram) {
   local uint histogram[ISO_AGE_BUCKETS];
   const uint pass = counts->pass;
-  if (counts->requested_count == 0) return; /* uniform: the whole group leaves before the barrier */
+  const uint counted = counts->requested_count != 0 ? num_slots : 0; /* no return before a barrier */
   for (uint age = get_local_id(0); age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) histogram[age] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
+  for (uint slot = get_global_id(0); slot < counted; slot += get_global_size(0)) {
     atomic_inc(&histogram[slot_age(slot_stamps[slot], pass)]);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -86,41 +86,33 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     global uint *age_histogram, global CacheSelection *selection) {
   local uint first_missing[8]; /* blocks of the pair served first that are on the request list */
   local uint places[8];        /* where they stand there */
-  local uint num_first_missing, num_pinned;
+  local uint num_first_missing;
   const uint requested = counts->requested_count;
   const uint in_use = age_histogram[0];
   const uint item = get_local_id(0);
-  if (requested == 0) return; /* uniform */
   const int scarce = requested > num_slots - in_use;
-  if (scarce) {
-    if (item == 0) {
-      const uint block_id = pair_block_ids[0]; /* invalid: that ray is leaving the volume and needs nothing */
-      num_first_missing = 0;
-      num_pinned = 0;
-      for (uint corner = 0; corner < 8 && block_id != ISO_INVALID_ID; ++corner) {
-        const uint needed = dual_grid_block(frame, block_coords(frame, block_id), corner);
-        if (needed == ISO_INVALID_ID) continue;
-        if (page_table[needed] == ISO_BLOCK_REQUESTED) {
-          first_missing[num_first_missing++] = needed;
-        } else {
-          slot_stamps[page_table[needed]] = counts->pass + 1;
-          ++num_pinned;
-        }
-      }
-    }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = item; i < requested; i += ISO_GROUP_SIZE) {
-      const uint wanted = request_block_ids[i];
-      for (uint j = 0; j < num_first_missing; ++j) {
-        if (first_missing[j] == wanted) places[j] = i;
-      }
-    }
-    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-  } else if (item == 0) {
-    num_first_missing = 0;
-    num_pinned = 0;
-  }
   if (item == 0) {
+    const uint block_id = pair_block_ids[0]; /* invalid: that ray is leaving the volume and needs nothing */
+    num_first_missing = 0;
+    for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
+      const uint needed = dual_grid_block(frame, block_coords(frame, block_id), corner);
+      if (needed == ISO_INVALID_ID) continue;
+      if (page_table[needed] == ISO_BLOCK_REQUESTED) {
+        first_missing[num_first_missing++] = needed;
+      } else {
+        slot_stamps[page_table[needed]] = counts->pass + 1;
+      }
+    }
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint i = item; scarce && i < requested; i += ISO_GROUP_SIZE) {
+    const uint wanted = request_block_ids[i];
+    for (uint j = 0; j < num_first_missing; ++j) {
+      if (first_missing[j] == wanted) places[j] = i;
+    }
+  }
+  barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+  if (item == 0 && requested != 0) {
     uint granted, age, older = 0;
     for (uint j = 0; j < num_first_missing; ++j) { /* swap it to place j */
       const uint displaced = request_block_ids[j];
