@@ -28,8 +28,8 @@ Spread spread_of(const std::vector<double> &values) {
 /// A value of every frame of the list.
 template <class Value>
 std::vector<double> each(const std::vector<FrameStats> &frames, const Value &value) {
-  std::vector<double> values;
-  for (const FrameStats &frame : frames) values.push_back(value(frame));
+  std::vector<double> values(frames.size());
+  std::transform(frames.begin(), frames.end(), values.begin(), value);
   return values;
 }
 

@@ -69,7 +69,7 @@ void group_pairs(benchmark::State &state, Distribution distribution) {
       state, {pairs, 12 * pairs}, [] {}, [&] { in.run(); });
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   for (const Distribution distribution : kDistributions) {
     stage_benchmark(fmt::format("group/{}", to_string(distribution)),
                     [=](benchmark::State &state) { group_pairs(state, distribution); })

@@ -6,7 +6,7 @@
 //     auto &in = input<SortInput>(state.range(0));
 //     measure(state, {pairs, bytes}, [&] { in.reset(); }, [&] { in.sort(...); });
 //   }
-//   const bool registered = (stage_benchmark("radix_sort", sort_pairs)->Arg(921600), true);
+//   const bool kRegistered = (stage_benchmark("radix_sort", sort_pairs)->Arg(921600), true);
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>

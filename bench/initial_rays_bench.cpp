@@ -40,7 +40,7 @@ void make_rays(benchmark::State &state) {
   state.counters["active_rays"] = in.num_active;
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   stage_benchmark("initial_rays", make_rays)
       ->ArgName("width")
       ->ArgsProduct({{kWidths.begin(), kWidths.end()}});

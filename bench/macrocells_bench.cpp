@@ -84,7 +84,7 @@ void select_isovalue(benchmark::State &state) {
       [&] { in.macrocells.select(in.frame); });
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   stage_benchmark("macrocells/build", build_ranges)
       ->ArgNames({"edge", "rate"})
       ->ArgsProduct({{128, 256}, {4}})

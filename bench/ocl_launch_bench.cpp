@@ -56,7 +56,7 @@ void launch_and_read_back(benchmark::State &state) {
   state.SetItemsProcessed(state.iterations());
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   stage_benchmark("ocl_launch/queued_1000", queued_launch)->ArgName("profiling")->Arg(0)->Arg(1);
   stage_benchmark("ocl_launch/read_back", launch_and_read_back)->Unit(benchmark::kMicrosecond);
   return true;

@@ -63,7 +63,7 @@ void sort_rays_by_block(benchmark::State &state, Distribution distribution) {
       state, {pairs, 16 * pairs}, [&] { in.reset(); }, [&] { in.run(); });
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   for (const Distribution distribution : kDistributions) {
     stage_benchmark(fmt::format("radix_sort/{}", to_string(distribution)),
                     [=](benchmark::State &state) { sort_rays_by_block(state, distribution); })

@@ -33,7 +33,7 @@ void shade_hits(benchmark::State &state) {
       [&] { benchmark::DoNotOptimize(in.run()); });
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   stage_benchmark("shade", shade_hits)->ArgName("width")->ArgsProduct({{kWidths.begin(), kWidths.end()}});
   return true;
 }();

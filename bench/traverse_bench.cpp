@@ -56,7 +56,7 @@ void find_blocks(benchmark::State &state) {
   state.counters["pairs"] = in.counts.pair_count;
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   stage_benchmark("traverse", find_blocks)
       ->ArgNames({"width", "edge", "n_spec"})
       ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {128, 256}, {1, 8, 64}});

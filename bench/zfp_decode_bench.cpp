@@ -88,7 +88,7 @@ void decode_blocks(benchmark::State &state, Order order) {
       state, {kNumDecoded, kNumDecoded * block_bytes}, [] {}, [&] { in.run(); });
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   for (const auto &[order, name] : {std::pair(Order::kSequential, "sequential"),
                                     {Order::kSorted, "sorted"},
                                     {Order::kRandom, "random"}}) {

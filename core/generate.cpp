@@ -159,7 +159,7 @@ std::unique_ptr<VolumeReader> open_generated(const GenerateOptions &options) {
 
 fs::path generate_to_file(const GenerateOptions &options, const fs::path &path, const Progress &progress) {
   const VolumeInfo info = info_of(options);
-  const fs::path target = output_path(options, path);
+  fs::path target = output_path(options, path);
   AtomicFile file(target);
   const GeneratedReader reader(options);
   const std::uint64_t layer_bytes = std::uint64_t(info.dims.x) * info.dims.y * size_of(info.type);

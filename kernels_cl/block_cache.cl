@@ -66,10 +66,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
     global uint *age_histogram) {
   local uint histogram[ISO_AGE_BUCKETS];
   const uint pass = counts->pass;
-  const uint counted = counts->requested_count != 0 ? num_slots : 0; /* no return before a barrier */
+  /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
+  const uint counted_slots = counts->requested_count == 0 ? 0 : num_slots;
   for (uint age = get_local_id(0); age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) histogram[age] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint slot = get_global_id(0); slot < counted; slot += get_global_size(0)) {
+  for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
     atomic_inc(&histogram[slot_age(slot_stamps[slot], pass)]);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -91,6 +92,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   const uint in_use = age_histogram[0];
   const uint item = get_local_id(0);
   const int scarce = requested > num_slots - in_use;
+  const uint searched = scarce ? requested : 0;
   if (item == 0) {
     const uint block_id = pair_block_ids[0]; /* invalid: that ray is leaving the volume and needs nothing */
     num_first_missing = 0;
@@ -105,14 +107,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint i = item; scarce && i < requested; i += ISO_GROUP_SIZE) {
+  for (uint i = item; i < searched; i += ISO_GROUP_SIZE) {
     const uint wanted = request_block_ids[i];
     for (uint j = 0; j < num_first_missing; ++j) {
       if (first_missing[j] == wanted) places[j] = i;
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-  if (item == 0 && requested != 0) {
+  if (item == 0) {
     uint granted, age, older = 0;
     for (uint j = 0; j < num_first_missing; ++j) { /* swap it to place j */
       const uint displaced = request_block_ids[j];

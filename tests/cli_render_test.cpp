@@ -1,0 +1,272 @@
+// `isowave render`, run as a user runs it: what it writes, and how it fails.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/io/npy.hpp"
+#include "core/io/png.hpp"
+#include "tests/run_program.hpp"
+
+namespace isowave {
+namespace {
+
+using nlohmann::json;
+using test::run_isowave;
+using test::TemporaryFolder;
+using test::write_file;
+
+const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
+const std::string kGyroid = "generate:gyroid_20x21x22_uint8";
+
+std::string quoted(const std::filesystem::path &path) {
+  return fmt::format("'{}'", path.string());
+}
+
+std::set<std::string> names_in(const std::filesystem::path &folder) {
+  std::set<std::string> names;
+  for (const auto &entry : std::filesystem::directory_iterator(folder))
+    names.insert(entry.path().filename().string());
+  return names;
+}
+
+test::ProgramResult render(const std::string &arguments) {
+  test::ProgramResult result = run_isowave("render " + arguments);
+  EXPECT_EQ(result.status, 0) << arguments << "\n" << result.out << result.err;
+  return result;
+}
+
+std::string camera_file(const char *dims = "[41,41,41]") {
+  return std::string(R"({"dims":)") + dims + R"(,"spacing":[1,1,1],"width":40,"height":30,"fovy_deg":50,
+    "cameras":[{"eye":[20,30,90],"at":[20,20,20],"up":[0,1,0]},{"eye":[80,20,20],"at":[20,20,20],"up":[0,1,0]}]})";
+}
+
+TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
+  const TemporaryFolder folder;
+  const auto run = render(kNucleon + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") +
+                          " --depth " + quoted(folder / "a.npy") + " --stats " + quoted(folder / "a.json") +
+                          " --progress-dir " + quoted(folder / "passes") + " --max-speculation 2");
+  EXPECT_NE(run.out.find("device "), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("isovalue 80, view 0"), std::string::npos) << run.out;
+  EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"a.png", "a.npy", "a.json", "passes"}));
+
+  const Image8 picture = read_png(folder / "a.png");
+  EXPECT_EQ(picture.width, 64u);
+  EXPECT_EQ(picture.height, 48u);
+  const FloatImage depth = read_npy(folder / "a.npy");
+  EXPECT_EQ(depth.width, 64u);
+  EXPECT_EQ(depth.height, 48u);
+  const auto hits = std::count_if(depth.pixels.begin(), depth.pixels.end(),
+                                  [](float t) { return t < std::numeric_limits<float>::infinity(); });
+
+  const json stats = json::parse(test::read_file(folder / "a.json"));
+  ASSERT_EQ(stats["frames"].size(), 1u);
+  const json &frame = stats["frames"][0];
+  EXPECT_EQ(frame["isovalue"], 80);
+  EXPECT_EQ(frame["view"], 0);
+  EXPECT_EQ(frame["rays_hit"], hits);
+  EXPECT_GT(hits, 500);
+  EXPECT_GT(frame["total_ms"], 0.0);
+  ASSERT_EQ(frame["passes"], frame["per_pass"].size());
+  json hit_sum = 0;
+  for (const json &pass : frame["per_pass"]) {
+    for (const char *field :
+         {"active_rays", "n_spec", "ray_block_pairs", "visible_blocks", "requested_blocks", "decoded_blocks",
+          "rays_hit", "utilization_percent", "completed_percent"}) {
+      ASSERT_TRUE(pass.contains(field)) << field;
+      EXPECT_TRUE(pass[field].is_number()) << field;
+    }
+    for (const char *stage : {"traverse", "request", "cache", "decode", "group", "intersect", "composite"}) {
+      EXPECT_TRUE(pass["stage_ms"].contains(stage)) << stage;
+    }
+    hit_sum = hit_sum.get<int>() + pass["rays_hit"].get<int>();
+  }
+  EXPECT_EQ(hit_sum, frame["rays_hit"]);
+  EXPECT_EQ(frame["per_pass"].back()["completed_percent"], 100.0);
+  EXPECT_EQ(stats["volume"]["dims"], (std::array{41, 41, 41}));
+  EXPECT_EQ(stats["volume"]["rate"], 8.0);
+  EXPECT_EQ(stats["options"]["size"], (std::array{64, 48}));
+  EXPECT_EQ(stats["options"]["max_speculation"], 2);
+  EXPECT_EQ(stats["options"]["cache_slots"], 11 * 11 * 11);
+  EXPECT_FALSE(stats["device"]["name"].get<std::string>().empty());
+  std::uint64_t bytes = 0;
+  for (const json &entry : stats["memory"]["by_name"]) bytes += entry["current"].get<std::uint64_t>();
+  EXPECT_EQ(bytes, stats["memory"]["current"]);
+  EXPECT_GE(stats["memory"]["peak"], stats["memory"]["current"]);
+
+  // The last pass' picture is the picture.
+  std::set<std::string> passes;
+  for (std::size_t i = 1; i <= frame["passes"]; ++i) passes.insert(fmt::format("pass{:04}.png", i));
+  EXPECT_EQ(names_in(folder / "passes"), passes);
+  EXPECT_EQ(test::read_file(folder / "passes" / *passes.rbegin()), test::read_file(folder / "a.png"));
+  EXPECT_NE(test::read_file(folder / "passes" / *passes.begin()), test::read_file(folder / "a.png"));
+}
+
+TEST(CliRender, ReferenceIsTheSamePicture) {
+  const TemporaryFolder folder;
+  const auto outputs = [&](const std::string &name) {
+    return " -i 60 -i 150 --orbit 2 --size 48x40 --spacing 1 2 1 --rate 3 --color '#4080C0' -o " +
+           quoted(folder / (name + ".png")) + " --depth " + quoted(folder / (name + ".npy")) + " --stats " +
+           quoted(folder / (name + ".json"));
+  };
+  render(kNucleon + outputs("device") + " --speculation off --cache-slots 300 --no-stage-times");
+  const auto reference = render(kNucleon + outputs("twin") + " --reference");
+  EXPECT_EQ(reference.out.find("device"), std::string::npos) << reference.out;
+  for (const char *frame : {"_iso60_view0", "_iso60_view1", "_iso150_view0", "_iso150_view1"}) {
+    for (const char *extension : {".png", ".npy"}) {
+      const auto compare =
+          run_isowave("compare --exact " + quoted(folder / (fmt::format("device{}{}", frame, extension))) +
+                      " " + quoted(folder / (fmt::format("twin{}{}", frame, extension))));
+      EXPECT_EQ(compare.status, 0) << frame << extension << "\n" << compare.out << compare.err;
+      EXPECT_NE(compare.out.find("equal"), std::string::npos) << compare.out;
+    }
+  }
+  const auto compare = run_isowave("compare --exact " + quoted(folder / "device_iso60_view0.npy") + " " +
+                                   quoted(folder / "twin_iso60_view1.npy"));
+  EXPECT_EQ(compare.status, 1);
+
+  const json stats = json::parse(test::read_file(folder / "device.json"));
+  ASSERT_EQ(stats["frames"].size(), 4u);
+  std::size_t i = 0;
+  for (const int isovalue : {60, 150}) {  // all views of each isovalue in turn
+    for (const int view : {0, 1}) {
+      EXPECT_EQ(stats["frames"][i]["isovalue"], isovalue);
+      EXPECT_EQ(stats["frames"][i++]["view"], view);
+    }
+  }
+  for (const json &pass : stats["frames"][0]["per_pass"]) {
+    EXPECT_LE(pass["n_spec"], 1);
+    EXPECT_FALSE(pass.contains("stage_ms"));
+  }
+  const json twin = json::parse(test::read_file(folder / "twin.json"));
+  EXPECT_TRUE(twin["options"]["reference"]);
+  for (std::size_t frame = 0; frame < 4; ++frame)
+    EXPECT_EQ(twin["frames"][frame]["rays_hit"], stats["frames"][frame]["rays_hit"]);
+}
+
+TEST(CliRender, CameraFileGivesViewsAndSize) {
+  const TemporaryFolder folder;
+  write_file(folder / "c.json", camera_file());
+  const std::string cameras = " --cameras " + quoted(folder / "c.json") + " -i 80 ";
+  render(kNucleon + cameras + "--depth " + quoted(folder / "a.npy"));
+  const FloatImage first = read_npy(folder / "a_iso80_view0.npy");
+  EXPECT_EQ(first.width, 40u);
+  EXPECT_EQ(first.height, 30u);
+  EXPECT_NE(first.pixels, read_npy(folder / "a_iso80_view1.npy").pixels);
+  render(kNucleon + cameras + "--size 20x10 --depth " + quoted(folder / "b.npy"));  // the option wins
+  EXPECT_EQ(read_npy(folder / "b_iso80_view1.npy").width, 20u);
+}
+
+TEST(CliRender, ZfpFilesAndCompressionOnTheFlyAreTheSame) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 5 -o " + quoted(folder / "n.zfp")).status, 0);
+  render(quoted(folder / "n.zfp") + " -i 80 --size 32x32 --depth " + quoted(folder / "a.npy"));
+  render(kNucleon + " --rate 5 -i 80 --size 32x32 --depth " + quoted(folder / "b.npy"));
+  render(kNucleon + " --rate 4 -i 80 --size 32x32 --depth " + quoted(folder / "c.npy"));
+  EXPECT_EQ(test::read_file(folder / "a.npy"), test::read_file(folder / "b.npy"));
+  EXPECT_NE(test::read_file(folder / "a.npy"), test::read_file(folder / "c.npy"));
+}
+
+TEST(CliRender, NegativeAndFractionalIsovalues) {
+  const TemporaryFolder folder;
+  std::vector<float> ramp(512);
+  for (std::size_t i = 0; i < ramp.size(); ++i) ramp[i] = float(i % 8) - 4.0f;
+  write_file(folder / "r_8x8x8_float32.raw", ramp);
+  const auto run =
+      render(quoted(folder / "r_8x8x8_float32.raw") +
+             " --isovalue -1.5 -i -2e-1 -i=-3 --size 24x16 --rate 16 --depth " + quoted(folder / "a.npy"));
+  EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"r_8x8x8_float32.raw", "a_iso-1.5_view0.npy",
+                                                            "a_iso-0.2_view0.npy", "a_iso-3_view0.npy"}));
+  EXPECT_EQ(run.out.find(": 0 rays hit"), std::string::npos) << run.out;
+}
+
+TEST(CliRender, NothingHitIsABackgroundPicture) {
+  const TemporaryFolder folder;
+  render(kGyroid + " -i 1e9 --size 16x8 --background '#102030' -o " + quoted(folder / "a.png"));
+  const Image8 picture = read_png(folder / "a.png");
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i)
+    ASSERT_EQ(picture.pixels[i], 0x10 * (i % picture.channels + 1));
+}
+
+/// Status 1, one line on stderr that begins with `isowave:` and says `text`.
+void expect_refused(const std::string &arguments, std::string_view text) {
+  SCOPED_TRACE("render " + arguments);
+  const auto result = run_isowave("render " + arguments);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_TRUE(result.err.starts_with("isowave: ")) << result.err;
+  EXPECT_TRUE(result.err.ends_with('\n')) << result.err;
+  EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+  EXPECT_EQ(result.out.find("rays hit"), std::string::npos) << "refused before any work: " << result.out;
+}
+
+TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
+  const TemporaryFolder out;
+  const std::string good = kGyroid + " -i 128 --size 16x8 ";
+  const std::string to = " -o " + quoted(out / "a.png") + " --depth " + quoted(out / "a.npy") + " --stats " +
+                         quoted(out / "a.json");
+  expect_refused(good + "--device nosuchdevice" + to, "nosuchdevice");
+  expect_refused(good + "--device 99" + to, "99");
+  expect_refused(quoted(out / "missing.raw") + " -i 1" + to, "no such file");
+  expect_refused(quoted(out / "missing.zfp") + " -i 1" + to, "missing.zfp");
+  expect_refused(kGyroid + " -i abc --size 16x8" + to, "isovalue");
+  expect_refused(kGyroid + " -i nan --size 16x8" + to, "isovalue");
+  expect_refused(kGyroid + " --size 16x8" + to, "isovalue");
+  expect_refused("-i 128" + to, "VOLUME");
+  for (const char *size :
+       {"0x0", "0x8", "16x0", "16", "x", "16x8x4", "-16x8", "16X8", "99999999999x8", "''", "40000x40000"}) {
+    expect_refused(kGyroid + " -i 128 --size=" + size + to, "pixels");
+  }
+  expect_refused(good + "--cache-slots 7" + to, "cache-slots");
+  expect_refused(good + "--cache-slots -1" + to, "cache-slots");
+  expect_refused(good + "--max-speculation 0" + to, "1 to 64");
+  expect_refused(good + "--max-speculation 65" + to, "1 to 64");
+  expect_refused(good + "--speculation often" + to, "speculation");
+  expect_refused(good + "--group-size 48" + to, "48");
+  expect_refused(good + "--orbit 0" + to, "orbit");
+  expect_refused(good + "--orbit 2 --cameras x.json" + to, "orbit");
+  expect_refused(good + "--rate 0" + to, "1 to 32");
+  expect_refused(good + "--rate 33" + to, "1 to 32");
+  expect_refused(good + "--spacing 0" + to, "spacing");
+  expect_refused(good + "--color red" + to, "#RRGGBB");
+  expect_refused(good + "--background '#12345g'" + to, "#RRGGBB");
+  expect_refused(good + "--nonsense" + to, "nonsense");
+  expect_refused(good + "--reference --progress-dir " + quoted(out / "p") + to, "--progress-dir");
+  EXPECT_EQ(out.num_files(), 0u);
+}
+
+TEST(CliRender, BadCameraFilesAreOneLine) {
+  const TemporaryFolder folder;
+  const TemporaryFolder out;
+  const auto with = [&](const std::string &text) {
+    write_file(folder / "c.json", text);
+    return kNucleon + " -i 80 --cameras " + quoted(folder / "c.json") + " -o " + quoted(out / "a.png");
+  };
+  expect_refused(with(camera_file("[41,41,42]")), "41x41x42");
+  expect_refused(with(camera_file()) + " --spacing 1 1 2", "spacing");
+  expect_refused(with("{"), "c.json");
+  expect_refused(with(R"({"fovy_deg":60,"cameras":[]})"), "cameras");
+  expect_refused(with(R"({"fovy_deg":60,"cameras":[{"eye":[0,0,0],"at":[0,0,0],"up":[0,1,0]}]})"),
+                 "camera 0");
+  expect_refused(with(R"({"fovy_deg":60,"cameras":[{"eye":[1e9,0,0],"at":[0,0,0],"up":[0,1,0]}]})"), "eye");
+  expect_refused(kNucleon + " -i 80 --cameras " + quoted(folder / "none.json"), "none.json");
+  EXPECT_EQ(out.num_files(), 0u);
+}
+
+TEST(CliRender, UnwritableOutputsAreOneLine) {
+  const TemporaryFolder folder;
+  const std::string good = kGyroid + " -i 128 --size 16x8 ";
+  for (const char *option : {"-o", "--depth", "--stats"}) {
+    expect_refused(good + option + " " + quoted(folder / "missing" / "a.x"), "cannot write");
+    expect_refused(good + option + " " + quoted(folder.path()), "cannot write");
+  }
+  write_file(folder / "file", std::string_view("old"));
+  expect_refused(good + "--progress-dir " + quoted(folder / "file"), "cannot make the folder");
+  EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"file"}));
+  EXPECT_EQ(test::read_file(folder / "file"), "old");
+}
+
+}  // namespace
+}  // namespace isowave

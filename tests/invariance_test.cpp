@@ -1,0 +1,326 @@
+// What must not change the picture: speculation, cache size, work-group size, what was drawn before, and who
+// watches. And what the counts of a frame's passes must say of each other.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "core/renderer.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+using test::expect_same_hits;
+using test::TestVolume;
+using test::twin_hits;
+
+/// Sheets at several depths, so that rays go on behind a miss; 9x10x11 has 27 blocks.
+TestVolume small_volume() {
+  return TestVolume({9, 10, 11}, test::noise_field(21), 8);
+}
+TestVolume medium_volume() {
+  return TestVolume({30, 27, 33}, test::gyroid_field(10), 8);
+}
+
+constexpr ImageSize kTiny{8, 6}, kSmall{12, 8}, kMedium{80, 54};
+constexpr float kIsovalue = 0.8f;  // both fields: many candidate blocks that rays only graze
+
+class InvarianceOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  /// Draws the default view with fresh options; it must be the twin's.
+  FrameStats check(const TestVolume &volume, const RendererOptions &options) {
+    const Camera camera = orbit_cameras(volume.info(), 1)[0];
+    Renderer renderer(device_, volume.compressed, options);
+    const FrameStats stats = renderer.render(camera, kIsovalue);
+    expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue), options.size.width);
+    expect_consistent(stats, renderer.options());
+    return stats;
+  }
+
+  /// The relations between the counts of one frame.
+  static void expect_consistent(const FrameStats &stats, const RendererOptions &options) {
+    const std::uint64_t pixels = options.size.num_pixels();
+    ASSERT_FALSE(stats.passes.empty());
+    std::uint64_t hits = 0;
+    for (std::size_t i = 0; i < stats.passes.size(); ++i) {
+      SCOPED_TRACE(fmt::format("pass {}", i));
+      const PassStats &pass = stats.passes[i];
+      const PassCounts &c = pass.counts;
+      EXPECT_EQ(c.pixel_count, pixels);
+      EXPECT_LE(c.active_count, pixels);
+      if (c.active_count != 0) {
+        EXPECT_EQ(c.spec_count, std::min<std::uint64_t>(options.max_speculation, pixels / c.active_count));
+      }
+      EXPECT_EQ(c.pair_slot_count, c.active_count * c.spec_count);
+      EXPECT_LE(c.pair_slot_count, pixels);
+      EXPECT_LE(c.pair_count, c.pair_slot_count);
+      EXPECT_LE(c.granted_count, c.pair_count);
+      EXPECT_LE(c.visible_count, c.granted_count);
+      EXPECT_LE(c.visible_count, options.cache_slots);
+      EXPECT_EQ(c.visible_count == 0, c.granted_count == 0);
+      EXPECT_LE(c.decoded_count, c.requested_count);
+      EXPECT_LE(c.decoded_count, options.cache_slots);
+      EXPECT_LE(c.requested_count, 8 * c.pair_count);
+      EXPECT_LE(c.hit_count, c.granted_count);
+      EXPECT_LE(c.next_active_count + c.hit_count, c.active_count);
+      if (i != 0) {
+        EXPECT_EQ(c.active_count, stats.passes[i - 1].counts.next_active_count);
+        EXPECT_EQ(c.pass, stats.passes[i - 1].counts.pass + 1);
+      }
+      EXPECT_DOUBLE_EQ(pass.utilization_percent, 100.0 * c.granted_count / double(pixels));
+      EXPECT_DOUBLE_EQ(pass.completed_percent, 100.0 * double(pixels - c.next_active_count) / double(pixels));
+      hits += c.hit_count;
+    }
+    EXPECT_EQ(hits, stats.rays_hit);
+    EXPECT_EQ(stats.passes.back().counts.next_active_count == 0, !stats.cancelled);
+  }
+
+  static std::uint64_t total(const FrameStats &stats, uint PassCounts::*count) {
+    return std::accumulate(
+        stats.passes.begin(), stats.passes.end(), std::uint64_t{0},
+        [&](std::uint64_t sum, const PassStats &pass) { return sum + pass.counts.*count; });
+  }
+
+  ocl::Device device_{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, InvarianceOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+// ---- speculation
+
+TEST_P(InvarianceOnDevice, SmallSpeculationLimits) {
+  const TestVolume volume = small_volume();
+  for (const std::uint32_t limit : {1u, 2u, 64u}) {
+    SCOPED_TRACE(limit);
+    check(volume, {.size = kSmall, .max_speculation = limit});
+  }
+}
+
+TEST_P(InvarianceOnDevice, SpeculationNeverNeedsMorePasses) {
+  const TestVolume volume = medium_volume();
+  std::vector<std::size_t> num_passes;
+  for (const std::uint32_t limit : {1u, 2u, 3u, 7u, 16u, 33u, 64u}) {
+    SCOPED_TRACE(limit);
+    const FrameStats stats = check(volume, {.size = kMedium, .max_speculation = limit});
+    for (const PassStats &pass : stats.passes) {  // an ample cache: nobody waits
+      EXPECT_EQ(pass.counts.granted_count, pass.counts.pair_count);
+      EXPECT_EQ(pass.counts.decoded_count, pass.counts.requested_count);
+    }
+    num_passes.push_back(stats.passes.size());
+  }
+  EXPECT_TRUE(std::is_sorted(num_passes.rbegin(), num_passes.rend())) << testing::PrintToString(num_passes);
+  EXPECT_GT(num_passes.front(), 2 * num_passes.back()) << "else this scene tests nothing";
+}
+
+// ---- cache size
+
+/// One dual grid for all rays: the first pass asks for far more, and yet every pass takes the first ray on.
+TEST_P(InvarianceOnDevice, SmallestCacheOfEightSlots) {
+  const TestVolume volume = small_volume();
+  const FrameStats ample = check(volume, {.size = kTiny, .max_speculation = 1});
+  const std::uint64_t bound = total(ample, &PassCounts::pair_count) + ample.passes[0].counts.active_count;
+  for (const std::uint32_t limit : {1u, 64u}) {
+    SCOPED_TRACE(limit);
+    const FrameStats stats = check(volume, {.size = kTiny, .cache_slots = 8, .max_speculation = limit});
+    EXPECT_GT(stats.passes[0].counts.requested_count, 8u) << "else this scene tests nothing";
+    EXPECT_LE(stats.passes.size(), bound) << "a candidate pair or a ray's end in every pass";
+    for (const PassStats &pass : stats.passes) {
+      EXPECT_TRUE(pass.counts.granted_count > 0 || pass.counts.next_active_count < pass.counts.active_count);
+    }
+  }
+}
+
+TEST_P(InvarianceOnDevice, CacheSizes) {
+  const TestVolume volume = medium_volume();
+  const std::uint32_t blocks = std::uint32_t(volume.compressed.block_count());
+  for (const std::uint32_t slots : {16u, 64u, 200u, blocks, 4 * blocks}) {
+    SCOPED_TRACE(fmt::format("{} slots", slots));
+    const ImageSize size = slots < 64 ? ImageSize{20, 14} : kMedium;
+    const FrameStats stats = check(volume, {.size = size, .cache_slots = slots});
+    const bool waited = total(stats, &PassCounts::requested_count) > total(stats, &PassCounts::decoded_count);
+    EXPECT_EQ(waited, slots < blocks) << "else this scene tests nothing";
+  }
+}
+
+/// Slots are taken over and over; every block that comes back must be decoded again, to its own values.
+TEST_P(InvarianceOnDevice, ManyViewsThroughASmallCache) {
+  const TestVolume volume = medium_volume();
+  constexpr ImageSize size{24, 16};
+  for (const std::uint32_t slots : {9u, 13u, 31u}) {
+    SCOPED_TRACE(fmt::format("{} slots", slots));
+    Renderer renderer(device_, volume.compressed, {.size = size, .cache_slots = slots});
+    for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
+      expect_consistent(renderer.render(camera, kIsovalue), renderer.options());
+      expect_same_hits(renderer.hits(), twin_hits(volume, camera, size, kIsovalue), size.width);
+    }
+  }
+}
+
+// ---- work-groups
+
+TEST_P(InvarianceOnDevice, SmallWorkGroups) {
+  const TestVolume volume = small_volume();
+  for (const std::uint32_t group : {8u, 128u}) {
+    if (group > device_.capabilities().max_work_group_size) continue;
+    SCOPED_TRACE(group);
+    check(volume, {.size = kSmall, .group_size = group});
+  }
+}
+
+TEST_P(InvarianceOnDevice, WorkGroupSizes) {
+  const TestVolume volume = medium_volume();
+  for (const std::uint32_t group : {8u, 16u, 32u, 64u, 128u, 256u}) {
+    if (group > device_.capabilities().max_work_group_size) continue;
+    SCOPED_TRACE(group);
+    check(volume, {.size = kMedium, .group_size = group});
+    check(volume, {.size = {20, 14}, .cache_slots = 40, .max_speculation = 7, .group_size = group});
+  }
+}
+
+TEST_P(InvarianceOnDevice, ImageShapes) {
+  const TestVolume volume = medium_volume();
+  for (const ImageSize size : {ImageSize{1, 1}, {1, 97}, {513, 1}, {63, 65}, {7, 3}}) {
+    SCOPED_TRACE(fmt::format("{}x{}", size.width, size.height));
+    check(volume, {.size = size});
+  }
+}
+
+// ---- one renderer, many frames
+
+TEST_P(InvarianceOnDevice, SmallWarmCacheDecodesNothing) {
+  const TestVolume volume = small_volume();
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  Renderer renderer(device_, volume.compressed, {.size = kSmall});
+  const FrameStats cold = renderer.render(camera, kIsovalue);
+  const auto hits = renderer.hits();
+  const FrameStats warm = renderer.render(camera, kIsovalue);
+  expect_same_hits(renderer.hits(), hits, kSmall.width);
+  EXPECT_GT(total(cold, &PassCounts::decoded_count), 0u);
+  EXPECT_EQ(total(warm, &PassCounts::requested_count), 0u);
+  EXPECT_EQ(total(warm, &PassCounts::pair_count), total(cold, &PassCounts::pair_count));
+  EXPECT_EQ(warm.passes.size(), cold.passes.size());
+}
+
+TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
+  const TestVolume volume = medium_volume();
+  const auto cameras = orbit_cameras(volume.info(), 3);
+  const std::vector<float> isovalues{0.8f, -0.3f, 5.0f};  // 5: nothing to hit
+  struct Frame {
+    std::size_t view, iso;
+  };
+  std::vector<Frame> frames;
+  for (std::size_t view = 0; view < cameras.size(); ++view) {
+    for (std::size_t iso = 0; iso < isovalues.size(); ++iso) frames.push_back({view, iso});
+  }
+  constexpr std::uint32_t kSeed = 5;
+  std::mt19937 random(kSeed);
+  SCOPED_TRACE(fmt::format("seed {}", kSeed));
+  for (const std::uint32_t slots : {0u, 150u}) {
+    Renderer renderer(device_, volume.compressed, {.size = kMedium, .cache_slots = slots});
+    std::shuffle(frames.begin(), frames.end(), random);
+    for (const Frame &frame : frames) {
+      SCOPED_TRACE(fmt::format("{} slots, isovalue {}, view {}", slots, isovalues[frame.iso], frame.view));
+      expect_consistent(renderer.render(cameras[frame.view], isovalues[frame.iso]), renderer.options());
+      expect_same_hits(renderer.hits(), twin_hits(volume, cameras[frame.view], kMedium, isovalues[frame.iso]),
+                       kMedium.width);
+    }
+  }
+}
+
+TEST_P(InvarianceOnDevice, SmallMemoryIsFixedBeforeTheFirstFrame) {
+  const TestVolume volume = small_volume();
+  Renderer renderer(device_, volume.compressed, {.size = kSmall, .cache_slots = 12});
+  const ocl::MemoryLedger &ledger = device_.ledger();
+  const std::uint64_t current = ledger.current(), peak = ledger.peak();
+  EXPECT_GT(current, 0u);
+  for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
+    renderer.render(camera, kIsovalue, [&](const PassStats &) {
+      EXPECT_EQ(ledger.current(), current);
+      return true;
+    });
+    renderer.shade();
+  }
+  EXPECT_EQ(ledger.current(), current);
+  EXPECT_EQ(ledger.peak(), peak);
+  std::uint64_t sum = 0;
+  for (const auto &[name, entry] : ledger.by_name()) {
+    EXPECT_FALSE(name.empty());
+    EXPECT_LE(entry.current, entry.peak) << name;
+    sum += entry.current;
+  }
+  EXPECT_EQ(sum, current);
+  EXPECT_EQ(ledger.by_name().at("block cache").current, 12u * 256);
+}
+
+// ---- watching and cancelling
+
+TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
+  const TestVolume volume = medium_volume();
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  const auto expected = twin_hits(volume, camera, kMedium, kIsovalue);
+  for (const std::uint32_t slots : {0u, 100u}) {
+    SCOPED_TRACE(fmt::format("{} slots", slots));
+    Renderer renderer(device_, volume.compressed,
+                      {.size = kMedium, .cache_slots = slots, .max_speculation = 4});
+    std::uint64_t found = 0;
+    std::size_t calls = 0;
+    const FrameStats stats = renderer.render(camera, kIsovalue, [&](const PassStats &pass) {
+      ++calls;
+      found += pass.counts.hit_count;
+      const auto hits = renderer.hits();
+      EXPECT_EQ(test::num_hits(hits), found);
+      for (std::size_t i = 0; i < hits.size(); ++i) {  // a hit, once found, is final
+        if (std::isfinite(hits[i].t)) {
+          EXPECT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(HitRecord)), 0) << "pixel " << i;
+        }
+      }
+      return true;
+    });
+    EXPECT_FALSE(stats.cancelled);
+    EXPECT_EQ(calls, stats.passes.size());
+    EXPECT_GT(calls, 3u) << "else this scene tests nothing";
+    expect_same_hits(renderer.hits(), expected, kMedium.width);
+  }
+}
+
+TEST_P(InvarianceOnDevice, SmallCancelledFrameLeavesNoTrace) {
+  const TestVolume volume = small_volume();
+  const auto cameras = orbit_cameras(volume.info(), 2);
+  Renderer renderer(device_, volume.compressed, {.size = kSmall, .cache_slots = 16, .max_speculation = 2});
+  for (const std::size_t stop_after : {1u, 2u, 3u}) {
+    SCOPED_TRACE(stop_after);
+    std::size_t calls = 0;
+    const FrameStats cancelled =
+        renderer.render(cameras[0], kIsovalue, [&](const PassStats &) { return ++calls < stop_after; });
+    EXPECT_TRUE(cancelled.cancelled);
+    EXPECT_EQ(cancelled.passes.size(), stop_after);
+    EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u) << "else there was nothing to cancel";
+    EXPECT_EQ(test::num_hits(renderer.hits()), cancelled.rays_hit);
+    expect_consistent(cancelled, renderer.options());
+    const FrameStats next = renderer.render(cameras[1], kIsovalue);
+    expect_consistent(next, renderer.options());
+    expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kSmall, kIsovalue), kSmall.width);
+  }
+}
+
+/// With profiling every stage is timed and the host waits after each pass: the same bits.
+TEST_P(InvarianceOnDevice, SmallProfilingChangesNothing) {
+  const TestVolume volume = small_volume();
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  ocl::Device device(GetParam(), true);
+  Renderer renderer(device, volume.compressed, {.size = kSmall});
+  const FrameStats stats = renderer.render(camera, kIsovalue);
+  expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
+  expect_consistent(stats, renderer.options());
+  for (const PassStats &pass : stats.passes) {
+    for (const char *stage : {"traverse", "request", "cache", "decode", "group", "intersect", "composite"}) {
+      EXPECT_TRUE(pass.stage_ms.contains(stage)) << stage;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,311 @@
+// Whole frames on every device: the hit buffer must equal the twin's bit for bit, whatever is drawn.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "core/error.hpp"
+#include "core/renderer.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+using test::camera_along;
+using test::expect_same_hits;
+using test::TestVolume;
+using test::twin_hits;
+
+class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  /// Draws all isovalues from all cameras with one renderer. Returns the number of hits.
+  std::uint64_t check(const TestVolume &volume, const std::vector<Camera> &cameras,
+                      const std::vector<float> &isovalues, ImageSize size, RendererOptions options = {}) {
+    std::uint64_t hits = 0;
+    options.size = size;
+    Renderer renderer(device_, volume.compressed, options);
+    for (const float isovalue : isovalues) {
+      for (std::size_t view = 0; view < cameras.size(); ++view) {
+        SCOPED_TRACE(fmt::format("isovalue {}, view {}", isovalue, view));
+        const FrameStats stats = renderer.render(cameras[view], isovalue);
+        const auto expected = twin_hits(volume, cameras[view], size, isovalue);
+        expect_same_hits(renderer.hits(), expected, size.width);
+        EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
+        hits += stats.rays_hit;
+      }
+    }
+    return hits;
+  }
+  std::uint64_t check(const TestVolume &volume, const std::vector<float> &isovalues, ImageSize size) {
+    return check(volume, orbit_cameras(volume.info(), 2), isovalues, size);
+  }
+
+  ocl::Device device_{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, RenderOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+
+constexpr ImageSize kSmall{12, 8};
+constexpr ImageSize kMedium{96, 64};
+
+TestVolume read_volume(const char *name, std::uint32_t rate) {
+  const auto reader = open_volume(std::string(ISOWAVE_TEST_DATA "/") + name);
+  return TestVolume(*reader, rate);
+}
+
+// ---- small enough for Oclgrind
+
+TEST_P(RenderOnDevice, SmallSphere) {
+  const glm::uvec3 dims(9, 10, 11);
+  EXPECT_GT(check(TestVolume(dims, test::sphere_field(dims)), {0.5f}, kSmall), 20u);
+}
+
+TEST_P(RenderOnDevice, SmallNoiseManyCandidates) {
+  EXPECT_GT(check(TestVolume({9, 10, 11}, test::noise_field(3), 4), {0.9f}, kSmall), 20u);
+}
+
+TEST_P(RenderOnDevice, SmallOneCellOneBlockAndThinVolumes) {
+  for (const glm::uvec3 dims : {glm::uvec3(2, 2, 2), {4, 4, 4}, {5, 2, 9}, {2, 13, 6}}) {
+    SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
+    const TestVolume volume(dims, test::noise_field(4), 16);
+    EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, kSmall), 5u);
+  }
+}
+
+TEST_P(RenderOnDevice, SmallEyeInside) {
+  const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
+  EXPECT_GT(check(volume, {camera_along({4, 4.5, 5}, {1, 0.25, -0.5})}, {0.1f}, kSmall), 20u);
+}
+
+TEST_P(RenderOnDevice, SmallNothingToHit) {
+  const glm::uvec3 dims(9, 10, 11);
+  const TestVolume volume(dims, test::sphere_field(dims));
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  EXPECT_EQ(check(volume, {camera}, {-5.0f, 5.0f}, kSmall), 0u);  // no block holds the isovalue
+  const Camera away = camera_along(camera.eye, camera.eye - camera.at);
+  EXPECT_EQ(check(volume, {away}, {0.5f}, kSmall), 0u);  // no ray meets the volume
+}
+
+TEST_P(RenderOnDevice, SmallShadedPictureIsTheTwins) {
+  const TestVolume volume(test::grid_info({9, 10, 11}, {1, 2, 0.5}),
+                          test::sample({9, 10, 11}, test::gyroid_field(7)), 8);
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  RendererOptions options;
+  options.size = kSmall;
+  Renderer renderer(device_, volume.compressed, options);
+  renderer.render(camera, 0.1f);
+  const FrameParams frame = make_frame_params(volume.info(), camera, kSmall, 0.1f);
+  for (const Appearance &appearance :
+       {Appearance{}, Appearance{{0.2f, 0.4f, 1.0f}, {0, 0, 0}, 0.0f, 1.0f, 2.0f}}) {
+    const Image8 expected =
+        shade_scalar(frame, make_shade_params(volume.info(), appearance), renderer.hits());
+    const Image8 got = renderer.shade(appearance);
+    EXPECT_EQ(got.width, kSmall.width);
+    EXPECT_EQ(got.height, kSmall.height);
+    EXPECT_EQ(got.pixels, expected.pixels);
+  }
+}
+
+// ---- real and synthetic volumes
+
+TEST_P(RenderOnDevice, Nucleon) {
+  const TestVolume volume = read_volume("nucleon_41x41x41_uint8.raw.gz", 8);
+  EXPECT_GT(check(volume, {20, 80, 128.5f, 200}, kMedium), 1000u);
+}
+
+TEST_P(RenderOnDevice, FuelAtLowRate) {
+  const TestVolume volume = read_volume("fuel_64x33x32_uint8.raw.gz", 2);
+  EXPECT_GT(check(volume, {1, 10, 70, 150}, kMedium), 1000u);
+}
+
+TEST_P(RenderOnDevice, SheetsAndNoiseAtEveryRate) {
+  for (const std::uint32_t rate : {1u, 4u, 32u}) {
+    SCOPED_TRACE(fmt::format("rate {}", rate));
+    EXPECT_GT(check(TestVolume({37, 30, 26}, test::gyroid_field(9), rate), {0.2f}, kMedium), 500u);
+    EXPECT_GT(check(TestVolume({19, 22, 17}, test::noise_field(rate), rate), {0.7f}, kMedium), 500u);
+  }
+}
+
+/// At low rates zfp turns flat steps into ripples: many values near, at and beyond the isovalue.
+TEST_P(RenderOnDevice, PlateausAtLowRates) {
+  for (const std::uint32_t rate : {1u, 2u, 4u, 16u}) {
+    SCOPED_TRACE(fmt::format("rate {}", rate));
+    check(TestVolume({33, 30, 26}, test::plateau_field(), rate), {51, 102, 76.5f}, kMedium);
+  }
+}
+
+TEST_P(RenderOnDevice, DimsNotMultiplesOfFour) {
+  for (const glm::uvec3 dims : {glm::uvec3(17, 18, 19), {16, 5, 33}, {21, 2, 22}, {2, 2, 40}}) {
+    SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
+    EXPECT_GT(check(TestVolume(dims, test::gyroid_field(8), 16), {-0.1f}, kMedium), 100u);
+  }
+}
+
+TEST_P(RenderOnDevice, SaddleAndAnisotropicSpacing) {
+  const glm::uvec3 dims(21, 18, 23);
+  const auto voxels =
+      test::sample(dims, [](const glm::dvec3 &p) { return (p.x - 9.5) * (p.y - 8.25) + 4 * (p.z - 11); });
+  for (const glm::dvec3 &spacing : {glm::dvec3(1), glm::dvec3(1, 1, 1000), glm::dvec3(1e-3, 5e-3, 2e-3)}) {
+    EXPECT_GT(check(TestVolume(test::grid_info(dims, spacing), voxels, 16), {0, 13.25f}, kMedium), 200u);
+  }
+}
+
+TEST_P(RenderOnDevice, ConstantVolumes) {
+  const TestVolume volume({9, 8, 5}, [](const glm::dvec3 &) { return 3.0; });
+  EXPECT_EQ(check(volume, {2.5f, volume.voxels[0], 3.5f}, kMedium), 0u);
+  const TestVolume zeros({9, 8, 5}, [](const glm::dvec3 &) { return 0.0; });
+  EXPECT_EQ(check(zeros, {-1, 0, 1}, kMedium), 0u);
+}
+
+/// Isovalues that are voxels: at block borders, the smallest and the largest of all, and just beside them.
+TEST_P(RenderOnDevice, IsovaluesExactlyAtVoxels) {
+  const TestVolume volume({13, 12, 10}, test::noise_field(11), 6);
+  const auto [low, high] = std::minmax_element(volume.voxels.begin(), volume.voxels.end());
+  std::vector<float> isovalues{*low,
+                               std::nextafter(*low, -INFINITY),
+                               std::nextafter(*low, INFINITY),
+                               *high,
+                               std::nextafter(*high, INFINITY),
+                               INFINITY,
+                               -INFINITY,
+                               volume.voxel(3, 4, 5),
+                               volume.voxel(4, 4, 4),
+                               volume.voxel(8, 7, 3)};
+  EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, isovalues, kMedium), 1000u);
+}
+
+TEST_P(RenderOnDevice, MoreDistinctValuesThanTheQuantileTableHolds) {
+  // One outlier stretches the range by 1e6; the surface lives in what is left.
+  const TestVolume volume(
+      {30, 31, 29},
+      [gyroid = test::gyroid_field(9)](const glm::dvec3 &p) {
+        return p == glm::dvec3(14, 15, 2) ? 1e6 : gyroid(p);
+      },
+      16);
+  EXPECT_GT(check(volume, {-1.2f, 0.0f, 1.3f, 5e5f}, kMedium), 1000u);
+}
+
+// ---- awkward rays
+
+TEST_P(RenderOnDevice, EyeInsideOnVoxelsAndOnPlanes) {
+  const TestVolume volume({22, 19, 25}, test::gyroid_field(11), 8);
+  std::vector<Camera> cameras;
+  for (const glm::dvec3 &eye :
+       {glm::dvec3(8.3, 7.1, 12.9), {8, 8, 12}, {8, 7.5, 12.5}, {0, 0, 0}, {21, 9, 24}}) {
+    cameras.push_back(camera_along(eye, {0.3, -0.2, 1}, {0, 1, 0}, 110));
+    cameras.push_back(camera_along(eye, {0, 0, -1}, {0, 1, 0}, 110));
+  }
+  EXPECT_GT(check(volume, cameras, {0.05f}, {61, 41}), 1000u);
+}
+
+/// Rays exactly along axes, in cell planes and block planes, through edges and the exact centre.
+TEST_P(RenderOnDevice, AxisParallelRays) {
+  const TestVolume volume({17, 16, 21}, test::gyroid_field(8), 8);
+  std::vector<Camera> cameras;
+  for (const glm::dvec3 &through :
+       {glm::dvec3(8, 7.5, 10), {8, 8, 8}, {7.5, 6.25, 9.5}, {0, 0, 0}, {16, 15, 20}}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double sign : {1.0, -1.0}) {
+        glm::dvec3 direction(0.0);
+        direction[axis] = sign;
+        const glm::dvec3 up = axis == 1 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+        cameras.push_back(camera_along(through - 30.0 * direction, direction, up, 40));
+      }
+    }
+  }
+  // Odd sizes have a middle column and row; even sizes straddle the planes.
+  EXPECT_GT(check(volume, cameras, {0.05f}, {33, 21}), 1000u);
+  EXPECT_GT(check(volume, {cameras[0], cameras[3], cameras[10]}, {0.05f}, {32, 22}), 100u);
+  EXPECT_GT(check(volume, cameras, {0.05f}, {1, 1}), 5u);
+}
+
+TEST_P(RenderOnDevice, DiagonalRaysThroughEdgesAndCorners) {
+  const TestVolume volume({17, 17, 17}, test::gyroid_field(8), 8);
+  std::vector<Camera> cameras;
+  for (const glm::dvec3 &direction : {glm::dvec3(1, 1, 1), {-1, 1, 1}, {1, 1, 0}, {0, -1, 1}, {-1, 0, -1}}) {
+    cameras.push_back(camera_along(glm::dvec3(8) - 20.0 * direction, direction, {0.1, 1.0, 0.3}, 40));
+  }
+  EXPECT_GT(check(volume, cameras, {0.05f}, {33, 33}), 1000u);
+}
+
+TEST_P(RenderOnDevice, FarCameras) {
+  const TestVolume volume({33, 34, 35}, test::gyroid_field(9), 8);
+  std::vector<Camera> cameras;
+  for (const double distance : {3000.0, 1e5, 5e6}) {
+    const glm::dvec3 direction = glm::normalize(glm::dvec3(1.0, 0.7, -1.3));
+    cameras.push_back(camera_along(glm::dvec3(16) - distance * direction, direction, {0, 1, 0},
+                                   glm::degrees(2 * std::atan(17.0 / distance))));
+  }
+  EXPECT_GT(check(volume, cameras, {0.05f}, kMedium), 1000u);
+}
+
+TEST_P(RenderOnDevice, FlippedAndTurnedAxes) {
+  const glm::uvec3 dims(18, 21, 15);
+  VolumeInfo info = test::grid_info(dims, {1.0, 0.5, 2.0});
+  info.origin = {-40, 7, 300};
+  info.direction = glm::dmat3{{0, -1, 0}, {0.8, 0, 0.6}, {0.6, 0, -0.8}};
+  EXPECT_GT(check(TestVolume(info, test::sample(dims, test::gyroid_field(8)), 8), {0.1f}, kMedium), 500u);
+}
+
+/// Values near the ends of what zfp holds: denormals and overflow must not tell devices apart.
+TEST_P(RenderOnDevice, TinyAndHugeValues) {
+  for (const int k : {-95, -60, 60, 120}) {
+    SCOPED_TRACE(fmt::format("times 2^{}", k));
+    const auto voxels = test::sample({11, 12, 10}, [k, noise = test::noise_field(5)](const glm::dvec3 &p) {
+      return std::ldexp(noise(p), k);
+    });
+    EXPECT_GT(check(TestVolume(test::grid_info({11, 12, 10}), voxels, 16), {std::ldexp(0.25f, k)}, kMedium),
+              500u);
+  }
+}
+
+// ---- refusals
+
+TEST_P(RenderOnDevice, BadOptionsAreErrors) {
+  const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
+  const auto refused = [&](RendererOptions options) {
+    EXPECT_THROW(Renderer(device_, volume.compressed, options), Error);
+  };
+  const RendererOptions good{.size = kSmall};
+  for (const std::uint32_t slots : {1u, 7u, 0x40000001u, 0xFFFFFFFFu}) {
+    RendererOptions options = good;
+    options.cache_slots = slots;
+    SCOPED_TRACE(fmt::format("{} slots", slots));
+    refused(options);
+  }
+  for (const std::uint32_t limit : {0u, 65u}) {
+    RendererOptions options = good;
+    options.max_speculation = limit;
+    SCOPED_TRACE(fmt::format("speculation {}", limit));
+    refused(options);
+  }
+  for (const std::uint32_t group : {0u, 1u, 4u, 48u, 512u, 0x80000000u}) {
+    RendererOptions options = good;
+    options.group_size = group;
+    SCOPED_TRACE(fmt::format("groups of {}", group));
+    refused(options);
+  }
+  for (const ImageSize size : {ImageSize{0, 8}, {8, 0}, {1u << 15, 1u << 14}, {0xFFFFFFFFu, 0xFFFFFFFFu}}) {
+    SCOPED_TRACE(fmt::format("{}x{}", size.width, size.height));
+    refused({.size = size});
+  }
+  EXPECT_EQ(device_.ledger().current(), 0u) << "nothing is left behind";
+}
+
+TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
+  const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  Renderer renderer(device_, volume.compressed, {.size = kSmall});
+  EXPECT_THROW(renderer.render(camera, NAN), Error);
+  for (const Camera &bad :
+       {Camera{camera.eye, camera.eye, camera.up}, Camera{camera.eye, camera.at, {0, 0, 0}},
+        Camera{camera.eye, camera.at, camera.at - camera.eye},
+        Camera{camera.eye, camera.at, camera.up, 180.0}, Camera{camera.eye, camera.at, camera.up, 0.0},
+        Camera{{NAN, 0, 0}, camera.at, camera.up}, Camera{{1e9, 0, 0}, camera.at, camera.up}}) {
+    EXPECT_THROW(renderer.render(bad, 0.1f), Error);
+  }
+  renderer.render(camera, 0.1f);
+  expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, 0.1f), kSmall.width);
+}
+
+}  // namespace
+}  // namespace isowave
