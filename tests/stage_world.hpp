@@ -39,10 +39,16 @@ struct StageWorld {
         cache(device, std::uint64_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z, num_slots,
               rays.num_pixels, group_size),
         compaction(device, rays.num_pixels, group_size) {
-    rays.frame.write({&frame, 1});
+    set_frame(frame_params);
     std::vector<uint> ids(rays.num_pixels);
     for (uint i = 0; i < ids.size(); ++i) ids[i] = i;
     set_active(ids);
+  }
+
+  /// Another camera or isovalue; image size and volume stay.
+  void set_frame(const FrameParams &frame_params) {
+    frame = frame_params;
+    rays.frame.write({&frame, 1});
   }
 
   PassCounts counts() const { return rays.counts.read().front(); }

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <vector>
 
 #include "core/initial_rays.hpp"
@@ -80,24 +79,34 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   using TraverseKernel = ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
                                      ocl::Out<uint>, ocl::Out<uint>>;
 
-  TraverseKernel make_kernel(uint group_size) {
-    return {device_, "traverse", "traverse", group_defines(group_size)};
-  }
+  /// The kernel itself, since masks that no isovalue makes are wanted.
+  struct Stages {
+    Stages(ocl::Device &device, std::uint64_t pixels, uint group_size)
+        : rays(device, pixels),
+          compaction(device, pixels, 8),
+          initial_rays(device, pixels),
+          range(ocl::Range::strided(pixels, group_size, device)),
+          kernel(device, "traverse", "traverse", group_defines(group_size)) {}
 
-  /// Passes of spec_count blocks until every ray has left the volume. Runs the kernel itself, since masks that
-  /// no isovalue makes are wanted.
-  BlockLists traverse_all(TraverseKernel &kernel, Wavefront &rays, const FrameParams &frame,
-                          const Selection &selected, uint spec_count, uint group_size) {
+    Wavefront rays;
+    Compaction compaction;
+    InitialRays initial_rays;
+    ocl::Range range;
+    TraverseKernel kernel;
+  };
+
+  /// Passes of spec_count blocks until every ray has left the volume.
+  BlockLists traverse_all(Stages &stages, const FrameParams &frame, const Selection &selected,
+                          uint spec_count) {
+    Wavefront &rays = stages.rays;
     const ocl::Buffer<uint> masks(device_, "masks", std::span<const uint>(masks_of(frame, selected)));
     const uint num_pixels = frame.width * frame.height;
     ocl::Buffer<uint> pairs(device_, "pairs", std::size_t{num_pixels} * spec_count);
-    InitialRays initial_rays(device_, num_pixels);
-    Compaction compaction(device_, num_pixels, 8);
     rays.frame.write({&frame, 1});
     PassCounts start{};
     start.pixel_count = num_pixels;
     rays.counts.write({&start, 1});
-    initial_rays(rays, compaction);
+    stages.initial_rays(rays, stages.compaction);
     std::vector<uint> active = rays.next_active_ray_ids.read();
     active.resize(rays.counts.read().front().next_active_count);
     BlockLists lists(num_pixels);
@@ -113,8 +122,8 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       counts.spec_count = spec_count;
       counts.pair_count = 0;
       rays.counts.write({&counts, 1});
-      kernel(ocl::Range::strided(num_pixels, group_size, device_), rays.frame, masks, rays.counts,
-             rays.active_ray_ids, rays.ray_block_ids, pairs);
+      stages.kernel(stages.range, rays.frame, masks, rays.counts, rays.active_ray_ids, rays.ray_block_ids,
+                    pairs);
       const std::vector<uint> got = pairs.read(), states = rays.ray_block_ids.read();
       counts.pair_count = collect(got, active, spec_count, lists);
       expect_counts(rays.counts, counts);
@@ -150,8 +159,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   void expect_walks(const glm::uvec3 &dims, const std::vector<CameraCase> &cameras, uint one_in,
                     std::initializer_list<uint> spec_counts, ImageSize size, uint group_size) {
-    TraverseKernel kernel = make_kernel(group_size);
-    Wavefront rays(device_, size.num_pixels());
+    Stages stages(device_, size.num_pixels(), group_size);
     for (const CameraCase &c : cameras) {
       const FrameParams frame = case_frame(dims, c, size);
       const Selection selected = random_selection(frame, one_in, 1);
@@ -160,7 +168,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         SCOPED_TRACE(
             fmt::format("{} x {} x {}, camera '{}', one block in {}, spec count {}, group size {}, seed 1",
                         dims.x, dims.y, dims.z, c.name, one_in, spec_count, group_size));
-        const BlockLists got = traverse_all(kernel, rays, frame, selected, spec_count, group_size);
+        const BlockLists got = traverse_all(stages, frame, selected, spec_count);
         ASSERT_EQ(first_difference(got, expected), kNoDifference) << "(a pixel)";
       }
       expect_crossed_blocks(frame, selected, expected, c.name);
