@@ -8,7 +8,7 @@ trap 'rm -rf "$folder"' EXIT
 unset ISOWAVE_DEVICE RUSTICL_ENABLE # Oclgrind's library takes the loader's place: it is the only device
 
 status=0
-oclgrind --data-races --uninitialized --max-errors 20 --log "$folder/oclgrind.log" "$@" || status=$?
+oclgrind --build-options -cl-opt-disable --data-races --uninitialized --max-errors 20 --log "$folder/oclgrind.log" "$@" || status=$?
 if [ -s "$folder/oclgrind.log" ]; then
   echo 'run_under_oclgrind: Oclgrind reports:' >&2
   cat "$folder/oclgrind.log" >&2
