@@ -33,8 +33,8 @@ struct Wavefront {
   ocl::Buffer<uint> active_ray_ids;       ///< [active_count] pixels of the rays at work, ascending (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
   ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
-  ocl::Buffer<uint> pair_block_ids;       ///< [active_count * spec_count] blocks asked for, in ray order
-  ocl::Buffer<PairHit> pair_hits;         ///< [active_count * spec_count] what intersection found
+  ocl::Buffer<uint> pair_block_ids;       ///< [window_count * spec_count] blocks asked for, in ray order
+  ocl::Buffer<PairHit> pair_hits;         ///< [window_count * spec_count] what intersection found
 };
 
 }  // namespace isowave

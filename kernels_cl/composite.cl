@@ -25,11 +25,12 @@ kernel void composite(constant FrameParams *frame, global PassCounts *counts,
                       global const float *cache_values, global uint *ray_block_ids, global HitRecord *hits,
                       global uint *ray_active_mask) {
   const LastPlanes last = last_planes(frame);
-  const uint active_count = counts->active_count, spec_count = counts->spec_count;
+  const uint active_count = counts->active_count, spec_count = counts->spec_count,
+             window = counts->window_count;
   for (uint a = get_global_id(0); a < active_count; a += get_global_size(0)) {
     const uint ray_id = active_ray_ids[a];
-    uint goes_on = ray_block_ids[ray_id] != ISO_INVALID_ID;
-    for (uint pair = a * spec_count; pair < (a + 1) * spec_count; ++pair) {
+    uint goes_on = ray_block_ids[ray_id] != ISO_INVALID_ID; /* also for rays outside the window: untouched */
+    for (uint pair = a * spec_count; a < window && pair < (a + 1) * spec_count; ++pair) {
       const uint block_id = pair_block_ids[pair];
       const PairHit pair_hit = pair_hits[pair];
       if (block_id == ISO_INVALID_ID) break;

@@ -87,7 +87,8 @@ typedef struct PassCounts {
   uint pass;               ///< number of the pass since the cache was made, from 1: the LRU's clock
   uint active_count;       ///< N_Act: rays at work at the start of the pass
   uint spec_count;         ///< N_Spec of the pass; 0 when no ray is active
-  uint pair_slot_count;    ///< active_count * spec_count: entries of the pair arrays in use
+  uint window_count;       ///< of the active rays, the first so many take part in the pass
+  uint pair_slot_count;    ///< window_count * spec_count: entries of the pair arrays in use
   uint pair_count;         ///< ray-block pairs made by traversal
   uint granted_count;      ///< of those, pairs whose dual grid was in the cache and were intersected
   uint visible_count;      ///< distinct blocks those belong to
@@ -96,7 +97,7 @@ typedef struct PassCounts {
   uint hit_count;          ///< rays that hit in this pass
   uint next_active_count;  ///< rays left for the next pass
 } PassCounts;
-ISO_CHECK_SIZE(PassCounts, 48);
+ISO_CHECK_SIZE(PassCounts, 52);
 
 ISO_NAMESPACE_END
 

@@ -14,8 +14,8 @@
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
 #define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)
 #define ISO_PASS_COUNTS_FIELDS(X)                                           \
-  X(pixel_count) X(pass) X(active_count) X(spec_count) X(pair_slot_count)   \
-  X(pair_count)                                                             \
+  X(pixel_count) X(pass) X(active_count) X(spec_count) X(window_count)      \
+  X(pair_slot_count) X(pair_count)                                          \
   X(granted_count) X(visible_count) X(requested_count) X(decoded_count)     \
   X(hit_count) X(next_active_count)
 

@@ -2,17 +2,25 @@
 #include "shared_types.h"
 
 /// Opens a pass: N_Spec = min(max_spec_count, floor(W H / N_Act)), counters at 0. One work-item.
+///
+/// Not in the paper: when a pass asked for more blocks than the cache could free, half as many rays take part in the next
+/// one; when it did not, a quarter more. Otherwise all rays would hold on to parts of their dual grids, none would
+/// get the rest, and only the ray that is served first would move.
 kernel void begin_pass(constant FrameParams *frame, global PassCounts *counts) {
   const uint active = counts->next_active_count;
-  uint spec = 0;
+  uint spec = 0, window = counts->window_count;
   if (active != 0) {
     spec = frame->width * frame->height / active;
     if (spec > frame->max_spec_count) spec = frame->max_spec_count;
   }
+  window = counts->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
+  if (window == 0) window = 1;
+  if (window > active) window = active;
   counts->pass += 1;
   counts->active_count = active;
   counts->spec_count = spec;
-  counts->pair_slot_count = active * spec;
+  counts->window_count = window;
+  counts->pair_slot_count = window * spec;
   counts->pair_count = 0;
   counts->granted_count = 0;
   counts->visible_count = 0;

@@ -57,19 +57,19 @@ inline uint find_blocks(constant FrameParams *frame, global const uint *macrocel
   return k;
 }
 
-/// pair_block_ids [active_count * spec_count]: entries a * spec_count + k, k ascending along the ray; ISO_INVALID_ID behind
+/// pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k ascending along the ray; ISO_INVALID_ID behind
 /// the last. ray_block_ids [pixel]: in, the block to go on from; out, the first block not yet looked at, or
 /// ISO_INVALID_ID when the ray has left the volume. macrocell_masks [2 * coarse cells]: bit x + 4y + 16z of a block in its
-/// coarse cell. Grid-stride over active rays.
+/// coarse cell. Grid-stride over the window.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse(
     constant FrameParams *frame, global const uint *macrocell_masks, global PassCounts *counts,
     global const uint *active_ray_ids, global uint *ray_block_ids, global uint *pair_block_ids) {
   local uint group_pairs;
-  const uint active_count = counts->active_count, spec_count = counts->spec_count;
+  const uint window = counts->window_count, spec_count = counts->spec_count;
   uint pairs = 0;
   if (get_local_id(0) == 0) group_pairs = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint a = get_global_id(0); a < active_count; a += get_global_size(0)) {
+  for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
     const uint ray_id = active_ray_ids[a];
     const Ray ray = make_ray(frame, ray_id);
     uint block_id = ray_block_ids[ray_id];

@@ -58,7 +58,9 @@ class InvarianceOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       if (c.active_count != 0) {
         EXPECT_EQ(c.spec_count, std::min<std::uint64_t>(options.max_speculation, pixels / c.active_count));
       }
-      EXPECT_EQ(c.pair_slot_count, c.active_count * c.spec_count);
+      EXPECT_LE(c.window_count, c.active_count);
+      EXPECT_EQ(c.window_count == 0, c.active_count == 0);
+      EXPECT_EQ(c.pair_slot_count, c.window_count * c.spec_count);
       EXPECT_LE(c.pair_slot_count, pixels);
       EXPECT_LE(c.pair_count, c.pair_slot_count);
       EXPECT_LE(c.granted_count, c.pair_count);

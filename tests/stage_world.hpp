@@ -66,6 +66,7 @@ struct StageWorld {
     counts.pixel_count = static_cast<uint>(rays.num_pixels);
     counts.pass = pass;
     counts.active_count = static_cast<uint>(pair_block_ids.size()) / spec_count;
+    counts.window_count = counts.active_count;
     counts.spec_count = spec_count;
     counts.pair_slot_count = static_cast<uint>(pair_block_ids.size());
     rays.counts.write({&counts, 1});

@@ -119,6 +119,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       rays.active_ray_ids.write(active);
       PassCounts counts = distinct_counts();
       counts.active_count = static_cast<uint>(active.size());
+      counts.window_count = counts.active_count;
       counts.spec_count = spec_count;
       counts.pair_count = 0;
       rays.counts.write({&counts, 1});
@@ -259,6 +260,7 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   rays.active_ray_ids.write(active);
   PassCounts counts{};
   counts.active_count = static_cast<uint>(active.size());
+  counts.window_count = counts.active_count;
   counts.spec_count = 1;
   rays.counts.write({&counts, 1});
   Traverse(device_, 40 * 30, 64)(macrocells, rays);
