@@ -6,6 +6,7 @@
 //   assign        slots for all of them, each taken from a block that was used in the pass before
 
 #include <algorithm>
+#include <utility>
 
 #include "bench/block_pairs.hpp"
 #include "core/block_cache.hpp"

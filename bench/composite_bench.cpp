@@ -1,7 +1,6 @@
 // The closest of each ray's results -> hits, and the next wavefront: composite.cl with its compaction.
 
 #include <cmath>
-#include <cstring>
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
@@ -36,7 +35,7 @@ struct CompositeInput : FrameRig {
     for (std::size_t pixel = 0; pixel < got.size(); ++pixel) {
       if (!std::isfinite(got[pixel].t)) continue;
       ++num_hits;
-      check(std::memcmp(&got[pixel], &expected[pixel], sizeof(HitRecord)) == 0, "hit of a pixel");
+      check(same_bits<HitRecord>({&got[pixel], 1}, {&expected[pixel], 1}), "hit of a pixel");
     }
     check(num_hits == counts.hit_count && num_hits > 0, "number of hits");
   }

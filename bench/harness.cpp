@@ -1,6 +1,5 @@
 #include "bench/harness.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <limits>
 #include <vector>

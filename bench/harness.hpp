@@ -11,11 +11,13 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <typeinfo>
 
@@ -93,6 +95,12 @@ T &input(const Args &...args) {
 
 /// Throws Error naming `what` unless it holds.
 void check(bool holds, const std::string &what);
+
+/// Whether both hold the same bytes: of floats, more than equality says.
+template <class T>
+bool same_bits(std::span<const T> a, std::span<const T> b) {
+  return std::ranges::equal(std::as_bytes(a), std::as_bytes(b));
+}
 
 /// What one run of a stage does.
 struct Work {

@@ -1,7 +1,5 @@
 // Camera -> rays and the first wavefront: initial_rays.cl.
 
-#include <algorithm>
-
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
 

@@ -14,13 +14,13 @@ namespace {
 constexpr std::uint32_t kBlocksX = 640, kBlocksY = 360;
 
 const CompressedVolume &slab() {
-  static const CompressedVolume volume = wavy_slab(kBlocksX, kBlocksY);
-  return volume;
+  static const CompressedVolume kVolume = wavy_slab(kBlocksX, kBlocksY);
+  return kVolume;
 }
 
 const std::vector<float> &slab_voxels() {
-  static const std::vector<float> voxels = decode_with_libzfp(slab());
-  return voxels;
+  static const std::vector<float> kVoxels = decode_with_libzfp(slab());
+  return kVoxels;
 }
 
 /// Far away, so that the rays are nearly parallel.

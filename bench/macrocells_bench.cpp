@@ -1,7 +1,6 @@
 // Block ranges and coarse macrocells of a volume, once per volume; the bits of an isovalue: macrocells.cl.
 
 #include <algorithm>
-#include <bit>
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"

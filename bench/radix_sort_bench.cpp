@@ -2,7 +2,6 @@
 // voxels.
 
 #include <algorithm>
-#include <utility>
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"

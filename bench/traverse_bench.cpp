@@ -1,8 +1,6 @@
 // Rays -> their next N_Spec blocks: traverse.cl. The first pass of a frame, with as many rays as give each
 // N_Spec.
 
-#include <bit>
-
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
 

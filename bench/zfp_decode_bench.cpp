@@ -1,7 +1,7 @@
 // Decoding listed blocks into cache slots: zfp_decode.cl, over rates and orders of the list.
 
 #include <algorithm>
-#include <cstring>
+#include <utility>
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
@@ -69,7 +69,7 @@ struct DecodeInput {
       for (std::size_t row = 0; row < 16; ++row) {
         const std::size_t voxel = 4 * x + kEdge * (4 * y + row % 4 + kEdge * (4 * z + row / 4));
         const std::size_t value = slot_ids[i] * std::size_t{ISO_BLOCK_VOXELS} + 4 * row;
-        check(std::memcmp(&expected[voxel], &got[value], 4 * sizeof(float)) == 0, "decoded values");
+        check(same_bits<float>({&expected[voxel], 4}, {&got[value], 4}), "decoded values");
       }
     }
   }

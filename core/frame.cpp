@@ -20,14 +20,18 @@ double largest_component(const glm::dvec3 &v) {
 
 }  // namespace
 
+void check_image_size(ImageSize size) {
+  constexpr std::uint64_t kMaxPixels = 1u << 28;
+  if (size.num_pixels() == 0 || size.num_pixels() > kMaxPixels) {
+    throw Error("an image of {} x {} pixels cannot be drawn: 1 to {} pixels can", size.width, size.height,
+                kMaxPixels);
+  }
+}
+
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue) {
   check_volume_info(info, "the volume");
   check_camera(camera, "the camera");
-  constexpr std::uint64_t kMaxPixels = 1u << 28;
-  if (size.num_pixels() == 0 || size.num_pixels() > kMaxPixels) {
-    throw Error("an image of {} x {} pixels cannot be drawn: 1 to {} pixels are", size.width, size.height,
-                kMaxPixels);
-  }
+  check_image_size(size);
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number in the volume's value range");
 
   const glm::dmat3 world_to_index = glm::inverse(info.index_to_world());

@@ -15,6 +15,9 @@ struct ImageSize {
   std::uint64_t num_pixels() const { return std::uint64_t(width) * height; }
 };
 
+/// Throws Error: an image of 0 or more than 2^28 pixels.
+void check_image_size(ImageSize size);
+
 /// Computes the camera basis once, in double, and maps it to index space. isovalue_index and max_spec_count
 /// are left for the renderer. Throws Error: a degenerate camera, an image of 0 or more than 2^28 pixels, a
 /// NaN isovalue.

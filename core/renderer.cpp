@@ -18,6 +18,7 @@ double ms_since(std::chrono::steady_clock::time_point begin) {
 
 RendererOptions checked(RendererOptions options, const CompressedVolume &volume, const ocl::Device &device) {
   check_volume_info(volume.info, "the volume");
+  check_image_size(options.size);
   if (volume.block_count() >= ISO_MAX_CACHE_SLOTS) {
     throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", volume.block_count(),
                 ISO_MAX_CACHE_SLOTS);

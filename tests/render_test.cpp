@@ -60,7 +60,7 @@ TEST_P(RenderOnDevice, SmallSphere) {
 }
 
 TEST_P(RenderOnDevice, SmallNoiseManyCandidates) {
-  EXPECT_GT(check(TestVolume({9, 10, 11}, test::noise_field(3), 4), {0.9f}, kSmall), 20u);
+  EXPECT_GT(check(TestVolume({9, 10, 11}, test::noise_field(3), 4), {0.6f}, kSmall), 20u);
 }
 
 TEST_P(RenderOnDevice, SmallOneCellOneBlockAndThinVolumes) {
@@ -136,7 +136,7 @@ TEST_P(RenderOnDevice, PlateausAtLowRates) {
 TEST_P(RenderOnDevice, DimsNotMultiplesOfFour) {
   for (const glm::uvec3 dims : {glm::uvec3(17, 18, 19), {16, 5, 33}, {21, 2, 22}, {2, 2, 40}}) {
     SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
-    EXPECT_GT(check(TestVolume(dims, test::gyroid_field(8), 16), {-0.1f}, kMedium), 100u);
+    EXPECT_GT(check(TestVolume(dims, test::gyroid_field(8), 16), {-0.1f}, kMedium), 50u);
   }
 }
 
@@ -145,7 +145,14 @@ TEST_P(RenderOnDevice, SaddleAndAnisotropicSpacing) {
   const auto voxels =
       test::sample(dims, [](const glm::dvec3 &p) { return (p.x - 9.5) * (p.y - 8.25) + 4 * (p.z - 11); });
   for (const glm::dvec3 &spacing : {glm::dvec3(1), glm::dvec3(1, 1, 1000), glm::dvec3(1e-3, 5e-3, 2e-3)}) {
-    EXPECT_GT(check(TestVolume(test::grid_info(dims, spacing), voxels, 16), {0, 13.25f}, kMedium), 200u);
+    const TestVolume volume(test::grid_info(dims, spacing), voxels, 16);
+    std::vector<Camera> cameras = orbit_cameras(volume.info(), 2);
+    // And one that sees the pillar of 1:1:1000 end on.
+    const glm::dvec3 extent = spacing * glm::dvec3(dims - 1u);
+    const glm::dvec3 eye = extent * glm::dvec3(0.6, 0.57, -0.3);
+    const double fovy = 2 * std::atan(std::max(extent.x, extent.y) / glm::length(0.5 * extent - eye));
+    cameras.push_back(camera_along(eye, 0.5 * extent - eye, {0, 1, 0}, glm::degrees(fovy)));
+    EXPECT_GT(check(volume, cameras, {0, 13.25f}, kMedium), 500u);
   }
 }
 
@@ -170,7 +177,7 @@ TEST_P(RenderOnDevice, IsovaluesExactlyAtVoxels) {
                                volume.voxel(3, 4, 5),
                                volume.voxel(4, 4, 4),
                                volume.voxel(8, 7, 3)};
-  EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, isovalues, kMedium), 1000u);
+  EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, isovalues, kMedium), 50u);
 }
 
 TEST_P(RenderOnDevice, MoreDistinctValuesThanTheQuantileTableHolds) {

@@ -5,6 +5,7 @@
 
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -77,9 +78,14 @@ std::string dims_text(const glm::uvec3 &dims) {
 }
 
 Scene load_scene(const Options &options) {
-  Scene scene;
+  Scene scene;  // what is cheap to refuse comes before the volume, which may take minutes
   std::optional<CameraFile> file;
   if (!options.cameras.empty()) file = read_camera_file(options.cameras);
+  if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
+  if (!options.size.empty()) scene.size = parse_size(options.size);
+  check_image_size(scene.size);
+  scene.appearance.surface = parse_color("--color", options.color);
+  scene.appearance.background = parse_color("--background", options.background);
   scene.volume = load_volume(options.input, to_overrides(options.volume), options.rate);
   const VolumeInfo &info = scene.volume.info;
   if (file && file->dims && *file->dims != info.dims) {
@@ -93,10 +99,6 @@ Scene load_scene(const Options &options) {
                 info.spacing.y, info.spacing.z);
   }
   scene.cameras = file ? file->cameras : orbit_cameras(info, std::max(1u, options.orbit));
-  if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
-  if (!options.size.empty()) scene.size = parse_size(options.size);
-  scene.appearance.surface = parse_color("--color", options.color);
-  scene.appearance.background = parse_color("--background", options.background);
   return scene;
 }
 
@@ -226,6 +228,7 @@ void check_outputs(const Options &options) {
     const fs::path folder = fs::path(output).parent_path();
     if (!folder.empty() && !fs::is_directory(folder))
       throw Error("cannot write {}: {} is no folder", output, folder.string());
+    if (fs::is_directory(output)) throw Error("cannot write {}: it is a folder", output);
   }
   if (options.progress_dir.empty()) return;
   std::error_code failure;
@@ -247,6 +250,11 @@ ocl::Device open_device(const Options &options) {
 }
 
 void run_render(Options options) {
+  if (options.reference && !options.progress_dir.empty())
+    throw Error("--reference has no passes: leave out --progress-dir");
+  for (const float isovalue : options.isovalues) {
+    if (std::isnan(isovalue)) throw Error("--isovalue nan: give a number in the volume's value range");
+  }
   check_outputs(options);
   if (options.speculation == "off") options.renderer.max_speculation = 1;
   const Scene scene = load_scene(options);
@@ -254,7 +262,6 @@ void run_render(Options options) {
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
   if (options.reference) {
-    if (!options.progress_dir.empty()) throw Error("--reference has no passes: leave out --progress-dir");
     TwinFrames frames(scene);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
@@ -282,6 +289,7 @@ void add_render(CLI::App &app) {
   command
       ->add_option("--isovalue,-i", options->isovalues,
                    "isovalue; repeat it for more surfaces, each drawn from all views")
+      ->allow_extra_args(false)  // one number each time: VOLUME may follow
       ->required();
   add_volume_options(*command, options->volume);
   command
