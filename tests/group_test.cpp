@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
+#include <numeric>
 #include <set>
 #include <vector>
 
@@ -115,6 +117,38 @@ TEST_P(GroupOnDevice, ScarceSlotsGrantSome) {
     EXPECT_GT(tally.granted, 0u);
     EXPECT_LT(tally.granted, tally.pairs / 2);
   }
+}
+
+/// All blocks as pairs, with the dual grids of a few of them cached: many miss just one block, each corner in turn.
+TEST_P(GroupOnDevice, OneMissingBlockIsEnoughToWait) {
+  const FrameParams frame = plain_frame(kDims, 8 * 7 * 6);
+  std::vector<uint> all(8 * 7 * 6);
+  std::iota(all.begin(), all.end(), 0u);
+  std::set<std::size_t> sole_missing;  // corners
+  Tally tally;
+  Random random(40);
+  for (uint trial = 0; trial < 12; ++trial) {
+    SCOPED_TRACE(fmt::format("trial {}, seed 40", trial));
+    StageWorld world(device_, frame, 8 * 7 * 6, 64);
+    Group group(device_, 8 * 7 * 6, 8 * 7 * 6, 64);
+    std::vector<uint> some;
+    std::ranges::copy_if(all, std::back_inserter(some), [&](uint) { return random() % 5 == 0; });
+    world.begin_pass(some, 1);
+    world.cache.request(world.rays);
+    world.cache.assign_slots(world.rays);
+    const std::vector<uint> table = world.cache.page_table().read();
+    for (const uint block : all) {
+      const std::vector<uint> grid = dual_grid_blocks(frame, block);
+      const auto absent = [&](uint b) { return table[b] == ISO_BLOCK_ABSENT; };
+      if (grid.size() == 8 && std::ranges::count_if(grid, absent) == 1)
+        sole_missing.insert(static_cast<std::size_t>(std::ranges::find_if(grid, absent) - grid.begin()));
+    }
+    world.begin_pass(all, 1);
+    group(world.cache, world.rays, world.compaction);
+    check(world, group, all, tally);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_EQ(sole_missing.size(), 8u);
 }
 
 TEST_P(GroupOnDevice, OneHotBlock) {
