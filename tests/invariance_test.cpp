@@ -25,7 +25,7 @@ TestVolume medium_volume() {
   return TestVolume({30, 27, 33}, test::gyroid_field(10), 8);
 }
 
-constexpr ImageSize kTiny{8, 6}, kSmall{12, 8}, kMedium{80, 54};
+constexpr ImageSize kTiny{6, 5}, kSmall{12, 8}, kMedium{80, 54};
 constexpr float kIsovalue = 0.8f;  // both fields: many candidate blocks that rays only graze
 
 class InvarianceOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
@@ -99,7 +99,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, InvarianceOnDevice, testing::ValuesIn(devices_
 
 TEST_P(InvarianceOnDevice, SmallSpeculationLimits) {
   const TestVolume volume = small_volume();
-  for (const std::uint32_t limit : {1u, 2u, 64u}) {
+  for (const std::uint32_t limit : {1u, 64u}) {
     SCOPED_TRACE(limit);
     check(volume, {.size = kSmall, .max_speculation = limit});
   }
@@ -152,7 +152,7 @@ TEST_P(InvarianceOnDevice, CacheSizes) {
 }
 
 /// Slots are taken over and over; every block that comes back must be decoded again, to its own values.
-TEST_P(InvarianceOnDevice, ManyViewsThroughASmallCache) {
+TEST_P(InvarianceOnDevice, ManyViewsThroughFewSlots) {
   const TestVolume volume = medium_volume();
   constexpr ImageSize size{14, 10};
   for (const std::uint32_t slots : {13u, 9u, 31u}) {
@@ -242,7 +242,7 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
 
 TEST_P(InvarianceOnDevice, SmallMemoryIsFixedBeforeTheFirstFrame) {
   const TestVolume volume = small_volume();
-  Renderer renderer(device_, volume.compressed, {.size = kSmall, .cache_slots = 12});
+  Renderer renderer(device_, volume.compressed, {.size = kTiny, .cache_slots = 20});
   const ocl::MemoryLedger &ledger = device_.ledger();
   const std::uint64_t current = ledger.current(), peak = ledger.peak();
   EXPECT_GT(current, 0u);
@@ -262,7 +262,7 @@ TEST_P(InvarianceOnDevice, SmallMemoryIsFixedBeforeTheFirstFrame) {
     sum += entry.current;
   }
   EXPECT_EQ(sum, current);
-  EXPECT_EQ(ledger.by_name().at("block cache").current, 12u * 256);
+  EXPECT_EQ(ledger.by_name().at("block cache").current, 20u * 256);
 }
 
 // ---- watching and cancelling
@@ -300,8 +300,8 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
 TEST_P(InvarianceOnDevice, SmallCancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
-  Renderer renderer(device_, volume.compressed, {.size = kSmall, .cache_slots = 16, .max_speculation = 2});
-  for (const std::size_t stop_after : {1u, 2u, 3u}) {
+  Renderer renderer(device_, volume.compressed, {.size = kTiny, .cache_slots = 20, .max_speculation = 2});
+  for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
     const FrameStats cancelled =
@@ -313,7 +313,7 @@ TEST_P(InvarianceOnDevice, SmallCancelledFrameLeavesNoTrace) {
     expect_consistent(cancelled, renderer.options());
     const FrameStats next = renderer.render(cameras[1], kIsovalue);
     expect_consistent(next, renderer.options());
-    expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kSmall, kIsovalue), kSmall.width);
+    expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kTiny, kIsovalue), kTiny.width);
   }
 }
 
