@@ -170,6 +170,11 @@ static inline int intersect_cell(const Ray *r, const float *w, int x, int y, int
       segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1)), s_hit);
 }
 
+/// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).
+static inline float without_zero_sign(float x) {
+  return x == 0.0f ? 0.0f : x;
+}
+
 /// The hit at parameter s of cell (x,y,z): t, position in the cell, gradient. w [8] as in segment_cubic.
 static inline HitRecord make_hit(ISO_CONSTANT const FrameParams *frame, const Ray *r, const float *w, int x,
                                  int y, int z, RayEvent enter, RayEvent exit, float s) {
@@ -186,6 +191,9 @@ static inline HitRecord make_hit(ISO_CONSTANT const FrameParams *frame, const Ra
   hit.grad_x = lerp(hit.z, lerp(hit.y, w[1] - w[0], w[3] - w[2]), lerp(hit.y, w[5] - w[4], w[7] - w[6]));
   hit.grad_y = lerp(hit.z, lerp(hit.x, w[2] - w[0], w[3] - w[1]), lerp(hit.x, w[6] - w[4], w[7] - w[5]));
   hit.grad_z = lerp(hit.y, lerp(hit.x, w[4] - w[0], w[5] - w[1]), lerp(hit.x, w[6] - w[2], w[7] - w[3]));
+  hit.grad_x = without_zero_sign(hit.grad_x);
+  hit.grad_y = without_zero_sign(hit.grad_y);
+  hit.grad_z = without_zero_sign(hit.grad_z);
   return hit;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // Volumes, cameras and comparisons for tests of whole frames.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -105,10 +106,13 @@ inline void expect_same_hits(const std::vector<HitRecord> &got, const std::vecto
     ++num_differing;
     first = i;
   }
-  const HitRecord &g = got[first], &e = expected[first];
+  const auto text = [](const HitRecord &h) {
+    return fmt::format("t {} block {} cell {} at ({:a} {:a} {:a}) gradient ({:a} {:a} {:a})", h.t, h.block_id,
+                       h.cell, h.x, h.y, h.z, h.grad_x, h.grad_y, h.grad_z);
+  };
   ADD_FAILURE() << num_differing << " of " << got.size() << " pixels differ; the first is (" << first % width
-                << "," << first / width << "): t " << g.t << ", block " << g.block_id << ", cell " << g.cell
-                << ", expected t " << e.t << ", block " << e.block_id << ", cell " << e.cell;
+                << "," << first / width << "): " << text(got[first]) << ", expected "
+                << text(expected[first]);
 }
 
 // Fields. Values are of the order of 1 unless they say otherwise.

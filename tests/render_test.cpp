@@ -253,9 +253,12 @@ TEST_P(RenderOnDevice, FlippedAndTurnedAxes) {
   EXPECT_GT(check(TestVolume(info, test::sample(dims, test::gyroid_field(8)), 8), {0.1f}, kMedium), 500u);
 }
 
-/// Values near the ends of what zfp holds: denormals and overflow must not tell devices apart.
+/// Values near the ends of what zfp holds: overflow must not tell devices apart, nor denormals where they are kept.
 TEST_P(RenderOnDevice, TinyAndHugeValues) {
   for (const int k : {-95, -60, 60, 120}) {
+    // Products of values of 2^-95 and positions in a cell are denormal, which OpenCL lets a device flush
+    // (README "Devices"): no bits to compare there. llvmpipe is the one that does.
+    if (k == -95 && !GetParam().capabilities.denormals) continue;
     SCOPED_TRACE(fmt::format("times 2^{}", k));
     const auto voxels = test::sample({11, 12, 10}, [k, noise = test::noise_field(5)](const glm::dvec3 &p) {
       return std::ldexp(noise(p), k);
