@@ -197,7 +197,7 @@ TEST_P(BlockCacheOnDevice, AmpleSlots) {
 }
 
 /// One ray after the other over all blocks, in a cache of one dual grid: each is served in its pass.
-TEST_P(BlockCacheOnDevice, SmallestCacheServesEveryBlock) {
+TEST_P(BlockCacheOnDevice, OneDualGridOfSlotsServesEveryBlock) {
   const FrameParams frame = plain_frame(kDims, 3);
   StageWorld world(device_, frame, kMinCacheSlots, 64);
   CacheModel model(frame, kMinCacheSlots);

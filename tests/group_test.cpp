@@ -101,7 +101,7 @@ class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 };
 
 TEST_P(GroupOnDevice, SmallGroups) {
-  run_passes(40, 40, 3, 4, 8, 1);
+  run_passes(40, 40, 2, 4, 8, 1);
 }
 
 TEST_P(GroupOnDevice, AmpleSlotsGrantEveryPair) {

@@ -87,7 +87,7 @@ TEST_P(RadixSortOnDevice, SmallSorts) {
   constexpr uint kMaxCount = 300;  // tiles of 128
   RadixSort sort(device_, kMaxCount, 8);
   uint seed = 100;
-  for (const uint count : {0u, 1u, 127u, 129u, kMaxCount}) {
+  for (const uint count : {0u, 1u, 129u}) {
     expect_sorted(sort, kMaxCount, KeyKind::kRandom, count, 5, ++seed);
   }
   expect_sorted(sort, kMaxCount, KeyKind::kHotBlock, kMaxCount, 17, ++seed);
