@@ -1,60 +1,66 @@
-// The cost of launching on a device: an empty kernel, queued and with a wait after each launch, timer off and
-// on. The device is the default one or ISOWAVE_DEVICE's; its name stands in the label.
+// What a launch costs: an empty kernel, queued and with a wait after each launch, profiling off and on. Wall
+// clock.
 
-#include <benchmark/benchmark.h>
+#include <chrono>
 
-#include <vector>
-
+#include "bench/harness.hpp"
 #include "core/ocl/kernel.hpp"
 #include "kernels_cl/shared_types.h"
 
-namespace isowave {
+namespace isowave::bench {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 /// Launches per wait: enough that the wait does not count.
 constexpr int kBatch = 1000;
 
-void label(benchmark::State &state, ocl::Device &device) {
-  const char *source = device.timer().source() == ocl::TimerSource::kOff ? "timer off" : "timer on";
-  state.SetLabel(device.info().name + ", " + source);
-}
-
-void BM_QueuedLaunch(benchmark::State &state) {
-  ocl::Device device(ocl::choose_device(), state.range(0) != 0);
-  ocl::Kernel<> empty(device, "launch_probe", "launch_empty");
-  empty({1, 64});
-  device.finish();
-  for (auto _ : state) {
-    for (int i = 0; i < kBatch; ++i) empty({1, 64});
+/// Profiling belongs to the queue, so each has a device of its own.
+struct LaunchInput {
+  LaunchInput(ocl::Device &session_device, bool profiling)
+      : device(session_device.info(), profiling),
+        empty(device, "launch_probe", "launch_empty"),
+        counts(device, "counts", 1) {
+    empty({1, 64});
     device.finish();
-    state.PauseTiming();
-    device.timer().collect();
-    state.ResumeTiming();
+  }
+
+  ocl::Device device;
+  ocl::Kernel<> empty;
+  ocl::Buffer<PassCounts> counts;
+};
+
+void queued_launch(benchmark::State &state) {
+  auto &in = input<LaunchInput>(state.range(0) != 0);
+  for (auto _ : state) {
+    const auto begin = Clock::now();
+    for (int i = 0; i < kBatch; ++i) in.empty({1, 64});
+    in.device.finish();
+    state.SetIterationTime(std::chrono::duration<double>(Clock::now() - begin).count());
+    in.device.timer().collect();
   }
   state.SetItemsProcessed(state.iterations() * kBatch);
-  label(state, device);
 }
-BENCHMARK(BM_QueuedLaunch)
-    ->ArgName("profiling")
-    ->Arg(0)
-    ->Arg(1)
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
 
 /// Launch, then read one struct back and wait: what a host that looks at every pass pays.
-void BM_LaunchAndReadBack(benchmark::State &state) {
-  ocl::Device device(ocl::choose_device());
-  ocl::Kernel<> empty(device, "launch_probe", "launch_empty");
-  const ocl::Buffer<PassCounts> counts(device, "counts", 1);
+void launch_and_read_back(benchmark::State &state) {
+  auto &in = input<LaunchInput>(false);
   std::vector<PassCounts> host(1);
   for (auto _ : state) {
-    empty({1, 64});
-    counts.read(host);
+    const auto begin = Clock::now();
+    in.empty({1, 64});
+    in.counts.read(host);
+    state.SetIterationTime(std::chrono::duration<double>(Clock::now() - begin).count());
     benchmark::DoNotOptimize(host.data());
   }
-  label(state, device);
+  state.SetItemsProcessed(state.iterations());
 }
-BENCHMARK(BM_LaunchAndReadBack)->UseRealTime()->Unit(benchmark::kMicrosecond);
+
+const bool registered = [] {
+  stage_benchmark("ocl_launch/queued_1000", queued_launch)->ArgName("profiling")->Arg(0)->Arg(1);
+  stage_benchmark("ocl_launch/read_back", launch_and_read_back)->Unit(benchmark::kMicrosecond);
+  return true;
+}();
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::bench

@@ -44,8 +44,13 @@ BlockCache::BlockCache(ocl::Device &device, std::uint64_t num_blocks, std::uint3
       select_(device, "block_cache", "cache_select", group_defines(group_size)),
       collect_victims_(device, "block_cache", "cache_collect_victims", group_defines(group_size)),
       assign_(device, "block_cache", "cache_assign", group_defines(group_size)) {
+  clear();
+}
+
+void BlockCache::clear() {
   page_table_.fill(ISO_BLOCK_ABSENT);
   slot_block_ids_.fill(ISO_INVALID_ID);
+  slot_stamps_.fill(0);  // older than every pass (Wavefront)
 }
 
 void BlockCache::request(Wavefront &rays) {

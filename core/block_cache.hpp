@@ -25,6 +25,10 @@ class BlockCache {
   /// decode_slots() hold that many. Asynchronous.
   void assign_slots(Wavefront &rays);
 
+  /// Forgets every block: the next pass finds the cache as it was made. O(blocks): not for the pass loop.
+  /// Asynchronous.
+  void clear();
+
   std::uint32_t num_slots() const { return num_slots_; }
   /// [blocks] slot of each block; ISO_BLOCK_ABSENT if not cached.
   const ocl::Buffer<uint> &page_table() const { return page_table_; }

@@ -70,7 +70,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       traverse_(device, rays_.num_pixels, options_.group_size),
       zfp_decode_(device, options_.cache_slots),
       group_(device, rays_.num_pixels, options_.cache_slots, options_.group_size),
-      intersect_(device, rays_.num_pixels, options_.group_size),
+      intersect_(device, rays_.num_pixels, options_.group_size, options_.solver),
       composite_(device, rays_.num_pixels),
       shade_(device, rays_.num_pixels) {
   device.finish();
@@ -153,6 +153,11 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   stats.completed_percent = 100.0 * (pixels - counts.next_active_count) / pixels;
   stats.stage_ms = device_.timer().collect();
   return stats;
+}
+
+void Renderer::clear_cache() {
+  cache_.clear();
+  device_.finish();
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {

@@ -30,6 +30,7 @@ struct RendererOptions {
   ImageSize size;
   std::uint32_t cache_slots = 0;       ///< decoded blocks kept, at least 8; 0: default_cache_slots()
   std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
+  Solver solver = kDefaultSolver;      ///< root finder in a cell
   std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
 };
 
@@ -66,6 +67,10 @@ class Renderer {
   /// Draws one frame and waits for it. Decoded blocks stay in the cache for the next frame, whatever its
   /// isovalue.
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
+
+  /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture depends
+  /// on it. Waits.
+  void clear_cache();
 
   /// The hit buffer [height * width], row 0 at the top. Waits.
   std::vector<HitRecord> hits() const { return rays_.hits.read(); }

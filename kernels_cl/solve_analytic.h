@@ -51,8 +51,8 @@ static inline float portable_acos(float x) {
 static inline float portable_cos(float x) {
   const float h = 0.25f * x, h2 = h * h;
   const float c = fma(h2, fma(h2, fma(h2, fma(h2, 1.0f / 40320.0f, -1.0f / 720.0f), 1.0f / 24.0f), -0.5f), 1.0f);
-  const float half = fma(2.0f * c, c, -1.0f);
-  return fma(2.0f * half, half, -1.0f);
+  const float cos_half = fma(2.0f * c, c, -1.0f);
+  return fma(2.0f * cos_half, cos_half, -1.0f);
 }
 
 /// max_steps is not used: the closed form has nothing to refine.

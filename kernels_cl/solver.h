@@ -11,7 +11,7 @@
 ///   analytic    roots lost to cancellation              none (closed form)  most: cube root, arc cosine
 ///   bernstein   nothing above rounding                  bracketed Newton    low
 ///
-/// ISO_SOLVER picks one when a kernel is built; the twin passes it as a value.
+/// A kernel is built for one solver (-D ISO_SOLVER, -D ISO_ROOT_STEPS); the twin takes it as a value.
 #ifndef ISOWAVE_SOLVER_H
 #define ISOWAVE_SOLVER_H
 
@@ -23,16 +23,27 @@
 
 ISO_NAMESPACE_BEGIN
 
-static inline int first_change(int solver, Cubic c, int max_steps, float *s) {
-  switch (solver) {
+#define ISO_SOLVER_LINEAR 0
+#define ISO_SOLVER_MARMITT 1
+#define ISO_SOLVER_ANALYTIC 2
+#define ISO_SOLVER_BERNSTEIN 3
+
+typedef struct Solver {
+  int kind;       ///< ISO_SOLVER_*
+  int max_steps;  ///< refinement steps at most, 0..64
+} Solver;
+
+/// See the contract above.
+static inline int first_change(Solver solver, Cubic c, float *s) {
+  switch (solver.kind) {
     case ISO_SOLVER_LINEAR:
-      return solve_linear(c, max_steps, s);
+      return solve_linear(c, solver.max_steps, s);
     case ISO_SOLVER_MARMITT:
-      return solve_marmitt(c, max_steps, s);
+      return solve_marmitt(c, solver.max_steps, s);
     case ISO_SOLVER_ANALYTIC:
-      return solve_analytic(c, max_steps, s);
+      return solve_analytic(c, solver.max_steps, s);
     default:
-      return solve_bernstein(c, max_steps, s);
+      return solve_bernstein(c, solver.max_steps, s);
   }
 }
 

@@ -20,7 +20,7 @@ void load_corners(const FrameParams &frame, const float *voxels, int x, int y, i
   for (int corner = 0; corner < 8; ++corner) w[corner] = v[offsets[corner]] - frame.isovalue;
 }
 
-HitRecord trace(const FrameParams &frame, const float *voxels, std::uint32_t pixel) {
+HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, std::uint32_t pixel) {
   const Ray ray = make_ray(&frame, pixel);
   const LastPlanes last = last_planes(&frame);
   RayEvent enter;
@@ -33,7 +33,7 @@ HitRecord trace(const FrameParams &frame, const float *voxels, std::uint32_t pix
     float w[8];
     float s;
     load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-    if (intersect_cell(&ray, w, cell.x, cell.y, cell.z, enter, exit, &s)) {
+    if (intersect_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &s)) {
       return make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit, s);
     }
     walk_step(&cell, &ray, exit, 1, last);
@@ -54,7 +54,7 @@ std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const f
   const auto trace_rows = [&] {
     for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
       for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel) {
-        hits[pixel] = trace(frame, voxels.data(), pixel);
+        hits[pixel] = trace(frame, voxels.data(), solver, pixel);
       }
     }
   };

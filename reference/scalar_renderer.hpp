@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/solvers.hpp"
 #include "kernels_cl/shared_types.h"
 
 namespace isowave {
@@ -16,6 +17,6 @@ namespace isowave {
 /// Returns the hits [height * width], row 0 at the top. Throws std::invalid_argument when voxels do not fit
 /// the frame.
 std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
-                                     unsigned threads = 0);
+                                     Solver solver = kDefaultSolver, unsigned threads = 0);
 
 }  // namespace isowave

@@ -321,7 +321,12 @@ TEST(ZfpFile, AnyFlippedBitIsNoticed) {
   options.rate = 2;
   compress_to_file(reader, options, folder / "a.zfp");
   const std::string right = test::read_file(folder / "a.zfp");
+  constexpr std::size_t kHeaderBits = 12 * 8, kFooterBits = 24 * 8;
   for (std::size_t bit = 0; bit < right.size() * 8; ++bit) {
+    // Every bit of header and footer, one of each other byte: a test of seconds, not of minutes under
+    // sanitizers.
+    const bool in_the_middle = bit >= kHeaderBits && bit < right.size() * 8 - kFooterBits;
+    if (in_the_middle && bit % 8 != bit / 8 * 5 % 8) continue;
     std::string wrong = right;
     wrong[bit / 8] = char(wrong[bit / 8] ^ (1 << bit % 8));
     write_file(folder / "b.zfp", wrong);

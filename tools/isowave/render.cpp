@@ -141,7 +141,7 @@ class TwinFrames : public FrameSource {
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
-    hits_ = render_scalar(frame_, voxels_);
+    hits_ = render_scalar(frame_, voxels_, solver_);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);

@@ -1,0 +1,130 @@
+// Requests and slots: block_cache.cl. key_bits 18 and 27 are the blocks of 256^3 and 2048^3 voxels; only
+// their page table exists here.
+//
+//   request_cold  every block that the pairs' dual grids need is missing
+//   request_warm  every one is cached
+//   assign        slots for all of them, each taken from a block that was used in the pass before
+
+#include <algorithm>
+
+#include "bench/block_pairs.hpp"
+#include "core/block_cache.hpp"
+
+namespace isowave::bench {
+namespace {
+
+constexpr std::size_t kNumVisible = 1u << 14;
+
+/// Two sets of pairs that fill the cache in turn.
+class CacheInput {
+ public:
+  CacheInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t key_bits, Distribution distribution)
+      : sets_{make_block_pairs(distribution, num_pairs, kNumVisible, static_cast<std::uint32_t>(key_bits), 0),
+              make_block_pairs(distribution, num_pairs, kNumVisible, static_cast<std::uint32_t>(key_bits),
+                               1)},
+        rays_(device, num_pairs),
+        cache_(device, std::uint64_t{1} << key_bits, static_cast<std::uint32_t>(num_needed()), num_pairs,
+               kGroupSize) {
+    const FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
+    rays_.frame.write({&params, 1});
+    for (int set = 0; set < 2; ++set) {
+      open_pass(true);
+      request();
+      verify_requests();
+      settle();
+      verify_slots();
+    }
+    open_pass(false);
+    request();
+    check(rays_.counts.read()[0].requested_count == 0, "requests for cached blocks");
+    settle();
+  }
+
+  std::size_t num_needed() const { return sets_[0].needed_block_ids.size(); }
+
+  /// Starts a pass with the pairs of the pass before, or the other ones. Ends the last.
+  void open_pass(bool other_pairs) {
+    settle();
+    if (other_pairs) turn_ = 1 - turn_;
+    rays_.pair_block_ids.write(sets_[turn_].pair_block_ids);
+    const PassCounts counts = pair_counts(rays_.num_pixels, ++pass_);
+    rays_.counts.write({&counts, 1});
+  }
+  void request() {
+    cache_.request(rays_);
+    requested_ = true;
+  }
+  void assign() {
+    cache_.assign_slots(rays_);
+    requested_ = false;
+  }
+  /// Gives slots to requests that have none yet.
+  void settle() {
+    if (requested_) assign();
+  }
+
+ private:
+  void verify_requests() {
+    std::vector<uint> ids(rays_.counts.read()[0].requested_count);
+    cache_.decode_block_ids().read(ids);
+    std::sort(ids.begin(), ids.end());
+    check(ids == sets_[turn_].needed_block_ids, "list of missing blocks");
+  }
+  void verify_slots() {
+    check(rays_.counts.read()[0].decoded_count == num_needed(), "number of blocks granted");
+    std::vector<uint> ids = cache_.slot_block_ids().read();
+    std::sort(ids.begin(), ids.end());
+    check(ids == sets_[turn_].needed_block_ids, "blocks in the slots");
+  }
+
+  BlockPairs sets_[2];
+  Wavefront rays_;
+  BlockCache cache_;
+  int turn_ = 0;
+  std::uint32_t pass_ = ISO_AGE_BUCKETS;
+  bool requested_ = false;
+};
+
+enum class Part { kRequestCold, kRequestWarm, kAssign };
+
+void use_cache(benchmark::State &state, Part part, Distribution distribution) {
+  const std::int64_t num_pairs = pixels_of_width(state.range(0));
+  auto &in = input<CacheInput>(num_pairs, state.range(1), distribution);
+  const auto pairs = static_cast<double>(num_pairs), needed = static_cast<double>(in.num_needed());
+  if (part == Part::kAssign) {
+    const auto prepare = [&] {
+      in.open_pass(true);
+      in.request();
+    };
+    // Read: stamps, requests, victims. Written: victims, both page table entries, slot, stamp.
+    measure(state, {needed, 32 * needed}, prepare, [&] { in.assign(); });
+  } else {
+    const bool cold = part == Part::kRequestCold;
+    measure(
+        state, {pairs, 4 * pairs + 8 * needed}, [&] { in.open_pass(cold); }, [&] { in.request(); });
+  }
+  state.counters["blocks"] = needed;
+}
+
+/// One input serves three benchmarks: they are registered together.
+const bool registered = [] {
+  for (const Distribution distribution : kDistributions) {
+    for (const std::int64_t width : kWidths) {
+      for (const std::int64_t key_bits : {18, 27}) {
+        for (const auto &[part, name] : {std::pair(Part::kRequestCold, "request_cold"),
+                                         {Part::kRequestWarm, "request_warm"},
+                                         {Part::kAssign, "assign"}}) {
+          stage_benchmark(
+              fmt::format("block_cache/{}/{}", name, to_string(distribution)),
+              [part = part, distribution](benchmark::State &state) { use_cache(state, part, distribution); })
+              ->ArgNames({"width", "key_bits"})
+              ->Args({width, key_bits});
+        }
+      }
+    }
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace isowave::bench

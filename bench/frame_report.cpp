@@ -1,0 +1,260 @@
+#include "bench/frame_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ctime>
+#include <set>
+
+#include "bench/run_info.hpp"
+
+namespace isowave::bench {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+/// Median, least and most.
+struct Spread {
+  double median = 0, min = 0, max = 0;
+};
+
+Spread spread_of(const std::vector<double> &values) {
+  if (values.empty()) return {};
+  const auto [min, max] = std::minmax_element(values.begin(), values.end());
+  return {median(values), *min, *max};
+}
+
+/// A value of every frame of the list.
+template <class Value>
+std::vector<double> each(const std::vector<FrameStats> &frames, const Value &value) {
+  std::vector<double> values;
+  for (const FrameStats &frame : frames) values.push_back(value(frame));
+  return values;
+}
+
+double total_ms(const FrameStats &frame) {
+  return frame.total_ms;
+}
+
+/// Sum of one of the counts over a frame's passes.
+double sum_of(const FrameStats &frame, uint PassCounts::*count) {
+  double sum = 0;
+  for (const PassStats &pass : frame.passes) sum += pass.counts.*count;
+  return sum;
+}
+
+double num_passes(const FrameStats &frame) {
+  return static_cast<double>(frame.passes.size());
+}
+
+double median_spec_count(const FrameStats &frame) {
+  std::vector<double> counts;
+  for (const PassStats &pass : frame.passes) counts.push_back(pass.counts.spec_count);
+  return median(std::move(counts));
+}
+
+double mean_utilization(const FrameStats &frame) {
+  double sum = 0;
+  for (const PassStats &pass : frame.passes) sum += pass.utilization_percent;
+  return frame.passes.empty() ? 0.0 : sum / num_passes(frame);
+}
+
+/// A column of the table that is not a total time: of a cold frame.
+struct Column {
+  const char *name;
+  const char *json_name;
+  int precision;
+  double (*value)(const FrameReport &report, const FrameStats &frame);
+};
+
+const Column kColumns[] = {
+    {"hit %", "rays_hit_percent", 1,
+     [](const FrameReport &report, const FrameStats &frame) {
+       return 100.0 * double(frame.rays_hit) / double(report.options.size.num_pixels());
+     }},
+    {"passes", "passes", 0, [](const FrameReport &, const FrameStats &frame) { return num_passes(frame); }},
+    {"ms/pass", "ms_per_pass", 2,
+     [](const FrameReport &, const FrameStats &frame) { return frame.total_ms / num_passes(frame); }},
+    {"visible %", "visible_blocks_percent", 2,
+     [](const FrameReport &report, const FrameStats &frame) {
+       return 100.0 * sum_of(frame, &PassCounts::visible_count) / double(report.grid.block_count());
+     }},
+    {"decoded", "decoded_blocks", 0,
+     [](const FrameReport &, const FrameStats &frame) { return sum_of(frame, &PassCounts::decoded_count); }},
+    {"N_spec", "median_n_spec", 1,
+     [](const FrameReport &, const FrameStats &frame) { return median_spec_count(frame); }},
+    {"util %", "utilization_percent", 1,
+     [](const FrameReport &, const FrameStats &frame) { return mean_utilization(frame); }},
+};
+
+/// The medians over a view's rounds.
+double column_of(const FrameReport &report, const ViewTimes &view, const Column &column) {
+  return median(each(view.cold, [&](const FrameStats &frame) { return column.value(report, frame); }));
+}
+
+/// All frames of one kind.
+std::vector<double> all_times(const FrameReport &report, std::vector<FrameStats> ViewTimes::*kind) {
+  std::vector<double> times;
+  for (const ViewTimes &view : report.views) {
+    for (const FrameStats &frame : view.*kind) times.push_back(frame.total_ms);
+  }
+  return times;
+}
+
+constexpr std::pair<const char *, std::vector<FrameStats> ViewTimes::*> kKinds[] = {
+    {"cold", &ViewTimes::cold}, {"warm", &ViewTimes::warm}, {"next", &ViewTimes::next}};
+
+std::string spread_text(const Spread &spread) {
+  return fmt::format("{:.1f} ({:.1f}..{:.1f})", spread.median, spread.min, spread.max);
+}
+
+void print_row(const std::string &name, const std::vector<std::string> &cells) {
+  fmt::print("{:<7}", name);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    fmt::print(" {:>{}}", cells[i], i < std::size(kKinds) ? 23 : 10);
+  }
+  fmt::print("\n");
+}
+
+void print_views(const FrameReport &report) {
+  std::vector<std::string> header;
+  for (const auto &[kind, member] : kKinds) header.push_back(fmt::format("{} ms", kind));
+  for (const Column &column : kColumns) header.emplace_back(column.name);
+  print_row("view", header);
+  std::vector<std::vector<double>> columns(std::size(kColumns));
+  for (std::size_t v = 0; v < report.views.size(); ++v) {
+    const ViewTimes &view = report.views[v];
+    std::vector<std::string> cells;
+    for (const auto &[kind, member] : kKinds) {
+      cells.push_back(spread_text(spread_of(each(view.*member, total_ms))));
+    }
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      columns[c].push_back(column_of(report, view, kColumns[c]));
+      cells.push_back(fmt::format("{:.{}f}", columns[c].back(), kColumns[c].precision));
+    }
+    print_row(std::to_string(v), cells);
+  }
+  std::vector<std::string> cells;
+  for (const auto &[kind, member] : kKinds)
+    cells.push_back(spread_text(spread_of(all_times(report, member))));
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    cells.push_back(fmt::format("{:.{}f}", median(columns[c]), kColumns[c].precision));
+  }
+  print_row("median", cells);
+}
+
+/// Stage -> its times in every view that has it, 0 where it was not run.
+std::map<std::string, std::vector<double>> times_by_stage(const FrameReport &report) {
+  std::set<std::string> names;
+  for (const auto &view : report.stage_ms) {
+    for (const auto &[stage, ms] : view) names.insert(stage);
+  }
+  std::map<std::string, std::vector<double>> times;
+  for (const auto &view : report.stage_ms) {
+    for (const std::string &name : names) times[name].push_back(view.contains(name) ? view.at(name) : 0.0);
+  }
+  return times;
+}
+
+void print_stages(const FrameReport &report) {
+  const auto times = times_by_stage(report);
+  std::vector<std::pair<double, std::string>> rows;
+  double sum = 0;
+  for (const auto &[stage, ms] : times) {
+    rows.emplace_back(median(ms), stage);
+    sum += rows.back().first;
+  }
+  std::sort(rows.rbegin(), rows.rend());
+  fmt::print("\nms per stage of a cold frame, medians over the views, from a run with profiling ({}):\n",
+             report.stage_clock);
+  for (const auto &[ms, stage] : rows) fmt::print("  {:<14}{:>9.2f}{:>7.1f} %\n", stage, ms, 100 * ms / sum);
+  fmt::print("  {:<14}{:>9.2f}\n", "sum", sum);
+}
+
+ordered_json frame_json(const FrameReport &report, const FrameStats &frame) {
+  ordered_json json = {{"total_ms", frame.total_ms}};
+  for (const Column &column : kColumns) json[column.json_name] = column.value(report, frame);
+  return json;
+}
+
+ordered_json spread_json(const Spread &spread) {
+  return {{"median", spread.median}, {"min", spread.min}, {"max", spread.max}};
+}
+
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+ordered_json options_json(const FrameReport &report) {
+  return {{"volume", report.volume},
+          {"dims", {report.grid.info.dims.x, report.grid.info.dims.y, report.grid.info.dims.z}},
+          {"type", to_string(report.grid.info.type)},
+          {"blocks", report.grid.block_count()},
+          {"rate", report.grid.rate()},
+          {"isovalue", report.isovalue},
+          {"width", report.options.size.width},
+          {"height", report.options.size.height},
+          {"views", report.views.size()},
+          {"rounds", report.rounds},
+          {"cache_slots", report.options.cache_slots},
+          {"max_speculation", report.options.max_speculation},
+          {"group_size", report.options.group_size}};
+}
+
+}  // namespace
+
+void print_report(const FrameReport &report) {
+  const glm::uvec3 dims = report.grid.info.dims;
+  fmt::print("{}\n", report.command);
+  for (const auto &[name, value] : report.run_info) fmt::print("  {:<16}{}\n", name, value);
+  fmt::print("  {:<16}{} x {} x {} {}, {} blocks, rate {}, isovalue {}\n", "volume", dims.x, dims.y, dims.z,
+             to_string(report.grid.info.type), report.grid.block_count(), report.grid.rate(),
+             report.isovalue);
+  fmt::print("  {:<16}{} x {}, {} views, {} rounds, {} cache slots, N_spec up to {}\n", "frames",
+             report.options.size.width, report.options.size.height, report.views.size(), report.rounds,
+             report.options.cache_slots, report.options.max_speculation);
+  fmt::print("  {:<16}{:.1f} MiB at most; setup {:.0f} ms\n\n", "device memory",
+             double(report.peak_bytes) / (1 << 20), report.setup_ms);
+  print_views(report);
+  fmt::print(
+      "Times are wall clock, median (min..max) over the rounds, and in the last row over views and rounds.\n"
+      "cold: nothing decoded before; warm: the same view again; next: then one degree further. The other\n"
+      "columns are a cold frame's. visible: blocks with rays, summed over the passes, of all blocks; "
+      "decoded:\n"
+      "blocks; N_spec: median over the passes; util: intersected ray-block pairs per pass, of all pixels.\n");
+  print_stages(report);
+}
+
+ordered_json to_json(const FrameReport &report) {
+  ordered_json json = {{"program", "frame_bench"}, {"command", report.command}, {"date", utc_now()}};
+  for (const auto &[name, value] : report.run_info) json["context"][name] = value;
+  json["options"] = options_json(report);
+  for (const auto &[kind, member] : kKinds) {
+    json["total_ms"][kind] = spread_json(spread_of(all_times(report, member)));
+  }
+  for (const Column &column : kColumns) {
+    std::vector<double> values;
+    for (const ViewTimes &view : report.views) values.push_back(column_of(report, view, column));
+    json["median"][column.json_name] = median(values);
+  }
+  json["stage_clock"] = report.stage_clock;
+  for (const auto &[stage, ms] : times_by_stage(report)) json["stage_ms"][stage] = spread_json(spread_of(ms));
+  json["setup_ms"] = report.setup_ms;
+  json["memory"] = report.memory;
+  for (const ViewTimes &view : report.views) {
+    ordered_json frames;
+    for (const auto &[kind, member] : kKinds) {
+      for (const FrameStats &frame : view.*member) frames[kind].push_back(frame_json(report, frame));
+    }
+    json["frames"].push_back(std::move(frames));
+  }
+  return json;
+}
+
+}  // namespace isowave::bench

@@ -1,0 +1,115 @@
+#pragma once
+// What the stage benchmarks share: the device, inputs that are made once, and the clock.
+//
+//   struct SortInput { SortInput(ocl::Device &, std::int64_t pairs); ... };   // makes and checks: not timed
+//   void sort_pairs(benchmark::State &state) {
+//     auto &in = input<SortInput>(state.range(0));
+//     measure(state, {pairs, bytes}, [&] { in.reset(); }, [&] { in.sort(...); });
+//   }
+//   const bool registered = (stage_benchmark("radix_sort", sort_pairs)->Arg(921600), true);
+
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <typeinfo>
+
+#include "core/ocl/device.hpp"
+#include "core/renderer.hpp"
+
+namespace isowave::bench {
+
+/// Opens the device of all benchmarks; closes it, and frees the input kept, when it goes. One at a time.
+class Session {
+ public:
+  /// profiling: time with OpenCL events where the driver reports them, else with the wall clock.
+  Session(const ocl::DeviceInfo &info, bool profiling);
+  ~Session();
+  Session(const Session &) = delete;
+  Session &operator=(const Session &) = delete;
+
+  /// The session at work.
+  static Session &current();
+
+  ocl::Device &device() { return device_; }
+  /// Bytes per second, read and written, of a large device-to-device copy: the peak that stages are held to.
+  double copy_bandwidth() const { return copy_bandwidth_; }
+
+  /// Whether a benchmark failed: it threw, its check included.
+  bool failed = false;
+  /// The input made last, and what it was made of.
+  std::string input_key;
+  std::shared_ptr<void> input;
+
+ private:
+  ocl::Device device_;
+  double copy_bandwidth_;
+};
+
+/// Work-items per group of the stages that take it: the renderer's default.
+inline const std::uint32_t kGroupSize = RendererOptions{}.group_size;
+
+/// How the keys, blocks or kept entries of an input lie.
+enum class Distribution {
+  kUniform,  ///< anywhere, in random order
+  kHot,      ///< all in one place
+  kSorted    ///< as kUniform, but in ascending order
+};
+inline constexpr std::array kDistributions = {Distribution::kUniform, Distribution::kHot,
+                                              Distribution::kSorted};
+/// "uniform", "hot", "sorted".
+std::string to_string(Distribution distribution);
+
+/// The image sizes that stages are swept over: 640x360 and 1280x720.
+inline constexpr std::array<std::int64_t, 2> kWidths = {640, 1280};
+inline ImageSize image_of_width(std::int64_t width) {
+  return {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(width * 9 / 16)};
+}
+inline std::int64_t pixels_of_width(std::int64_t width) {
+  return static_cast<std::int64_t>(image_of_width(width).num_pixels());
+}
+
+/// T(device, args...), kept until the next different one is asked for: Google Benchmark calls a benchmark
+/// several times to find how many iterations it needs. T's constructor also runs the stage once and checks
+/// it.
+template <class T, class... Args>
+T &input(const Args &...args) {
+  Session &session = Session::current();
+  std::string key = typeid(T).name();
+  ((key += fmt::format(" {}", static_cast<std::int64_t>(args))), ...);
+  if (session.input_key != key) {
+    session.input_key.clear();
+    session.input.reset();  // before the next one takes its memory
+    session.input = std::make_shared<T>(session.device(), args...);
+    session.input_key = key;
+  }
+  return *static_cast<T *>(session.input.get());
+}
+
+/// Throws Error naming `what` unless it holds.
+void check(bool holds, const std::string &what);
+
+/// What one run of a stage does.
+struct Work {
+  double items = 0;
+  double bytes = 0;  ///< that must be read or written at least, each once
+};
+
+using Step = std::function<void()>;
+
+/// The benchmark loop: prepare, not timed; then run, timed from its first launch to the end of its last. The
+/// time is that of the OpenCL events, or the wall clock's where there are none. Counters, medians over the
+/// iterations: wall_ms, event_ms; spread_%: distance of the quartiles; of_copy_%: bytes per second against
+/// copy_bandwidth().
+void measure(benchmark::State &state, const Work &work, const Step &prepare, const Step &run);
+
+/// Registers `body` under `name`. What it throws becomes the error of that benchmark alone.
+benchmark::internal::Benchmark *stage_benchmark(const std::string &name,
+                                                const std::function<void(benchmark::State &)> &body);
+
+}  // namespace isowave::bench

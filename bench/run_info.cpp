@@ -1,0 +1,39 @@
+#include "bench/run_info.hpp"
+
+#include <algorithm>
+
+namespace isowave::bench {
+
+std::string clock_name(ocl::TimerSource source) {
+  switch (source) {
+    case ocl::TimerSource::kOff:
+      return "wall clock, profiling off";
+    case ocl::TimerSource::kEvents:
+      return "OpenCL events";
+    case ocl::TimerSource::kWallClock:
+      return "wall clock: the driver reports event times of 0";
+  }
+  return "";
+}
+
+std::vector<std::pair<std::string, std::string>> run_info(ocl::Device &device) {
+  const ocl::DeviceInfo &info = device.info();
+  return {{"device", info.name},
+          {"device_type", std::string(to_string(info.type))},
+          {"device_version", info.device_version},
+          {"driver", info.driver_version},
+          {"platform", info.platform},
+          {"compute_units", std::to_string(info.capabilities.compute_units)},
+          {"clock", clock_name(device.timer().source())},
+          {"compiler", ISOWAVE_BUILD},
+          {"commit", ISOWAVE_COMMIT}};
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+}  // namespace isowave::bench

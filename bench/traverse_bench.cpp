@@ -1,0 +1,67 @@
+// Rays -> their next N_Spec blocks: traverse.cl. The first pass of a frame, with as many rays as give each
+// N_Spec.
+
+#include <bit>
+
+#include "bench/frame_rig.hpp"
+#include "bench/scenes.hpp"
+
+namespace isowave::bench {
+namespace {
+
+struct TraverseInput : FrameRig {
+  TraverseInput(ocl::Device &device, std::int64_t width, std::int64_t edge, std::int64_t spec_count)
+      : FrameRig(device, mixing_layer(edge),
+                 mixing_layer_setup(edge, image_of_width(width), static_cast<std::uint32_t>(spec_count))) {
+    start();
+    thin_wavefront(params.max_spec_count);
+    begin_pass();
+    before.emplace(rays);
+    traverse(macrocells, rays);
+    verify();
+  }
+
+  /// Every block found is one that the isovalue is in the range of; those of a ray come without gaps.
+  void verify() {
+    counts = read_counts();
+    const std::vector<uint> masks = macrocells.masks().read();
+    std::vector<uint> blocks(counts.pair_slot_count);
+    rays.pair_block_ids.read(blocks);
+    check(counts.spec_count == params.max_spec_count && counts.active_count > 0, "N_Spec");
+    const uint coarse_x = (params.blocks_x + 3) / 4, coarse_y = (params.blocks_y + 3) / 4;
+    uint num_pairs = 0;
+    for (std::size_t pair = 0; pair < blocks.size(); ++pair) {
+      if (blocks[pair] == ISO_INVALID_ID) continue;
+      ++num_pairs;
+      check(pair % counts.spec_count == 0 || blocks[pair - 1] != ISO_INVALID_ID, "order of a ray's blocks");
+      const uint x = blocks[pair] % params.blocks_x, y = blocks[pair] / params.blocks_x % params.blocks_y,
+                 z = blocks[pair] / params.blocks_x / params.blocks_y;
+      const std::size_t cell = x / 4 + coarse_x * (y / 4 + std::size_t{coarse_y} * (z / 4));
+      const uint bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+      check((masks[2 * cell + bit / 32] >> (bit % 32) & 1u) == 1u, "block without the isovalue");
+    }
+    check(num_pairs == counts.pair_count, "number of ray-block pairs");
+  }
+
+  std::optional<WavefrontSnapshot> before;
+  PassCounts counts{};
+};
+
+void find_blocks(benchmark::State &state) {
+  auto &in = input<TraverseInput>(state.range(0), state.range(1), state.range(2));
+  const double bytes = 12.0 * in.counts.active_count + 4.0 * in.counts.pair_slot_count;
+  measure(
+      state, {double(in.counts.active_count), bytes}, [&] { in.before->restore(); },
+      [&] { in.traverse(in.macrocells, in.rays); });
+  state.counters["pairs"] = in.counts.pair_count;
+}
+
+const bool registered = [] {
+  stage_benchmark("traverse", find_blocks)
+      ->ArgNames({"width", "edge", "n_spec"})
+      ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {128, 256}, {1, 8, 64}});
+  return true;
+}();
+
+}  // namespace
+}  // namespace isowave::bench

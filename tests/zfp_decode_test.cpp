@@ -1,0 +1,265 @@
+// kernels_cl/zfp_codec.h, on the host and through core/zfp_decode, against libzfp: the same bits.
+
+#include "core/zfp_decode.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "kernels_cl/zfp_codec.h"
+#include "tests/stage_support.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+enum class ValueKind { kRandom, kSmooth, kConstant, kZero, kHuge, kTiny, kMixed };
+constexpr ValueKind kValueKinds[] = {ValueKind::kRandom, ValueKind::kSmooth, ValueKind::kConstant,
+                                     ValueKind::kZero,   ValueKind::kHuge,   ValueKind::kTiny,
+                                     ValueKind::kMixed};
+
+std::vector<float> make_voxels(ValueKind kind, const glm::uvec3 &dims, uint seed) {
+  std::vector<float> voxels = random_voxels(dims, -1.0f, 1.0f, seed);
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    float &v = voxels[i];
+    const float x = static_cast<float>(i % dims.x), y = static_cast<float>(i / dims.x % dims.y);
+    switch (kind) {
+      case ValueKind::kRandom:
+        break;
+      case ValueKind::kSmooth:
+        v = std::sin(0.3f * x) + 0.1f * y;
+        break;
+      case ValueKind::kConstant:
+        v = 127.0f;
+        break;
+      case ValueKind::kZero:
+        v = 0.0f;
+        break;
+      case ValueKind::kHuge:
+        v *= 1e37f;
+        break;
+      case ValueKind::kTiny:
+        v = v < 0 ? -1e-29f : 3e-29f * v;
+        break;
+      case ValueKind::kMixed:
+        v = std::ldexp(v, static_cast<int>(i / 64 % 200) - 90);
+        break;
+    }
+  }
+  return voxels;
+}
+
+/// Our decoder on the host: all blocks.
+std::vector<float> decode_on_host(const CompressedVolume &volume) {
+  std::vector<float> values(volume.block_count() * 64);
+  for (std::uint64_t b = 0; b < volume.block_count(); ++b) {
+    zfp_decode_block(volume.words.data(), b * volume.bits_per_block, volume.bits_per_block,
+                     values.data() + 64 * b);
+  }
+  return values;
+}
+
+/// Index of the first value of other bits (0.0 and -0.0 differ), or kNoDifference.
+std::ptrdiff_t first_other_bits(const std::vector<float> &got, const std::vector<float> &expected) {
+  if (got.size() == expected.size() &&
+      std::memcmp(got.data(), expected.data(), got.size() * sizeof(float)) == 0)
+    return kNoDifference;
+  std::size_t i = 0;
+  while (i < got.size() && i < expected.size() && std::memcmp(&got[i], &expected[i], sizeof(float)) == 0) ++i;
+  return static_cast<std::ptrdiff_t>(i);
+}
+
+std::vector<std::uint32_t> awkward_bits_per_block() {
+  std::vector<std::uint32_t> bits;
+  for (std::uint32_t rate = 1; rate <= 32; ++rate) bits.push_back(64 * rate);
+  for (const std::uint32_t odd : {9u, 10u, 11u, 31u, 33u, 37u, 63u, 65u, 100u, 777u, 1999u, 2047u})
+    bits.push_back(odd);
+  return bits;
+}
+
+TEST(ZfpCodec, EveryRateAndKindEqualsLibzfp) {
+  const glm::uvec3 dims(21, 6, 9);
+  for (const std::uint32_t bits_per_block : awkward_bits_per_block()) {
+    for (const ValueKind kind : kValueKinds) {
+      SCOPED_TRACE(fmt::format("{} bits per block, values {}", bits_per_block, static_cast<int>(kind)));
+      const CompressedVolume volume = compress_with_libzfp(make_voxels(kind, dims, 1), dims, bits_per_block);
+      EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)), kNoDifference);
+    }
+  }
+}
+
+TEST(ZfpCodec, DenormalsEqualLibzfp) {
+  const glm::uvec3 dims(8, 8, 8);
+  for (const float scale : {1e-30f, 1e-35f, 1e-38f, 1e-41f, 1e-45f}) {
+    std::vector<float> voxels = random_voxels(dims, -1.0f, 1.0f, 2);
+    for (float &v : voxels) v *= scale;
+    const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
+    EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)), kNoDifference)
+        << scale;
+  }
+}
+
+/// Any bits are a stream that libzfp decodes to something; so must we.
+TEST(ZfpCodec, RandomBitsEqualLibzfp) {
+  Random random(3);
+  for (const std::uint32_t bits_per_block : {9u, 37u, 64u, 100u, 512u, 2048u}) {
+    CompressedVolume volume;
+    volume.info.dims = glm::uvec3(64, 16, 16);
+    volume.bits_per_block = bits_per_block;
+    volume.words.resize((volume.block_count() * bits_per_block + 31) / 32 + 2);
+    std::generate(volume.words.begin(), volume.words.end() - 2, std::ref(random));
+    EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)), kNoDifference)
+        << bits_per_block << " bits per block, seed 3";
+  }
+}
+
+/// What the padding holds is zfp's business; what belongs to the volume is what a zfp reader sees.
+TEST(ZfpCodec, PartialBlocksEqualTheVolume) {
+  for (const glm::uvec3 dims :
+       {glm::uvec3(5, 6, 7), glm::uvec3(2, 2, 2), glm::uvec3(4, 4, 4), glm::uvec3(41, 41, 41)}) {
+    for (const std::uint32_t bits_per_block : {37u, 64u, 512u}) {
+      const CompressedVolume volume =
+          compress_with_libzfp(random_voxels(dims, -100, 100, 4), dims, bits_per_block);
+      const std::vector<float> voxels = decode_with_libzfp(volume), values = decode_on_host(volume);
+      const glm::uvec3 blocks = volume.num_blocks();
+      std::vector<float> gathered(voxels.size());
+      for (std::size_t i = 0; i < voxels.size(); ++i) {
+        const std::size_t x = i % dims.x, y = i / dims.x % dims.y, z = i / dims.x / dims.y;
+        gathered[i] = values[64 * (x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))) + x % 4 + 4 * (y % 4) +
+                             16 * (z % 4)];
+      }
+      EXPECT_EQ(first_other_bits(gathered, voxels), kNoDifference)
+          << dims.x << " x " << dims.y << " x " << dims.z << ", " << bits_per_block << " bits per block";
+    }
+  }
+}
+
+class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  static constexpr float kSentinel = -12345.0f;
+
+  /// Decodes a random part of a shuffled list of blocks to random slots; all other slots keep their values.
+  void expect_decoded(const CompressedVolume &volume, uint seed) {
+    SCOPED_TRACE(fmt::format("{} bits per block, {} blocks, seed {}", volume.bits_per_block,
+                             volume.block_count(), seed));
+    Random random(seed);
+    const uint num_blocks = static_cast<uint>(volume.block_count());
+    const uint num_slots = num_blocks + 5;
+    std::vector<uint> block_ids(num_blocks), slots(num_slots);
+    std::iota(block_ids.begin(), block_ids.end(), 0u);
+    std::iota(slots.begin(), slots.end(), 0u);
+    std::ranges::shuffle(block_ids, random);
+    std::ranges::shuffle(slots, random);
+    PassCounts start = distinct_counts();
+    start.decoded_count = num_blocks - num_blocks / 4;
+    CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
+    ocl::Buffer<float> values(device_, "values", 64 * std::size_t{num_slots});
+    values.fill(kSentinel);
+    const DeviceStream stream(device_, volume);
+    const ocl::Buffer<uint> d_block_ids(device_, "block ids", std::span<const uint>(block_ids)),
+        d_slots(device_, "slots", std::span<const uint>(slots));
+
+    ZfpDecode decode(device_, num_blocks);
+    decode(stream, counts, d_block_ids, d_slots, values);
+
+    const std::vector<float> decoded = decode_blocks_with_libzfp(volume);
+    std::vector<float> expected(64 * std::size_t{num_slots}, kSentinel);
+    for (uint i = 0; i < start.decoded_count; ++i) {
+      std::copy_n(decoded.begin() + 64 * std::ptrdiff_t(block_ids[i]), 64,
+                  expected.begin() + 64 * std::ptrdiff_t(slots[i]));
+    }
+    EXPECT_EQ(first_other_bits(values.read(), expected), kNoDifference);
+    expect_counts(counts, start);
+  }
+
+  ocl::Device device_{GetParam()};
+};
+
+TEST_P(ZfpDecodeOnDevice, SmallPartialBlocksAtOddOffsets) {
+  const glm::uvec3 dims(5, 6, 7);
+  for (const std::uint32_t bits_per_block : {37u, 64u, 100u}) {
+    expect_decoded(compress_with_libzfp(random_voxels(dims, -3, 3, 10), dims, bits_per_block), 10);
+  }
+}
+
+TEST_P(ZfpDecodeOnDevice, EveryRate) {
+  const glm::uvec3 dims(13, 14, 15);
+  const std::vector<float> voxels = make_voxels(ValueKind::kMixed, dims, 11);
+  for (const std::uint32_t bits_per_block : awkward_bits_per_block()) {
+    expect_decoded(compress_with_libzfp(voxels, dims, bits_per_block), bits_per_block);
+  }
+}
+
+TEST_P(ZfpDecodeOnDevice, EveryKindOfValues) {
+  for (const glm::uvec3 dims :
+       {glm::uvec3(5, 6, 7), glm::uvec3(2, 2, 2), glm::uvec3(4, 4, 4), glm::uvec3(41, 41, 41)}) {
+    for (const ValueKind kind : kValueKinds) {
+      SCOPED_TRACE(fmt::format("values {}", static_cast<int>(kind)));
+      for (const std::uint32_t bits_per_block : {9u, 100u, 256u, 2048u}) {
+        expect_decoded(compress_with_libzfp(make_voxels(kind, dims, 12), dims, bits_per_block), 12);
+      }
+    }
+  }
+}
+
+TEST_P(ZfpDecodeOnDevice, DenormalsWhereTheDeviceKeepsThem) {
+  if (!device_.capabilities().denormals) GTEST_SKIP() << "the device flushes denormals";
+  const glm::uvec3 dims(8, 8, 8);
+  for (const float scale : {1e-30f, 1e-35f, 1e-38f, 1e-41f}) {
+    std::vector<float> voxels = random_voxels(dims, -1.0f, 1.0f, 13);
+    for (float &v : voxels) v *= scale;
+    SCOPED_TRACE(fmt::format("scale {}", scale));
+    expect_decoded(compress_with_libzfp(voxels, dims, 1024), 13);
+  }
+}
+
+TEST_P(ZfpDecodeOnDevice, NothingToDecodeTouchesNothing) {
+  const glm::uvec3 dims(4, 4, 4);
+  const DeviceStream stream(device_, compress_with_libzfp(random_voxels(dims, 0, 1, 14), dims, 64));
+  CountsBuffer counts(device_, "counts", 1);  // decoded_count = 0
+  const ocl::Buffer<uint> ids(device_, "block ids", 1), slots(device_, "slots", 1);
+  ocl::Buffer<float> values(device_, "values", 64);
+  values.fill(kSentinel);
+  ZfpDecode decode(device_, 1);
+  decode(stream, counts, ids, slots, values);
+  EXPECT_EQ(values.read(), std::vector<float>(64, kSentinel));
+}
+
+/// Bits past 2^32 of the stream: the bit offset of a block does not fit 32 bits.
+TEST_P(ZfpDecodeOnDevice, BlocksBehind32BitsOfBits) {
+  constexpr std::uint32_t kBits = 2048, kFirst = (1u << 21) + 3;  // block kFirst begins past bit 2^32
+  const std::uint64_t bytes = (std::uint64_t{kFirst} + 8) * kBits / 8;
+  if (bytes > device_.capabilities().largest_allocation) GTEST_SKIP() << "the device allocates no 512 MiB";
+  const glm::uvec3 dims(8, 8, 8);
+  const CompressedVolume volume = compress_with_libzfp(random_voxels(dims, -1, 1, 15), dims, kBits);
+  CompressedVolume nothing;
+  nothing.words.resize(1);
+  nothing.bits_per_block = kBits;
+  DeviceStream stream(device_, nothing);
+  stream.words = ocl::Buffer<uint>(device_, "long stream", bytes / 4 + 2);
+  stream.words.write(volume.words, std::size_t{kFirst} * kBits / 32);
+  const std::vector<uint> block_ids = {kFirst + 7, kFirst + 2}, slots = {1, 0};
+  const ocl::Buffer<uint> d_block_ids(device_, "block ids", std::span<const uint>(block_ids)),
+      d_slots(device_, "slots", std::span<const uint>(slots));
+  PassCounts start{};
+  start.decoded_count = 2;
+  const CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
+  ocl::Buffer<float> values(device_, "values", 128);
+  ZfpDecode decode(device_, 2);
+  decode(stream, counts, d_block_ids, d_slots, values);
+  const std::vector<float> decoded = decode_blocks_with_libzfp(volume);
+  std::vector<float> expected(decoded.begin() + 2 * 64, decoded.begin() + 3 * 64);
+  expected.insert(expected.end(), decoded.begin() + 7 * 64, decoded.end());
+  EXPECT_EQ(first_other_bits(values.read(), expected), kNoDifference);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, ZfpDecodeOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+}  // namespace
+}  // namespace isowave
