@@ -44,7 +44,7 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, st
 
 }  // namespace
 
-std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
+std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                                      unsigned threads) {
   if (voxels.size() != std::size_t{frame.dims_x} * frame.dims_y * frame.dims_z) {
     throw std::invalid_argument("render_scalar: the voxels do not fit the frame's dims");
