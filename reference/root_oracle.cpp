@@ -188,8 +188,7 @@ template <class Number>
 std::array<Number, 3> position(const OracleRay &ray, const std::array<int, 3> &cell, const Number &t) {
   std::array<Number, 3> p;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    p[axis] = Number(double(ray.origin[axis])) - Number(double(cell[axis])) +
-              t * Number(double(ray.direction[axis]));
+    p[axis] = Number(ray.origin[axis]) - Number(double(cell[axis])) + t * Number(ray.direction[axis]);
   }
   return p;
 }
@@ -201,7 +200,7 @@ Answer change_in_cell(const std::array<double, 8> &v, double isovalue, const Ora
   const std::array<Number, 3> p = position(ray, cell, t_enter);
   const Number length = t_exit - t_enter;
   std::array<Number, 3> e;
-  for (std::size_t axis = 0; axis < 3; ++axis) e[axis] = length * Number(double(ray.direction[axis]));
+  for (std::size_t axis = 0; axis < 3; ++axis) e[axis] = length * Number(ray.direction[axis]);
   return first_change(bernstein(along_segment(v, isovalue, p, e)), 0.0, 1.0, 0, max_depth);
 }
 
@@ -242,7 +241,7 @@ OracleHit RootOracle::first_hit(const OracleRay &ray) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {  // clip to the domain
     const int last = static_cast<int>(dims_[axis]) - 1;
     if (ray.direction[axis] == 0) {
-      if (!(ray.origin[axis] >= 0 && ray.origin[axis] <= float(last))) return {};
+      if (!(ray.origin[axis] >= 0 && ray.origin[axis] <= last)) return {};
       continue;
     }
     step[axis] = ray.direction[axis] > 0 ? 1 : -1;
@@ -256,7 +255,7 @@ OracleHit RootOracle::first_hit(const OracleRay &ray) const {
   std::array<Crossing, 3> next;  // the plane at which each axis leaves its current cell
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const int last_cell = static_cast<int>(dims_[axis]) - 2;
-    const double x = double(ray.origin[axis]) + enter.t * double(ray.direction[axis]);
+    const double x = ray.origin[axis] + enter.t * ray.direction[axis];
     cell[axis] = std::clamp(static_cast<int>(std::floor(x)), 0, last_cell);
     if (step[axis] == 0) continue;
     const auto leaves = [&](int c) { return crossing(axis, step[axis] > 0 ? c + 1 : c); };

@@ -14,9 +14,10 @@
 
 namespace isowave {
 
-/// A ray in index space: position = origin + t direction, t >= 0. The float32 values are taken as exact.
+/// A ray in index space: position = origin + t direction, t >= 0. The numbers are taken as exact; the
+/// renderer's float32 ones fit without rounding.
 struct OracleRay {
-  std::array<float, 3> origin{}, direction{};
+  std::array<double, 3> origin{}, direction{};
 };
 
 struct OracleHit {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/solvers.hpp"
-#include "kernels_cl/shared_types.h"
+#include "kernels_cl/grid_dda.h"
 
 namespace isowave {
 
@@ -18,5 +18,10 @@ namespace isowave {
 /// the frame.
 std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
                                      Solver solver = kDefaultSolver, unsigned threads = 0);
+
+/// One ray of the same: the hit of `ray` (index space; t in units of frame.t_scale). frame: dims, blocks,
+/// isovalue and t_scale are used.
+HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
+                       const Ray &ray);
 
 }  // namespace isowave

@@ -1,0 +1,147 @@
+#include "reference/accuracy.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+#include "kernels_cl/grid_dda.h"
+
+namespace isowave {
+
+namespace {
+
+using Vec = std::array<double, 3>;
+
+double dot(const Vec &a, const Vec &b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+double length(const Vec &v) {
+  return std::sqrt(dot(v, v));
+}
+
+/// Two unit vectors at right angles to d and to each other.
+std::array<Vec, 2> sideways(const Vec &d) {
+  std::size_t smallest = 0;
+  for (std::size_t axis = 1; axis < 3; ++axis) {
+    if (std::abs(d[axis]) < std::abs(d[smallest])) smallest = axis;
+  }
+  Vec e{};
+  e[smallest] = 1;
+  Vec a{d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]};
+  Vec b{d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]};
+  const double la = length(a), lb = length(b);
+  for (double &x : a) x /= la;
+  for (double &x : b) x /= lb;
+  return {a, b};
+}
+
+/// Does the oracle give `first` for all of eight rays beside this one?
+bool stable(const RootOracle &oracle, const JudgedRay &judged, const OracleHit &first, double speed) {
+  const double offset = judged.eye_distance >= 3000 ? 5e-5 : 1e-5;
+  const auto [a, b] = sideways(judged.ray.direction);
+  for (int i = 0; i < 8; ++i) {
+    const double angle = 0.7853981633974483 * i;
+    OracleRay beside = judged.ray;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      beside.origin[axis] += offset * (std::cos(angle) * a[axis] + std::sin(angle) * b[axis]);
+    }
+    const OracleHit moved = oracle.first_hit(beside);
+    if (moved.hit != first.hit) return false;
+    if (first.hit && std::abs(moved.t - first.t) * speed > kSameHit) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Quantiles quantiles(std::vector<double> values) {
+  if (values.empty()) return {};
+  const auto at = [&](double q) {
+    const auto i = static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), values.begin() + i, values.end());
+    return values[static_cast<std::size_t>(i)];
+  };
+  return {at(0.5), at(0.99), at(1.0)};
+}
+
+void judge(const RootOracle &oracle, float isovalue, const JudgedRay &judged, Accuracy &tally) {
+  const OracleHit truth = oracle.first_hit(judged.ray);
+  const Vec &d = judged.ray.direction;
+  const double speed = length(d);  // voxels per unit of t
+  const bool hit = std::isfinite(judged.hit.t);
+  ++tally.rays;
+  tally.hits += truth.hit;
+  // From cell and local position, not from t: a float32 t of 3,000 is only good to 2e-4.
+  Vec point{};
+  double along = 0;
+  if (hit) {
+    const std::array<float, 3> local{judged.hit.x, judged.hit.y, judged.hit.z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      point[axis] = double(judged.cell[axis]) + double(local[axis]);
+      along += (point[axis] - judged.ray.origin[axis]) * d[axis];
+    }
+    along /= speed * speed;
+  }
+  const bool missed = truth.hit && (!hit || (along - truth.t) * speed > kSameHit);
+  const bool false_hit = hit && (!truth.hit || (truth.t - along) * speed > kSameHit);
+  if (missed || false_hit) {
+    if (!stable(oracle, judged, truth, speed)) {
+      ++tally.unstable;
+    } else {
+      ++(missed ? tally.missed : tally.false_hits);
+    }
+    return;
+  }
+  if (!hit) return;
+  tally.distance.push_back(std::abs(along - truth.t) * speed);
+  const double slope = length(oracle.gradient(point));
+  if (slope > 0) tally.residual.push_back(std::abs(oracle.field(point) - double(isovalue)) / slope);
+}
+
+void merge(Accuracy &into, const Accuracy &from) {
+  into.rays += from.rays;
+  into.hits += from.hits;
+  into.missed += from.missed;
+  into.false_hits += from.false_hits;
+  into.unstable += from.unstable;
+  into.distance.insert(into.distance.end(), from.distance.begin(), from.distance.end());
+  into.residual.insert(into.residual.end(), from.residual.begin(), from.residual.end());
+}
+
+Accuracy judge_frame(const RootOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits) {
+  const Vec centre{0.5 * (frame.dims_x - 1), 0.5 * (frame.dims_y - 1), 0.5 * (frame.dims_z - 1)};
+  const double eye_distance =
+      length({frame.eye_x - centre[0], frame.eye_y - centre[1], frame.eye_z - centre[2]});
+  std::atomic<std::uint32_t> next_row{0};
+  std::vector<Accuracy> tallies(std::max(1u, std::thread::hardware_concurrency()));
+  {
+    std::vector<std::jthread> pool;
+    for (Accuracy &tally : tallies) {
+      pool.emplace_back([&] {
+        for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
+          for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel) {
+            const Ray ray = make_ray(&frame, pixel);
+            const HitRecord &hit = hits[pixel];
+            JudgedRay judged{
+                {{ray.x.o, ray.y.o, ray.z.o}, {ray.x.d, ray.y.d, ray.z.d}}, eye_distance, hit, {}};
+            if (std::isfinite(hit.t)) {
+              const std::uint32_t block[3] = {hit.block_id % frame.blocks_x,
+                                              hit.block_id / frame.blocks_x % frame.blocks_y,
+                                              hit.block_id / frame.blocks_x / frame.blocks_y};
+              for (std::size_t axis = 0; axis < 3; ++axis) {
+                judged.cell[axis] = static_cast<int>(4 * block[axis] + (hit.cell >> (2 * axis) & 3u));
+              }
+            }
+            judge(oracle, frame.isovalue, judged, tally);
+          }
+        }
+      });
+    }
+  }
+  Accuracy sum;
+  for (const Accuracy &tally : tallies) merge(sum, tally);
+  return sum;
+}
+
+}  // namespace isowave
