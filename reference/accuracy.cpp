@@ -5,8 +5,6 @@
 #include <cmath>
 #include <thread>
 
-#include "kernels_cl/grid_dda.h"
-
 namespace isowave {
 
 namespace {
@@ -37,12 +35,12 @@ std::array<Vec, 2> sideways(const Vec &d) {
 }
 
 /// Does the oracle give `first` for all of eight rays beside this one?
-bool stable(const RootOracle &oracle, const JudgedRay &judged, const OracleHit &first, double speed) {
-  const double offset = judged.eye_distance >= 3000 ? 5e-5 : 1e-5;
-  const auto [a, b] = sideways(judged.ray.direction);
+bool stable(const RootOracle &oracle, const OracleRay &ray, const OracleHit &first, double offset) {
+  const double speed = length(ray.direction);
+  const auto [a, b] = sideways(ray.direction);
   for (int i = 0; i < 8; ++i) {
     const double angle = 0.7853981633974483 * i;
-    OracleRay beside = judged.ray;
+    OracleRay beside = ray;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       beside.origin[axis] += offset * (std::cos(angle) * a[axis] + std::sin(angle) * b[axis]);
     }
@@ -65,28 +63,36 @@ Quantiles quantiles(std::vector<double> values) {
   return {at(0.5), at(0.99), at(1.0)};
 }
 
-void judge(const RootOracle &oracle, float isovalue, const JudgedRay &judged, Accuracy &tally) {
-  const OracleHit truth = oracle.first_hit(judged.ray);
-  const Vec &d = judged.ray.direction;
+void judge(const RootOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
+           Accuracy &tally) {
+  const OracleRay exact{{ray.x.o, ray.y.o, ray.z.o}, {ray.x.d, ray.y.d, ray.z.d}};
+  const OracleHit truth = oracle.first_hit(exact);
+  const Vec &d = exact.direction;
   const double speed = length(d);  // voxels per unit of t
-  const bool hit = std::isfinite(judged.hit.t);
+  const bool hit = std::isfinite(record.t);
   ++tally.rays;
   tally.hits += truth.hit;
   // From cell and local position, not from t: a float32 t of 3,000 is only good to 2e-4.
   Vec point{};
   double along = 0;
   if (hit) {
-    const std::array<float, 3> local{judged.hit.x, judged.hit.y, judged.hit.z};
+    const std::uint32_t block[3] = {record.block_id % frame.blocks_x,
+                                    record.block_id / frame.blocks_x % frame.blocks_y,
+                                    record.block_id / frame.blocks_x / frame.blocks_y};
+    const float local[3] = {record.x, record.y, record.z};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      point[axis] = double(judged.cell[axis]) + double(local[axis]);
-      along += (point[axis] - judged.ray.origin[axis]) * d[axis];
+      point[axis] = 4.0 * block[axis] + (record.cell >> (2 * axis) & 3u) + double(local[axis]);
+      along += (point[axis] - exact.origin[axis]) * d[axis];
     }
     along /= speed * speed;
   }
   const bool missed = truth.hit && (!hit || (along - truth.t) * speed > kSameHit);
   const bool false_hit = hit && (!truth.hit || (truth.t - along) * speed > kSameHit);
   if (missed || false_hit) {
-    if (!stable(oracle, judged, truth, speed)) {
+    const Vec from_centre{exact.origin[0] - 0.5 * (frame.dims_x - 1),
+                          exact.origin[1] - 0.5 * (frame.dims_y - 1),
+                          exact.origin[2] - 0.5 * (frame.dims_z - 1)};
+    if (!stable(oracle, exact, truth, length(from_centre) >= 3000 ? 5e-5 : 1e-5)) {
       ++tally.unstable;
     } else {
       ++(missed ? tally.missed : tally.false_hits);
@@ -96,7 +102,7 @@ void judge(const RootOracle &oracle, float isovalue, const JudgedRay &judged, Ac
   if (!hit) return;
   tally.distance.push_back(std::abs(along - truth.t) * speed);
   const double slope = length(oracle.gradient(point));
-  if (slope > 0) tally.residual.push_back(std::abs(oracle.field(point) - double(isovalue)) / slope);
+  if (slope > 0) tally.residual.push_back(std::abs(oracle.field(point) - double(frame.isovalue)) / slope);
 }
 
 void merge(Accuracy &into, const Accuracy &from) {
@@ -110,9 +116,6 @@ void merge(Accuracy &into, const Accuracy &from) {
 }
 
 Accuracy judge_frame(const RootOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits) {
-  const Vec centre{0.5 * (frame.dims_x - 1), 0.5 * (frame.dims_y - 1), 0.5 * (frame.dims_z - 1)};
-  const double eye_distance =
-      length({frame.eye_x - centre[0], frame.eye_y - centre[1], frame.eye_z - centre[2]});
   std::atomic<std::uint32_t> next_row{0};
   std::vector<Accuracy> tallies(std::max(1u, std::thread::hardware_concurrency()));
   {
@@ -121,19 +124,7 @@ Accuracy judge_frame(const RootOracle &oracle, const FrameParams &frame, std::sp
       pool.emplace_back([&] {
         for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
           for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel) {
-            const Ray ray = make_ray(&frame, pixel);
-            const HitRecord &hit = hits[pixel];
-            JudgedRay judged{
-                {{ray.x.o, ray.y.o, ray.z.o}, {ray.x.d, ray.y.d, ray.z.d}}, eye_distance, hit, {}};
-            if (std::isfinite(hit.t)) {
-              const std::uint32_t block[3] = {hit.block_id % frame.blocks_x,
-                                              hit.block_id / frame.blocks_x % frame.blocks_y,
-                                              hit.block_id / frame.blocks_x / frame.blocks_y};
-              for (std::size_t axis = 0; axis < 3; ++axis) {
-                judged.cell[axis] = static_cast<int>(4 * block[axis] + (hit.cell >> (2 * axis) & 3u));
-              }
-            }
-            judge(oracle, frame.isovalue, judged, tally);
+            judge(oracle, frame, make_ray(&frame, pixel), hits[pixel], tally);
           }
         }
       });

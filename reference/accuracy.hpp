@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "kernels_cl/shared_types.h"
+#include "kernels_cl/grid_dda.h"
 #include "reference/root_oracle.hpp"
 
 namespace isowave {
@@ -31,19 +31,12 @@ struct Accuracy {
                                  ///< where the gradient is 0
 };
 
-/// One ray of the renderer: its float32 origin and direction, and what came of it.
-struct JudgedRay {
-  OracleRay ray;
-  double eye_distance =
-      0;  ///< voxels from the eye to the volume's centre: how far a ray is moved to see if it is stable
-  HitRecord hit{};  ///< t in units of the ray's direction
-  std::array<int, 3> cell{};
-};
-
-/// Adds the ray to the tally. Where renderer and oracle disagree, the ray is moved sideways by 1e-5 voxels in
-/// eight directions (5e-5 from 3,000 voxels on): if the oracle then does not always give its first answer,
-/// the ray is unstable.
-void judge(const RootOracle &oracle, float isovalue, const JudgedRay &judged, Accuracy &tally);
+/// Adds one ray of the renderer, its float32 origin and direction taken as exact, and the hit it gave. frame:
+/// dims, blocks and isovalue are used. Where renderer and oracle disagree, the ray is moved sideways by 1e-5
+/// voxels in eight directions (5e-5 when the eye is 3,000 voxels or more from the volume's centre): if the
+/// oracle then does not always give its first answer, the ray is unstable.
+void judge(const RootOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &hit,
+           Accuracy &tally);
 
 /// Judges a whole frame with as many threads as there are cores. hits [height * width] of `frame`.
 Accuracy judge_frame(const RootOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits);
