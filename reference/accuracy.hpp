@@ -12,7 +12,7 @@ namespace isowave {
 
 /// A hit closer than this to the oracle's along the ray is the same hit [voxels]. Only what lies beyond
 /// counts as missed or false; what lies within shows in the distances.
-inline constexpr double kSameHit = 1e-3;
+inline constexpr double kSameHit = 1e-2;
 
 /// Quantiles of a set of distances [voxels]; 0 for an empty one.
 struct Quantiles {

@@ -160,7 +160,7 @@ StabilityCase triple_roots(std::uint32_t rays, Random &random) {
 }
 
 StabilityCase tangents(std::uint32_t rays, Random &random) {
-  StabilityCase result{"tangents", "rays that graze a sphere within 1e-3 voxels", {}};
+  StabilityCase result{"tangents", "rays that graze a sphere of radius 5 within a tenth of a voxel", {}};
   StabilityScene scene = sampled({16, 16, 16}, 5, [](double x, double y, double z) {
     return std::sqrt((x - 7.4) * (x - 7.4) + (y - 7.6) * (y - 7.6) + (z - 7.3) * (z - 7.3));
   });
@@ -170,7 +170,7 @@ StabilityCase tangents(std::uint32_t rays, Random &random) {
     Vec t{d[0] - along * n[0], d[1] - along * n[1], d[2] - along * n[2]};
     const double length = std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
     for (double &x : t) x /= length;
-    const double radius = 5 + random.in(-1e-3, 1e-3);
+    const double radius = 5 + random.in(-0.1, 0.1);
     scene.rays.push_back(ray_through({7.4 + radius * n[0], 7.6 + radius * n[1], 7.3 + radius * n[2]}, t, 30));
   }
   result.scenes.push_back(std::move(scene));
