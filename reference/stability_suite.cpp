@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
-#include <random>
 
+#include "reference/random.hpp"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave {
@@ -14,29 +13,6 @@ namespace {
 
 using Vec = std::array<double, 3>;
 using Field = std::function<double(double x, double y, double z)>;
-
-/// Numbers that are the same with every standard library, unlike its distributions.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  /// [0,1)
-  double unit() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
-  double in(double low, double high) { return low + (high - low) * unit(); }
-  std::uint32_t below(std::uint32_t end) { return static_cast<std::uint32_t>(engine_() % end); }
-  Vec in_box(const Vec &low, const Vec &high) {
-    return {in(low[0], high[0]), in(low[1], high[1]), in(low[2], high[2])};
-  }
-  Vec direction() {
-    for (;;) {
-      const Vec v = in_box({-1, -1, -1}, {1, 1, 1});
-      const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-      if (length > 0.1 && length < 1) return {v[0] / length, v[1] / length, v[2] / length};
-    }
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 Ray make_ray_from(const Vec &origin, const Vec &direction) {
   Ray ray;
