@@ -107,21 +107,22 @@ void use_cache(benchmark::State &state, Part part, Distribution distribution) {
 }
 
 /// One input serves three benchmarks: they are registered together.
+void register_parts(Distribution distribution, std::int64_t width, std::int64_t key_bits) {
+  for (const auto &[part, name] : {std::pair(Part::kRequestCold, "request_cold"),
+                                   {Part::kRequestWarm, "request_warm"},
+                                   {Part::kAssign, "assign"}}) {
+    stage_benchmark(
+        fmt::format("block_cache/{}/{}", name, to_string(distribution)),
+        [part = part, distribution](benchmark::State &state) { use_cache(state, part, distribution); })
+        ->ArgNames({"width", "key_bits"})
+        ->Args({width, key_bits});
+  }
+}
+
 const bool registered = [] {
   for (const Distribution distribution : kDistributions) {
-    for (const std::int64_t width : kWidths) {
-      for (const std::int64_t key_bits : {18, 27}) {
-        for (const auto &[part, name] : {std::pair(Part::kRequestCold, "request_cold"),
-                                         {Part::kRequestWarm, "request_warm"},
-                                         {Part::kAssign, "assign"}}) {
-          stage_benchmark(
-              fmt::format("block_cache/{}/{}", name, to_string(distribution)),
-              [part = part, distribution](benchmark::State &state) { use_cache(state, part, distribution); })
-              ->ArgNames({"width", "key_bits"})
-              ->Args({width, key_bits});
-        }
-      }
-    }
+    for (const std::int64_t width : kWidths) register_parts(distribution, width, 18);
+    register_parts(distribution, kWidths.back(), 27);
   }
   return true;
 }();

@@ -18,6 +18,11 @@ const CompressedVolume &slab() {
   return volume;
 }
 
+const std::vector<float> &slab_voxels() {
+  static const std::vector<float> voxels = decode_with_libzfp(slab());
+  return voxels;
+}
+
 /// Far away, so that the rays are nearly parallel.
 FrameSetup slab_setup(std::int64_t width, std::int64_t rays_per_block) {
   constexpr double kDistance = 4096, kMargin = 0.98;
@@ -48,7 +53,7 @@ struct IntersectInput : FrameRig {
   /// The cells that the twin hits, by the same rays.
   void verify() {
     counts = read_counts();
-    const std::vector<HitRecord> expected = render_scalar(params, decode_with_libzfp(slab()));
+    const std::vector<HitRecord> expected = render_scalar(params, slab_voxels());
     std::vector<uint> active(counts.active_count), blocks(counts.pair_slot_count);
     std::vector<PairHit> got(counts.pair_slot_count);
     rays.active_ray_ids.read(active);
@@ -79,8 +84,8 @@ void intersect_blocks(benchmark::State &state) {
 const bool registered = [] {
   stage_benchmark("intersect", intersect_blocks)
       ->ArgNames({"width", "rays_per_block"})
-      ->ArgsProduct({{640}, {1, 4, 16, 64, 250, 1000}})
-      ->ArgsProduct({{1280}, {4, 16, 64, 250, 1000}});
+      ->ArgsProduct({{640}, {1, 4, 16, 100, 1000}})
+      ->ArgsProduct({{1280}, {16, 1000}});
   return true;
 }();
 

@@ -1,5 +1,6 @@
 // isowave_bench: every stage of the pipeline alone, on one device. The options that are not ours are Google
-// Benchmark's: --benchmark_filter=REGEX picks stages, --benchmark_out=FILE writes JSON.
+// Benchmark's: --benchmark_filter=REGEX picks stages, --benchmark_out=FILE writes JSON. A default
+// run is for looking around: for numbers to quote, add --benchmark_min_time=1 or --benchmark_repetitions=9.
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>

@@ -6,13 +6,12 @@
 /// inside along the ray. Between entry pa and exit pb (cell-local [0,1]^3) the field is a cubic in s; its
 /// Bernstein coefficients are values of the trilinear form at mixed coordinates of pa and pb [Ramshaw 1987,
 /// blossoms], hence convex combinations of corners:
-///   b0 = f(a,a,a)   b1 = (f(b,a,a) + f(a,b,a) + f(a,a,b)) / 3   b2 = (f(b,b,a) + f(b,a,b) + f(a,b,b)) / 3 b3
-///   = f(b,b,b)
+///   b0 = f(a,a,a)    b1 = (f(b,a,a) + f(a,b,a) + f(a,a,b)) / 3
+///   b3 = f(b,b,b)    b2 = (f(b,b,a) + f(b,a,b) + f(a,b,b)) / 3
 /// b0 and b3 lie on cell faces. There one coordinate is exactly 0 or 1 and lerp() returns its end exactly, so
-/// the two cells of a face compute the same bits: a ray cannot slip between them. lerp() also keeps signs
-/// (both ends < 0 give < 0, both
-/// >= 0 give >= 0), which is what clamping the face's value to its corners' range would be for: cells and
-/// blocks whose corners agree in sign can be skipped without changing any hit.
+/// the two cells of a face compute the same bits: a ray cannot slip between them. lerp() also keeps signs (two
+/// ends < 0 give < 0, two ends >= 0 give >= 0), which is what clamping the face's value to its corners' range
+/// would be for: cells and blocks whose corners agree in sign can be skipped without changing any hit.
 #ifndef ISOWAVE_CELL_INTERSECT_H
 #define ISOWAVE_CELL_INTERSECT_H
 

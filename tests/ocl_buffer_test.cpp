@@ -191,7 +191,8 @@ TEST_P(OclBufferOnDevice, TooLargeIsRefusedBeforeAnyWork) {
   EXPECT_EQ(device_.ledger().peak(), 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclBufferOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclBufferOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 }  // namespace
 }  // namespace isowave

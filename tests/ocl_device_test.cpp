@@ -192,7 +192,8 @@ TEST_P(OclDeviceOnDevice, MisuseIsAnInvalidArgument) {
   EXPECT_THROW(device.program("launch_probe", {{"ISO_A", "1 -cl-fast-relaxed-math"}}), std::invalid_argument);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclDeviceOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclDeviceOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 }  // namespace
 }  // namespace isowave

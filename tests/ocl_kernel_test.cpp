@@ -140,7 +140,8 @@ TEST_P(OclKernelOnDevice, Ranges) {
   EXPECT_EQ(Range::strided(1u << 30, 64, device_).num_groups, device_.max_resident_groups());
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclKernelOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclKernelOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 }  // namespace
 }  // namespace isowave

@@ -99,7 +99,8 @@ TEST_P(OclTimerOnDevice, TransfersAndAsyncReadsAreBooked) {
   EXPECT_THAT(device.timer().collect(), UnorderedElementsAre(Key("transfer")));
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OclTimerOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, OclTimerOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 }  // namespace
 }  // namespace isowave

@@ -7,6 +7,7 @@
 
 #include "core/camera.hpp"
 #include "core/frame.hpp"
+#include "kernels_cl/grid_dda.h"
 
 namespace isowave {
 
@@ -52,6 +53,25 @@ inline FrameParams case_frame(const glm::uvec3 &dims, const CameraCase &c, Image
   VolumeInfo info;
   info.dims = dims;
   return make_frame_params(info, c.camera, size, isovalue);
+}
+
+/// The blocks that a pixel's ray enters, found by walking through every cell.
+inline std::vector<uint> blocks_of_ray(const FrameParams &frame, uint pixel) {
+  const Ray ray = make_ray(&frame, pixel);
+  const LastPlanes last = last_planes(&frame);
+  std::vector<uint> blocks;
+  RayEvent enter;
+  if (!domain_entry(&ray, last, &enter)) return blocks;
+  GridWalk cell =
+      walk_from(&ray, locate(ray.x, 0, enter, 1, 0, last.x - 1), locate(ray.y, 1, enter, 1, 0, last.y - 1),
+                locate(ray.z, 2, enter, 1, 0, last.z - 1), 1, last);
+  while (cell.x >= 0 && cell.x < last.x && cell.y >= 0 && cell.y < last.y && cell.z >= 0 && cell.z < last.z) {
+    const uint block =
+        uint(cell.x / 4) + frame.blocks_x * (uint(cell.y / 4) + frame.blocks_y * uint(cell.z / 4));
+    if (blocks.empty() || blocks.back() != block) blocks.push_back(block);
+    walk_step(&cell, &ray, walk_exit(&cell), 1, last);
+  }
+  return blocks;
 }
 
 }  // namespace isowave

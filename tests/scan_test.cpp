@@ -128,7 +128,7 @@ TEST_P(ScanOnDevice, ScansAtAwkwardCounts) {
     uint seed = 200;
     std::vector<uint> counts = awkward_counts(tile_of(group_size));
     for (const uint other_tile : {tile_of(8), tile_of(64), tile_of(256)}) counts.push_back(other_tile + 1);
-    counts.push_back(1000003);
+    counts.push_back(500009);  // one group: llvmpipe's 65,535 turns (Device::max_resident_groups) suffice
     for (const uint count : counts) expect_scan(scan, count, 1, 1, ++seed);
   }
 }

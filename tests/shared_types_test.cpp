@@ -66,7 +66,8 @@ TEST_P(SharedTypesOnDevice, SmallOffsetsAreTheHosts) {
   EXPECT_EQ(offsets.read(), expected);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, SharedTypesOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, SharedTypesOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 }  // namespace
 }  // namespace isowave

@@ -100,6 +100,9 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
 }
 
 std::uint32_t Device::max_resident_groups() const {
+  // Mesa's llvmpipe ends all loops of a work-item, without a word, after 65,535 turns in all. A work-item that
+  // strides over many elements gets there; one element each does not.
+  if (info_.name.find("llvmpipe") != std::string::npos) return 1u << 20;
   // A GPU's compute unit holds up to 2048 work-items and hides memory latency behind them: 16 groups of 64 to
   // 128. A CPU driver runs the groups of a unit one after the other; a few per unit even out groups of
   // unequal work.

@@ -1,0 +1,246 @@
+// core/block_cache over many passes, against a model that knows which pass used each slot last. Which block
+// gets which slot is left to chance, so the model follows what the device chose and checks that it may.
+
+#include "core/block_cache.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "core/error.hpp"
+#include "tests/stage_support.hpp"
+#include "tests/stage_world.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+constexpr glm::uvec3 kDims(29, 25, 22);  // 8 x 7 x 6 blocks
+
+/// What was cached, where, and when it was used last.
+class CacheModel {
+ public:
+  CacheModel(const FrameParams &frame, uint num_slots)
+      : frame_(frame), slots_(num_slots, ISO_INVALID_ID), stamps_(num_slots, 0) {}
+
+  /// One pass on the device and here.
+  void pass(StageWorld &world, const std::vector<uint> &pairs, uint spec_count) {
+    world.begin_pass(pairs, spec_count);
+    const uint pass = world.counts().pass;
+    world.cache.request(world.rays);
+    check_requests(world, pairs, pass);
+    if (testing::Test::HasFatalFailure()) return;
+    world.cache.assign_slots(world.rays);
+    check_assignment(world, pairs, pass);
+  }
+
+  std::size_t num_granted = 0, num_refused = 0, num_stolen = 0;
+
+ private:
+  bool cached(uint block) const { return std::ranges::find(slots_, block) != slots_.end(); }
+
+  /// Requests are the missing blocks of all pairs' dual grids, once each; cached ones are stamped.
+  void check_requests(const StageWorld &world, const std::vector<uint> &pairs, uint pass) {
+    wanted_.clear();
+    for (const uint pair : pairs) {
+      if (pair == ISO_INVALID_ID) continue;
+      for (const uint block : dual_grid_blocks(frame_, pair)) {
+        const auto at = std::ranges::find(slots_, block);
+        if (at == slots_.end()) {
+          wanted_.insert(block);
+        } else {
+          stamps_[static_cast<std::size_t>(at - slots_.begin())] = pass;
+        }
+      }
+    }
+    ASSERT_EQ(world.counts().requested_count, wanted_.size());
+    std::vector<uint> requests = world.cache.decode_block_ids().read();
+    requests.resize(wanted_.size());
+    std::ranges::sort(requests);
+    ASSERT_TRUE(std::ranges::equal(requests, wanted_)) << "requests";
+  }
+
+  void check_assignment(const StageWorld &world, const std::vector<uint> &pairs, uint pass) {
+    const uint num_slots = static_cast<uint>(slots_.size());
+    const uint decoded = world.counts().decoded_count;
+    const uint in_use = static_cast<uint>(std::ranges::count(stamps_, pass));
+    std::set<uint> first_grid;  // blocks of the pair served first
+    if (!pairs.empty() && pairs[0] != ISO_INVALID_ID) {
+      for (const uint block : dual_grid_blocks(frame_, pairs[0])) first_grid.insert(block);
+    }
+    const auto first_missing =
+        static_cast<uint>(std::ranges::count_if(first_grid, [&](uint block) { return !cached(block); }));
+    ASSERT_EQ(world.counts().requested_count, wanted_.size());
+    /* Slots of this pass stay with it, but as many as the first pair needs are found in any case. */
+    ASSERT_EQ(decoded, std::min<std::size_t>(wanted_.size(), std::max(num_slots - in_use, first_missing)));
+
+    const std::vector<uint> table = world.cache.page_table().read(),
+                            slots = world.cache.slot_block_ids().read(),
+                            stream = world.cache.decode_block_ids().read(),
+                            targets = world.cache.decode_slots().read();
+    /* The decode list: distinct blocks that were asked for, in distinct slots. */
+    const std::set<uint> blocks(stream.begin(), stream.begin() + decoded),
+        into(targets.begin(), targets.begin() + decoded);
+    ASSERT_EQ(blocks.size(), decoded);
+    ASSERT_EQ(into.size(), decoded);
+    ASSERT_TRUE(std::ranges::includes(wanted_, blocks));
+    uint youngest_evicted = 0, oldest_kept = 0xFFFFFFFFu;
+    bool stole = false;
+    for (uint slot = 0; slot < num_slots; ++slot) {
+      if (into.contains(slot)) {
+        stole |= stamps_[slot] == pass;
+        ASSERT_FALSE(first_grid.contains(slots_[slot])) << "a block of the first pair was evicted";
+        youngest_evicted = std::max(youngest_evicted, clock(slot, pass));
+      } else {
+        ASSERT_EQ(slots[slot], slots_[slot]) << "slot " << slot << " changed and is not in the decode list";
+        if (!first_grid.contains(slots_[slot])) oldest_kept = std::min(oldest_kept, clock(slot, pass));
+      }
+    }
+    ASSERT_LE(youngest_evicted, oldest_kept) << "a younger block was evicted than one that was kept";
+    if (stole) {
+      ASSERT_EQ(decoded, first_missing) << "slots of this pass were taken, and not for the first pair";
+    }
+    for (uint i = 0; i < decoded; ++i) {
+      ASSERT_EQ(slots[targets[i]], stream[i]);
+      slots_[targets[i]] = stream[i];
+      stamps_[targets[i]] = pass;
+    }
+    /* Page table and slots are inverse of each other. */
+    std::size_t num_cached = 0;
+    for (uint block = 0; block < table.size(); ++block) {
+      if (table[block] == ISO_BLOCK_ABSENT) continue;
+      ASSERT_LT(table[block], num_slots) << "block " << block;
+      ASSERT_EQ(slots[table[block]], block);
+      ++num_cached;
+    }
+    ASSERT_EQ(num_cached, num_slots - std::ranges::count(slots, ISO_INVALID_ID));
+    for (const uint block : first_grid)
+      ASSERT_TRUE(cached(block)) << "block " << block << " of the first pair";
+    /* When slots are scarce, what the first pair had already stays for a pass more. */
+    for (uint slot = 0; slot < num_slots && wanted_.size() > num_slots - in_use; ++slot) {
+      if (first_grid.contains(slots_[slot]) && !into.contains(slot)) stamps_[slot] = pass + 1;
+    }
+    num_granted += decoded;
+    num_refused += wanted_.size() - decoded;
+    num_stolen += stole;
+  }
+
+  /// The LRU's clock: ages of 63 passes and more are one.
+  uint clock(uint slot, uint pass) const { return std::max(stamps_[slot], pass - (ISO_AGE_BUCKETS - 1)); }
+
+  FrameParams frame_;
+  std::vector<uint> slots_, stamps_;
+  std::set<uint> wanted_;
+};
+
+class BlockCacheOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  /// Random passes: each active ray asks for a row of neighbouring blocks that drifts from pass to pass.
+  CacheModel run_passes(uint num_slots, uint num_pixels, uint num_passes, uint group_size, uint seed) {
+    SCOPED_TRACE(
+        fmt::format("{} slots, {} pixels, group size {}, seed {}", num_slots, num_pixels, group_size, seed));
+    Random random(seed);
+    const FrameParams frame = plain_frame(kDims, num_pixels);
+    const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
+    StageWorld world(device_, frame, num_slots, group_size);
+    CacheModel model(frame, num_slots);
+    uint centre = 0;
+    for (uint pass = 0; pass < num_passes; ++pass) {
+      SCOPED_TRACE(fmt::format("pass {}", pass));
+      const uint spec_count = 1u << random() % 4, active = 1 + random() % (num_pixels / spec_count);
+      std::vector<uint> pairs;
+      if (random() % 8 == 0) centre = random() % num_blocks;
+      for (uint a = 0; a < active; ++a) {
+        const uint length = random() % (spec_count + 1);  // 0: a ray that is leaving
+        const uint begin = (centre + random() % 40) % num_blocks;
+        for (uint k = 0; k < spec_count; ++k) {
+          pairs.push_back(k < length && begin + k < num_blocks ? begin + k : ISO_INVALID_ID);
+        }
+      }
+      model.pass(world, pairs, spec_count);
+      if (HasFatalFailure()) return model;
+    }
+    return model;
+  }
+
+  ocl::Device device_{GetParam()};
+};
+
+TEST_P(BlockCacheOnDevice, SmallCache) {
+  run_passes(8, 4, 3, 8, 1);
+  run_passes(30, 8, 3, 8, 2);
+}
+
+TEST_P(BlockCacheOnDevice, ScarceSlots) {
+  for (const uint group_size : kGroupSizes) {
+    for (const uint num_slots : {8u, 9u, 17u}) {
+      const CacheModel model = run_passes(num_slots, 24, 60, group_size, 10 + num_slots);
+      EXPECT_GT(model.num_refused, 0u);
+      EXPECT_GT(model.num_stolen, 0u) << "the first pair was never in need: the test tests too little";
+    }
+  }
+}
+
+TEST_P(BlockCacheOnDevice, ReplacementOfTheLeastRecentlyUsed) {
+  for (const uint num_slots : {64u, 100u, 200u}) {
+    const CacheModel model = run_passes(num_slots, 40, 150, 64, 20 + num_slots);
+    EXPECT_GT(model.num_granted, num_slots) << "nothing was replaced";
+  }
+}
+
+TEST_P(BlockCacheOnDevice, AmpleSlots) {
+  const CacheModel model = run_passes(8 * 7 * 6, 300, 60, 64, 30);
+  EXPECT_EQ(model.num_refused, 0u);
+  EXPECT_LE(model.num_granted, 8u * 7 * 6) << "a block was decoded twice";
+}
+
+/// One ray after the other over all blocks, in a cache of one dual grid: each is served in its pass.
+TEST_P(BlockCacheOnDevice, SmallestCacheServesEveryBlock) {
+  const FrameParams frame = plain_frame(kDims, 3);
+  StageWorld world(device_, frame, kMinCacheSlots, 64);
+  CacheModel model(frame, kMinCacheSlots);
+  const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
+  for (uint block = 0; block < num_blocks; ++block) {
+    SCOPED_TRACE(fmt::format("block {}", block));
+    model.pass(world, {block * 37 % num_blocks, block * 11 % num_blocks, block * 5 % num_blocks}, 1);
+    if (HasFatalFailure()) return;
+  }
+}
+
+/// Ages of more passes than the histogram has buckets.
+TEST_P(BlockCacheOnDevice, AgesBeyondTheLastBucket) {
+  const FrameParams frame = plain_frame(kDims, 2);
+  StageWorld world(device_, frame, 40, 64);
+  CacheModel model(frame, 40);
+  model.pass(world, {0, 5}, 1);
+  for (uint pass = 0; pass < ISO_AGE_BUCKETS + 10; ++pass) model.pass(world, {100, 100}, 1);
+  for (uint block = 200; block < 240; block += 2) {
+    model.pass(world, {100, block}, 1);
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST_P(BlockCacheOnDevice, PassesWithoutRequestsChangeNothing) {
+  const FrameParams frame = plain_frame(kDims, 2);
+  StageWorld world(device_, frame, 16, 64);
+  CacheModel model(frame, 16);
+  model.pass(world, {7, 7}, 1);
+  model.pass(world, {7, 7}, 1);
+  EXPECT_EQ(world.counts().decoded_count, 0u);
+  model.pass(world, {ISO_INVALID_ID, ISO_INVALID_ID}, 1);
+  model.pass(world, {}, 1);
+}
+
+TEST_P(BlockCacheOnDevice, TooFewOrTooManySlotsAreRefused) {
+  EXPECT_THROW(BlockCache(device_, 100, 7, 100, 64), Error);
+  EXPECT_THROW(BlockCache(device_, 100, 0, 100, 64), Error);
+  EXPECT_THROW(BlockCache(device_, 100, ISO_MAX_CACHE_SLOTS + 1, 100, 64), Error);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, BlockCacheOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,139 @@
+// core/group: pairs gathered by block, exactly those whose dual grid is cached, against plain loops.
+
+#include "core/group.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "tests/stage_support.hpp"
+#include "tests/stage_world.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+constexpr glm::uvec3 kDims(29, 25, 22);  // 8 x 7 x 6 blocks
+
+class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  /// How many pairs got their dual grids, of how many.
+  struct Tally {
+    std::size_t granted = 0, pairs = 0, blocks = 0;
+  };
+
+  /// Passes of random pairs; one block in `hot_one_in` pairs is the same hot block.
+  Tally run_passes(uint num_slots, uint num_pixels, uint num_passes, uint hot_one_in, uint group_size,
+                   uint seed) {
+    SCOPED_TRACE(fmt::format("{} slots, {} pixels, hot 1 in {}, group size {}, seed {}", num_slots,
+                             num_pixels, hot_one_in, group_size, seed));
+    Random random(seed);
+    const FrameParams frame = plain_frame(kDims, num_pixels);
+    const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
+    StageWorld world(device_, frame, num_slots, group_size);
+    Group group(device_, num_pixels, num_slots, group_size);
+    Tally tally;
+    for (uint pass = 0; pass < num_passes; ++pass) {
+      SCOPED_TRACE(fmt::format("pass {}", pass));
+      const uint spec_count = 1 + random() % 5;
+      std::vector<uint> pairs((pass == 0 ? 1 : num_pixels / spec_count) * spec_count);
+      const uint hot = random() % num_blocks;
+      for (uint &pair : pairs) {
+        const uint kind = random() % hot_one_in;
+        pair = kind == 0 ? hot : (kind == 1 ? ISO_INVALID_ID : random() % num_blocks);
+      }
+      world.begin_pass(pairs, spec_count);
+      world.cache.request(world.rays);
+      world.cache.assign_slots(world.rays);
+      group(world.cache, world.rays, world.compaction);
+      check(world, group, pairs, tally);
+      if (HasFatalFailure()) return tally;
+    }
+    return tally;
+  }
+
+  static void check(const StageWorld &world, const Group &group, const std::vector<uint> &pairs,
+                    Tally &tally) {
+    const std::vector<uint> table = world.cache.page_table().read();
+    const auto granted = [&](uint pair) {
+      if (pairs[pair] == ISO_INVALID_ID) return false;
+      return std::ranges::all_of(dual_grid_blocks(world.frame, pairs[pair]),
+                                 [&](uint block) { return table[block] < world.cache.num_slots(); });
+    };
+    std::map<uint, std::set<uint>> expected;  // by slot
+    std::size_t num_granted = 0;
+    for (uint pair = 0; pair < pairs.size(); ++pair) {
+      if (!granted(pair)) continue;
+      expected[table[pairs[pair]]].insert(pair);
+      ++num_granted;
+    }
+    const PassCounts counts = world.counts();
+    ASSERT_EQ(counts.granted_count, num_granted);
+    ASSERT_EQ(counts.visible_count, expected.size());
+    const std::vector<uint> pair_ids = group.groups().pair_ids.read(), slots = group.groups().slots.read(),
+                            offsets = group.groups().block_ray_offsets.read();
+    std::set<uint> seen;
+    for (uint visible = 0; visible < counts.visible_count; ++visible) {
+      const uint begin = offsets[visible];
+      const uint end = visible + 1 < counts.visible_count ? offsets[visible + 1] : counts.granted_count;
+      ASSERT_LT(begin, end);
+      const uint slot = slots[begin];
+      ASSERT_TRUE(seen.insert(slot).second) << "slot " << slot << " has two groups";
+      ASSERT_TRUE(expected.contains(slot));
+      ASSERT_EQ(std::set<uint>(pair_ids.begin() + begin, pair_ids.begin() + end), expected[slot]);
+      ASSERT_EQ(end - begin, expected[slot].size());
+      ASSERT_TRUE(std::all_of(slots.begin() + begin, slots.begin() + end, [&](uint s) { return s == slot; }));
+    }
+    /* Every pair begins as not tested. */
+    const std::vector<PairHit> hits = world.rays.pair_hits.read();
+    for (uint pair = 0; pair < pairs.size(); ++pair) ASSERT_EQ(hits[pair].cell, ISO_NOT_TESTED) << pair;
+    tally.granted += num_granted;
+    tally.pairs += pairs.size();
+    tally.blocks += expected.size();
+  }
+
+  ocl::Device device_{GetParam()};
+};
+
+TEST_P(GroupOnDevice, SmallGroups) {
+  run_passes(40, 40, 3, 4, 8, 1);
+}
+
+TEST_P(GroupOnDevice, AmpleSlotsGrantEveryPair) {
+  for (const uint group_size : kGroupSizes) {
+    const Tally tally = run_passes(8 * 7 * 6, 5000, 4, 3, group_size, 10);
+    EXPECT_GT(tally.granted, tally.pairs / 2);
+  }
+}
+
+TEST_P(GroupOnDevice, ScarceSlotsGrantSome) {
+  for (const uint num_slots : {8u, 9u, 60u}) {
+    const Tally tally = run_passes(num_slots, 1000, 10, 3, 64, 20);
+    EXPECT_GT(tally.granted, 0u);
+    EXPECT_LT(tally.granted, tally.pairs / 2);
+  }
+}
+
+TEST_P(GroupOnDevice, OneHotBlock) {
+  const Tally tally = run_passes(64, 20000, 3, 1, 64, 30);
+  EXPECT_EQ(tally.granted, tally.pairs);
+  EXPECT_EQ(tally.blocks, 3u);
+}
+
+TEST_P(GroupOnDevice, NoPairs) {
+  const FrameParams frame = plain_frame(kDims, 10);
+  StageWorld world(device_, frame, 8, 64);
+  Group group(device_, 10, 8, 64);
+  world.begin_pass(std::vector<uint>(10, ISO_INVALID_ID), 1);
+  group(world.cache, world.rays, world.compaction);
+  EXPECT_EQ(world.counts().granted_count, 0u);
+  EXPECT_EQ(world.counts().visible_count, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, GroupOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,296 @@
+// core/intersect: every pair against the portable headers on the host (equal bits), and rays against closed
+// forms in double on a plane and on a saddle, which are trilinear.
+
+#include "core/intersect.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "kernels_cl/cell_intersect.h"
+#include "tests/ray_cases.hpp"
+#include "tests/stage_support.hpp"
+#include "tests/stage_world.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+/// A hit within a block, with the moment in double.
+struct BlockHit {
+  PairHit pair{ISO_NO_HIT, 0.0f};
+  double t = 0;
+  float largest = 0;  ///< |corner - isovalue| of the cell
+};
+
+double value_of(TwoFloat t) {
+  return double(t.hi) + double(t.lo);
+}
+
+/// Cell by cell through a block. When `known` is given, only its moment is filled in.
+BlockHit trace_block(const FrameParams &frame, const std::vector<float> &voxels, uint pixel, uint block,
+                     const PairHit *known = nullptr) {
+  const Ray ray = make_ray(&frame, pixel);
+  const LastPlanes last = last_planes(&frame);
+  const int bx = int(block % frame.blocks_x), by = int(block / frame.blocks_x % frame.blocks_y),
+            bz = int(block / frame.blocks_x / frame.blocks_y);
+  const int end_x = std::min(4 * bx + 4, last.x), end_y = std::min(4 * by + 4, last.y),
+            end_z = std::min(4 * bz + 4, last.z);
+  RayEvent enter = region_entry(&ray, bx, by, bz, 4, last);
+  GridWalk cell = walk_from(&ray, locate(ray.x, 0, enter, 1, 4 * bx, end_x - 1),
+                            locate(ray.y, 1, enter, 1, 4 * by, end_y - 1),
+                            locate(ray.z, 2, enter, 1, 4 * bz, end_z - 1), 1, last);
+  BlockHit hit;
+  while (cell.x >= 4 * bx && cell.x < end_x && cell.y >= 4 * by && cell.y < end_y && cell.z >= 4 * bz &&
+         cell.z < end_z) {
+    const RayEvent exit = walk_exit(&cell);
+    const std::array<float, 8> w = cell_corners(frame, voxels, cell.x, cell.y, cell.z);
+    const uint number = uint(cell.x % 4 + 4 * (cell.y % 4) + 16 * (cell.z % 4));
+    float s = 0;
+    const bool here = known ? known->cell == number
+                            : intersect_cell(&ray, w.data(), cell.x, cell.y, cell.z, enter, exit, &s) != 0;
+    if (here) {
+      hit.pair = known ? *known : PairHit{number, s};
+      const double t_enter = value_of(enter.t), t_exit = value_of(exit.t);
+      hit.t = t_enter + hit.pair.s * (t_exit - t_enter);
+      for (const float corner : w) hit.largest = std::max(hit.largest, std::abs(corner));
+      return hit;
+    }
+    walk_step(&cell, &ray, exit, 1, last);
+    enter = exit;
+  }
+  return hit;
+}
+
+enum class Field { kPlane, kSaddle, kRandom };
+
+/// Small whole numbers and quarters: voxels are exact.
+double field_value(Field field, double x, double y, double z) {
+  return field == Field::kPlane ? x - 2 * y + 0.5 * z : x * y - 6 * x - 8 * y + 2 * z;
+}
+
+std::vector<float> make_voxels(Field field, const glm::uvec3 &dims) {
+  if (field == Field::kRandom) return random_voxels(dims, -1, 1, 5);
+  std::vector<float> voxels;
+  for (uint z = 0; z < dims.z; ++z) {
+    for (uint y = 0; y < dims.y; ++y) {
+      for (uint x = 0; x < dims.x; ++x) voxels.push_back(static_cast<float>(field_value(field, x, y, z)));
+    }
+  }
+  return voxels;
+}
+
+/// Where the ray is first on the other side than where it enters the domain, by the quadratic formula.
+struct ClosedForm {
+  bool certain = false;  ///< nothing happens within rounding of an end of the ray, or of a tangent
+  std::optional<double> t;
+};
+
+ClosedForm closed_form(const FrameParams &frame, Field field, const Ray &ray) {
+  const double o[3] = {ray.x.o, ray.y.o, ray.z.o}, d[3] = {ray.x.d, ray.y.d, ray.z.d};
+  const double last[3] = {frame.dims_x - 1.0, frame.dims_y - 1.0, frame.dims_z - 1.0};
+  double enter = 0, exit = 1e30;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (d[axis] == 0) {
+      if (o[axis] < 0 || o[axis] > last[axis]) return {true, std::nullopt};
+      continue;
+    }
+    const double t0 = -o[axis] / d[axis], t1 = (last[axis] - o[axis]) / d[axis];
+    enter = std::max(enter, std::min(t0, t1));
+    exit = std::min(exit, std::max(t0, t1));
+  }
+  if (exit - enter < 1e-3) return {exit < enter - 1e-3, std::nullopt};
+  const auto f = [&](double t) {
+    return field_value(field, o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]) - frame.isovalue;
+  };
+  /* f is a quadratic: from three values of it, about the middle of the ray, u in [-1,1]. */
+  const double middle = 0.5 * (enter + exit), half = 0.5 * (exit - enter);
+  const double c = f(middle), a = 0.5 * (f(enter) + f(exit)) - c, b = 0.5 * (f(exit) - f(enter));
+  std::vector<double> roots;
+  const double discriminant = b * b - 4 * a * c, size = std::abs(a) + std::abs(b) + std::abs(c);
+  if (std::abs(discriminant) < 1e-3 * size * size) return {};
+  if (discriminant > 0) {
+    const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
+    roots.push_back(c / q);
+    if (std::abs(a) > 1e-12 * size) roots.push_back(q / a);
+  }
+  std::ranges::sort(roots);
+  ClosedForm answer{true, std::nullopt};
+  for (const double u : roots) {
+    if (std::abs(std::abs(u) - 1) < 1e-3) return {};
+    if (!answer.t && std::abs(u) < 1) answer.t = middle + u * half;
+  }
+  return answer;
+}
+
+class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  struct Tally {
+    std::size_t tested = 0, untested = 0, hits = 0, certain_hits = 0, certain_misses = 0;
+  };
+
+  /// One camera: passes of spec_count blocks of every ray, until all rays are through. Slots may be scarce: then
+  /// each pass tests what it can, and what it cannot is not tried again.
+  void run(const glm::uvec3 &dims, Field field, const FrameParams &frame, uint num_slots, uint spec_count,
+           uint group_size, Tally &tally) {
+    const uint num_pixels = frame.width * frame.height;
+    const std::vector<float> voxels = make_voxels(field, dims);
+    StageWorld world(device_, frame, num_slots, group_size);
+    Group group(device_, num_pixels, num_slots, group_size);
+    Intersect intersect(device_, num_pixels, group_size);
+    std::vector<std::vector<uint>> blocks(num_pixels);
+    std::size_t longest = 0;
+    for (uint pixel = 0; pixel < num_pixels; ++pixel) {
+      blocks[pixel] = blocks_of_ray(frame, pixel);
+      longest = std::max(longest, blocks[pixel].size());
+    }
+    std::vector<std::optional<double>> first_hit(num_pixels);
+    std::vector<float> largest(num_pixels);
+    const uint rays_at_once = num_pixels / spec_count;
+    bool all_tested = true;
+    for (uint first_ray = 0; first_ray < num_pixels; first_ray += rays_at_once) {
+      std::vector<uint> active;
+      for (uint pixel = first_ray; pixel < std::min(num_pixels, first_ray + rays_at_once); ++pixel)
+        active.push_back(pixel);
+      world.set_active(active);
+      for (std::size_t done = 0; done < longest; done += spec_count) {
+        std::vector<uint> pairs;
+        for (const uint pixel : active) {
+          for (std::size_t k = done; k < done + spec_count; ++k)
+            pairs.push_back(k < blocks[pixel].size() ? blocks[pixel][k] : ISO_INVALID_ID);
+        }
+        world.begin_pass(pairs, spec_count);
+        world.cache.request(world.rays);
+        world.cache.assign_slots(world.rays);
+        world.fill_slots(voxels);
+        group(world.cache, world.rays, world.compaction);
+        intersect(world.cache, group.groups(), world.rays);
+
+        const std::vector<PairHit> got = world.rays.pair_hits.read();
+        const std::vector<uint> table = world.cache.page_table().read();
+        for (uint pair = 0; pair < pairs.size(); ++pair) {
+          const uint pixel = active[pair / spec_count];
+          if (pairs[pair] == ISO_INVALID_ID) continue;
+          const bool cached = std::ranges::all_of(dual_grid_blocks(frame, pairs[pair]),
+                                                  [&](uint block) { return table[block] < num_slots; });
+          if (!cached) {
+            ASSERT_EQ(got[pair].cell, ISO_NOT_TESTED) << "pair " << pair;
+            all_tested = false;
+            ++tally.untested;
+            continue;
+          }
+          const BlockHit expected = trace_block(frame, voxels, pixel, pairs[pair]);
+          ASSERT_EQ(got[pair].cell, expected.pair.cell) << "pixel " << pixel << ", block " << pairs[pair];
+          ASSERT_EQ(std::bit_cast<uint>(got[pair].s), std::bit_cast<uint>(expected.pair.s))
+              << "pixel " << pixel << ", block " << pairs[pair];
+          ++tally.tested;
+          if (expected.pair.cell >= ISO_NO_HIT) continue;
+          ++tally.hits;
+          if (!first_hit[pixel]) {
+            const BlockHit at = trace_block(frame, voxels, pixel, pairs[pair], &got[pair]);
+            first_hit[pixel] = at.t;
+            largest[pixel] = at.largest;
+          }
+        }
+      }
+    }
+    if (all_tested && field != Field::kRandom) expect_closed_form(field, frame, first_hit, largest, tally);
+  }
+
+  /// Residual of the field at the hit: 46 u M (derived in cell_intersect_test.cpp), u = 2^-24.
+  static void expect_closed_form(Field field, const FrameParams &frame,
+                                 const std::vector<std::optional<double>> &first_hit,
+                                 const std::vector<float> &largest, Tally &tally) {
+    for (uint pixel = 0; pixel < first_hit.size(); ++pixel) {
+      const Ray ray = make_ray(&frame, pixel);
+      if (const std::optional<double> &t = first_hit[pixel]) {
+        const double residual =
+            field_value(field, ray.x.o + *t * ray.x.d, ray.y.o + *t * ray.y.d, ray.z.o + *t * ray.z.d) -
+            frame.isovalue;
+        ASSERT_LE(std::abs(residual), 46 * 0x1p-24 * largest[pixel]) << "pixel " << pixel;
+      }
+      const ClosedForm expected = closed_form(frame, field, ray);
+      if (!expected.certain) continue;
+      ASSERT_EQ(first_hit[pixel].has_value(), expected.t.has_value()) << "pixel " << pixel;
+      ++(expected.t ? tally.certain_hits : tally.certain_misses);
+      if (!expected.t) continue;
+      /* The nearest of two roots, not the other: those are apart by more than this. */
+      ASSERT_NEAR(*first_hit[pixel], *expected.t, 1e-3) << "pixel " << pixel;
+    }
+  }
+
+  void run_cameras(const glm::uvec3 &dims, Field field, float isovalue, uint group_size, Tally &tally) {
+    const uint num_blocks = uint((dims.x + 3) / 4 * ((dims.y + 3) / 4) * ((dims.z + 3) / 4));
+    for (const CameraCase &c : camera_cases(dims)) {
+      SCOPED_TRACE(fmt::format("{} x {} x {}, camera '{}', field {}, isovalue {}, group size {}", dims.x,
+                               dims.y, dims.z, c.name, static_cast<int>(field), isovalue, group_size));
+      run(dims, field, case_frame(dims, c, {23, 17}, isovalue), std::max(8u, num_blocks), 3, group_size,
+          tally);
+      if (HasFatalFailure()) return;
+    }
+  }
+
+  ocl::Device device_{GetParam()};
+};
+
+TEST_P(IntersectOnDevice, SmallPlane) {
+  const glm::uvec3 dims(7, 6, 5);
+  Tally tally;
+  run(dims, Field::kPlane, case_frame(dims, camera_cases(dims)[0], {7, 5}, 0.25f), 8, 2, 8, tally);
+  EXPECT_GT(tally.certain_hits, 0u);
+}
+
+TEST_P(IntersectOnDevice, Plane) {
+  Tally tally;
+  for (const float isovalue : {0.25f, -7.0f, 3.3f})
+    run_cameras({18, 21, 17}, Field::kPlane, isovalue, 64, tally);
+  EXPECT_GT(tally.certain_hits, 2000u);
+  EXPECT_GT(tally.certain_misses, 2000u);
+}
+
+TEST_P(IntersectOnDevice, Saddle) {
+  Tally tally;
+  for (const float isovalue : {-48.0f, -30.5f, 12.25f})
+    run_cameras({18, 21, 17}, Field::kSaddle, isovalue, 64, tally);
+  EXPECT_GT(tally.certain_hits, 2000u);
+  EXPECT_GT(tally.certain_misses, 1000u);
+}
+
+TEST_P(IntersectOnDevice, RandomVoxelsOfAwkwardDims) {
+  Tally tally;
+  for (const glm::uvec3 dims :
+       {glm::uvec3(18, 21, 17), glm::uvec3(5, 6, 7), glm::uvec3(2, 9, 33), glm::uvec3(2, 2, 2)})
+    run_cameras(dims, Field::kRandom, 0.1f, 64, tally);
+  EXPECT_GT(tally.hits, 10000u);
+  EXPECT_EQ(tally.untested, 0u);
+}
+
+TEST_P(IntersectOnDevice, GroupSizesDoNotMatter) {
+  for (const uint group_size : kGroupSizes) {
+    const glm::uvec3 dims(18, 21, 17);
+    Tally tally;
+    run(dims, Field::kRandom, case_frame(dims, camera_cases(dims)[1], {71, 53}), 5 * 6 * 5, 2, group_size,
+        tally);
+    EXPECT_GT(tally.hits, 1000u);
+  }
+}
+
+TEST_P(IntersectOnDevice, ScarceSlots) {
+  const glm::uvec3 dims(18, 21, 17);
+  for (const uint num_slots : {8u, 9u, 40u}) {
+    Tally tally;
+    run(dims, Field::kRandom, case_frame(dims, camera_cases(dims)[0], {23, 17}), num_slots, 4, 64, tally);
+    EXPECT_GT(tally.tested, 0u);
+    EXPECT_GT(tally.untested, 0u);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, IntersectOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+}  // namespace
+}  // namespace isowave

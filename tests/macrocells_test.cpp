@@ -1,0 +1,240 @@
+// core/macrocells: ranges and masks against plain loops over the voxels that libzfp decodes.
+
+#include "core/macrocells.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/zfp_decode.hpp"
+#include "tests/stage_support.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// What a block's dual cells hold, padding left out. min > max: the block owns no cell.
+struct Range {
+  float min = kInfinity, max = -kInfinity;
+};
+
+std::vector<Range> dual_cell_ranges(const glm::uvec3 &dims, const std::vector<float> &voxels) {
+  const glm::uvec3 blocks = (dims + 3u) / 4u;
+  std::vector<Range> ranges(std::size_t{blocks.x} * blocks.y * blocks.z);
+  for (uint z = 0; z + 1 < dims.z; ++z) {
+    for (uint y = 0; y + 1 < dims.y; ++y) {
+      for (uint x = 0; x + 1 < dims.x; ++x) {
+        Range &range = ranges[x / 4 + blocks.x * (y / 4 + std::size_t{blocks.y} * (z / 4))];
+        for (uint corner = 0; corner < 8; ++corner) {
+          const float value =
+              voxels[x + (corner & 1) +
+                     dims.x * (y + (corner >> 1 & 1) + std::size_t{dims.y} * (z + (corner >> 2)))];
+          range.min = std::min(range.min, value);
+          range.max = std::max(range.max, value);
+        }
+      }
+    }
+  }
+  return ranges;
+}
+
+/// Values at and around every end of a range, and far outside.
+std::vector<float> awkward_isovalues(const std::vector<Range> &ranges, std::size_t max_ranges) {
+  std::vector<float> isovalues = {-kInfinity, kInfinity, 0.0f, -1e30f, 1e30f};
+  const std::size_t step = std::max<std::size_t>(1, ranges.size() / max_ranges);
+  for (std::size_t i = 0; i < ranges.size(); i += step) {
+    const Range &range = ranges[i];
+    if (range.min > range.max) continue;
+    for (const float value : {range.min, range.max}) {
+      isovalues.push_back(value);
+      isovalues.push_back(std::nextafter(value, -kInfinity));
+      isovalues.push_back(std::nextafter(value, kInfinity));
+    }
+    isovalues.push_back(0.5f * range.min + 0.5f * range.max);
+  }
+  return isovalues;
+}
+
+class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  /// Builds the ranges of a volume and checks them and the masks of many isovalues.
+  void expect_exact(const CompressedVolume &volume, std::size_t max_ranges = 20) {
+    const glm::uvec3 dims = volume.info.dims;
+    SCOPED_TRACE(
+        fmt::format("{} x {} x {}, {} bits per block", dims.x, dims.y, dims.z, volume.bits_per_block));
+    FrameParams params = grid_frame(dims);
+    ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+    const DeviceStream stream(device_, volume);
+    Macrocells macrocells(device_, frame, params, stream.words, stream.bits_per_block);
+    const std::vector<Range> expected = dual_cell_ranges(dims, decode_with_libzfp(volume));
+    expect_ranges(macrocells, expected);
+
+    std::size_t num_selected = 0, num_in_range = 0;
+    for (const float isovalue : awkward_isovalues(expected, max_ranges)) {
+      SCOPED_TRACE(fmt::format("isovalue {:a}", isovalue));
+      params.isovalue_index = macrocells.isovalue_index(isovalue);
+      frame.write({&params, 1});
+      macrocells.select(frame);
+      expect_mask(macrocells, params, expected, isovalue, num_selected, num_in_range);
+      if (HasFatalFailure()) return;
+    }
+    /* Not every selected block holds the isovalue, for a range has 8 bits; but a mask of ones would be useless. */
+    EXPECT_LE(num_selected, 3 * num_in_range + 2 * expected.size());
+  }
+
+  static void expect_ranges(const Macrocells &macrocells, const std::vector<Range> &expected) {
+    const std::vector<float> &thresholds = macrocells.thresholds();
+    const std::vector<cl_ushort> ranges = macrocells.ranges().read();
+    ASSERT_EQ(thresholds.size(), 256u);
+    ASSERT_TRUE(std::ranges::is_sorted(thresholds));
+    ASSERT_EQ(thresholds.front(), -kInfinity);
+    ASSERT_EQ(thresholds.back(), kInfinity);
+    ASSERT_EQ(ranges.size(), expected.size());
+    for (std::size_t b = 0; b < ranges.size(); ++b) {
+      const uint low = ranges[b] & 255u, high = ranges[b] >> 8;
+      const Range &range = expected[b];
+      if (range.min > range.max) {
+        ASSERT_GT(low, high) << "block " << b << " owns no dual cell";
+        continue;
+      }
+      ASSERT_LE(thresholds[low], range.min) << "block " << b;
+      ASSERT_GE(thresholds[high], range.max) << "block " << b;
+      /* Tight: one step further in would cut the range, but for repeated thresholds. */
+      ASSERT_TRUE(thresholds[low + 1] > range.min || low == 254) << "block " << b;
+      ASSERT_TRUE(thresholds[high - 1] < range.max || high == 1) << "block " << b;
+    }
+  }
+
+  /// A block whose dual cells hold values on both sides must be selected; one that owns no cell must not.
+  static void expect_mask(const Macrocells &macrocells, const FrameParams &params,
+                          const std::vector<Range> &expected, float isovalue, std::size_t &num_selected,
+                          std::size_t &num_in_range) {
+    const std::vector<uint> masks = macrocells.masks().read();
+    const std::vector<float> &thresholds = macrocells.thresholds();
+    const std::vector<cl_ushort> ranges = macrocells.ranges().read();
+    const uint coarse_x = (params.blocks_x + 3) / 4, coarse_y = (params.blocks_y + 3) / 4;
+    std::size_t num_bits = 0, num_blocks_selected = 0;
+    for (const uint word : masks) num_bits += static_cast<std::size_t>(std::popcount(word));
+    for (uint b = 0; b < expected.size(); ++b) {
+      const uint x = b % params.blocks_x, y = b / params.blocks_x % params.blocks_y,
+                 z = b / params.blocks_x / params.blocks_y;
+      const uint coarse = x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4)),
+                 bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+      const bool selected = masks[2 * coarse + bit / 32] >> bit % 32 & 1;
+      const Range &range = expected[b];
+      const bool in_range =
+          range.min < isovalue && isovalue <= range.max;  // half open: inside := f >= isovalue
+      if (in_range) {
+        ASSERT_TRUE(selected) << "block " << b << " of [" << range.min << ", " << range.max << "] is missed";
+      }
+      if (range.min > range.max) {
+        ASSERT_FALSE(selected) << "block " << b << " owns no dual cell";
+      }
+      if (selected) {  // as far as 8 bits can tell
+        ASSERT_LT(thresholds[ranges[b] & 255u], isovalue) << "block " << b;
+        ASSERT_GE(thresholds[ranges[b] >> 8], isovalue) << "block " << b;
+      }
+      num_blocks_selected += selected;
+      num_in_range += in_range;
+    }
+    EXPECT_EQ(num_bits, num_blocks_selected) << "bits of blocks outside the volume";
+    num_selected += num_blocks_selected;
+  }
+
+  ocl::Device device_{GetParam()};
+};
+
+std::vector<float> sphere_voxels(const glm::uvec3 &dims) {
+  std::vector<float> voxels;
+  for (uint z = 0; z < dims.z; ++z) {
+    for (uint y = 0; y < dims.y; ++y) {
+      for (uint x = 0; x < dims.x; ++x) {
+        const glm::vec3 p = glm::vec3(x, y, z) - 0.5f * glm::vec3(dims);
+        voxels.push_back(std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z));
+      }
+    }
+  }
+  return voxels;
+}
+
+constexpr glm::uvec3 kAwkwardDims[] = {{2, 2, 2},   {4, 4, 4},   {5, 5, 5},    {2, 19, 21}, {17, 2, 9},
+                                       {13, 22, 2}, {9, 10, 11}, {41, 41, 41}, {70, 18, 33}};
+
+TEST_P(MacrocellsOnDevice, SmallPartialBlocks) {
+  const glm::uvec3 dims(5, 6, 9);
+  expect_exact(compress_with_libzfp(random_voxels(dims, -1, 1, 1), dims, 256), 3);
+}
+
+TEST_P(MacrocellsOnDevice, RandomVolumesOfAwkwardDims) {
+  for (const glm::uvec3 &dims : kAwkwardDims) {
+    expect_exact(compress_with_libzfp(random_voxels(dims, -50, 200, 2), dims, 512));
+  }
+}
+
+TEST_P(MacrocellsOnDevice, SmoothVolumesOfAwkwardDims) {
+  for (const glm::uvec3 &dims : kAwkwardDims)
+    expect_exact(compress_with_libzfp(sphere_voxels(dims), dims, 1024));
+}
+
+/// At 1 bit per voxel zfp overshoots a step several times: ranges must come from decoded values.
+TEST_P(MacrocellsOnDevice, OvershootAtOneBitPerVoxel) {
+  const glm::uvec3 dims(24, 24, 24);
+  std::vector<float> voxels = random_voxels(dims, 0, 1, 3);
+  for (float &v : voxels) v = v < 0.5f ? 0.0f : 255.0f;
+  const CompressedVolume volume = compress_with_libzfp(voxels, dims, 64);
+  const std::vector<float> decoded = decode_with_libzfp(volume);
+  const auto [least, largest] = std::ranges::minmax_element(decoded);
+  ASSERT_TRUE(*least < 0.0f || *largest > 255.0f) << "no overshoot: the test tests nothing";
+  expect_exact(volume);
+}
+
+/// One voxel of a million must not coarsen the table for all others.
+TEST_P(MacrocellsOnDevice, Outliers) {
+  const glm::uvec3 dims(40, 40, 40);
+  std::vector<float> voxels = sphere_voxels(dims);
+  voxels[12345] = 1e30f;
+  voxels[54321] = -1e30f;
+  const CompressedVolume volume = compress_with_libzfp(voxels, dims, 2048);
+  expect_exact(volume);
+  FrameParams params = grid_frame(dims);
+  ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+  const DeviceStream stream(device_, volume);
+  const Macrocells macrocells(device_, frame, params, stream.words, stream.bits_per_block);
+  const auto within =
+      std::ranges::count_if(macrocells.thresholds(), [](float t) { return t > -1.0f && t < 100.0f; });
+  EXPECT_GT(within, 200);
+}
+
+TEST_P(MacrocellsOnDevice, ConstantVolumes) {
+  const glm::uvec3 dims(9, 10, 11);
+  for (const float value : {0.0f, 7.0f, -1e20f}) {
+    expect_exact(compress_with_libzfp(std::vector<float>(9 * 10 * 11, value), dims, 1024));
+  }
+}
+
+/// Two values of blocks only: a table with a single inner threshold, or two.
+TEST_P(MacrocellsOnDevice, FewDistinctValues) {
+  const glm::uvec3 dims(8, 8, 8);
+  std::vector<float> voxels(512, 1.0f);
+  std::fill(voxels.begin() + 256, voxels.end(), 2.0f);
+  expect_exact(compress_with_libzfp(voxels, dims, 2048));
+}
+
+/// More blocks than the sample for the table takes: the rest may hold values beyond every threshold.
+TEST_P(MacrocellsOnDevice, MoreBlocksThanSamples) {
+  const glm::uvec3 dims(130, 126, 66);  // 33 * 32 * 17 = 17,952 blocks: every second is sampled
+  std::vector<float> voxels = sphere_voxels(dims);
+  voxels[4] = -1e6f;  // block 1
+  expect_exact(compress_with_libzfp(voxels, dims, 256), 5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, MacrocellsOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,118 @@
+#pragma once
+// One volume and one wavefront on a device, for tests that run a few stages of a pass by hand.
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <vector>
+
+#include "core/block_cache.hpp"
+#include "core/frame.hpp"
+#include "core/scan.hpp"
+#include "core/wavefront.hpp"
+#include "kernels_cl/block_grid.h"
+#include "tests/stage_support.hpp"
+
+namespace isowave {
+
+/// The blocks of a dual grid, by plain arithmetic.
+inline std::vector<uint> dual_grid_blocks(const FrameParams &frame, uint block_id) {
+  const uint x = block_id % frame.blocks_x, y = block_id / frame.blocks_x % frame.blocks_y,
+             z = block_id / frame.blocks_x / frame.blocks_y;
+  std::vector<uint> blocks;
+  for (uint dz = 0; dz < 2; ++dz) {
+    for (uint dy = 0; dy < 2; ++dy) {
+      for (uint dx = 0; dx < 2; ++dx) {
+        if (x + dx < frame.blocks_x && y + dy < frame.blocks_y && z + dz < frame.blocks_z)
+          blocks.push_back(x + dx + frame.blocks_x * (y + dy + frame.blocks_y * (z + dz)));
+      }
+    }
+  }
+  return blocks;
+}
+
+/// A wavefront whose first pass begins with every pixel active, and a cache.
+struct StageWorld {
+  StageWorld(ocl::Device &device, const FrameParams &frame_params, uint num_slots, uint group_size)
+      : frame(frame_params),
+        rays(device, frame.width * frame.height),
+        cache(device, std::uint64_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z, num_slots,
+              rays.num_pixels, group_size),
+        compaction(device, rays.num_pixels, group_size) {
+    rays.frame.write({&frame, 1});
+    std::vector<uint> ids(rays.num_pixels);
+    for (uint i = 0; i < ids.size(); ++i) ids[i] = i;
+    set_active(ids);
+  }
+
+  PassCounts counts() const { return rays.counts.read().front(); }
+
+  void set_active(const std::vector<uint> &ray_ids) {
+    active_ray_ids = ray_ids;
+    rays.active_ray_ids.write(ray_ids);
+  }
+
+  /// Opens a pass by hand: these pairs, entries a * spec_count + k for active ray a.
+  void begin_pass(const std::vector<uint> &pair_block_ids, uint spec_count) {
+    PassCounts counts = rays.counts.read().front();
+    const uint pass = counts.pass + 1;
+    counts = {};
+    counts.pixel_count = static_cast<uint>(rays.num_pixels);
+    counts.pass = pass;
+    counts.active_count = static_cast<uint>(pair_block_ids.size()) / spec_count;
+    counts.spec_count = spec_count;
+    counts.pair_slot_count = static_cast<uint>(pair_block_ids.size());
+    rays.counts.write({&counts, 1});
+    rays.pair_block_ids.write(pair_block_ids);
+  }
+
+  /// Instead of decoding: puts the voxels [nz][ny][nx] of the blocks just granted into their slots, and NaN into
+  /// padding, which nobody may use.
+  void fill_slots(const std::vector<float> &voxels) {
+    const uint granted = counts().decoded_count;
+    const std::vector<uint> blocks = cache.decode_block_ids().read(), slots = cache.decode_slots().read();
+    for (uint i = 0; i < granted; ++i) {
+      const uint x0 = 4 * (blocks[i] % frame.blocks_x),
+                 y0 = 4 * (blocks[i] / frame.blocks_x % frame.blocks_y),
+                 z0 = 4 * (blocks[i] / frame.blocks_x / frame.blocks_y);
+      std::vector<float> values(64, std::numeric_limits<float>::quiet_NaN());
+      for (uint v = 0; v < 64; ++v) {
+        const uint x = x0 + v % 4, y = y0 + v / 4 % 4, z = z0 + v / 16;
+        if (x < frame.dims_x && y < frame.dims_y && z < frame.dims_z)
+          values[v] = voxels[x + frame.dims_x * (y + std::size_t{frame.dims_y} * z)];
+      }
+      cache.values().write(values, 64 * std::size_t{slots[i]});
+    }
+  }
+
+  FrameParams frame;
+  Wavefront rays;
+  BlockCache cache;
+  Compaction compaction;
+  std::vector<uint> active_ray_ids;
+};
+
+/// A camera-less frame: only grid and number of pixels matter.
+inline FrameParams plain_frame(const glm::uvec3 &dims, uint width, uint height = 1) {
+  FrameParams frame = grid_frame(dims);
+  frame.width = width;
+  frame.height = height;
+  frame.max_spec_count = ISO_MAX_SPECULATION;
+  return frame;
+}
+
+/// Corners of dual cell (x,y,z), corner x + 2y + 4z, minus the isovalue.
+inline std::array<float, 8> cell_corners(const FrameParams &frame, const std::vector<float> &voxels, int x,
+                                         int y, int z) {
+  std::array<float, 8> w;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto vx = static_cast<std::size_t>(x + (corner & 1)),
+               vy = static_cast<std::size_t>(y + (corner >> 1 & 1)),
+               vz = static_cast<std::size_t>(z + (corner >> 2));
+    w[static_cast<std::size_t>(corner)] =
+        voxels[vx + frame.dims_x * (vy + frame.dims_y * vz)] - frame.isovalue;
+  }
+  return w;
+}
+
+}  // namespace isowave

@@ -1,0 +1,315 @@
+// core/initial_rays and core/traverse: the blocks of each ray against a walk over every cell (the same
+// arithmetic, so equal), and against slabs in double (its own, so every block that a ray crosses must be there).
+
+#include "core/traverse.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "core/initial_rays.hpp"
+#include "core/zfp_decode.hpp"
+#include "kernels_cl/grid_dda.h"
+#include "tests/ray_cases.hpp"
+#include "tests/stage_support.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+/// Which blocks are selected, one entry per block.
+using Selection = std::vector<bool>;
+
+std::vector<uint> masks_of(const FrameParams &frame, const Selection &selected) {
+  const uint coarse_x = (frame.blocks_x + 3) / 4, coarse_y = (frame.blocks_y + 3) / 4,
+             coarse_z = (frame.blocks_z + 3) / 4;
+  std::vector<uint> masks(2 * std::size_t{coarse_x} * coarse_y * coarse_z);
+  for (uint b = 0; b < selected.size(); ++b) {
+    if (!selected[b]) continue;
+    const uint x = b % frame.blocks_x, y = b / frame.blocks_x % frame.blocks_y,
+               z = b / frame.blocks_x / frame.blocks_y;
+    const uint bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+    masks[2 * (x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4))) + bit / 32] |= 1u << bit % 32;
+  }
+  return masks;
+}
+
+Selection random_selection(const FrameParams &frame, uint one_in, uint seed) {
+  Random random(seed);
+  Selection selected(std::size_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z);
+  for (std::size_t b = 0; b < selected.size(); ++b) selected[b] = random() % one_in == 0;
+  return selected;
+}
+
+using BlockLists = std::vector<std::vector<uint>>;  ///< by pixel, in ray order
+
+BlockLists walk_cells(const FrameParams &frame, const Selection &selected) {
+  BlockLists lists(std::size_t{frame.width} * frame.height);
+  for (uint pixel = 0; pixel < lists.size(); ++pixel) {
+    lists[pixel] = blocks_of_ray(frame, pixel);
+    std::erase_if(lists[pixel], [&](uint block) { return !selected[block]; });
+  }
+  return lists;
+}
+
+/// Length of a ray within the dual cells of a block, in voxels; negative when it misses them.
+double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
+  const double b[3] = {4.0 * (block % frame.blocks_x), 4.0 * (block / frame.blocks_x % frame.blocks_y),
+                       4.0 * (block / frame.blocks_x / frame.blocks_y)};
+  const double last[3] = {frame.dims_x - 1.0, frame.dims_y - 1.0, frame.dims_z - 1.0};
+  const RayAxis axes[3] = {ray.x, ray.y, ray.z};
+  double enter = 0, exit = 1e30;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = b[axis], high = std::min(low + 4, last[axis]), o = axes[axis].o, d = axes[axis].d;
+    if (high <= low) return -1;
+    if (d == 0) {  // a ray within a shared face belongs to one side only: not asked for
+      if (o <= low || o >= high) return -1;
+      continue;
+    }
+    enter = std::max(enter, ((d > 0 ? low : high) - o) / d);
+    exit = std::min(exit, ((d > 0 ? high : low) - o) / d);
+  }
+  return (exit - enter) * std::hypot(double(ray.x.d), double(ray.y.d), double(ray.z.d));
+}
+
+class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  using TraverseKernel = ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
+                                     ocl::Out<uint>, ocl::Out<uint>>;
+
+  TraverseKernel make_kernel(uint group_size) {
+    return {device_, "traverse", "traverse", group_defines(group_size)};
+  }
+
+  /// Passes of spec_count blocks until every ray has left the volume. Runs the kernel itself, since masks that
+  /// no isovalue makes are wanted.
+  BlockLists traverse_all(TraverseKernel &kernel, Wavefront &rays, const FrameParams &frame,
+                          const Selection &selected, uint spec_count, uint group_size) {
+    const ocl::Buffer<uint> masks(device_, "masks", std::span<const uint>(masks_of(frame, selected)));
+    const uint num_pixels = frame.width * frame.height;
+    ocl::Buffer<uint> pairs(device_, "pairs", std::size_t{num_pixels} * spec_count);
+    InitialRays initial_rays(device_, num_pixels);
+    Compaction compaction(device_, num_pixels, 8);
+    rays.frame.write({&frame, 1});
+    PassCounts start{};
+    start.pixel_count = num_pixels;
+    rays.counts.write({&start, 1});
+    initial_rays(rays, compaction);
+    std::vector<uint> active = rays.next_active_ray_ids.read();
+    active.resize(rays.counts.read().front().next_active_count);
+    BlockLists lists(num_pixels);
+    for (uint passes = 0; !active.empty(); ++passes) {
+      if (passes > 1000) {
+        ADD_FAILURE() << "the rays never leave";
+        break;
+      }
+      pairs.fill(0xABCDEF01u);
+      rays.active_ray_ids.write(active);
+      PassCounts counts = distinct_counts();
+      counts.active_count = static_cast<uint>(active.size());
+      counts.spec_count = spec_count;
+      counts.pair_count = 0;
+      rays.counts.write({&counts, 1});
+      kernel(ocl::Range::strided(num_pixels, group_size, device_), rays.frame, masks, rays.counts,
+             rays.active_ray_ids, rays.ray_block_ids, pairs);
+      const std::vector<uint> got = pairs.read(), states = rays.ray_block_ids.read();
+      counts.pair_count = collect(got, active, spec_count, lists);
+      expect_counts(rays.counts, counts);
+      std::vector<uint> still;
+      for (const uint ray : active) {
+        if (states[ray] != ISO_INVALID_ID) still.push_back(ray);
+      }
+      active = still;
+    }
+    return lists;
+  }
+
+  /// Appends a pass's pairs to the lists; returns how many there are.
+  static uint collect(const std::vector<uint> &pairs, const std::vector<uint> &active, uint spec_count,
+                      BlockLists &lists) {
+    uint num_pairs = 0;
+    for (std::size_t a = 0; a < active.size(); ++a) {
+      bool ended = false;
+      for (uint k = 0; k < spec_count; ++k) {
+        const uint block = pairs[a * spec_count + k];
+        EXPECT_FALSE(ended && block != ISO_INVALID_ID) << "a gap in the pairs of ray " << active[a];
+        ended = block == ISO_INVALID_ID;
+        if (ended) continue;
+        lists[active[a]].push_back(block);
+        ++num_pairs;
+      }
+    }
+    for (std::size_t i = active.size() * spec_count; i < pairs.size(); ++i) {
+      EXPECT_EQ(pairs[i], 0xABCDEF01u) << "written past the end, at " << i;
+    }
+    return num_pairs;
+  }
+
+  void expect_walks(const glm::uvec3 &dims, const std::vector<CameraCase> &cameras, uint one_in,
+                    std::initializer_list<uint> spec_counts, ImageSize size, uint group_size) {
+    TraverseKernel kernel = make_kernel(group_size);
+    Wavefront rays(device_, size.num_pixels());
+    for (const CameraCase &c : cameras) {
+      const FrameParams frame = case_frame(dims, c, size);
+      const Selection selected = random_selection(frame, one_in, 1);
+      const BlockLists expected = walk_cells(frame, selected);
+      for (const uint spec_count : spec_counts) {
+        SCOPED_TRACE(
+            fmt::format("{} x {} x {}, camera '{}', one block in {}, spec count {}, group size {}, seed 1",
+                        dims.x, dims.y, dims.z, c.name, one_in, spec_count, group_size));
+        const BlockLists got = traverse_all(kernel, rays, frame, selected, spec_count, group_size);
+        ASSERT_EQ(first_difference(got, expected), kNoDifference) << "(a pixel)";
+      }
+      expect_crossed_blocks(frame, selected, expected, c.name);
+      if (HasFatalFailure()) return;
+    }
+  }
+
+  /// `lists` holds each selected block that a ray spends more than 1/1000 voxel in.
+  static void expect_crossed_blocks(const FrameParams &frame, const Selection &selected,
+                                    const BlockLists &lists, const std::string &name) {
+    for (uint pixel = 0; pixel < lists.size(); ++pixel) {
+      const Ray ray = make_ray(&frame, pixel);
+      for (uint block = 0; block < selected.size(); ++block) {
+        if (!selected[block] || stay_in_block(frame, ray, block) < 1e-3) continue;
+        ASSERT_EQ(std::ranges::count(lists[pixel], block), 1)
+            << "block " << block << ", pixel " << pixel << ", camera '" << name << "'";
+      }
+      for (const uint block : lists[pixel]) {
+        const RayAxis axes[3] = {ray.x, ray.y, ray.z};
+        if (axes[0].d == 0 || axes[1].d == 0 || axes[2].d == 0) continue;
+        ASSERT_GT(stay_in_block(frame, ray, block), -1e-4) << "block " << block << ", pixel " << pixel;
+      }
+    }
+  }
+
+  ocl::Device device_{GetParam()};
+};
+
+TEST_P(TraverseOnDevice, SmallWalks) {
+  const glm::uvec3 dims(18, 9, 21);
+  const std::vector<CameraCase> cameras = camera_cases(dims);
+  expect_walks(dims, {cameras[0], cameras[1], cameras[9]}, 3, {2}, {5, 3}, 8);
+}
+
+TEST_P(TraverseOnDevice, AllBlocksSelected) {
+  for (const glm::uvec3 dims :
+       {glm::uvec3(38, 41, 35), glm::uvec3(5, 6, 7), glm::uvec3(2, 9, 33), glm::uvec3(2, 2, 2)}) {
+    expect_walks(dims, camera_cases(dims), 1, {1, 7, 64}, {23, 17}, 64);
+  }
+}
+
+TEST_P(TraverseOnDevice, RandomBlocksSelected) {
+  for (const glm::uvec3 dims : {glm::uvec3(38, 41, 35), glm::uvec3(17, 33, 2)}) {
+    expect_walks(dims, camera_cases(dims), 4, {1, 2, 7, 64}, {23, 17}, 64);
+  }
+}
+
+/// Most coarse macrocells are empty: the walk skips them, and must come out where a cell walk does.
+TEST_P(TraverseOnDevice, FewBlocksSelected) {
+  for (const glm::uvec3 dims : {glm::uvec3(100, 97, 70), glm::uvec3(161, 18, 34)}) {
+    expect_walks(dims, camera_cases(dims), 150, {1, 2, 64}, {23, 17}, 64);
+    expect_walks(dims, {camera_cases(dims)[0]}, 1u << 30, {1}, {23, 17}, 64);
+  }
+}
+
+TEST_P(TraverseOnDevice, GroupSizesDoNotMatter) {
+  const glm::uvec3 dims(38, 41, 35);
+  for (const uint group_size : kGroupSizes) {
+    expect_walks(dims, {camera_cases(dims)[0], camera_cases(dims)[2]}, 4, {3}, {71, 53}, group_size);
+  }
+}
+
+/// The host class with masks of a real isovalue, one pass.
+TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
+  const glm::uvec3 dims(33, 34, 35);
+  std::vector<float> voxels(33 * 34 * 35);
+  for (std::size_t i = 0; i < voxels.size(); ++i)
+    voxels[i] = std::sin(0.2f * float(i % 33)) * float(i / 33 % 34);
+  const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
+  const DeviceStream stream(device_, volume);
+  FrameParams frame = case_frame(dims, camera_cases(dims)[0], {40, 30}, 3.0f);
+  Wavefront rays(device_, 40 * 30);
+  Macrocells macrocells(device_, rays.frame, frame, stream.words, stream.bits_per_block);
+  frame.isovalue_index = macrocells.isovalue_index(3.0f);
+  rays.frame.write({&frame, 1});
+  macrocells.select(rays.frame);
+  const std::vector<uint> masks = macrocells.masks().read();
+  Selection selected(9 * 9 * 9);
+  for (uint b = 0; b < selected.size(); ++b) {
+    const uint x = b % 9, y = b / 9 % 9, z = b / 81, bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+    selected[b] = masks[2 * (x / 4 + 3 * (y / 4 + 3 * (z / 4))) + bit / 32] >> bit % 32 & 1;
+  }
+  const BlockLists expected = walk_cells(frame, selected);
+  Compaction compaction(device_, 40 * 30, 64);
+  InitialRays(device_, 40 * 30)(rays, compaction);
+  std::vector<uint> active = rays.next_active_ray_ids.read();
+  active.resize(rays.counts.read().front().next_active_count);
+  rays.active_ray_ids.write(active);
+  PassCounts counts{};
+  counts.active_count = static_cast<uint>(active.size());
+  counts.spec_count = 1;
+  rays.counts.write({&counts, 1});
+  Traverse(device_, 40 * 30, 64)(macrocells, rays);
+  const std::vector<uint> pairs = rays.pair_block_ids.read();
+  std::size_t num_pairs = 0;
+  for (std::size_t a = 0; a < active.size(); ++a) {
+    const std::vector<uint> &list = expected[active[a]];
+    ASSERT_EQ(pairs[a], list.empty() ? ISO_INVALID_ID : list.front()) << "ray " << active[a];
+    num_pairs += !list.empty();
+  }
+  EXPECT_EQ(rays.counts.read().front().pair_count, num_pairs);
+  EXPECT_GT(num_pairs, 100u);
+}
+
+class InitialRaysOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  void expect_first_blocks(const glm::uvec3 &dims, ImageSize size) {
+    const uint num_pixels = static_cast<uint>(size.num_pixels());
+    Wavefront rays(device_, num_pixels);
+    Compaction compaction(device_, num_pixels, 64);
+    InitialRays initial_rays(device_, num_pixels);
+    for (const CameraCase &c : camera_cases(dims)) {
+      SCOPED_TRACE(fmt::format("{} x {} x {}, camera '{}'", dims.x, dims.y, dims.z, c.name));
+      const FrameParams frame = case_frame(dims, c, size);
+      rays.frame.write({&frame, 1});
+      initial_rays(rays, compaction);
+      const BlockLists all = walk_cells(frame, random_selection(frame, 1, 0));
+      const std::vector<uint> blocks = rays.ray_block_ids.read();
+      std::vector<uint> active;
+      for (uint pixel = 0; pixel < num_pixels; ++pixel) {
+        ASSERT_EQ(blocks[pixel], all[pixel].empty() ? ISO_INVALID_ID : all[pixel].front())
+            << "pixel " << pixel;
+        if (!all[pixel].empty()) active.push_back(pixel);
+      }
+      ASSERT_EQ(rays.counts.read().front().next_active_count, active.size());
+      std::vector<uint> got = rays.next_active_ray_ids.read();
+      got.resize(active.size());
+      ASSERT_EQ(first_difference(got, active), kNoDifference);
+      for (const HitRecord &hit : rays.hits.read()) ASSERT_EQ(hit.t, INFINITY);
+    }
+  }
+
+  ocl::Device device_{GetParam()};
+};
+
+TEST_P(InitialRaysOnDevice, SmallImages) {
+  expect_first_blocks({5, 6, 7}, {3, 3});
+}
+
+TEST_P(InitialRaysOnDevice, FirstBlocks) {
+  for (const glm::uvec3 dims : {glm::uvec3(38, 41, 35), glm::uvec3(5, 6, 7), glm::uvec3(2, 2, 2)}) {
+    expect_first_blocks(dims, {61, 47});
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, TraverseOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, InitialRaysOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+}  // namespace
+}  // namespace isowave
