@@ -18,7 +18,9 @@ constexpr std::uint32_t kEdge = 42;  ///< voxels; not a multiple of 4
 constexpr double kCentre = 20.3;
 
 /// Closed surfaces at 0, positive inside, well within the grid.
-double sphere(const Vec &p) { return 17 - std::hypot(p[0] - kCentre, p[1] - kCentre, p[2] - kCentre); }
+double sphere(const Vec &p) {
+  return 17 - std::hypot(p[0] - kCentre, p[1] - kCentre, p[2] - kCentre);
+}
 
 double torus(const Vec &p) {
   const double ring = std::hypot(p[0] - kCentre, p[1] - kCentre) - 12;
@@ -77,13 +79,15 @@ Shot random_shot(const std::vector<float> &voxels, Random &random) {
   }
   const double distance = random.below(2) ? 0 : 64;  // from inside, or from outside
   const auto axis = [&](std::size_t i) {
-    return make_ray_axis(static_cast<float>(target[i] - distance * direction[i]), static_cast<float>(direction[i]));
+    return make_ray_axis(static_cast<float>(target[i] - distance * direction[i]),
+                         static_cast<float>(direction[i]));
   };
   // The ray that was rounded to float32 passes the inside point within 1e-5 voxels, far less than its depth inside.
   return {{axis(0), axis(1), axis(2)}, distance == 0 ? INFINITY : static_cast<float>(distance)};
 }
 
-WatertightResult run_surface(const Surface &surface, std::uint64_t num_rays, std::uint32_t seed, Solver solver) {
+WatertightResult run_surface(const Surface &surface, std::uint64_t num_rays, std::uint32_t seed,
+                             Solver solver) {
   std::vector<float> voxels;
   for (std::uint32_t z = 0; z < kEdge; ++z) {
     for (std::uint32_t y = 0; y < kEdge; ++y) {
@@ -120,7 +124,8 @@ WatertightResult run_surface(const Surface &surface, std::uint64_t num_rays, std
 
 std::vector<WatertightResult> run_watertight(std::uint64_t num_rays, std::uint32_t seed, Solver solver) {
   std::vector<WatertightResult> results;
-  for (const Surface &surface : {Surface{"sphere", sphere}, Surface{"torus", torus}, Surface{"gyroid shell", gyroid_shell}}) {
+  for (const Surface &surface :
+       {Surface{"sphere", sphere}, Surface{"torus", torus}, Surface{"gyroid shell", gyroid_shell}}) {
     results.push_back(run_surface(surface, num_rays, seed, solver));
   }
   return results;

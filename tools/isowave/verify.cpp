@@ -34,7 +34,9 @@ struct Options {
   std::string json;
 };
 
-ordered_json quantiles_json(const Quantiles &q) { return {{"p50", q.p50}, {"p99", q.p99}, {"max", q.max}}; }
+ordered_json quantiles_json(const Quantiles &q) {
+  return {{"p50", q.p50}, {"p99", q.p99}, {"max", q.max}};
+}
 
 ordered_json accuracy_json(const Accuracy &tally) {
   return {{"rays", tally.rays},
@@ -47,15 +49,15 @@ ordered_json accuracy_json(const Accuracy &tally) {
 }
 
 void print_header(const char *what) {
-  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays", "hits", "missed", "false", "unstable",
-             "|dt| p50, p99, max [voxels]", "|f-iso|/|grad f| p99, max");
+  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays", "hits", "missed", "false",
+             "unstable", "|dt| p50, p99, max [voxels]", "|f-iso|/|grad f| p99, max");
 }
 
 void print_row(std::string_view name, const Accuracy &tally) {
   const Quantiles distance = quantiles(tally.distance), residual = quantiles(tally.residual);
-  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8}  {:.1e}, {:.1e}, {:.1e}  {:.1e}, {:.1e}\n", name, tally.rays,
-             tally.hits, tally.missed, tally.false_hits, tally.unstable, distance.p50, distance.p99, distance.max,
-             residual.p99, residual.max);
+  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8}  {:.1e}, {:.1e}, {:.1e}  {:.1e}, {:.1e}\n", name,
+             tally.rays, tally.hits, tally.missed, tally.false_hits, tally.unstable, distance.p50,
+             distance.p99, distance.max, residual.p99, residual.max);
 }
 
 /// Returns the failures of the solver: rays missed, false or leaked.
@@ -80,8 +82,10 @@ std::uint64_t verify_solver(const Options &options, std::string_view name, order
     failures += result.leaks;
     surfaces.push_back({{"surface", result.surface}, {"rays", result.rays}, {"leaks", result.leaks}});
   }
-  document["solvers"].push_back(
-      {{"solver", name}, {"cases", std::move(cases)}, {"watertight", std::move(surfaces)}, {"failures", failures}});
+  document["solvers"].push_back({{"solver", name},
+                                 {"cases", std::move(cases)},
+                                 {"watertight", std::move(surfaces)},
+                                 {"failures", failures}});
   return failures;
 }
 
@@ -95,8 +99,10 @@ std::uint64_t verify_frames(const Options &options, ordered_json &document) {
     for (const float isovalue : options.frame.isovalues) {
       const RootOracle oracle(voxels, {dims.x, dims.y, dims.z}, isovalue);
       for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
-        const FrameParams frame = make_frame_params(scene.volume.info, scene.cameras[view], scene.size, isovalue);
-        const Accuracy tally = judge_frame(oracle, frame, render_scalar(frame, voxels, solver_from_string(name)));
+        const FrameParams frame =
+            make_frame_params(scene.volume.info, scene.cameras[view], scene.size, isovalue);
+        const Accuracy tally =
+            judge_frame(oracle, frame, render_scalar(frame, voxels, solver_from_string(name)));
         print_row(fmt::format("isovalue {}, view {}", isovalue, view), tally);
         failures += tally.missed + tally.false_hits;
         ordered_json entry = accuracy_json(tally);
@@ -123,7 +129,8 @@ void run_verify(Options options) {
   } else {
     for (const std::string &name : options.solvers) {
       const std::uint64_t found = verify_solver(options, name, document);
-      if (judged.empty() || name == judged) failures += found;  // the others are expected to fail: that is shown
+      if (judged.empty() || name == judged)
+        failures += found;  // the others are expected to fail: that is shown
     }
   }
   if (!options.json.empty()) write_json(document, options.json);
@@ -140,10 +147,12 @@ void add_verify(CLI::App &app) {
                       "judge frames of this volume, drawn by the scalar reference, instead of the suite");
   add_volume_options(*command, options->volume);
   add_frame_options(*command, options->frame);
-  command->add_option("--solver", options->solvers,
-                      "linear, marmitt, analytic, bernstein; repeat it [suite: all; frames: the default one]");
+  command->add_option(
+      "--solver", options->solvers,
+      "linear, marmitt, analytic, bernstein; repeat it [suite: all; frames: the default one]");
   command->add_option("--rays", options->rays, "rays per case of the suite")->capture_default_str();
-  command->add_option("--watertight", options->watertight, "rays per surface of the watertight test")->capture_default_str();
+  command->add_option("--watertight", options->watertight, "rays per surface of the watertight test")
+      ->capture_default_str();
   command->add_option("--seed", options->seed, "of the suite's fields and rays")->capture_default_str();
   command->add_option("--json", options->json, "write the results as JSON");
   command->callback([options] { run_verify(*options); });
