@@ -2,9 +2,21 @@
 
 namespace isowave {
 
-Intersect::Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size)
+namespace {
+
+/// A kernel is built for one solver: the others cost it nothing.
+ocl::Defines intersect_defines(std::uint32_t group_size, Solver solver) {
+  ocl::Defines defines = group_defines(group_size);
+  defines["ISO_SOLVER"] = std::to_string(solver.kind);
+  defines["ISO_ROOT_STEPS"] = std::to_string(solver.max_steps);
+  return defines;
+}
+
+}  // namespace
+
+Intersect::Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver)
     : range_(ocl::Range::strided(num_pixels, group_size, device)),
-      kernel_(device, "intersect", "intersect", group_defines(group_size)) {}
+      kernel_(device, "intersect", "intersect", intersect_defines(group_size, solver)) {}
 
 void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays) {
   kernel_(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, groups.block_ray_offsets,

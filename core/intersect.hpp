@@ -3,13 +3,15 @@
 
 #include "core/group.hpp"
 #include "core/ocl/kernel.hpp"
+#include "core/solvers.hpp"
 #include "core/wavefront.hpp"
 
 namespace isowave {
 
 class Intersect {
  public:
-  Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size);
+  Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
+            Solver solver = kDefaultSolver);
 
   /// Out: rays.pair_hits of every pair in `groups`. Asynchronous.
   void operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays);

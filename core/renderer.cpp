@@ -71,7 +71,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       traverse_(device, rays_.num_pixels, options_.group_size),
       zfp_decode_(device, options_.cache_slots),
       group_(device, rays_.num_pixels, options_.cache_slots, options_.group_size),
-      intersect_(device, rays_.num_pixels, options_.group_size),
+      intersect_(device, rays_.num_pixels, options_.group_size, options_.solver),
       composite_(device, rays_.num_pixels),
       shade_(device, rays_.num_pixels) {
   device.finish();

@@ -30,6 +30,7 @@ struct RendererOptions {
   ImageSize size;
   std::uint32_t cache_slots = 0;       ///< decoded blocks kept, at least 8; 0: default_cache_slots()
   std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
+  Solver solver = kDefaultSolver;      ///< root finder in a cell
   std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
 };
 

@@ -16,18 +16,9 @@
 #define ISOWAVE_CELL_INTERSECT_H
 
 #include "grid_dda.h"
+#include "solver.h"
 
 ISO_NAMESPACE_BEGIN
-
-/// Steps of the bracketed iteration. Newton needs 3 to 5; the rest is for double roots, where it halves.
-#define ISO_MAX_ROOT_STEPS 32
-/// The iteration ends when s moves less than this: 2^-23 of the way through the cell.
-#define ISO_ROOT_STEP 0x1p-23f
-
-/// a at u = 0 and b at u = 1, exactly; between them in sign and, but for rounding, in value.
-static inline float lerp(float u, float a, float b) {
-  return fma(u, b, fma(-u, a, a));
-}
 
 /// Position in a cell, [0,1]^3.
 typedef struct CellPoint {
@@ -43,11 +34,6 @@ static inline CellPoint event_position(const Ray *r, RayEvent e, int x, int y, i
   p.z = e.axis == 2 ? ((r->z.d > 0.0f) == leaving ? 1.0f : 0.0f) : local_position(r->z, e.t, z);
   return p;
 }
-
-/// The field along a segment: Bernstein coefficients on s in [0,1], isovalue subtracted.
-typedef struct Cubic {
-  float b0, b1, b2, b3;
-} Cubic;
 
 /// w [8]: corner x + 2y + 4z minus the isovalue.
 static inline Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
@@ -69,92 +55,6 @@ static inline Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
   return c;
 }
 
-/// De Casteljau's value and derivative of the cubic at s.
-static inline float cubic_value(Cubic c, float s, float *derivative) {
-  const float c0 = lerp(s, c.b0, c.b1), c1 = lerp(s, c.b1, c.b2), c2 = lerp(s, c.b2, c.b3);
-  const float d0 = lerp(s, c0, c1), d1 = lerp(s, c1, c2);
-  *derivative = 3.0f * (d1 - d0);
-  return lerp(s, d0, d1);
-}
-
-static inline int cubic_inside(Cubic c, float s) {
-  float derivative;
-  return cubic_value(c, s, &derivative) >= 0.0f;
-}
-
-/// s = n / (n + m) where n and m have one sign, so nothing cancels; -1 where they do not.
-static inline float same_sign_fraction(float n, float m) {
-  return (n > 0.0f && m > 0.0f) || (n < 0.0f && m < 0.0f) ? n / (n + m) : -1.0f;
-}
-
-/// The first s at which `inside` differs from its value at s = 0. Returns 0 if it never does.
-///
-/// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly one root,
-/// bracketed by [0,1]. More: [0,1] is split where the derivative d0 (1-s)^2 + 2 d1 s (1-s) + d2 s^2 is 0.
-/// With r = s / (1-s) > 0 that is d2 r^2 + 2 d1 r + d0 = 0, whose roots q / d2 and d0 / q (q = -(d1 +-
-/// sqrt(d1^2 - d0 d2)), larger magnitude) give s without cancellation and without dividing by a leading
-/// coefficient. A tangent's extremum is found to rounding because the value there depends on s only to second
-/// order.
-static inline int first_change(Cubic c, float *s_hit) {
-  const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
-  float lo = 0.0f, hi = 1.0f, s, value, derivative;
-  int found = in0 != in3;
-  int step;
-  if (in0 == in1 && in0 == in2 && in0 == in3) return 0;
-  if (in0 == in3 || (in1 != in0 && in2 == in0)) {
-    const float e0 = c.b1 - c.b0, e1 = c.b2 - c.b1, e2 = c.b3 - c.b2;
-    const float e01 = fabs(e0) > fabs(e1) ? fabs(e0) : fabs(e1), largest = fabs(e2) > e01 ? fabs(e2) : e01;
-    /* Squares of huge or tiny values would not survive; only the ratios of the three count. */
-    const float d0 = e0 / largest, d1 = e1 / largest, d2 = e2 / largest;
-    const float d02 = d0 * d2;
-    const float discriminant = fma(d1, d1, -d02) + fma(-d0, d2, d02); /* Kahan: exact to an ulp or two */
-    if (discriminant > 0.0f) {
-      const float root = sqrt(discriminant);
-      const float q = d1 > 0.0f ? -(d1 + root) : root - d1;
-      const float s_a = same_sign_fraction(q, d2), s_b = same_sign_fraction(d0, q);
-      const float s_first = s_a < s_b ? s_a : s_b, s_second = s_a < s_b ? s_b : s_a;
-      if (s_first >= 0.0f) {
-        if (cubic_inside(c, s_first) != in0) {
-          hi = s_first;
-          found = 1;
-        } else {
-          lo = s_first;
-        }
-      }
-      if (hi == 1.0f && s_second >= 0.0f) {
-        if (cubic_inside(c, s_second) != in0) {
-          hi = s_second;
-          found = 1;
-        } else {
-          lo = s_second;
-        }
-      }
-    }
-  }
-  if (!found) return 0;
-  /* inside changes between lo and hi: Newton, kept in the bracket by bisection. */
-  s = 0.5f * (lo + hi);
-  if (lo == 0.0f && hi == 1.0f) s = c.b0 / (c.b0 - c.b3); /* signs differ: the chord's root, in [0,1] */
-  for (step = 0; step < ISO_MAX_ROOT_STEPS; ++step) {
-    float next;
-    value = cubic_value(c, s, &derivative);
-    if ((value >= 0.0f) == in0) {
-      lo = s;
-    } else {
-      hi = s;
-    }
-    next = s - value / derivative;
-    if (!(next > lo && next < hi)) next = 0.5f * (lo + hi); /* also when derivative = 0 */
-    if (fabs(next - s) < ISO_ROOT_STEP) {
-      s = next;
-      break;
-    }
-    s = next;
-  }
-  *s_hit = s;
-  return 1;
-}
-
 /// 1 if the corners [8] are not all on one side: only then can `inside` change in the cell.
 static inline int corners_differ(const float *w) {
   const int in = w[0] >= 0.0f;
@@ -163,11 +63,12 @@ static inline int corners_differ(const float *w) {
 }
 
 /// First change of inside between the events `enter` and `exit` of cell (x,y,z). w [8] as in segment_cubic.
-static inline int intersect_cell(const Ray *r, const float *w, int x, int y, int z, RayEvent enter,
-                                 RayEvent exit, float *s_hit) {
+static inline int intersect_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
+                                 RayEvent enter, RayEvent exit, float *s_hit) {
   if (!corners_differ(w)) return 0;
   return first_change(
-      segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1)), s_hit);
+      solver, segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1)),
+      s_hit);
 }
 
 /// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).

@@ -20,8 +20,7 @@ void load_corners(const FrameParams &frame, const float *voxels, int x, int y, i
   for (int corner = 0; corner < 8; ++corner) w[corner] = v[offsets[corner]] - frame.isovalue;
 }
 
-HitRecord trace(const FrameParams &frame, const float *voxels, std::uint32_t pixel) {
-  const Ray ray = make_ray(&frame, pixel);
+HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray) {
   const LastPlanes last = last_planes(&frame);
   RayEvent enter;
   if (!domain_entry(&ray, last, &enter)) return no_hit();
@@ -33,7 +32,7 @@ HitRecord trace(const FrameParams &frame, const float *voxels, std::uint32_t pix
     float w[8];
     float s;
     load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-    if (intersect_cell(&ray, w, cell.x, cell.y, cell.z, enter, exit, &s)) {
+    if (intersect_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &s)) {
       return make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit, s);
     }
     walk_step(&cell, &ray, exit, 1, last);
@@ -42,19 +41,29 @@ HitRecord trace(const FrameParams &frame, const float *voxels, std::uint32_t pix
   return no_hit();
 }
 
+void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
+  if (voxels.size() != std::size_t{frame.dims_x} * frame.dims_y * frame.dims_z) {
+    throw std::invalid_argument("scalar renderer: the voxels do not fit the frame's dims");
+  }
+}
+
 }  // namespace
 
-std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
+HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
+                       const Ray &ray) {
+  check_voxels(frame, voxels);
+  return trace(frame, voxels.data(), solver, ray);
+}
+
+std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                                      unsigned threads) {
-  if (voxels.size() != std::size_t{frame.dims_x} * frame.dims_y * frame.dims_z) {
-    throw std::invalid_argument("render_scalar: the voxels do not fit the frame's dims");
-  }
+  check_voxels(frame, voxels);
   std::vector<HitRecord> hits(std::size_t{frame.width} * frame.height);
   std::atomic<std::uint32_t> next_row{0};
   const auto trace_rows = [&] {
     for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
       for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel) {
-        hits[pixel] = trace(frame, voxels.data(), pixel);
+        hits[pixel] = trace(frame, voxels.data(), solver, make_ray(&frame, pixel));
       }
     }
   };

@@ -7,7 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "kernels_cl/shared_types.h"
+#include "core/solvers.hpp"
+#include "kernels_cl/grid_dda.h"
 
 namespace isowave {
 
@@ -16,6 +17,11 @@ namespace isowave {
 /// Returns the hits [height * width], row 0 at the top. Throws std::invalid_argument when voxels do not fit
 /// the frame.
 std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
-                                     unsigned threads = 0);
+                                     Solver solver = kDefaultSolver, unsigned threads = 0);
+
+/// One ray of the same: the hit of `ray` (index space; t in units of frame.t_scale). frame: dims, blocks,
+/// isovalue and t_scale are used.
+HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
+                       const Ray &ray);
 
 }  // namespace isowave

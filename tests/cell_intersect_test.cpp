@@ -12,6 +12,7 @@
 #include <random>
 #include <vector>
 
+#include "core/solvers.hpp"
 #include "tests/cubic_oracle.hpp"
 #include "tests/stage_support.hpp"
 
@@ -129,7 +130,7 @@ class FirstChangeChecker {
     const Real largest = largest_of(c), noise = kUnit * largest;
     const FirstChange expected = first_change_of(f);
     float s = -1;
-    const bool found = first_change(c, &s) != 0;
+    const bool found = first_change(kDefaultSolver, c, &s) != 0;
     ++num_cubics;
     if (found) {
       ASSERT_TRUE(s >= 0.0f && s <= 1.0f) << s;
@@ -240,7 +241,7 @@ TEST(CellIntersect, FirstChangeIsHalfOpen) {
   for (const Case &k : cases) {
     SCOPED_TRACE(text_of(k.c));
     float s = -1;
-    ASSERT_EQ(first_change(k.c, &s) != 0, k.found);
+    ASSERT_EQ(first_change(kDefaultSolver, k.c, &s) != 0, k.found);
     /* A triple root at an end is flat: to 1/1000. */
     const bool flat = (k.c.b0 == 0 && k.c.b1 == 0) || (k.c.b3 == 0 && k.c.b2 == 0);
     if (k.found) {
@@ -256,7 +257,7 @@ TEST(CellIntersect, FirstChangeNeverMissesEndsThatDiffer) {
     const Cubic c = {float(n % 5 - 2), float(n / 5 % 5 - 2), float(n / 25 % 5 - 2), float(n / 125 - 2)};
     SCOPED_TRACE(text_of(c));
     float s = -1;
-    const bool found = first_change(c, &s) != 0;
+    const bool found = first_change(kDefaultSolver, c, &s) != 0;
     if ((c.b0 >= 0) != (c.b3 >= 0)) {
       EXPECT_TRUE(found);
     }
@@ -330,7 +331,8 @@ TEST(CellIntersect, CellsFarFromTheEye) {
     const Polynomial f = exact_cubic(ray, w, cell, t_enter, t_exit);
     const FirstChange expected = first_change_of(f);
     float s = -1;
-    const bool found = intersect_cell(&ray, w, cell[0], cell[1], cell[2], enter, exit, &s) != 0;
+    const bool found =
+        intersect_cell(kDefaultSolver, &ray, w, cell[0], cell[1], cell[2], enter, exit, &s) != 0;
     SCOPED_TRACE(fmt::format("ray {}, {} voxels away, seed 7", i, distance));
     if (found) {
       ASSERT_LE(std::abs(f.value(s)), 46 * kUnit);

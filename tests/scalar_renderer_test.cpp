@@ -391,9 +391,9 @@ TEST(ScalarRenderer, ThreadsAndBadInput) {
   const auto voxels = sample(dims, test::gyroid_field(7));
   const FrameParams frame =
       make_frame_params(grid_info(dims), orbit_cameras(grid_info(dims), 1)[0], kSize, 0.1f);
-  const auto expected = render_scalar(frame, voxels, 1);
+  const auto expected = render_scalar(frame, voxels, kDefaultSolver, 1);
   for (const unsigned threads : {2u, 5u, 100u})
-    test::expect_same_hits(render_scalar(frame, voxels, threads), expected, kSize.width);
+    test::expect_same_hits(render_scalar(frame, voxels, kDefaultSolver, threads), expected, kSize.width);
   EXPECT_THROW(render_scalar(frame, std::span(voxels).first(voxels.size() - 1)), std::invalid_argument);
 }
 

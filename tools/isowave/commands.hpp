@@ -12,5 +12,6 @@ void add_generate(CLI::App &app);
 void add_convert(CLI::App &app);
 void add_render(CLI::App &app);
 void add_compare(CLI::App &app);
+void add_verify(CLI::App &app);
 
 }  // namespace isowave::tools

@@ -22,6 +22,7 @@ int main(int argc, char **argv) {
   add_convert(app);
   add_render(app);
   add_compare(app);
+  add_verify(app);
   try {
     app.parse(argc, argv);
     return 0;

@@ -15,6 +15,7 @@
 #include "core/renderer.hpp"
 #include "reference/scalar_renderer.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/volume_options.hpp"
 
@@ -28,37 +29,15 @@ using Clock = std::chrono::steady_clock;
 struct Options {
   std::string input;
   VolumeOptions volume;
-  std::uint32_t rate = 8;
-  std::vector<float> isovalues;
-  std::string size;
-  std::uint32_t orbit = 0;
-  std::string cameras;
+  FrameOptions frame;
   std::string device;
   std::string speculation = "global";
+  std::string solver{to_string(kDefaultSolver)};
   RendererOptions renderer;
   bool reference = false, no_stage_times = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
   std::string image, depth, stats, progress_dir;
 };
-
-/// What is drawn: the same for device and twin.
-struct Scene {
-  CompressedVolume volume;
-  std::vector<Camera> cameras;
-  ImageSize size;
-  Appearance appearance;
-};
-
-ImageSize parse_size(const std::string &text) {
-  ImageSize size;
-  const char *end = text.data() + text.size();
-  const auto width = std::from_chars(text.data(), end, size.width);
-  if (width.ec == std::errc{} && width.ptr != end && *width.ptr == 'x') {
-    const auto height = std::from_chars(width.ptr + 1, end, size.height);
-    if (height.ec == std::errc{} && height.ptr == end) return size;
-  }
-  throw Error("--size {}: give WIDTHxHEIGHT in pixels, such as 1280x720", text);
-}
 
 /// "#RRGGBB" -> [0,1]^3.
 glm::vec3 parse_color(const char *option, const std::string &text) {
@@ -73,39 +52,10 @@ glm::vec3 parse_color(const char *option, const std::string &text) {
   throw Error("{} {}: give a colour as #RRGGBB", option, text);
 }
 
-std::string dims_text(const glm::uvec3 &dims) {
-  return fmt::format("{}x{}x{}", dims.x, dims.y, dims.z);
-}
-
-Scene load_scene(const Options &options) {
-  Scene scene;  // what is cheap to refuse comes before the volume, which may take minutes
-  std::optional<CameraFile> file;
-  if (!options.cameras.empty()) file = read_camera_file(options.cameras);
-  if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
-  if (!options.size.empty()) scene.size = parse_size(options.size);
-  check_image_size(scene.size);
-  scene.appearance.surface = parse_color("--color", options.color);
-  scene.appearance.background = parse_color("--background", options.background);
-  scene.volume = load_volume(options.input, to_overrides(options.volume), options.rate);
-  const VolumeInfo &info = scene.volume.info;
-  if (file && file->dims && *file->dims != info.dims) {
-    throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims),
-                options.input, dims_text(info.dims));
-  }
-  if (file && file->spacing &&
-      glm::any(glm::greaterThan(glm::abs(*file->spacing - info.spacing), 1e-3 * info.spacing))) {
-    throw Error("{} is for a spacing of {} {} {}, but {} has {} {} {}: give --spacing", options.cameras,
-                file->spacing->x, file->spacing->y, file->spacing->z, options.input, info.spacing.x,
-                info.spacing.y, info.spacing.z);
-  }
-  scene.cameras = file ? file->cameras : orbit_cameras(info, std::max(1u, options.orbit));
-  return scene;
-}
-
 /// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT.
 fs::path frame_path(const fs::path &path, const Scene &scene, const Options &options, float isovalue,
                     std::size_t view) {
-  if (scene.cameras.size() * options.isovalues.size() == 1) return path;
+  if (scene.cameras.size() * options.frame.isovalues.size() == 1) return path;
   fs::path result = path;
   result.replace_filename(
       fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view, path.extension().string()));
@@ -123,8 +73,9 @@ class FrameSource {
 
 class DeviceFrames : public FrameSource {
  public:
-  DeviceFrames(ocl::Device &device, const Scene &scene, const RendererOptions &options)
-      : renderer_(device, scene.volume, options), appearance_(scene.appearance) {}
+  DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance,
+               const RendererOptions &options)
+      : renderer_(device, scene.volume, options), appearance_(appearance) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
     return renderer_.render(camera, isovalue, on_pass);
   }
@@ -139,11 +90,12 @@ class DeviceFrames : public FrameSource {
 
 class TwinFrames : public FrameSource {
  public:
-  explicit TwinFrames(const Scene &scene) : scene_(scene), voxels_(decode_with_libzfp(scene.volume)) {}
+  TwinFrames(const Scene &scene, const Appearance &appearance, Solver solver)
+      : scene_(scene), appearance_(appearance), solver_(solver), voxels_(decode_with_libzfp(scene.volume)) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
-    hits_ = render_scalar(frame_, voxels_);
+    hits_ = render_scalar(frame_, voxels_, solver_);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
@@ -151,11 +103,13 @@ class TwinFrames : public FrameSource {
   }
   std::vector<HitRecord> hits() override { return hits_; }
   Image8 shade() override {
-    return shade_scalar(frame_, make_shade_params(scene_.volume.info, scene_.appearance), hits_);
+    return shade_scalar(frame_, make_shade_params(scene_.volume.info, appearance_), hits_);
   }
 
  private:
   const Scene &scene_;
+  Appearance appearance_;
+  Solver solver_;
   std::vector<float> voxels_;
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
@@ -185,7 +139,7 @@ OnPass progress_writer(const Options &options, const Scene &scene, FrameSource &
 
 nlohmann::ordered_json draw_frames(const Options &options, const Scene &scene, FrameSource &frames) {
   nlohmann::ordered_json result = nlohmann::ordered_json::array();
-  for (const float isovalue : options.isovalues) {
+  for (const float isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const FrameStats stats =
@@ -202,11 +156,12 @@ nlohmann::ordered_json draw_frames(const Options &options, const Scene &scene, F
 nlohmann::ordered_json options_json(const Options &options, const Scene &scene) {
   return {{"size", {scene.size.width, scene.size.height}},
           {"views", scene.cameras.size()},
-          {"isovalues", options.isovalues},
+          {"isovalues", options.frame.isovalues},
           {"reference", options.reference},
           {"speculation", options.speculation},
           {"max_speculation", options.renderer.max_speculation},
           {"cache_slots", options.renderer.cache_slots},
+          {"solver", to_string(options.renderer.solver)},
           {"group_size", options.renderer.group_size}};
 }
 
@@ -252,22 +207,26 @@ ocl::Device open_device(const Options &options) {
 void run_render(Options options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
-  for (const float isovalue : options.isovalues) {
+  for (const float isovalue : options.frame.isovalues) {
     if (std::isnan(isovalue)) throw Error("--isovalue nan: give a number in the volume's value range");
   }
   check_outputs(options);
   if (options.speculation == "off") options.renderer.max_speculation = 1;
-  const Scene scene = load_scene(options);
+  options.renderer.solver = solver_from_string(options.solver);
+  Appearance appearance;
+  appearance.surface = parse_color("--color", options.color);
+  appearance.background = parse_color("--background", options.background);
+  const Scene scene = load_scene(options.input, options.volume, options.frame);
   options.renderer.size = scene.size;
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
   if (options.reference) {
-    TwinFrames frames(scene);
+    TwinFrames frames(scene, appearance, options.renderer.solver);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {
     ocl::Device device = open_device(options);
-    DeviceFrames frames(device, scene, options.renderer);
+    DeviceFrames frames(device, scene, appearance, options.renderer);
     options.renderer = frames.renderer().options();
     document["device"] = device_json(device.info());
     document["options"] = options_json(options, scene);
@@ -286,21 +245,8 @@ void add_render(CLI::App &app) {
   CLI::App *command = app.add_subcommand("render", "Draw isosurfaces: PNG pictures, depth and statistics");
   const auto options = std::make_shared<Options>();
   command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))->required();
-  command
-      ->add_option("--isovalue,-i", options->isovalues,
-                   "isovalue; repeat it for more surfaces, each drawn from all views")
-      ->allow_extra_args(false)  // one number each time: VOLUME may follow
-      ->required();
   add_volume_options(*command, options->volume);
-  command
-      ->add_option("--rate", options->rate,
-                   "bits per voxel when an uncompressed volume is compressed on the fly")
-      ->capture_default_str();
-  command->add_option("--size", options->size, "picture size WxH [1280x720, or the camera file's]");
-  const auto *orbit = command->add_option("--orbit", options->orbit, "draw N views around the volume [1]")
-                          ->check(CLI::Range(1u, 100000u));
-  command->add_option("--cameras", options->cameras, "camera file (JSON)")
-      ->excludes(const_cast<CLI::Option *>(orbit));
+  add_frame_options(*command, options->frame)->required();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
   command
@@ -316,6 +262,8 @@ void add_render(CLI::App &app) {
       ->add_option("--cache-slots", options->renderer.cache_slots,
                    "decoded blocks kept on the device, at least 8 [2^18 or all]")
       ->check(CLI::Range(8u, 1u << 30));
+  command->add_option("--solver", options->solver, "root finder: linear, marmitt, analytic or bernstein")
+      ->capture_default_str();
   command->add_option("--group-size", options->renderer.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();
   command->add_flag("--reference", options->reference, "use the scalar C++ reference instead of a device");

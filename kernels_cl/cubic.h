@@ -1,0 +1,54 @@
+/// cubic.h -- the field along a ray's segment in one cell, as a cubic in Bernstein form.
+/// Portable: OpenCL C 1.2 and C++.
+#ifndef ISOWAVE_CUBIC_H
+#define ISOWAVE_CUBIC_H
+
+#include "shared_types.h"
+
+ISO_NAMESPACE_BEGIN
+
+/// a at u = 0 and b at u = 1, exactly; between them in sign and, but for rounding, in value.
+static inline float lerp(float u, float a, float b) {
+  return fma(u, b, fma(-u, a, a));
+}
+
+/// Bernstein coefficients on s in [0,1], isovalue subtracted.
+typedef struct Cubic {
+  float b0, b1, b2, b3;
+} Cubic;
+
+/// De Casteljau's value and derivative of the cubic at s.
+static inline float cubic_value(Cubic c, float s, float *derivative) {
+  const float c0 = lerp(s, c.b0, c.b1), c1 = lerp(s, c.b1, c.b2), c2 = lerp(s, c.b2, c.b3);
+  const float d0 = lerp(s, c0, c1), d1 = lerp(s, c1, c2);
+  *derivative = 3.0f * (d1 - d0);
+  return lerp(s, d0, d1);
+}
+
+static inline int cubic_inside(Cubic c, float s) {
+  float derivative;
+  return cubic_value(c, s, &derivative) >= 0.0f;
+}
+
+/// The cubic as p3 s^3 + p2 s^2 + p1 s + p0: the form most of the literature works in. Its coefficients are
+/// differences of the Bernstein ones, so they carry the rounding of the largest of those.
+typedef struct PowerCubic {
+  float p3, p2, p1, p0;
+} PowerCubic;
+
+static inline PowerCubic power_form(Cubic c) {
+  PowerCubic p;
+  p.p0 = c.b0;
+  p.p1 = 3.0f * (c.b1 - c.b0);
+  p.p2 = 3.0f * ((c.b2 - c.b1) - (c.b1 - c.b0));
+  p.p3 = (c.b3 - c.b0) - 3.0f * (c.b2 - c.b1);
+  return p;
+}
+
+static inline float power_value(PowerCubic p, float s) {
+  return fma(fma(fma(p.p3, s, p.p2), s, p.p1), s, p.p0);
+}
+
+ISO_NAMESPACE_END
+
+#endif

@@ -1,0 +1,45 @@
+/// solve_marmitt.h -- split at the derivative's roots, then repeated linear interpolation [Marmitt et al. 2004].
+///
+/// Guarantees: the first crossing, as long as the extrema that separate crossings are found.
+/// Fails: the extrema come from the quadratic formula in power form. b^2 - 4ac cancels where they lie close together,
+/// so pairs of crossings there (grazing rays) are lost, and dividing by 2a throws away the extremum that stays when the
+/// cubic's leading coefficient vanishes against the others. The refinement converges as slowly as in solve_linear.h.
+#ifndef ISOWAVE_SOLVE_MARMITT_H
+#define ISOWAVE_SOLVE_MARMITT_H
+
+#include "solve_linear.h"
+
+ISO_NAMESPACE_BEGIN
+
+static inline int solve_marmitt(Cubic c, int max_steps, float *s) {
+  const PowerCubic p = power_form(c);
+  const float qa = 3.0f * p.p3, qb = 2.0f * p.p2, qc = p.p1; /* the derivative */
+  const float discriminant = qb * qb - 4.0f * qa * qc;
+  float lo = 0.0f, hi = 1.0f, value_lo = c.b0, value_hi = c.b3;
+  if (discriminant >= 0.0f) { /* also false when it is not a number */
+    const float root = sqrt(discriminant);
+    const float e0 = (-qb - root) / (2.0f * qa), e1 = (-qb + root) / (2.0f * qa);
+    const float first = e0 < e1 ? e0 : e1, second = e0 < e1 ? e1 : e0;
+    int i;
+    for (i = 0; i < 2; ++i) {
+      const float e = i == 0 ? first : second;
+      float value, derivative;
+      if (!(e > lo && e < hi)) continue;
+      value = cubic_value(c, e, &derivative);
+      if ((value >= 0.0f) == (value_lo >= 0.0f)) {
+        lo = e;
+        value_lo = value;
+      } else {
+        hi = e;
+        value_hi = value;
+      }
+    }
+  }
+  if ((value_lo >= 0.0f) == (value_hi >= 0.0f)) return 0;
+  *s = false_position(c, lo, hi, value_lo, value_hi, max_steps);
+  return 1;
+}
+
+ISO_NAMESPACE_END
+
+#endif

@@ -1,0 +1,41 @@
+# Planted bugs. Each mutant is the scalar twin built from a copy of the portable headers with one line changed; its test
+# succeeds when the stability suite or the watertight test notices. A change that no longer applies stops the configuring.
+
+add_library(mutant_main OBJECT mutant_main.cpp)
+target_link_libraries(mutant_main PRIVATE isowave_reference)
+
+# add_mutant(<name> <header> <line as it stands> <line with the bug>)
+function(add_mutant name header from to)
+  set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name}/kernels_cl)
+  file(GLOB headers ${CMAKE_SOURCE_DIR}/kernels_cl/*.h)
+  file(COPY ${headers} DESTINATION ${folder})
+  file(READ ${CMAKE_SOURCE_DIR}/kernels_cl/${header} text)
+  string(FIND "${text}" "${from}" place)
+  if(place EQUAL -1)
+    message(FATAL_ERROR "mutant ${name}: ${header} no longer has the line\n${from}")
+  endif()
+  string(REPLACE "${from}" "${to}" text "${text}")
+  file(CONFIGURE OUTPUT ${folder}/${header} CONTENT "${text}" @ONLY)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/kernels_cl/${header})
+  add_executable(mutant_${name} $<TARGET_OBJECTS:mutant_main> ${CMAKE_SOURCE_DIR}/reference/scalar_renderer.cpp)
+  target_include_directories(mutant_${name} BEFORE PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name})
+  target_link_libraries(mutant_${name} PRIVATE isowave_reference)
+  target_compile_options(mutant_${name} PRIVATE -w)  # what a bug leaves unused is no matter
+  add_test(NAME mutant.${name} COMMAND mutant_${name})
+endfunction()
+
+add_mutant(accumulated_t grid_dda.h
+  "    w->fx = far_t(r->x, w->x, size, last.x);\n  } else if"
+  "    w->fx.hi += fabs(r->x.inv_d.hi) * (float)size;\n    (void)last;\n  } else if")
+add_mutant(missing_carry grid_dda.h
+  "return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);" "return a.hi < b.hi;")
+add_mutant(float_position grid_dda.h "const float x = r + (re + (pe + se));" "const float x = r;")
+add_mutant(position_decides grid_dda.h "if (a.d > 0.0f) {\n    while" "if (0) {\n    while")
+add_mutant(tie_order grid_dda.h "&& a.axis < b.axis)" "&& a.axis > b.axis)")
+add_mutant(open_interval cell_intersect.h "const int in = w[0] >= 0.0f;" "const int in = w[0] > 0.0f;")
+add_mutant(open_end solve_bernstein.h "in3 = c.b3 >= 0.0f;" "in3 = c.b3 > 0.0f;")
+add_mutant(one_crossing_only solve_bernstein.h
+  "if (in0 == in1 && in0 == in2 && in0 == in3) return 0;" "if (in0 == in3) return 0;")
+add_mutant(last_corner cell_intersect.h "(w[7] >= 0.0f) != in;" "0;")
+add_mutant(unbracketed_newton solve_bernstein.h "if (!(next > lo && next < hi))" "if (next != next)")
+add_mutant(face_of_neither cell_intersect.h "p.x = e.axis == 0 ?" "p.x = e.axis == 4 ?")

@@ -1,0 +1,63 @@
+// The stability suite and the watertight test at a size that every test run can afford (`isowave verify` runs them large).
+
+#include "reference/stability_suite.hpp"
+
+#include <gtest/gtest.h>
+
+#include "reference/watertight.hpp"
+
+namespace isowave {
+namespace {
+
+constexpr std::uint32_t kSeed = 20231;
+
+TEST(StabilitySuite, DefaultSolverMissesNothingAndInventsNothing) {
+  for (const StabilityCase &stability_case : stability_cases(600, kSeed)) {
+    SCOPED_TRACE(stability_case.name);
+    const Accuracy tally = run_case(stability_case, kDefaultSolver);
+    EXPECT_EQ(tally.missed, 0u);
+    EXPECT_EQ(tally.false_hits, 0u);
+    // Near a triple root the field is flat to third order: its place is known to the cube root of the rounding.
+    if (stability_case.name != "triple roots") {
+      EXPECT_LE(quantiles(tally.residual).p99, 1e-4);
+    }
+    EXPECT_GE(tally.rays, 12u);
+  }
+}
+
+TEST(StabilitySuite, ShowsWhereTheOtherSolversFail) {
+  for (const char *name : {"linear", "marmitt", "analytic"}) {
+    std::uint64_t failures = 0;
+    for (const StabilityCase &stability_case : stability_cases(300, kSeed)) {
+      const Accuracy tally = run_case(stability_case, solver_from_string(name));
+      failures += tally.missed + tally.false_hits;
+    }
+    EXPECT_GT(failures, 0u) << name << ": a suite that every solver passes proves nothing of the default one";
+  }
+}
+
+TEST(StabilitySuite, IsTheSameForTheSameSeed) {
+  const auto a = stability_cases(50, 7), b = stability_cases(50, 7);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ASSERT_EQ(a[i].scenes.size(), b[i].scenes.size());
+    EXPECT_EQ(a[i].scenes.front().voxels, b[i].scenes.front().voxels);
+  }
+}
+
+TEST(Watertight, NotOneRayLeaks) {
+  for (const WatertightResult &result : run_watertight(200000, kSeed, kDefaultSolver)) {
+    EXPECT_EQ(result.leaks, 0u) << result.surface;
+    EXPECT_EQ(result.rays, 200000u);
+  }
+}
+
+TEST(Watertight, FindsTheLeaksOfALeakySolver) {
+  std::uint64_t leaks = 0;
+  for (const WatertightResult &result : run_watertight(100000, kSeed, solver_from_string("analytic")))
+    leaks += result.leaks;
+  EXPECT_GT(leaks, 0u);
+}
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,11 @@
+# Defines GMP::gmpxx, the GNU multiple precision library with its C++ classes (Debian: libgmp-dev).
+find_path(GMP_INCLUDE_DIR gmpxx.h)
+find_library(GMP_LIBRARY gmp)
+find_library(GMPXX_LIBRARY gmpxx)
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(GMP REQUIRED_VARS GMPXX_LIBRARY GMP_LIBRARY GMP_INCLUDE_DIR)
+if(GMP_FOUND AND NOT TARGET GMP::gmpxx)
+  add_library(GMP::gmpxx INTERFACE IMPORTED)
+  target_include_directories(GMP::gmpxx INTERFACE ${GMP_INCLUDE_DIR})
+  target_link_libraries(GMP::gmpxx INTERFACE ${GMPXX_LIBRARY} ${GMP_LIBRARY})
+endif()

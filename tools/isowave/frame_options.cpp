@@ -1,0 +1,68 @@
+#include "tools/isowave/frame_options.hpp"
+
+#include <charconv>
+#include <optional>
+
+#include "core/error.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+ImageSize parse_size(const std::string &text) {
+  ImageSize size;
+  const char *end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width);
+  if (width.ec == std::errc{} && width.ptr != end && *width.ptr == 'x') {
+    const auto height = std::from_chars(width.ptr + 1, end, size.height);
+    if (height.ec == std::errc{} && height.ptr == end) return size;
+  }
+  throw Error("--size {}: give WIDTHxHEIGHT in pixels, such as 1280x720", text);
+}
+
+std::string dims_text(const glm::uvec3 &dims) {
+  return fmt::format("{}x{}x{}", dims.x, dims.y, dims.z);
+}
+
+}  // namespace
+
+Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options) {
+  Scene scene;  // what is cheap to refuse comes before the volume, which may take minutes
+  std::optional<CameraFile> file;
+  if (!options.cameras.empty()) file = read_camera_file(options.cameras);
+  if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
+  if (!options.size.empty()) scene.size = parse_size(options.size);
+  check_image_size(scene.size);
+  scene.volume = load_volume(path, to_overrides(volume), options.rate);
+  const VolumeInfo &info = scene.volume.info;
+  if (file && file->dims && *file->dims != info.dims) {
+    throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims), path,
+                dims_text(info.dims));
+  }
+  if (file && file->spacing &&
+      glm::any(glm::greaterThan(glm::abs(*file->spacing - info.spacing), 1e-3 * info.spacing))) {
+    throw Error("{} is for a spacing of {} {} {}, but {} has {} {} {}: give --spacing", options.cameras,
+                file->spacing->x, file->spacing->y, file->spacing->z, path, info.spacing.x, info.spacing.y,
+                info.spacing.z);
+  }
+  scene.cameras = file ? file->cameras : orbit_cameras(info, std::max(1u, options.orbit));
+  return scene;
+}
+
+CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
+  CLI::Option *isovalue = command
+                              .add_option("--isovalue,-i", options.isovalues,
+                                          "isovalue; repeat it for more surfaces, each drawn from all views")
+                              ->allow_extra_args(false);  // one number each time: VOLUME may follow
+  command
+      .add_option("--rate", options.rate,
+                  "bits per voxel when an uncompressed volume is compressed on the fly")
+      ->capture_default_str();
+  command.add_option("--size", options.size, "picture size WxH [1280x720, or the camera file's]");
+  CLI::Option *orbit = command.add_option("--orbit", options.orbit, "draw N views around the volume [1]")
+                           ->check(CLI::Range(1u, 100000u));
+  command.add_option("--cameras", options.cameras, "camera file (JSON)")->excludes(orbit);
+  return isovalue;
+}
+
+}  // namespace isowave::tools

@@ -1,0 +1,39 @@
+#pragma once
+// What `render` and `verify` share: which frames of which volume are drawn.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/camera.hpp"
+#include "core/frame.hpp"
+#include "core/zfp_stream.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::tools {
+
+/// Options as typed; load_scene() checks them.
+struct FrameOptions {
+  std::uint32_t rate = 8;  ///< bits per voxel when compressing on the fly
+  std::vector<float> isovalues;
+  std::string size;         ///< WxH
+  std::uint32_t orbit = 0;  ///< views; 0: one, or the camera file's
+  std::string cameras;      ///< camera file
+};
+
+/// Adds --isovalue, --size, --orbit, --cameras and --rate. Returns the option --isovalue.
+CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options);
+
+/// The volume and the views of it.
+struct Scene {
+  CompressedVolume volume;
+  std::vector<Camera> cameras;
+  ImageSize size;
+};
+
+/// Reads or compresses the volume and makes its cameras. Throws Error in one line, also when a camera file is for another
+/// volume.
+Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options);
+
+}  // namespace isowave::tools
