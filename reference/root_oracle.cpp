@@ -144,6 +144,27 @@ int count_distinct_roots(const Polynomial<mpq_class> &b) {
   return variations(0) - variations(1);
 }
 
+double middle(const Interval &x) {
+  return boost::numeric::median(x);
+}
+
+double middle(const mpq_class &x) {
+  return x.get_d();
+}
+
+/// Where a cubic with one sign variation changes sign on [0,1], to double precision.
+template <class Number>
+double place_of_root(const Polynomial<Number> &b) {
+  const std::array<double, 4> c{middle(b[0]), middle(b[1]), middle(b[2]), middle(b[3])};
+  double low = 0, high = 1;
+  for (int i = 0; i < std::numeric_limits<double>::digits; ++i) {
+    const double s = 0.5 * (low + high), r = 1 - s;
+    const double value = r * r * r * c[0] + 3 * r * s * (r * c[1] + s * c[2]) + s * s * s * c[3];
+    ((value >= 0) == (c[0] >= 0) ? low : high) = s;
+  }
+  return high;  // where inside has changed
+}
+
 /// A piece so small that its roots are one point for every purpose but their number.
 constexpr int kMaxDepth = 56;
 /// Interval arithmetic gives up earlier: its bounds no longer shrink.
@@ -173,12 +194,10 @@ Answer first_change(const Polynomial<Number> &b, double begin, double width, int
   int variations = 0;
   for (unsigned i = 1; i < 4; ++i) variations += sides[i] != sides[i - 1];
   if (known && variations == 0) return {Answer::kNone};  // the curve lies in the hull of its coefficients
-  const bool one_root = known && variations == 1;        // Descartes
-  if (one_root && depth >= max_depth) return {Answer::kChange, begin + 0.5 * width};
+  if (known && variations == 1) return {Answer::kChange, begin + width * place_of_root(b)};  // Descartes
   if (depth >= max_depth) return undecided_piece(b, begin + 0.5 * width);
   const auto [left, right] = halves(b);
   const Answer in_left = first_change(left, begin, 0.5 * width, depth + 1, max_depth);
-  if (in_left.kind == Answer::kUndecided && one_root) return {Answer::kChange, begin + 0.5 * width};
   if (in_left.kind != Answer::kNone) return in_left;
   return first_change(right, begin + 0.5 * width, 0.5 * width, depth + 1, max_depth);
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
+#include <glm/glm.hpp>
 #include <stdexcept>
 #include <thread>
 
@@ -20,14 +22,28 @@ void load_corners(const FrameParams &frame, const float *voxels, int x, int y, i
   for (int corner = 0; corner < 8; ++corner) w[corner] = v[offsets[corner]] - frame.isovalue;
 }
 
-HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray) {
+/// Cells [begin, end) along each axis.
+struct CellBox {
+  glm::ivec3 begin, end;
+};
+
+bool contains(const CellBox &box, const GridWalk &w) {
+  const glm::ivec3 at(w.x, w.y, w.z);
+  return glm::all(glm::greaterThanEqual(at, box.begin)) && glm::all(glm::lessThan(at, box.end));
+}
+
+GridWalk enter_box(const Ray &ray, RayEvent enter, int size, const CellBox &box, LastPlanes last) {
+  return walk_from(&ray, locate(ray.x, 0, enter, size, box.begin.x, box.end.x - 1),
+                   locate(ray.y, 1, enter, size, box.begin.y, box.end.y - 1),
+                   locate(ray.z, 2, enter, size, box.begin.z, box.end.z - 1), size, last);
+}
+
+/// The first hit in the cells of `box`, which the ray enters by `enter`.
+HitRecord trace_box(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
+                    RayEvent enter, const CellBox &box) {
   const LastPlanes last = last_planes(&frame);
-  RayEvent enter;
-  if (!domain_entry(&ray, last, &enter)) return no_hit();
-  GridWalk cell =
-      walk_from(&ray, locate(ray.x, 0, enter, 1, 0, last.x - 1), locate(ray.y, 1, enter, 1, 0, last.y - 1),
-                locate(ray.z, 2, enter, 1, 0, last.z - 1), 1, last);
-  while (cell.x >= 0 && cell.x < last.x && cell.y >= 0 && cell.y < last.y && cell.z >= 0 && cell.z < last.z) {
+  GridWalk cell = enter_box(ray, enter, 1, box, last);
+  while (contains(box, cell)) {
     const RayEvent exit = walk_exit(&cell);
     float w[8];
     float s;
@@ -39,6 +55,13 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
     enter = exit;
   }
   return no_hit();
+}
+
+HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray) {
+  const LastPlanes last = last_planes(&frame);
+  RayEvent enter;
+  if (!domain_entry(&ray, last, &enter)) return no_hit();
+  return trace_box(frame, voxels, solver, ray, enter, {glm::ivec3(0), {last.x, last.y, last.z}});
 }
 
 void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
@@ -53,6 +76,27 @@ HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, 
                        const Ray &ray) {
   check_voxels(frame, voxels);
   return trace(frame, voxels.data(), solver, ray);
+}
+
+HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels, Solver solver,
+                                 const Ray &ray) {
+  check_voxels(frame, voxels);
+  const LastPlanes last = last_planes(&frame);
+  const glm::ivec3 end_cell(last.x, last.y, last.z);
+  const CellBox blocks{glm::ivec3(0), (end_cell + 3) / 4};
+  RayEvent enter;
+  if (!domain_entry(&ray, last, &enter)) return no_hit();
+  GridWalk block = enter_box(ray, enter, 4, blocks, last);
+  while (contains(blocks, block)) {
+    const glm::ivec3 begin(4 * block.x, 4 * block.y, 4 * block.z);
+    const HitRecord hit =
+        trace_box(frame, voxels.data(), solver, ray, region_entry(&ray, block.x, block.y, block.z, 4, last),
+                  {begin, glm::min(begin + 4, end_cell)});
+    if (std::isfinite(hit.t)) return hit;
+    block = walk_from(&ray, block.x, block.y, block.z, 4, last);  // all that is kept between passes
+    walk_step(&block, &ray, walk_exit(&block), 4, last);
+  }
+  return no_hit();
 }
 
 std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,

@@ -24,4 +24,9 @@ std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const f
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                        const Ray &ray);
 
+/// The same ray block by block, as the device's passes see it: each block is entered anew and all that is known on
+/// leaving one is its number. Must give the bits of trace_scalar().
+HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels, Solver solver,
+                                 const Ray &ray);
+
 }  // namespace isowave

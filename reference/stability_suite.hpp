@@ -26,12 +26,25 @@ struct StabilityCase {
   std::string name;         ///< "double roots"
   std::string description;  ///< one line: what is hard about it
   std::vector<StabilityScene> scenes;
+  double residual_limit = 1e-4;  ///< on the 99th percentile of |f - iso| / |grad f| [voxels]
+};
+
+struct CaseResult {
+  Accuracy accuracy;
+  std::uint64_t resumed_differently = 0;  ///< rays whose hit has other bits when walked block by block
+
+  /// Rays missed, false or resumed differently.
+  std::uint64_t failures() const { return accuracy.missed + accuracy.false_hits + resumed_differently; }
 };
 
 /// Every case, with about `rays_per_case` rays each. The same for the same seed on every machine.
 std::vector<StabilityCase> stability_cases(std::uint32_t rays_per_case, std::uint32_t seed);
 
-/// A case's rays through the twin with one solver, judged by the root oracle.
-Accuracy run_case(const StabilityCase &stability_case, Solver solver);
+/// A case's rays through the twin with one solver, judged by the root oracle; each is walked twice, at once and
+/// block by block.
+CaseResult run_case(const StabilityCase &stability_case, Solver solver);
+
+/// Whether a result is what the default solver must deliver: no failures and the residual within the case's limit.
+bool passes(const StabilityCase &stability_case, const CaseResult &result);
 
 }  // namespace isowave

@@ -68,10 +68,12 @@ std::uint64_t verify_solver(const Options &options, std::string_view name, order
   ordered_json cases = ordered_json::array();
   print_header("case");
   for (const StabilityCase &stability_case : stability_cases(options.rays, options.seed)) {
-    const Accuracy tally = run_case(stability_case, solver);
-    print_row(stability_case.name, tally);
-    failures += tally.missed + tally.false_hits;
-    ordered_json entry = accuracy_json(tally);
+    const CaseResult result = run_case(stability_case, solver);
+    print_row(stability_case.name, result.accuracy);
+    failures += result.failures();
+    ordered_json entry = accuracy_json(result.accuracy);
+    entry["resumed_differently"] = result.resumed_differently;
+    entry["passes"] = passes(stability_case, result);
     entry["name"] = stability_case.name;
     entry["description"] = stability_case.description;
     cases.push_back(std::move(entry));
