@@ -55,6 +55,32 @@ static inline Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
   return c;
 }
 
+/// The field at (x,y,z) of the cell. w [8] as in segment_cubic.
+static inline TwoFloat precise_trilinear(const float *w, float x, float y, float z) {
+  const TwoFloat y0z0 = tf_lerp(x, two_float(w[0]), two_float(w[1]));
+  const TwoFloat y1z0 = tf_lerp(x, two_float(w[2]), two_float(w[3]));
+  const TwoFloat y0z1 = tf_lerp(x, two_float(w[4]), two_float(w[5]));
+  const TwoFloat y1z1 = tf_lerp(x, two_float(w[6]), two_float(w[7]));
+  return tf_lerp(z, tf_lerp(y, y0z0, y1z0), tf_lerp(y, y0z1, y1z1));
+}
+
+/// segment_cubic() in 48 bits.
+static inline PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellPoint b) {
+  TwoFloat third;
+  PreciseCubic c;
+  third.hi = 1.0f / 3.0f;
+  third.lo = fma(-third.hi, 3.0f, 1.0f) / 3.0f;
+  c.b0 = precise_trilinear(w, a.x, a.y, a.z);
+  c.b1 =
+      tf_mul(third, tf_add(tf_add(precise_trilinear(w, b.x, a.y, a.z), precise_trilinear(w, a.x, b.y, a.z)),
+                           precise_trilinear(w, a.x, a.y, b.z)));
+  c.b2 =
+      tf_mul(third, tf_add(tf_add(precise_trilinear(w, b.x, b.y, a.z), precise_trilinear(w, b.x, a.y, b.z)),
+                           precise_trilinear(w, a.x, b.y, b.z)));
+  c.b3 = precise_trilinear(w, b.x, b.y, b.z);
+  return c;
+}
+
 /// 1 if the corners [8] are not all on one side: only then can `inside` change in the cell.
 static inline int corners_differ(const float *w) {
   const int in = w[0] >= 0.0f;
@@ -66,9 +92,10 @@ static inline int corners_differ(const float *w) {
 static inline int intersect_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
                                  RayEvent enter, RayEvent exit, float *s_hit) {
   if (!corners_differ(w)) return 0;
-  return first_change(
-      solver, segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1)),
-      s_hit);
+  const CellPoint a = event_position(r, enter, x, y, z, 0), b = event_position(r, exit, x, y, z, 1);
+  const Cubic c = segment_cubic(w, a, b);
+  const int found = first_change_or_doubt(solver, c, s_hit);
+  return found == ISO_DOUBTFUL ? solve_bernstein_precisely(precise_segment_cubic(w, a, b), c, s_hit) : found;
 }
 
 /// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).

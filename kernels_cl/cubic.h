@@ -3,7 +3,7 @@
 #ifndef ISOWAVE_CUBIC_H
 #define ISOWAVE_CUBIC_H
 
-#include "shared_types.h"
+#include "two_float.h"
 
 ISO_NAMESPACE_BEGIN
 
@@ -25,9 +25,24 @@ static inline float cubic_value(Cubic c, float s, float *derivative) {
   return lerp(s, d0, d1);
 }
 
-static inline int cubic_inside(Cubic c, float s) {
-  float derivative;
-  return cubic_value(c, s, &derivative) >= 0.0f;
+/// The same coefficients with about 48 bits.
+typedef struct PreciseCubic {
+  TwoFloat b0, b1, b2, b3;
+} PreciseCubic;
+
+static inline PreciseCubic widened(Cubic c) {
+  PreciseCubic p;
+  p.b0 = two_float(c.b0);
+  p.b1 = two_float(c.b1);
+  p.b2 = two_float(c.b2);
+  p.b3 = two_float(c.b3);
+  return p;
+}
+
+static inline int precise_cubic_inside(PreciseCubic c, float s) {
+  const TwoFloat c0 = tf_lerp(s, c.b0, c.b1), c1 = tf_lerp(s, c.b1, c.b2), c2 = tf_lerp(s, c.b2, c.b3);
+  const TwoFloat value = tf_lerp(s, tf_lerp(s, c0, c1), tf_lerp(s, c1, c2));
+  return value.hi >= 0.0f; /* lo cannot change the sign */
 }
 
 /// The cubic as p3 s^3 + p2 s^2 + p1 s + p0: the form most of the literature works in. Its coefficients are

@@ -12,18 +12,13 @@
 #ifndef ISOWAVE_GRID_DDA_H
 #define ISOWAVE_GRID_DDA_H
 
-#include "shared_types.h"
+#include "two_float.h"
 
 ISO_NAMESPACE_BEGIN
 
 #define ISO_AXIS_START 3  ///< axis of the event "the ray starts here"
 #define ISO_SMALLEST_DIRECTION \
   0x1p-40f  ///< smaller direction components count as 0: no denormals behind them
-
-/// hi + lo, |lo| <= ulp(hi) / 2.
-typedef struct TwoFloat {
-  float hi, lo;
-} TwoFloat;
 
 /// One axis of a ray. Position = o + t d.
 typedef struct RayAxis {
@@ -41,10 +36,6 @@ typedef struct RayEvent {
   TwoFloat t;
   int axis;
 } RayEvent;
-
-static inline int t_less(TwoFloat a, TwoFloat b) {
-  return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);
-}
 
 static inline int event_before(RayEvent a, RayEvent b) {
   return t_less(a.t, b.t) || (!t_less(b.t, a.t) && a.axis < b.axis);

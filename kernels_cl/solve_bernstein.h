@@ -1,9 +1,10 @@
-/// solve_bernstein.h -- sign variations of Bernstein coefficients reject and isolate, bracketed Newton refines [Yuksel 2022].
+/// solve_bernstein.h -- sign variations of Bernstein coefficients reject and isolate, bracketed Newton refines [Yuksel 2022];
+/// where float rounding would decide between crossing and passing by, 48-bit arithmetic decides.
 ///
-/// Guarantees: a change of inside between entry and exit is always found; a pair of crossings is found down to the
-/// rounding of the coefficients, because the value at an extremum depends on its place only to second order. Nothing is
-/// divided by a leading coefficient. The result lies in a bracket whose ends differ in inside.
-/// Fails: crossings that rounding of the coefficients itself removes or adds (about 2^-23 of the largest corner).
+/// Guarantees: a change of inside between entry and exit is always found. A pair of crossings is found down to 2^-40
+/// or so of the largest coefficient. Nothing is divided by a leading coefficient. The result lies in a bracket
+/// whose ends differ in inside.
+/// Fails: crossings that only the rounding of the positions of entry and exit (2^-25 voxels) removes or adds.
 #ifndef ISOWAVE_SOLVE_BERNSTEIN_H
 #define ISOWAVE_SOLVE_BERNSTEIN_H
 
@@ -13,77 +14,142 @@ ISO_NAMESPACE_BEGIN
 
 /// The iteration ends when s moves less than this: 2^-23 of the way through the cell.
 #define ISO_ROOT_STEP 0x1p-23f
+/// Bound on the rounding of a float coefficient and of a value computed from it, in units of the largest
+/// coefficient: what is smaller has no certain sign.
+#define ISO_CUBIC_NOISE 0x1p-20f
+
+/// An answer besides 0 and 1: the sign of something too small decides. See solve_bernstein_precisely().
+#define ISO_DOUBTFUL 2
 
 /// s = n / (n + m) where n and m have one sign, so nothing cancels; -1 where they do not.
 static inline float same_sign_fraction(float n, float m) {
   return (n > 0.0f && m > 0.0f) || (n < 0.0f && m < 0.0f) ? n / (n + m) : -1.0f;
 }
 
-/// The first s at which `inside` differs from its value at s = 0. Returns 0 if it never does.
-///
-/// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly one root,
-/// bracketed by [0,1]. More: [0,1] is split where the derivative d0 (1-s)^2 + 2 d1 s (1-s) + d2 s^2 is 0.
-/// With r = s / (1-s) > 0 that is d2 r^2 + 2 d1 r + d0 = 0, whose roots q / d2 and d0 / q (q = -(d1 +-
-/// sqrt(d1^2 - d0 d2)), larger magnitude) give s without cancellation and without dividing by a leading
-/// coefficient. A tangent's extremum is found to rounding because the value there depends on s only to second
-/// order.
-static inline int solve_bernstein(Cubic c, int max_steps, float *s_hit) {
-  const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
-  float lo = 0.0f, hi = 1.0f, s, value, derivative;
-  int found = in0 != in3;
-  int step;
-  if (in0 == in1 && in0 == in2 && in0 == in3) return 0;
-  if (in0 == in3 || (in1 != in0 && in2 == in0)) {
-    const float e0 = c.b1 - c.b0, e1 = c.b2 - c.b1, e2 = c.b3 - c.b2;
-    const float e01 = fabs(e0) > fabs(e1) ? fabs(e0) : fabs(e1), largest = fabs(e2) > e01 ? fabs(e2) : e01;
-    /* Squares of huge or tiny values would not survive; only the ratios of the three count. */
-    const float d0 = e0 / largest, d1 = e1 / largest, d2 = e2 / largest;
-    const float d02 = d0 * d2;
-    const float discriminant = fma(d1, d1, -d02) + fma(-d0, d2, d02); /* Kahan: exact to an ulp or two */
-    if (discriminant > 0.0f) {
-      const float root = sqrt(discriminant);
-      const float q = d1 > 0.0f ? -(d1 + root) : root - d1;
-      const float s_a = same_sign_fraction(q, d2), s_b = same_sign_fraction(d0, q);
-      const float s_first = s_a < s_b ? s_a : s_b, s_second = s_a < s_b ? s_b : s_a;
-      if (s_first >= 0.0f) {
-        if (cubic_inside(c, s_first) != in0) {
-          hi = s_first;
-          found = 1;
-        } else {
-          lo = s_first;
-        }
-      }
-      if (hi == 1.0f && s_second >= 0.0f) {
-        if (cubic_inside(c, s_second) != in0) {
-          hi = s_second;
-          found = 1;
-        } else {
-          lo = s_second;
-        }
-      }
-    }
+/// Where the cubic has its extrema, first <= second; -1 for none.
+typedef struct Extrema {
+  float first, second;
+  float discriminant;  ///< of the derivative, whose largest coefficient is scaled to 1
+} Extrema;
+
+/// The derivative is d0 (1-s)^2 + 2 d1 s (1-s) + d2 s^2, up to a factor. With r = s / (1-s) > 0 that is d2 r^2 +
+/// 2 d1 r + d0 = 0, whose roots q / d2 and d0 / q (q = -(d1 +- sqrt(d1^2 - d0 d2)), larger magnitude) give s
+/// without cancellation and without dividing by a leading coefficient.
+static inline Extrema cubic_extrema(float e0, float e1, float e2) {
+  const float e01 = fabs(e0) > fabs(e1) ? fabs(e0) : fabs(e1), largest = fabs(e2) > e01 ? fabs(e2) : e01;
+  /* Squares of huge or tiny values would not survive; only the ratios of the three count. */
+  const float d0 = e0 / largest, d1 = e1 / largest, d2 = e2 / largest;
+  const float d02 = d0 * d2;
+  Extrema at;
+  at.first = at.second = -1.0f;
+  at.discriminant = fma(d1, d1, -d02) + fma(-d0, d2, d02); /* Kahan: exact to an ulp or two */
+  if (at.discriminant > 0.0f) {
+    const float root = sqrt(at.discriminant);
+    const float q = d1 > 0.0f ? -(d1 + root) : root - d1;
+    const float s_a = same_sign_fraction(q, d2), s_b = same_sign_fraction(d0, q);
+    at.first = s_a < s_b ? s_a : s_b;
+    at.second = s_a < s_b ? s_b : s_a;
   }
-  if (!found) return 0;
-  /* inside changes between lo and hi: Newton, kept in the bracket by bisection. */
-  s = 0.5f * (lo + hi);
-  if (lo == 0.0f && hi == 1.0f) s = c.b0 / (c.b0 - c.b3); /* signs differ: the chord's root, in [0,1] */
+  return at;
+}
+
+static inline float largest_coefficient(Cubic c) {
+  const float b01 = fabs(c.b0) > fabs(c.b1) ? fabs(c.b0) : fabs(c.b1);
+  const float b23 = fabs(c.b2) > fabs(c.b3) ? fabs(c.b2) : fabs(c.b3);
+  return b01 > b23 ? b01 : b23;
+}
+
+/// Where inside changes between lo and hi: Newton from s, kept in the bracket by bisection. in_lo: inside at lo.
+static inline float bracketed_newton(Cubic c, int in_lo, float lo, float hi, float s, int max_steps) {
+  int step;
   for (step = 0; step < max_steps; ++step) {
-    float next;
-    value = cubic_value(c, s, &derivative);
-    if ((value >= 0.0f) == in0) {
+    float derivative, next;
+    const float value = cubic_value(c, s, &derivative);
+    if ((value >= 0.0f) == in_lo) {
       lo = s;
     } else {
       hi = s;
     }
     next = s - value / derivative;
     if (!(next > lo && next < hi)) next = 0.5f * (lo + hi); /* also when derivative = 0 */
-    if (fabs(next - s) < ISO_ROOT_STEP) {
-      s = next;
-      break;
-    }
+    if (fabs(next - s) < ISO_ROOT_STEP) return next;
     s = next;
   }
-  *s_hit = s;
+  return s;
+}
+
+/// The first s at which `inside` differs from its value at s = 0. Returns 1, 0 if it never does, or ISO_DOUBTFUL.
+///
+/// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly one root,
+/// bracketed by [0,1]. More: [0,1] is split at the extrema. An extremum's value depends on its place only to second
+/// order, so its sign is certain unless the value is noise; nor is it certain that there is an extremum where the
+/// derivative's discriminant is noise.
+static inline int solve_bernstein(Cubic c, int max_steps, float *s_hit) {
+  const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
+  float lo = 0.0f, hi = 1.0f, s;
+  if (in0 == in1 && in0 == in2 && in0 == in3) return 0;
+  if (in0 == in3 || (in1 != in0 && in2 == in0)) {
+    const Extrema at = cubic_extrema(c.b1 - c.b0, c.b2 - c.b1, c.b3 - c.b2);
+    const float noise = ISO_CUBIC_NOISE * largest_coefficient(c);
+    float derivative;
+    if (fabs(at.discriminant) <= ISO_CUBIC_NOISE) return ISO_DOUBTFUL;
+    if (at.first >= 0.0f) {
+      const float value = cubic_value(c, at.first, &derivative);
+      if (fabs(value) <= noise) return ISO_DOUBTFUL;
+      if ((value >= 0.0f) != in0) {
+        hi = at.first;
+      } else {
+        lo = at.first;
+      }
+    }
+    if (hi == 1.0f && at.second >= 0.0f) {
+      const float value = cubic_value(c, at.second, &derivative);
+      if (fabs(value) <= noise) return ISO_DOUBTFUL;
+      if ((value >= 0.0f) != in0) {
+        hi = at.second;
+      } else {
+        lo = at.second;
+      }
+    }
+    if (hi == 1.0f && in0 == in3) return 0;
+  }
+  s = 0.5f * (lo + hi);
+  if (lo == 0.0f && hi == 1.0f) s = c.b0 / (c.b0 - c.b3); /* signs differ: the chord's root, in [0,1] */
+  *s_hit = bracketed_newton(c, in0, lo, hi, s, max_steps);
+  return 1;
+}
+
+/// The same in 48 bits, bisecting: slow, for the few segments on which solve_bernstein() is in doubt. rounded: the float
+/// coefficients, whose end signs neighbouring cells share and which therefore say what is inside at entry and exit.
+static inline int solve_bernstein_precisely(PreciseCubic c, Cubic rounded, float *s_hit) {
+  const int in0 = rounded.b0 >= 0.0f, in3 = rounded.b3 >= 0.0f;
+  const Extrema at = cubic_extrema(tf_sub(c.b1, c.b0).hi, tf_sub(c.b2, c.b1).hi, tf_sub(c.b3, c.b2).hi);
+  float lo = 0.0f, hi = 1.0f;
+  int step;
+  if (at.first >= 0.0f) {
+    if (precise_cubic_inside(c, at.first) != in0) {
+      hi = at.first;
+    } else {
+      lo = at.first;
+    }
+  }
+  if (hi == 1.0f && at.second >= 0.0f) {
+    if (precise_cubic_inside(c, at.second) != in0) {
+      hi = at.second;
+    } else {
+      lo = at.second;
+    }
+  }
+  if (hi == 1.0f && in0 == in3) return 0;
+  for (step = 0; step < 24; ++step) {
+    const float s = 0.5f * (lo + hi);
+    if (precise_cubic_inside(c, s) == in0) {
+      lo = s;
+    } else {
+      hi = s;
+    }
+  }
+  *s_hit = hi;
   return 1;
 }
 

@@ -9,7 +9,7 @@
 ///   linear      every even number of crossings          false position      least
 ///   marmitt     extrema lost to its naive quadratic     false position      low
 ///   analytic    roots lost to cancellation              none (closed form)  most: cube root, arc cosine
-///   bernstein   nothing above rounding                  bracketed Newton    low
+///   bernstein   nothing above 2^-40                     bracketed Newton    low
 ///
 /// A kernel is built for one solver (-D ISO_SOLVER, -D ISO_ROOT_STEPS); the twin takes it as a value.
 #ifndef ISOWAVE_SOLVER_H
@@ -33,8 +33,8 @@ typedef struct Solver {
   int max_steps;  ///< refinement steps at most, 0..64
 } Solver;
 
-/// See the contract above.
-static inline int first_change(Solver solver, Cubic c, float *s) {
+/// See the contract above; or ISO_DOUBTFUL (`bernstein` alone): solve_bernstein_precisely() then decides.
+static inline int first_change_or_doubt(Solver solver, Cubic c, float *s) {
   switch (solver.kind) {
     case ISO_SOLVER_LINEAR:
       return solve_linear(c, solver.max_steps, s);
@@ -45,6 +45,12 @@ static inline int first_change(Solver solver, Cubic c, float *s) {
     default:
       return solve_bernstein(c, solver.max_steps, s);
   }
+}
+
+/// See the contract above, for a cubic of which no more than its float coefficients is known.
+static inline int first_change(Solver solver, Cubic c, float *s) {
+  const int found = first_change_or_doubt(solver, c, s);
+  return found == ISO_DOUBTFUL ? solve_bernstein_precisely(widened(c), c, s) : found;
 }
 
 ISO_NAMESPACE_END

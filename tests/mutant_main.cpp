@@ -11,7 +11,7 @@ int main() {
   std::uint64_t failed_cases = 0, leaks = 0;
   for (const StabilityCase &stability_case : stability_cases(600, 20231)) {
     const CaseResult result = run_case(stability_case, kDefaultSolver);
-    if (passes(stability_case, result)) continue;
+    if (passes(result)) continue;
     ++failed_cases;
     fmt::print("{}: {} missed, {} false, {} resumed differently, residual p99 {:.1e}\n", stability_case.name,
                result.accuracy.missed, result.accuracy.false_hits, result.resumed_differently,

@@ -31,12 +31,11 @@ set_tests_properties(mutant.none_at_all PROPERTIES WILL_FAIL TRUE)
 add_mutant(accumulated_t grid_dda.h
   "    w->fx = far_t(r->x, w->x, size, last.x);\n  } else if"
   "    w->fx.hi += fabs(r->x.inv_d.hi) * (float)size;\n    (void)last;\n  } else if")
-add_mutant(missing_carry grid_dda.h
+add_mutant(missing_carry two_float.h
   "return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);" "return a.hi < b.hi;")
 add_mutant(float_plane_t grid_dda.h
   "fma(s, a.inv_d.hi, -h) + fma(s, a.inv_d.lo, e * a.inv_d.hi);" "0.0f;")
 add_mutant(float_position grid_dda.h "const float x = r + (re + (pe + se));" "const float x = r;")
-add_mutant(position_decides grid_dda.h "    while (c < last && crossed(a, axis, size * (c + 1), e)) ++c;\n" "")
 add_mutant(domain_end grid_dda.h
   "return plane_t(a, plane > last_plane ? last_plane : plane);" "return plane_t(a, plane);")
 
@@ -47,10 +46,9 @@ add_mutant(open_interval solve_bernstein.h
 add_mutant(open_end solve_bernstein.h "in3 = c.b3 >= 0.0f;" "in3 = c.b3 > 0.0f;")
 add_mutant(one_crossing_only solve_bernstein.h
   "if (in0 == in1 && in0 == in2 && in0 == in3) return 0;" "if (in0 == in3) return 0;")
-add_mutant(second_extremum solve_bernstein.h "if (hi == 1.0f && s_second >= 0.0f)" "if (0)")
-add_mutant(lost_extrema solve_bernstein.h "if (discriminant > 0.0f)" "if (discriminant > 0.05f)")
+add_mutant(second_extremum solve_bernstein.h "at.second = s_a < s_b ? s_b : s_a;" "at.second = -1.0f;")
+add_mutant(lost_extrema solve_bernstein.h "if (at.discriminant > 0.0f)" "if (at.discriminant > 0.05f)")
 add_mutant(unbracketed_newton solve_bernstein.h "if (!(next > lo && next < hi))" "if (next != next)")
 add_mutant(stops_early solve_bernstein.h "#define ISO_ROOT_STEP 0x1p-23f" "#define ISO_ROOT_STEP 0x1p-4f")
 add_mutant(last_corner cell_intersect.h "(w[7] >= 0.0f) != in;" "0;")
-add_mutant(open_corner cell_intersect.h "return (w[1] >= 0.0f) != in" "return (w[1] > 0.0f) != in")
 add_mutant(entry_for_exit cell_intersect.h "c.b2 = (lerp(a.z, bb0, bb1)" "c.b2 = (lerp(b.z, bb0, bb1)")

@@ -18,7 +18,7 @@ TEST(StabilitySuite, DefaultSolverMissesNothingAndInventsNothing) {
     EXPECT_EQ(result.accuracy.missed, 0u);
     EXPECT_EQ(result.accuracy.false_hits, 0u);
     EXPECT_EQ(result.resumed_differently, 0u);
-    EXPECT_TRUE(passes(stability_case, result)) << quantiles(result.accuracy.residual).p99;
+    EXPECT_TRUE(passes(result)) << quantiles(result.accuracy.residual).p99;
     EXPECT_GE(result.accuracy.rays, 500u);
   }
 }
