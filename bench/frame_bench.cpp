@@ -24,6 +24,7 @@ namespace {
 
 struct Options {
   std::string volume, device, json;
+  std::string solver{to_string(kDefaultSolver)};
   tools::VolumeOptions volume_options;
   std::optional<float> isovalue;
   std::uint32_t rate = 4, orbit = 10, rounds = 3;
@@ -90,6 +91,7 @@ FrameReport measure(const Options &options, std::string command) {
   report.isovalue = isovalue_of(options, volume);
   report.options = options.renderer;
   report.options.size = {options.size.at(0), options.size.at(1)};
+  report.options.solver = solver_from_string(options.solver);
   report.rounds = options.rounds;
   {
     ocl::Device device(device_info);
@@ -134,6 +136,8 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("--cache-slots", options.renderer.cache_slots,
                  "decoded blocks kept on the device, at least 8 [2^18 or all]")
       ->check(CLI::Range(8u, 1u << 30));
+  app.add_option("--solver", options.solver, "root finder: linear, marmitt, analytic or bernstein")
+      ->capture_default_str();
   app.add_option("--group-size", options.renderer.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();
   app.add_option("--json", options.json, "also write everything to this file");

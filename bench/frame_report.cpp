@@ -204,6 +204,7 @@ ordered_json options_json(const FrameReport &report) {
           {"rounds", report.rounds},
           {"cache_slots", report.options.cache_slots},
           {"max_speculation", report.options.max_speculation},
+          {"solver", to_string(report.options.solver)},
           {"group_size", report.options.group_size}};
 }
 

@@ -88,14 +88,26 @@ static inline int corners_differ(const float *w) {
          (w[5] >= 0.0f) != in || (w[6] >= 0.0f) != in || (w[7] >= 0.0f) != in;
 }
 
-/// First change of inside between the events `enter` and `exit` of cell (x,y,z). w [8] as in segment_cubic.
-static inline int intersect_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
-                                 RayEvent enter, RayEvent exit, float *s_hit) {
+/// A change of inside in a cell, not yet refined.
+typedef struct CellChange {
+  Cubic cubic;
+  Bracket bracket;
+} CellChange;
+
+/// Finds the first change of inside between the events `enter` and `exit` of cell (x,y,z). w [8] as in segment_cubic.
+static inline int change_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
+                                 RayEvent enter, RayEvent exit, CellChange *change) {
+  CellPoint a, b;
+  int found;
   if (!corners_differ(w)) return 0;
-  const CellPoint a = event_position(r, enter, x, y, z, 0), b = event_position(r, exit, x, y, z, 1);
-  const Cubic c = segment_cubic(w, a, b);
-  const int found = first_change_or_doubt(solver, c, s_hit);
-  return found == ISO_DOUBTFUL ? solve_bernstein_precisely(precise_segment_cubic(w, a, b), c, s_hit) : found;
+  a = event_position(r, enter, x, y, z, 0);
+  b = event_position(r, exit, x, y, z, 1);
+  change->cubic = segment_cubic(w, a, b);
+  found = isolate(solver, change->cubic, &change->bracket);
+  if (found == ISO_DOUBTFUL) {
+    found = isolate_precisely(precise_segment_cubic(w, a, b), change->cubic, &change->bracket);
+  }
+  return found;
 }
 
 /// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).

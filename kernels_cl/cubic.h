@@ -17,12 +17,22 @@ typedef struct Cubic {
   float b0, b1, b2, b3;
 } Cubic;
 
+/// A part of [0,1] at whose ends inside (value >= 0) differs; lo == hi: a root itself.
+typedef struct Bracket {
+  float lo, hi;
+} Bracket;
+
 /// De Casteljau's value and derivative of the cubic at s.
 static inline float cubic_value(Cubic c, float s, float *derivative) {
   const float c0 = lerp(s, c.b0, c.b1), c1 = lerp(s, c.b1, c.b2), c2 = lerp(s, c.b2, c.b3);
   const float d0 = lerp(s, c0, c1), d1 = lerp(s, c1, c2);
   *derivative = 3.0f * (d1 - d0);
   return lerp(s, d0, d1);
+}
+
+static inline int cubic_inside(Cubic c, float s) {
+  float derivative;
+  return cubic_value(c, s, &derivative) >= 0.0f;
 }
 
 /// The same coefficients with about 48 bits.

@@ -12,6 +12,7 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
       walk_from(ray, locate(ray->x, 0, enter, 1, x0, end_x - 1), locate(ray->y, 1, enter, 1, y0, end_y - 1),
                 locate(ray->z, 2, enter, 1, z0, end_z - 1), 1, last);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  CellChange change;
   PairHit hit;
   hit.cell = ISO_NO_HIT;
   hit.s = 0.0f;
@@ -22,13 +23,14 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
     for (int corner = 0; corner < 8; ++corner) {
       w[corner] = dual_grid[vertex + (corner & 1) + 5 * (corner >> 1 & 1) + 25 * (corner >> 2)];
     }
-    if (intersect_cell(solver, ray, w, cell.x, cell.y, cell.z, enter, exit, &hit.s)) {
+    if (change_in_cell(solver, ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
       hit.cell = (uint)((cell.x - x0) + 4 * (cell.y - y0) + 16 * (cell.z - z0));
       break;
     }
     walk_step(&cell, ray, exit, 1, last);
     enter = exit;
   }
+  if (hit.cell != ISO_NO_HIT) hit.s = refine(solver, change.cubic, change.bracket);
   return hit;
 }
 

@@ -56,15 +56,14 @@ static inline float portable_cos(float x) {
   return fma(2.0f * cos_half, cos_half, -1.0f);
 }
 
-/// max_steps is not used: the closed form has nothing to refine.
-static inline int solve_analytic(Cubic c, int max_steps, float *s) {
+/// The bracket is the root itself: the closed form has nothing to refine.
+static inline int isolate_analytic(Cubic c, Bracket *bracket) {
   const PowerCubic p = power_form(c);
   const float largest_low = fabs(p.p1) > fabs(p.p0) ? fabs(p.p1) : fabs(p.p0);
   const float largest = fabs(p.p2) > largest_low ? fabs(p.p2) : largest_low;
   float roots[3];
   float best = 2.0f;
   int count = 0, i;
-  (void)max_steps;
   if (fabs(p.p3) > ISO_ANALYTIC_DEGENERATE * largest) {
     /* s = y - a/3 takes s^3 + a s^2 + b s + d to y^3 + 3 m y + 2 n. */
     const float a = p.p2 / p.p3, b = p.p1 / p.p3, d = p.p0 / p.p3;
@@ -97,9 +96,8 @@ static inline int solve_analytic(Cubic c, int max_steps, float *s) {
   for (i = 0; i < count; ++i) {
     if (roots[i] >= 0.0f && roots[i] <= 1.0f && roots[i] < best) best = roots[i];
   }
-  if (best > 1.0f) return 0;
-  *s = best;
-  return 1;
+  bracket->lo = bracket->hi = best;
+  return best <= 1.0f;
 }
 
 ISO_NAMESPACE_END

@@ -18,7 +18,7 @@ ISO_NAMESPACE_BEGIN
 /// coefficient: what is smaller has no certain sign.
 #define ISO_CUBIC_NOISE 0x1p-20f
 
-/// An answer besides 0 and 1: the sign of something too small decides. See solve_bernstein_precisely().
+/// An answer besides 0 and 1: the sign of something too small decides. See isolate_precisely().
 #define ISO_DOUBTFUL 2
 
 /// s = n / (n + m) where n and m have one sign, so nothing cancels; -1 where they do not.
@@ -59,9 +59,77 @@ static inline float largest_coefficient(Cubic c) {
   return b01 > b23 ? b01 : b23;
 }
 
-/// Where inside changes between lo and hi: Newton from s, kept in the bracket by bisection. in_lo: inside at lo.
-static inline float bracketed_newton(Cubic c, int in_lo, float lo, float hi, float s, int max_steps) {
+/// The first piece of [0,1] at whose ends inside differs. Returns 1, 0 if it never does, or ISO_DOUBTFUL.
+///
+/// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly one root,
+/// bracketed by [0,1]. More: [0,1] is split at the extrema. An extremum's value depends on its place only to second
+/// order, so its sign is certain unless the value is noise; nor is it certain that there is an extremum where the
+/// derivative's discriminant is noise.
+static inline int isolate_bernstein(Cubic c, Bracket *bracket) {
+  const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
+  bracket->lo = 0.0f;
+  bracket->hi = 1.0f;
+  if (in0 == in1 && in0 == in2 && in0 == in3) return 0;
+  if (in0 == in3 || (in1 != in0 && in2 == in0)) {
+    const Extrema at = cubic_extrema(c.b1 - c.b0, c.b2 - c.b1, c.b3 - c.b2);
+    const float noise = ISO_CUBIC_NOISE * largest_coefficient(c);
+    int i;
+    if (fabs(at.discriminant) <= ISO_CUBIC_NOISE) return ISO_DOUBTFUL;
+    for (i = 0; i < 2; ++i) {
+      const float s = i == 0 ? at.first : at.second;
+      float value, derivative;
+      if (s < 0.0f) continue;
+      value = cubic_value(c, s, &derivative);
+      if (fabs(value) <= noise) return ISO_DOUBTFUL;
+      if ((value >= 0.0f) != in0) {
+        bracket->hi = s;
+        return 1;
+      }
+      bracket->lo = s;
+    }
+    return in0 != in3;
+  }
+  return 1;
+}
+
+/// The same in 48 bits, for the few segments on which isolate_bernstein() is in doubt, and the root itself (lo == hi) by
+/// bisection. rounded: the float coefficients, whose end signs neighbouring cells share and which therefore say what
+/// is inside at entry and exit.
+static inline int isolate_precisely(PreciseCubic c, Cubic rounded, Bracket *bracket) {
+  const int in0 = rounded.b0 >= 0.0f, in3 = rounded.b3 >= 0.0f;
+  const Extrema at = cubic_extrema(tf_sub(c.b1, c.b0).hi, tf_sub(c.b2, c.b1).hi, tf_sub(c.b3, c.b2).hi);
+  float lo = 0.0f, hi = 1.0f;
+  int found = 0, i;
+  for (i = 0; i < 2 && !found; ++i) {
+    const float s = i == 0 ? at.first : at.second;
+    if (s < 0.0f) continue;
+    found = precise_cubic_inside(c, s) != in0;
+    if (found) {
+      hi = s;
+    } else {
+      lo = s;
+    }
+  }
+  if (!found && in0 == in3) return 0;
+  for (i = 0; i < 24; ++i) {
+    const float s = 0.5f * (lo + hi);
+    if (precise_cubic_inside(c, s) == in0) {
+      lo = s;
+    } else {
+      hi = s;
+    }
+  }
+  bracket->lo = bracket->hi = hi;
+  return 1;
+}
+
+/// Newton, kept in the bracket by bisection.
+static inline float refine_by_newton(Cubic c, Bracket bracket, int max_steps) {
+  const int in_lo = cubic_inside(c, bracket.lo);
+  float lo = bracket.lo, hi = bracket.hi;
+  float s = 0.5f * (lo + hi);
   int step;
+  if (lo == 0.0f && hi == 1.0f) s = c.b0 / (c.b0 - c.b3); /* signs differ: the chord's root, in [0,1] */
   for (step = 0; step < max_steps; ++step) {
     float derivative, next;
     const float value = cubic_value(c, s, &derivative);
@@ -76,81 +144,6 @@ static inline float bracketed_newton(Cubic c, int in_lo, float lo, float hi, flo
     s = next;
   }
   return s;
-}
-
-/// The first s at which `inside` differs from its value at s = 0. Returns 1, 0 if it never does, or ISO_DOUBTFUL.
-///
-/// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly one root,
-/// bracketed by [0,1]. More: [0,1] is split at the extrema. An extremum's value depends on its place only to second
-/// order, so its sign is certain unless the value is noise; nor is it certain that there is an extremum where the
-/// derivative's discriminant is noise.
-static inline int solve_bernstein(Cubic c, int max_steps, float *s_hit) {
-  const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
-  float lo = 0.0f, hi = 1.0f, s;
-  if (in0 == in1 && in0 == in2 && in0 == in3) return 0;
-  if (in0 == in3 || (in1 != in0 && in2 == in0)) {
-    const Extrema at = cubic_extrema(c.b1 - c.b0, c.b2 - c.b1, c.b3 - c.b2);
-    const float noise = ISO_CUBIC_NOISE * largest_coefficient(c);
-    float derivative;
-    if (fabs(at.discriminant) <= ISO_CUBIC_NOISE) return ISO_DOUBTFUL;
-    if (at.first >= 0.0f) {
-      const float value = cubic_value(c, at.first, &derivative);
-      if (fabs(value) <= noise) return ISO_DOUBTFUL;
-      if ((value >= 0.0f) != in0) {
-        hi = at.first;
-      } else {
-        lo = at.first;
-      }
-    }
-    if (hi == 1.0f && at.second >= 0.0f) {
-      const float value = cubic_value(c, at.second, &derivative);
-      if (fabs(value) <= noise) return ISO_DOUBTFUL;
-      if ((value >= 0.0f) != in0) {
-        hi = at.second;
-      } else {
-        lo = at.second;
-      }
-    }
-    if (hi == 1.0f && in0 == in3) return 0;
-  }
-  s = 0.5f * (lo + hi);
-  if (lo == 0.0f && hi == 1.0f) s = c.b0 / (c.b0 - c.b3); /* signs differ: the chord's root, in [0,1] */
-  *s_hit = bracketed_newton(c, in0, lo, hi, s, max_steps);
-  return 1;
-}
-
-/// The same in 48 bits, bisecting: slow, for the few segments on which solve_bernstein() is in doubt. rounded: the float
-/// coefficients, whose end signs neighbouring cells share and which therefore say what is inside at entry and exit.
-static inline int solve_bernstein_precisely(PreciseCubic c, Cubic rounded, float *s_hit) {
-  const int in0 = rounded.b0 >= 0.0f, in3 = rounded.b3 >= 0.0f;
-  const Extrema at = cubic_extrema(tf_sub(c.b1, c.b0).hi, tf_sub(c.b2, c.b1).hi, tf_sub(c.b3, c.b2).hi);
-  float lo = 0.0f, hi = 1.0f;
-  int step;
-  if (at.first >= 0.0f) {
-    if (precise_cubic_inside(c, at.first) != in0) {
-      hi = at.first;
-    } else {
-      lo = at.first;
-    }
-  }
-  if (hi == 1.0f && at.second >= 0.0f) {
-    if (precise_cubic_inside(c, at.second) != in0) {
-      hi = at.second;
-    } else {
-      lo = at.second;
-    }
-  }
-  if (hi == 1.0f && in0 == in3) return 0;
-  for (step = 0; step < 24; ++step) {
-    const float s = 0.5f * (lo + hi);
-    if (precise_cubic_inside(c, s) == in0) {
-      lo = s;
-    } else {
-      hi = s;
-    }
-  }
-  *s_hit = hi;
-  return 1;
 }
 
 ISO_NAMESPACE_END

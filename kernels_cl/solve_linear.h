@@ -11,14 +11,20 @@
 
 ISO_NAMESPACE_BEGIN
 
-/// False position on [lo, hi], where inside is in_lo at lo and differs at hi; value_lo, value_hi: the curve there.
-static inline float false_position(Cubic c, float lo, float hi, float value_lo, float value_hi,
-                                   int max_steps) {
+static inline int isolate_linear(Cubic c, Bracket *bracket) {
+  bracket->lo = 0.0f;
+  bracket->hi = 1.0f;
+  return (c.b0 >= 0.0f) != (c.b3 >= 0.0f);
+}
+
+/// False position: the chord's root again and again, kept on the side where inside changes.
+static inline float refine_by_chords(Cubic c, Bracket bracket, int max_steps) {
+  float lo = bracket.lo, hi = bracket.hi, s, derivative;
+  float value_lo = cubic_value(c, lo, &derivative), value_hi = cubic_value(c, hi, &derivative);
   const int in_lo = value_lo >= 0.0f;
-  float s = lerp(value_lo / (value_lo - value_hi), lo, hi);
   int step;
+  s = lerp(value_lo / (value_lo - value_hi), lo, hi);
   for (step = 0; step < max_steps; ++step) {
-    float derivative;
     const float value = cubic_value(c, s, &derivative);
     float next;
     if ((value >= 0.0f) == in_lo) {
@@ -33,12 +39,6 @@ static inline float false_position(Cubic c, float lo, float hi, float value_lo, 
     s = next;
   }
   return s;
-}
-
-static inline int solve_linear(Cubic c, int max_steps, float *s) {
-  if ((c.b0 >= 0.0f) == (c.b3 >= 0.0f)) return 0;
-  *s = false_position(c, 0.0f, 1.0f, c.b0, c.b3, max_steps);
-  return 1;
 }
 
 ISO_NAMESPACE_END

@@ -11,11 +11,14 @@
 
 ISO_NAMESPACE_BEGIN
 
-static inline int solve_marmitt(Cubic c, int max_steps, float *s) {
+static inline int isolate_marmitt(Cubic c, Bracket *bracket) {
   const PowerCubic p = power_form(c);
   const float qa = 3.0f * p.p3, qb = 2.0f * p.p2, qc = p.p1; /* the derivative */
   const float discriminant = qb * qb - 4.0f * qa * qc;
-  float lo = 0.0f, hi = 1.0f, value_lo = c.b0, value_hi = c.b3;
+  const int in0 = c.b0 >= 0.0f;
+  int in_hi = c.b3 >= 0.0f;
+  bracket->lo = 0.0f;
+  bracket->hi = 1.0f;
   if (discriminant >= 0.0f) { /* also false when it is not a number */
     const float root = sqrt(discriminant);
     const float e0 = (-qb - root) / (2.0f * qa), e1 = (-qb + root) / (2.0f * qa);
@@ -23,21 +26,19 @@ static inline int solve_marmitt(Cubic c, int max_steps, float *s) {
     int i;
     for (i = 0; i < 2; ++i) {
       const float e = i == 0 ? first : second;
-      float value, derivative;
-      if (!(e > lo && e < hi)) continue;
-      value = cubic_value(c, e, &derivative);
-      if ((value >= 0.0f) == (value_lo >= 0.0f)) {
-        lo = e;
-        value_lo = value;
+      float derivative;
+      int in;
+      if (!(e > bracket->lo && e < bracket->hi)) continue;
+      in = cubic_value(c, e, &derivative) >= 0.0f;
+      if (in == in0) {
+        bracket->lo = e;
       } else {
-        hi = e;
-        value_hi = value;
+        bracket->hi = e;
+        in_hi = in;
       }
     }
   }
-  if ((value_lo >= 0.0f) == (value_hi >= 0.0f)) return 0;
-  *s = false_position(c, lo, hi, value_lo, value_hi, max_steps);
-  return 1;
+  return in_hi != in0;
 }
 
 ISO_NAMESPACE_END

@@ -1,9 +1,11 @@
 /// solver.h -- the family of root finders behind one contract, for the field along a ray's segment in one cell.
 /// Portable: OpenCL C 1.2 and C++; kernels and the scalar twin run these very lines.
 ///
-/// Contract of solve_*(cubic, max_steps, s): the cubic is the field minus the isovalue on s in [0,1], entry to exit.
-/// Returns 1 and the first s at which inside (value >= 0) differs from inside at s = 0; 0 if it never does. max_steps
-/// bounds the refinement; 0 leaves the first guess. What each keeps of that contract stands above it:
+/// Contract: the cubic is the field minus the isovalue on s in [0,1], entry to exit. isolate() returns 1 and a bracket of
+/// the first s at which inside (value >= 0) differs from inside at s = 0; 0 if it never does. refine() places the
+/// root in the bracket with at most max_steps steps; 0 leaves the first guess. They are apart so that a work-group's
+/// rays refine together after their walks, not one by one in the midst of the others' walks. What each keeps of that
+/// contract stands above it:
 ///
 ///   solver      misses                                  refinement          cost
 ///   linear      every even number of crossings          false position      least
@@ -33,24 +35,34 @@ typedef struct Solver {
   int max_steps;  ///< refinement steps at most, 0..64
 } Solver;
 
-/// See the contract above; or ISO_DOUBTFUL (`bernstein` alone): solve_bernstein_precisely() then decides.
-static inline int first_change_or_doubt(Solver solver, Cubic c, float *s) {
+/// See the contract above; or ISO_DOUBTFUL (`bernstein` alone): isolate_precisely() then decides.
+static inline int isolate(Solver solver, Cubic c, Bracket *bracket) {
   switch (solver.kind) {
     case ISO_SOLVER_LINEAR:
-      return solve_linear(c, solver.max_steps, s);
+      return isolate_linear(c, bracket);
     case ISO_SOLVER_MARMITT:
-      return solve_marmitt(c, solver.max_steps, s);
+      return isolate_marmitt(c, bracket);
     case ISO_SOLVER_ANALYTIC:
-      return solve_analytic(c, solver.max_steps, s);
+      return isolate_analytic(c, bracket);
     default:
-      return solve_bernstein(c, solver.max_steps, s);
+      return isolate_bernstein(c, bracket);
   }
 }
 
-/// See the contract above, for a cubic of which no more than its float coefficients is known.
+static inline float refine(Solver solver, Cubic c, Bracket bracket) {
+  if (bracket.lo == bracket.hi) return bracket.lo;
+  if (solver.kind == ISO_SOLVER_BERNSTEIN) return refine_by_newton(c, bracket, solver.max_steps);
+  return refine_by_chords(c, bracket, solver.max_steps);
+}
+
+/// Both, for a cubic of which no more than its float coefficients is known: the first s at which inside differs from
+/// inside at s = 0. Returns 0 if it never does.
 static inline int first_change(Solver solver, Cubic c, float *s) {
-  const int found = first_change_or_doubt(solver, c, s);
-  return found == ISO_DOUBTFUL ? solve_bernstein_precisely(widened(c), c, s) : found;
+  Bracket bracket;
+  int found = isolate(solver, c, &bracket);
+  if (found == ISO_DOUBTFUL) found = isolate_precisely(widened(c), c, &bracket);
+  if (found) *s = refine(solver, c, bracket);
+  return found;
 }
 
 ISO_NAMESPACE_END

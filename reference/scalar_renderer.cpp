@@ -46,9 +46,10 @@ HitRecord trace_box(const FrameParams &frame, const float *voxels, Solver solver
   while (contains(box, cell)) {
     const RayEvent exit = walk_exit(&cell);
     float w[8];
-    float s;
+    CellChange change;
     load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-    if (intersect_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &s)) {
+    if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
+      const float s = refine(solver, change.cubic, change.bracket);
       return make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit, s);
     }
     walk_step(&cell, &ray, exit, 1, last);

@@ -330,9 +330,10 @@ TEST(CellIntersect, CellsFarFromTheEye) {
                t_exit = static_cast<Real>(exit.t.hi) + exit.t.lo;
     const Polynomial f = exact_cubic(ray, w, cell, t_enter, t_exit);
     const FirstChange expected = first_change_of(f);
-    float s = -1;
+    CellChange change;
     const bool found =
-        intersect_cell(kDefaultSolver, &ray, w, cell[0], cell[1], cell[2], enter, exit, &s) != 0;
+        change_in_cell(kDefaultSolver, &ray, w, cell[0], cell[1], cell[2], enter, exit, &change) != 0;
+    const float s = found ? refine(kDefaultSolver, change.cubic, change.bracket) : -1;
     SCOPED_TRACE(fmt::format("ray {}, {} voxels away, seed 7", i, distance));
     if (found) {
       ASSERT_LE(std::abs(f.value(s)), 46 * kUnit);

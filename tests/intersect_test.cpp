@@ -49,9 +49,9 @@ BlockHit trace_block(const FrameParams &frame, const std::vector<float> &voxels,
     const RayEvent exit = walk_exit(&cell);
     const std::array<float, 8> w = cell_corners(frame, voxels, cell.x, cell.y, cell.z);
     const uint number = uint(cell.x % 4 + 4 * (cell.y % 4) + 16 * (cell.z % 4));
-    float s = 0;
-    if (intersect_cell(kDefaultSolver, &ray, w.data(), cell.x, cell.y, cell.z, enter, exit, &s)) {
-      hit.pair = {number, s};
+    CellChange change;
+    if (change_in_cell(kDefaultSolver, &ray, w.data(), cell.x, cell.y, cell.z, enter, exit, &change)) {
+      hit.pair = {number, refine(kDefaultSolver, change.cubic, change.bracket)};
       const double t_enter = value_of(enter.t), t_exit = value_of(exit.t);
       hit.t = t_enter + hit.pair.s * (t_exit - t_enter);
       for (const float corner : w) hit.largest = std::max(hit.largest, std::abs(corner));
