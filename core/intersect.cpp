@@ -16,11 +16,19 @@ ocl::Defines intersect_defines(std::uint32_t group_size, Solver solver) {
 
 Intersect::Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver)
     : range_(ocl::Range::strided(num_pixels, group_size, device)),
-      kernel_(device, "intersect", "intersect", intersect_defines(group_size, solver)) {}
+      kernel_(device, "intersect", "intersect", intersect_defines(group_size, solver)) {
+  if (solver.kind == ISO_SOLVER_BERNSTEIN) {
+    settle_doubts_.emplace(device, "intersect", "settle_doubts", intersect_defines(group_size, solver));
+  }
+}
 
 void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays) {
   kernel_(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, groups.block_ray_offsets,
           cache.slot_block_ids(), cache.page_table(), cache.values(), rays.active_ray_ids, rays.pair_hits);
+  if (settle_doubts_) {
+    (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, cache.slot_block_ids(),
+                      cache.page_table(), cache.values(), rays.active_ray_ids, rays.pair_hits);
+  }
 }
 
 }  // namespace isowave

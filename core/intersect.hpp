@@ -1,6 +1,8 @@
 #pragma once
 // A block's rays against its dual grid -> a result per ray-block pair (Sec. 3.7, 4.3).
 
+#include <optional>
+
 #include "core/group.hpp"
 #include "core/ocl/kernel.hpp"
 #include "core/solvers.hpp"
@@ -21,6 +23,10 @@ class Intersect {
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
               ocl::In<uint>, ocl::In<uint>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>>
       kernel_;
+  /// Only a solver that can be in doubt has it.
+  std::optional<ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
+                            ocl::In<uint>, ocl::In<uint>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>>>
+      settle_doubts_;
 };
 
 }  // namespace isowave

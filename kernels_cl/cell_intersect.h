@@ -94,20 +94,23 @@ typedef struct CellChange {
   Bracket bracket;
 } CellChange;
 
-/// Finds the first change of inside between the events `enter` and `exit` of cell (x,y,z). w [8] as in segment_cubic.
+/// Finds the first change of inside between the events `enter` and `exit` of cell (x,y,z), in float. Returns 1, 0 or
+/// ISO_DOUBTFUL. w [8] as in segment_cubic.
+static inline int change_or_doubt_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
+                                          RayEvent enter, RayEvent exit, CellChange *change) {
+  if (!corners_differ(w)) return 0;
+  change->cubic = segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1));
+  return isolate(solver, change->cubic, &change->bracket);
+}
+
+/// The same without doubt: returns 1 or 0.
 static inline int change_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
                                  RayEvent enter, RayEvent exit, CellChange *change) {
-  CellPoint a, b;
-  int found;
-  if (!corners_differ(w)) return 0;
-  a = event_position(r, enter, x, y, z, 0);
-  b = event_position(r, exit, x, y, z, 1);
-  change->cubic = segment_cubic(w, a, b);
-  found = isolate(solver, change->cubic, &change->bracket);
-  if (found == ISO_DOUBTFUL) {
-    found = isolate_precisely(precise_segment_cubic(w, a, b), change->cubic, &change->bracket);
-  }
-  return found;
+  const int found = change_or_doubt_in_cell(solver, r, w, x, y, z, enter, exit, change);
+  if (found != ISO_DOUBTFUL) return found;
+  return isolate_precisely(
+      precise_segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1)),
+      change->cubic, &change->bracket);
 }
 
 /// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).

@@ -1,21 +1,8 @@
 /// composite.cl -- the closest of a ray's N_Spec results becomes its hit; the other rays go on (Sec. 4.4).
 /// A ray's blocks come in ray order, so the closest hit is the one with the lowest index, provided that all
 /// before it were tested: no distances are compared.
-#include "block_grid.h"
+#include "cached_cell.h"
 #include "cell_intersect.h"
-
-/// The corners of dual cell (x,y,z) from the cache, minus the isovalue; corner x + 2y + 4z. All its blocks
-/// are cached.
-inline void load_corners(constant FrameParams *frame, global const uint *page_table,
-                         global const float *cache_values, int x, int y, int z, float *w) {
-  for (int corner = 0; corner < 8; ++corner) {
-    const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
-               vz = (uint)(z + (corner >> 2));
-    const uint slot = page_table[block_id_at(frame, vx >> 2, vy >> 2, vz >> 2)];
-    w[corner] =
-        cache_values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] - frame->isovalue;
-  }
-}
 
 /// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block without
 /// slots; ray_active_mask [active_count] = 1 where it goes on. Grid-stride.

@@ -1,9 +1,9 @@
 /// intersect.cl -- a block's rays against its dual grid (Sec. 3.7, 4.3).
-#include "block_grid.h"
+#include "cached_cell.h"
 #include "cell_intersect.h"
 
-/// The first change of inside in the cells of block b. dual_grid [125]: vertex x + 5y + 25z minus the
-/// isovalue.
+/// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk came into doubt.
+/// dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
 inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, local const float *dual_grid) {
   const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
   const int end_x = min(x0 + 4, last.x), end_y = min(y0 + 4, last.y), end_z = min(z0 + 4, last.z);
@@ -14,6 +14,7 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   CellChange change;
   PairHit hit;
+  int found = 0;
   hit.cell = ISO_NO_HIT;
   hit.s = 0.0f;
   while (cell.x >= x0 && cell.x < end_x && cell.y >= y0 && cell.y < end_y && cell.z >= z0 && cell.z < end_z) {
@@ -23,14 +24,19 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
     for (int corner = 0; corner < 8; ++corner) {
       w[corner] = dual_grid[vertex + (corner & 1) + 5 * (corner >> 1 & 1) + 25 * (corner >> 2)];
     }
-    if (change_in_cell(solver, ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
+    found = change_or_doubt_in_cell(solver, ray, w, cell.x, cell.y, cell.z, enter, exit, &change);
+    if (found) {
       hit.cell = (uint)((cell.x - x0) + 4 * (cell.y - y0) + 16 * (cell.z - z0));
       break;
     }
     walk_step(&cell, ray, exit, 1, last);
     enter = exit;
   }
-  if (hit.cell != ISO_NO_HIT) hit.s = refine(solver, change.cubic, change.bracket);
+  if (found == ISO_DOUBTFUL) {
+    hit.cell += ISO_IN_DOUBT;
+  } else if (found) {
+    hit.s = refine(solver, change.cubic, change.bracket);
+  }
   return hit;
 }
 
@@ -66,5 +72,46 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
       pair_hits[pair] = intersect_block(&ray, b, last, dual_grid);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
+  }
+}
+
+/// The pairs whose walk came into doubt, walked on from there with 48-bit arithmetic. They are few, but in intersect() the
+/// registers for them would cost a fifth of its speed (H100). Same arguments; grid-stride over the pairs.
+kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *counts,
+                          global const uint *pair_ids, global const uint *slots,
+                          global const uint *slot_block_ids, global const uint *page_table,
+                          global const float *cache_values, global const uint *active_ray_ids,
+                          global PairHit *pair_hits) {
+  const LastPlanes last = last_planes(frame);
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  for (uint i = get_global_id(0); i < counts->granted_count; i += get_global_size(0)) {
+    const uint pair = pair_ids[i], start = pair_hits[pair].cell;
+    if (start >= ISO_IN_DOUBT) {
+      const Ray ray = make_ray(frame, active_ray_ids[pair / counts->spec_count]);
+      const BlockCoords b = block_coords(frame, slot_block_ids[slots[i]]);
+      const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
+      const int end_x = min(x0 + 4, last.x), end_y = min(y0 + 4, last.y), end_z = min(z0 + 4, last.z);
+      const int x = x0 + (int)(start & 3), y = y0 + (int)(start >> 2 & 3), z = z0 + (int)(start >> 4 & 3);
+      GridWalk cell = walk_from(&ray, x, y, z, 1, last);
+      RayEvent enter = region_entry(&ray, x, y, z, 1, last);
+      PairHit hit;
+      hit.cell = ISO_NO_HIT;
+      hit.s = 0.0f;
+      while (cell.x >= x0 && cell.x < end_x && cell.y >= y0 && cell.y < end_y && cell.z >= z0 &&
+             cell.z < end_z) {
+        const RayEvent exit = walk_exit(&cell);
+        CellChange change;
+        float w[8];
+        load_corners(frame, page_table, cache_values, cell.x, cell.y, cell.z, w);
+        if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
+          hit.cell = (uint)((cell.x - x0) + 4 * (cell.y - y0) + 16 * (cell.z - z0));
+          hit.s = refine(solver, change.cubic, change.bracket);
+          break;
+        }
+        walk_step(&cell, &ray, exit, 1, last);
+        enter = exit;
+      }
+      pair_hits[pair] = hit;
+    }
   }
 }

@@ -62,6 +62,7 @@ ISO_CHECK_SIZE(FrameParams, 100);
 
 #define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED 65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass
+#define ISO_IN_DOUBT 128u   ///< added to PairHit::cell where the pair's walk stopped for settle_doubts()
 
 /// The result of one ray-block pair: which of the block's 64 dual cells the ray hits first, and where.
 typedef struct PairHit {
