@@ -57,27 +57,31 @@ static inline Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
 
 /// The field at (x,y,z) of the cell. w [8] as in segment_cubic.
 static inline TwoFloat precise_trilinear(const float *w, float x, float y, float z) {
-  const TwoFloat y0z0 = tf_lerp(x, two_float(w[0]), two_float(w[1]));
-  const TwoFloat y1z0 = tf_lerp(x, two_float(w[2]), two_float(w[3]));
-  const TwoFloat y0z1 = tf_lerp(x, two_float(w[4]), two_float(w[5]));
-  const TwoFloat y1z1 = tf_lerp(x, two_float(w[6]), two_float(w[7]));
-  return tf_lerp(z, tf_lerp(y, y0z0, y1z0), tf_lerp(y, y0z1, y1z1));
+  TwoFloat v[8];
+  int i, n;
+  for (i = 0; i < 8; ++i) v[i] = two_float(w[i]);
+  for (n = 4; n > 0; n >>= 1) {
+    for (i = 0; i < n; ++i) v[i] = tf_lerp(n == 4 ? x : (n == 2 ? y : z), v[2 * i], v[2 * i + 1]);
+  }
+  return v[0];
 }
 
-/// segment_cubic() in 48 bits.
+/// segment_cubic() in 48 bits. A loop, for one copy of the arithmetic: compilers that inline and unroll everything take
+/// half a minute over eight.
 static inline PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellPoint b) {
-  TwoFloat third;
   PreciseCubic c;
+  TwoFloat third;
+  int i;
+  for (i = 0; i < 4; ++i) c.b[i] = two_float(0.0f);
+  for (i = 0; i < 8; ++i) {
+    const int k = (i & 1) + (i >> 1 & 1) + (i >> 2); /* coordinates of b */
+    c.b[k] =
+        tf_add(c.b[k], precise_trilinear(w, i & 1 ? b.x : a.x, i >> 1 & 1 ? b.y : a.y, i >> 2 ? b.z : a.z));
+  }
   third.hi = 1.0f / 3.0f;
   third.lo = fma(-third.hi, 3.0f, 1.0f) / 3.0f;
-  c.b0 = precise_trilinear(w, a.x, a.y, a.z);
-  c.b1 =
-      tf_mul(third, tf_add(tf_add(precise_trilinear(w, b.x, a.y, a.z), precise_trilinear(w, a.x, b.y, a.z)),
-                           precise_trilinear(w, a.x, a.y, b.z)));
-  c.b2 =
-      tf_mul(third, tf_add(tf_add(precise_trilinear(w, b.x, b.y, a.z), precise_trilinear(w, b.x, a.y, b.z)),
-                           precise_trilinear(w, a.x, b.y, b.z)));
-  c.b3 = precise_trilinear(w, b.x, b.y, b.z);
+  c.b[1] = tf_mul(third, c.b[1]);
+  c.b[2] = tf_mul(third, c.b[2]);
   return c;
 }
 

@@ -37,22 +37,24 @@ static inline int cubic_inside(Cubic c, float s) {
 
 /// The same coefficients with about 48 bits.
 typedef struct PreciseCubic {
-  TwoFloat b0, b1, b2, b3;
+  TwoFloat b[4];
 } PreciseCubic;
 
 static inline PreciseCubic widened(Cubic c) {
   PreciseCubic p;
-  p.b0 = two_float(c.b0);
-  p.b1 = two_float(c.b1);
-  p.b2 = two_float(c.b2);
-  p.b3 = two_float(c.b3);
+  p.b[0] = two_float(c.b0);
+  p.b[1] = two_float(c.b1);
+  p.b[2] = two_float(c.b2);
+  p.b[3] = two_float(c.b3);
   return p;
 }
 
 static inline int precise_cubic_inside(PreciseCubic c, float s) {
-  const TwoFloat c0 = tf_lerp(s, c.b0, c.b1), c1 = tf_lerp(s, c.b1, c.b2), c2 = tf_lerp(s, c.b2, c.b3);
-  const TwoFloat value = tf_lerp(s, tf_lerp(s, c0, c1), tf_lerp(s, c1, c2));
-  return value.hi >= 0.0f; /* lo cannot change the sign */
+  int i, n;
+  for (n = 3; n > 0; --n) {
+    for (i = 0; i < n; ++i) c.b[i] = tf_lerp(s, c.b[i], c.b[i + 1]);
+  }
+  return c.b[0].hi >= 0.0f; /* lo cannot change the sign */
 }
 
 /// The cubic as p3 s^3 + p2 s^2 + p1 s + p0: the form most of the literature works in. Its coefficients are

@@ -97,26 +97,19 @@ static inline int isolate_bernstein(Cubic c, Bracket *bracket) {
 /// is inside at entry and exit.
 static inline int isolate_precisely(PreciseCubic c, Cubic rounded, Bracket *bracket) {
   const int in0 = rounded.b0 >= 0.0f, in3 = rounded.b3 >= 0.0f;
-  const Extrema at = cubic_extrema(tf_sub(c.b1, c.b0).hi, tf_sub(c.b2, c.b1).hi, tf_sub(c.b3, c.b2).hi);
+  const Extrema at =
+      cubic_extrema(tf_sub(c.b[1], c.b[0]).hi, tf_sub(c.b[2], c.b[1]).hi, tf_sub(c.b[3], c.b[2]).hi);
   float lo = 0.0f, hi = 1.0f;
-  int found = 0, i;
-  for (i = 0; i < 2 && !found; ++i) {
-    const float s = i == 0 ? at.first : at.second;
-    if (s < 0.0f) continue;
-    found = precise_cubic_inside(c, s) != in0;
-    if (found) {
-      hi = s;
-    } else {
-      lo = s;
-    }
-  }
-  if (!found && in0 == in3) return 0;
-  for (i = 0; i < 24; ++i) {
-    const float s = 0.5f * (lo + hi);
+  int changed = 0, i;
+  for (i = 0; i < 2 + 24; ++i) { /* the extrema, then bisection */
+    const float s = i == 0 ? at.first : (i == 1 ? at.second : 0.5f * (lo + hi));
+    if (i < 2 && (changed || s < 0.0f)) continue;
+    if (i == 2 && !changed && in0 == in3) return 0;
     if (precise_cubic_inside(c, s) == in0) {
       lo = s;
     } else {
       hi = s;
+      changed = 1;
     }
   }
   bracket->lo = bracket->hi = hi;
