@@ -4,11 +4,9 @@ namespace isowave {
 
 namespace {
 
-/// A kernel is built for one solver: the others cost it nothing.
 ocl::Defines intersect_defines(std::uint32_t group_size, Solver solver) {
   ocl::Defines defines = group_defines(group_size);
-  defines["ISO_SOLVER"] = std::to_string(solver.kind);
-  defines["ISO_ROOT_STEPS"] = std::to_string(solver.max_steps);
+  defines.merge(solver_defines(solver));
   return defines;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "core/ocl/device.hpp"
 #include "kernels_cl/solver.h"
 
 namespace isowave {
@@ -19,5 +20,8 @@ std::string_view to_string(Solver solver);
 /// The solver of that name with the steps its authors use: linear and marmitt 4, bernstein 32 (it stops by
 /// itself after 3 to 5). Throws Error naming the solvers.
 Solver solver_from_string(std::string_view name);
+
+/// What a kernel that includes solver.h is built with: it is built for one solver, so that the others cost it nothing.
+ocl::Defines solver_defines(Solver solver);
 
 }  // namespace isowave

@@ -49,7 +49,8 @@ static inline PreciseCubic widened(Cubic c) {
   return p;
 }
 
-static inline int precise_cubic_inside(PreciseCubic c, float s) {
+static inline int precise_cubic_inside(PreciseCubic cubic, float s) {
+  PreciseCubic c = cubic; /* see tf_sub() */
   int i, n;
   for (n = 3; n > 0; --n) {
     for (i = 0; i < n; ++i) c.b[i] = tf_lerp(s, c.b[i], c.b[i + 1]);

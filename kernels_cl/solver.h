@@ -50,9 +50,12 @@ static inline int isolate(Solver solver, Cubic c, Bracket *bracket) {
 }
 
 static inline float refine(Solver solver, Cubic c, Bracket bracket) {
-  if (bracket.lo == bracket.hi) return bracket.lo;
-  if (solver.kind == ISO_SOLVER_BERNSTEIN) return refine_by_newton(c, bracket, solver.max_steps);
-  return refine_by_chords(c, bracket, solver.max_steps);
+  float s = bracket.lo;
+  if (bracket.lo != bracket.hi) {
+    s = solver.kind == ISO_SOLVER_BERNSTEIN ? refine_by_newton(c, bracket, solver.max_steps)
+                                            : refine_by_chords(c, bracket, solver.max_steps);
+  }
+  return s > 0.0f ? s : 0.0f; /* no -0, whose sign compilers may change */
 }
 
 /// Both, for a cubic of which no more than its float coefficients is known: the first s at which inside differs from

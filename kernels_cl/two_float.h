@@ -49,9 +49,10 @@ static inline TwoFloat tf_add(TwoFloat a, TwoFloat b) {
 }
 
 static inline TwoFloat tf_sub(TwoFloat a, TwoFloat b) {
-  b.hi = -b.hi;
-  b.lo = -b.lo;
-  return tf_add(a, b);
+  TwoFloat minus_b; /* not b itself: rusticl changes the caller's struct with a parameter */
+  minus_b.hi = -b.hi;
+  minus_b.lo = -b.lo;
+  return tf_add(a, minus_b);
 }
 
 static inline TwoFloat tf_mul(TwoFloat a, TwoFloat b) {

@@ -342,4 +342,13 @@ std::array<double, 3> RootOracle::gradient(const std::array<double, 3> &point) c
   return result;
 }
 
+std::optional<double> first_change_of_cubic(const std::array<double, 4> &b) {
+  Answer answer = first_change(Polynomial<Interval>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxIntervalDepth);
+  if (answer.kind == Answer::kUndecided) {
+    answer = first_change(Polynomial<mpq_class>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxDepth);
+  }
+  if (answer.kind != Answer::kChange) return std::nullopt;
+  return answer.s;
+}
+
 }  // namespace isowave

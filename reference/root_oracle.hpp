@@ -10,6 +10,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 namespace isowave {
@@ -50,5 +51,9 @@ class RootOracle {
   double isovalue_;
   mutable std::atomic<std::uint64_t> num_exact_cells_{0};
 };
+
+/// The first s in [0,1] at which a cubic in Bernstein form changes sides of 0 (half-open: 0 is inside), none if it never
+/// does. Exact, placed to double precision.
+std::optional<double> first_change_of_cubic(const std::array<double, 4> &coefficients);
 
 }  // namespace isowave

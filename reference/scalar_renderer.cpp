@@ -38,24 +38,35 @@ GridWalk enter_box(const Ray &ray, RayEvent enter, int size, const CellBox &box,
                    locate(ray.z, 2, enter, size, box.begin.z, box.end.z - 1), size, last);
 }
 
-/// The first hit in the cells of `box`, which the ray enters by `enter`.
-HitRecord trace_box(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
-                    RayEvent enter, const CellBox &box) {
+/// Calls visit(cell, enter, exit) for each cell of `box` along the ray, which enters it by `enter`, until visit returns
+/// true.
+template <class Visit>
+void walk_cells(const FrameParams &frame, const Ray &ray, RayEvent enter, const CellBox &box, Visit visit) {
   const LastPlanes last = last_planes(&frame);
   GridWalk cell = enter_box(ray, enter, 1, box, last);
   while (contains(box, cell)) {
     const RayEvent exit = walk_exit(&cell);
-    float w[8];
-    CellChange change;
-    load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-    if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
-      const float s = refine(solver, change.cubic, change.bracket);
-      return make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit, s);
-    }
+    if (visit(cell, enter, exit)) return;
     walk_step(&cell, &ray, exit, 1, last);
     enter = exit;
   }
-  return no_hit();
+}
+
+/// The first hit in the cells of `box`, which the ray enters by `enter`.
+HitRecord trace_box(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
+                    RayEvent enter, const CellBox &box) {
+  HitRecord hit = no_hit();
+  walk_cells(frame, ray, enter, box, [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
+    CellChange change;
+    float w[8];
+    load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
+    if (!change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, &change))
+      return false;
+    hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
+                   refine(solver, change.cubic, change.bracket));
+    return true;
+  });
+  return hit;
 }
 
 HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray) {
@@ -72,6 +83,26 @@ void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
 }
 
 }  // namespace
+
+void append_segments(const FrameParams &frame, std::span<const float> voxels, const Ray &ray,
+                     std::vector<CellSegment> &segments) {
+  check_voxels(frame, voxels);
+  const LastPlanes last = last_planes(&frame);
+  RayEvent enter;
+  if (!domain_entry(&ray, last, &enter)) return;
+  const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
+  walk_cells(frame, ray, enter, domain, [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
+    CellChange change;
+    float w[8];
+    load_corners(frame, voxels.data(), cell.x, cell.y, cell.z, w);
+    if (!corners_differ(w)) return false;
+    const CellPoint a = event_position(&ray, cell_enter, cell.x, cell.y, cell.z, 0),
+                    b = event_position(&ray, cell_exit, cell.x, cell.y, cell.z, 1);
+    segments.push_back({segment_cubic(w, a, b), std::hypot(b.x - a.x, b.y - a.y, b.z - a.z)});
+    return change_in_cell(kDefaultSolver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, &change) !=
+           0;
+  });
+}
 
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                        const Ray &ray) {

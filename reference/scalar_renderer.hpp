@@ -29,4 +29,13 @@ HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, 
 HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                                  const Ray &ray);
 
+/// What an intersector is asked about one cell.
+struct CellSegment {
+  Cubic cubic;   ///< field minus isovalue along the ray, from entry (0) to exit (1)
+  float length;  ///< from entry to exit [voxels]
+};
+/// Appends the segments of a ray in the cells that hold the isovalue, from the eye to its hit: what tracing it asks.
+void append_segments(const FrameParams &frame, std::span<const float> voxels, const Ray &ray,
+                     std::vector<CellSegment> &segments);
+
 }  // namespace isowave
