@@ -18,13 +18,6 @@
 namespace isowave {
 namespace {
 
-/// Linear and Marmitt by their number of refinement steps, and the others.
-std::vector<Solver> solvers() {
-  return {{ISO_SOLVER_LINEAR, 0},    {ISO_SOLVER_LINEAR, 4},    {ISO_SOLVER_MARMITT, 1},
-          {ISO_SOLVER_MARMITT, 4},   {ISO_SOLVER_ANALYTIC, 0},  {ISO_SOLVER_BERNSTEIN, 0},
-          {ISO_SOLVER_BERNSTEIN, 3}, {ISO_SOLVER_BERNSTEIN, 32}};
-}
-
 /// A cubic of one kind of trouble. Its values are at least 1e-6 or 0, so that no product becomes denormal, which llvmpipe
 /// flushes.
 Cubic random_cubic(Random &random) {
@@ -63,7 +56,8 @@ class SolveCellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (Cubic &cubic : cubics) cubic = random_cubic(random);
     const ocl::Buffer<Cubic> on_device(device_, "cubics", std::span<const Cubic>(cubics));
     ocl::Buffer<float> roots(device_, "roots", count);
-    for (const Solver solver : solvers()) {
+    for (const std::string_view name : kSolverNames) {
+      const Solver solver = solver_from_string(name);
       SolveCells solve(device_, solver);
       solve(on_device, roots);
       const std::vector<float> got = roots.read();

@@ -13,5 +13,6 @@ void add_convert(CLI::App &app);
 void add_render(CLI::App &app);
 void add_compare(CLI::App &app);
 void add_verify(CLI::App &app);
+void add_bench(CLI::App &app);
 
 }  // namespace isowave::tools

@@ -23,6 +23,7 @@ int main(int argc, char **argv) {
   add_render(app);
   add_compare(app);
   add_verify(app);
+  add_bench(app);
   try {
     app.parse(argc, argv);
     return 0;
