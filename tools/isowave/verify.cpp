@@ -10,6 +10,7 @@
 #include "core/error.hpp"
 #include "core/frame.hpp"
 #include "reference/accuracy.hpp"
+#include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
 #include "reference/stability_suite.hpp"
 #include "reference/watertight.hpp"

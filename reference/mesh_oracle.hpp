@@ -1,0 +1,74 @@
+#pragma once
+// The second oracle of whole frames: triangles of the isosurface, traced by Embree.
+//
+// Extraction: marching tetrahedra. Each dual cell is cut into 24 tetrahedra: (cell centre, face centre, two
+// neighbouring corners of that face). The values at the centres are the trilinear field's there, and it is
+// interpolated linearly between. Both cells at a face cut it in the same four triangles with the same values, so the
+// surface has no holes whatever the signs (Marching Cubes is ambiguous there), and it passes through exactly
+// the cells that have corners on both sides: those that the trilinear surface can pass through.
+//
+// What can be judged by it: the triangles are not the trilinear surface, but both lie in the same cells. Rule:
+//   - renderer and mesh agree where both miss, or both hit within a cell's diagonal, sqrt(3) voxels, along the ray;
+//   - else the ray is moved sideways in eight directions by 1/4, 1/2 and 1 voxel: where the mesh then gives
+//     the renderer's answer (no hit; or a hit within sqrt(3) voxels along the ray), two surfaces less than a
+//     cell apart explain the difference: a silhouette pixel, counted as unstable;
+//   - the rest are failures: missed where the mesh's hit comes first, false where the renderer's does.
+// So it finds holes, leaks and surfaces in wrong places of more than a cell; the other oracles judge the rest.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "reference/accuracy.hpp"
+
+namespace isowave {
+
+class EmbreeScene;
+
+/// Triangles that share vertices by index. Index space. The outside is on the side from which they are
+/// counter-clockwise.
+struct IsoMesh {
+  std::vector<std::array<float, 3>> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// More triangles are refused: Embree's tree would not fit into a workstation's memory.
+inline constexpr std::uint64_t kMaxTriangles = 120'000'000;
+
+/// voxels [nz][ny][nx], x fastest, finite. inside := field >= isovalue. Throws std::invalid_argument (dims), Error
+/// (more than kMaxTriangles).
+IsoMesh extract_isosurface(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
+
+/// Edges that are not used exactly once in each direction: 0 for a closed surface, that is, one which does not
+/// leave the volume.
+std::uint64_t num_open_edges(const IsoMesh &mesh);
+
+class MeshOracle {
+ public:
+  /// Extracts the surface and builds Embree's tree. Throws as extract_isosurface(), and Error (memory).
+  MeshOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
+  ~MeshOracle();
+  MeshOracle(const MeshOracle &) = delete;
+  MeshOracle &operator=(const MeshOracle &) = delete;
+
+  /// t of the first triangle along the ray, infinity for none; float32 accuracy. Thread-safe. Throws
+  /// std::invalid_argument for an origin out of Embree's reach (embree_scene.hpp).
+  double first_hit(const OracleRay &ray) const;
+
+  std::uint64_t num_triangles() const { return mesh_.triangles.size(); }
+
+ private:
+  std::array<std::uint32_t, 3> dims_;
+  IsoMesh mesh_;  ///< Embree reads it in place; one vertex more, so that it may read 16 bytes at the last
+  std::unique_ptr<EmbreeScene> scene_;
+};
+
+/// Adds one ray by the rule above; frame: blocks are used.
+void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &hit,
+           Accuracy &tally);
+/// A whole frame, as judge_frame() of a HitOracle. No residuals, no cells.
+Accuracy judge_frame(const MeshOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits);
+
+}  // namespace isowave
