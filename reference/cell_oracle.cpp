@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "reference/embree_reach.hpp"
 #include "reference/embree_scene.hpp"
 
 namespace isowave {

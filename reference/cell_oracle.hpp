@@ -36,7 +36,7 @@ class CellOracle final : public HitOracle {
   CellOracle(const CellOracle &) = delete;  // Embree holds its address
   CellOracle &operator=(const CellOracle &) = delete;
 
-  /// Throws std::invalid_argument for an origin out of Embree's reach (embree_scene.hpp): cells could be lost.
+  /// Throws std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp): cells could be lost.
   OracleHit first_hit(const OracleRay &ray) const override;
   double field(const std::array<double, 3> &point) const override;
   std::array<double, 3> gradient(const std::array<double, 3> &point) const override;

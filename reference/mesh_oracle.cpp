@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "core/error.hpp"
+#include "reference/embree_reach.hpp"
 #include "reference/embree_scene.hpp"
 
 namespace isowave {

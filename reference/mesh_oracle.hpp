@@ -54,7 +54,7 @@ class MeshOracle {
   MeshOracle &operator=(const MeshOracle &) = delete;
 
   /// t of the first triangle along the ray, infinity for none; float32 accuracy. Thread-safe. Throws
-  /// std::invalid_argument for an origin out of Embree's reach (embree_scene.hpp).
+  /// std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp).
   double first_hit(const OracleRay &ray) const;
 
   std::uint64_t num_triangles() const { return mesh_.triangles.size(); }
