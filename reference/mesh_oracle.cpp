@@ -20,6 +20,7 @@ constexpr unsigned kNumNodes = 15, kFaceNode = 8, kCentreNode = 14;
 constexpr unsigned kNumTetrahedra = 24;
 // Edges that cells share belong to a voxel: three to the next voxels, and four spokes of each of its three lower faces.
 constexpr unsigned kEdgesPerVoxel = 15;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kCellDiagonal = 1.7320508075688772;
 
 using Node = std::array<int, 3>;  ///< half voxels from the cell's lower corner, 0..2
@@ -248,53 +249,177 @@ std::uint64_t num_open_edges(const IsoMesh &mesh) {
   return open;
 }
 
-MeshOracle::MeshOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
-    : dims_(dims),
-      mesh_(extract_isosurface(voxels, dims, isovalue)),
-      scene_(std::make_unique<EmbreeScene>(true)) {
-  const std::size_t num_vertices = mesh_.vertices.size();
-  mesh_.vertices.push_back({});
-  RTCGeometry geometry = rtcNewGeometry(scene_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh_.vertices.data(), 0,
-                             sizeof mesh_.vertices[0], num_vertices);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh_.triangles.data(), 0,
-                             sizeof mesh_.triangles[0], mesh_.triangles.size());
-  scene_->build(geometry);
+/// Triangles in an Embree scene.
+class TracedMesh {
+ public:
+  explicit TracedMesh(IsoMesh mesh) : mesh_(std::move(mesh)), scene_(true) {
+    const std::size_t num_vertices = mesh_.vertices.size();
+    mesh_.vertices.push_back({});
+    RTCGeometry geometry = rtcNewGeometry(scene_.device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh_.vertices.data(),
+                               0, sizeof mesh_.vertices[0], num_vertices);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh_.triangles.data(),
+                               0, sizeof mesh_.triangles[0], mesh_.triangles.size());
+    scene_.build(geometry);
+  }
+
+  /// t of the first triangle, infinity for none.
+  double first_hit(const OracleRay &ray) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit embree = to_embree(ray);
+    rtcIntersect1(scene_.scene(), &context, &embree);
+    return embree.hit.geomID == RTC_INVALID_GEOMETRY_ID ? kInfinity : embree.ray.tfar;
+  }
+
+  std::uint64_t num_triangles() const { return mesh_.triangles.size(); }
+
+ private:
+  IsoMesh mesh_;  ///< Embree reads it in place; one vertex more, so that it may read 16 bytes at the last
+  EmbreeScene scene_;
+};
+
+namespace {
+
+/// Does a ray moved sideways by up to `distance` give an answer that `agrees`?
+template <class FirstHit, class Agrees>
+bool agrees_beside(const OracleRay &ray, double distance, const FirstHit &first_hit, const Agrees &agrees) {
+  for (const double offset : {0.25 * distance, 0.5 * distance, distance}) {
+    for (int direction = 0; direction < 8; ++direction) {
+      if (agrees(first_hit(moved_sideways(ray, offset, direction)))) return true;
+    }
+  }
+  return false;
 }
 
+/// A box of points `spacing` voxels apart, numbered from the volume's origin: [begin, begin + count) along each axis.
+struct FineGrid {
+  double spacing;
+  std::array<std::int64_t, 3> begin{};
+  std::array<std::uint32_t, 3> count{};
+
+  /// kHalfWidth points to each side of `centre`, as far as the domain reaches.
+  FineGrid(double spacing_in, const std::array<double, 3> &centre, const std::array<std::uint32_t, 3> &dims)
+      : spacing(spacing_in) {
+    constexpr std::int64_t kHalfWidth = 24;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto last = static_cast<std::int64_t>((dims[axis] - 1) / spacing);
+      const std::int64_t middle =
+          std::clamp(static_cast<std::int64_t>(centre[axis] / spacing), std::int64_t{0}, last);
+      begin[axis] = std::max(std::int64_t{0}, middle - kHalfWidth);
+      count[axis] = static_cast<std::uint32_t>(std::min(last, middle + kHalfWidth) - begin[axis] + 1);
+    }
+  }
+
+  double place(std::size_t axis, std::uint32_t i) const {
+    return spacing * static_cast<double>(begin[axis] + i);
+  }
+  bool contains(const std::array<double, 3> &point) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (point[axis] < place(axis, 0) || point[axis] > place(axis, count[axis] - 1)) return false;
+    }
+    return true;
+  }
+  /// The ray from its point at `t` on, in units of the grid; one unit of t is what it was.
+  OracleRay local(const OracleRay &ray, double t) const {
+    OracleRay result;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      result.origin[axis] = (ray.origin[axis] + t * ray.direction[axis] - place(axis, 0)) / spacing;
+      result.direction[axis] = ray.direction[axis] / spacing;
+    }
+    return result;
+  }
+};
+
+}  // namespace
+
+MeshOracle::MeshOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
+    : voxels_(voxels),
+      dims_(dims),
+      isovalue_(isovalue),
+      mesh_(std::make_unique<TracedMesh>(extract_isosurface(voxels, dims, isovalue))) {}
+
 MeshOracle::~MeshOracle() = default;
+
+std::uint64_t MeshOracle::num_triangles() const {
+  return mesh_->num_triangles();
+}
 
 double MeshOracle::first_hit(const OracleRay &ray) const {
   if (!within_embree_reach(ray.origin, dims_)) {
     throw std::invalid_argument("MeshOracle: " + out_of_reach(ray.origin, dims_));
   }
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  RTCRayHit embree = to_embree(ray);
-  rtcIntersect1(scene_->scene(), &context, &embree);
-  return embree.hit.geomID == RTC_INVALID_GEOMETRY_ID ? std::numeric_limits<double>::infinity()
-                                                      : embree.ray.tfar;
+  return mesh_->first_hit(ray);
+}
+
+/// The trilinear field minus the isovalue.
+double MeshOracle::value(const std::array<double, 3> &point) const {
+  std::array<std::size_t, 3> cell;
+  std::array<double, 3> p;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    cell[axis] = static_cast<std::size_t>(std::clamp(std::floor(point[axis]), 0.0, dims_[axis] - 2.0));
+    p[axis] = point[axis] - static_cast<double>(cell[axis]);
+  }
+  double sum = 0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const std::size_t x = cell[0] + (corner & 1u), y = cell[1] + (corner >> 1 & 1u),
+                      z = cell[2] + (corner >> 2);
+    const double weight = ((corner & 1u) != 0 ? p[0] : 1 - p[0]) * ((corner & 2u) != 0 ? p[1] : 1 - p[1]) *
+                          ((corner & 4u) != 0 ? p[2] : 1 - p[2]);
+    sum += weight * (voxels_[x + dims_[0] * (y + std::size_t{dims_[1]} * z)] - isovalue_);
+  }
+  return sum;
+}
+
+bool MeshOracle::refined_agrees(const OracleRay &ray, const RendererHit &got, double at) const {
+  const double speed = speed_of(ray);
+  for (const double spacing : {1.0 / 8, 1.0 / 64, 1.0 / 512}) {
+    std::array<double, 3> centre;
+    for (std::size_t axis = 0; axis < 3; ++axis) centre[axis] = ray.origin[axis] + at * ray.direction[axis];
+    const FineGrid grid(spacing, centre, dims_);
+    std::vector<float> values;
+    for (std::uint32_t z = 0; z < grid.count[2]; ++z) {
+      for (std::uint32_t y = 0; y < grid.count[1]; ++y) {
+        for (std::uint32_t x = 0; x < grid.count[0]; ++x) {
+          values.push_back(static_cast<float>(value({grid.place(0, x), grid.place(1, y), grid.place(2, z)})));
+        }
+      }
+    }
+    const TracedMesh mesh(extract_isosurface(values, grid.count, 0));
+    // From before the grid, so that the fine ray's float32 numbers are small: its diagonal is 84 spacings.
+    const double start = std::max(0.0, at - 100 * spacing / speed);
+    const auto agrees = [&](double t) {
+      return t == kInfinity ? !(got.hit && grid.contains(got.point))
+                            : got.hit && std::abs(start + t - got.t) * speed <= 8 * spacing * kCellDiagonal;
+    };
+    const auto first_hit = [&](const OracleRay &fine) { return mesh.first_hit(fine); };
+    const OracleRay fine = grid.local(ray, start);
+    const double t = mesh.first_hit(fine);
+    // Lengths beside the fine ray are in units of the grid.
+    if (agrees(t) || agrees_beside(fine, 1.0, first_hit, agrees)) return true;
+    at = got.hit ? std::min(start + t, got.t) : start + t;
+  }
+  return false;
 }
 
 void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
            Accuracy &tally) {
   const OracleRay exact = exact_ray(ray);
   const RendererHit got = renderer_hit(frame, exact, record);
-  const double t_got = got.hit ? got.t : std::numeric_limits<double>::infinity();
+  const double t_got = got.hit ? got.t : kInfinity;
   const double t_mesh = oracle.first_hit(exact), speed = speed_of(exact);
-  const auto agree = [&](double t) { return t == t_got || std::abs(t - t_got) * speed <= kCellDiagonal; };
+  const auto agrees = [&](double t) { return t == t_got || std::abs(t - t_got) * speed <= kCellDiagonal; };
   ++tally.rays;
   tally.hits += std::isfinite(t_mesh);
-  if (agree(t_mesh)) {
+  if (agrees(t_mesh)) {
     if (got.hit) tally.distance.push_back(std::abs(t_mesh - t_got) * speed);
     return;
   }
-  for (const double offset : {0.25, 0.5, 1.0}) {
-    for (int direction = 0; direction < 8; ++direction) {
-      if (!agree(oracle.first_hit(moved_sideways(exact, offset, direction)))) continue;
-      ++tally.unstable;
-      return;
-    }
+  const auto first_hit = [&](const OracleRay &beside) { return oracle.first_hit(beside); };
+  if (agrees_beside(exact, 1.0, first_hit, agrees) ||
+      oracle.refined_agrees(exact, got, std::min(t_mesh, t_got))) {
+    ++tally.unstable;
+    return;
   }
   ++(t_mesh < t_got ? tally.missed : tally.false_hits);
 }

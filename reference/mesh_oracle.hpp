@@ -10,8 +10,13 @@
 // What can be judged by it: the triangles are not the trilinear surface, but both lie in the same cells. Rule:
 //   - renderer and mesh agree where both miss, or both hit within a cell's diagonal, sqrt(3) voxels, along the ray;
 //   - else the ray is moved sideways in eight directions by 1/4, 1/2 and 1 voxel: where the mesh then gives
-//     the renderer's answer (no hit; or a hit within sqrt(3) voxels along the ray), two surfaces less than a
+//     the renderer's answer (no hit; or a hit within sqrt(3) voxels along the ray), surfaces less than a
 //     cell apart explain the difference: a silhouette pixel, counted as unstable;
+//   - else, in a cell whose corners are inside and outside in turns, triangles and surface may be connected
+//     differently, and a ray may pass between sheets that the triangles join. So the field around the first of
+//     the two hits is sampled eight times as finely, which leaves the trilinear surface what it is and brings the
+//     triangles nearer, and the rule is asked again there, with all lengths an eighth (the first time sqrt(3) stays);
+//     and so on, to 1/512 voxel. Where the finer triangles agree with the renderer the pixel is unstable too;
 //   - the rest are failures: missed where the mesh's hit comes first, false where the renderer's does.
 // So it finds holes, leaks and surfaces in wrong places of more than a cell; the other oracles judge the rest.
 
@@ -24,8 +29,6 @@
 #include "reference/accuracy.hpp"
 
 namespace isowave {
-
-class EmbreeScene;
 
 /// Triangles that share vertices by index. Index space. The outside is on the side from which they are
 /// counter-clockwise.
@@ -45,9 +48,12 @@ IsoMesh extract_isosurface(std::span<const float> voxels, std::array<std::uint32
 /// leave the volume.
 std::uint64_t num_open_edges(const IsoMesh &mesh);
 
+class TracedMesh;
+
 class MeshOracle {
  public:
-  /// Extracts the surface and builds Embree's tree. Throws as extract_isosurface(), and Error (memory).
+  /// voxels as in extract_isosurface(); they must outlive the oracle. Extracts the surface and builds Embree's tree.
+  /// Throws as extract_isosurface(), and Error (memory).
   MeshOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
   ~MeshOracle();
   MeshOracle(const MeshOracle &) = delete;
@@ -57,12 +63,19 @@ class MeshOracle {
   /// std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp).
   double first_hit(const OracleRay &ray) const;
 
-  std::uint64_t num_triangles() const { return mesh_.triangles.size(); }
+  /// Does the mesh of the field around `at` (t of the ray), sampled ever more finely, come to agree with the
+  /// renderer?
+  bool refined_agrees(const OracleRay &ray, const RendererHit &got, double at) const;
+
+  std::uint64_t num_triangles() const;
 
  private:
+  double value(const std::array<double, 3> &point) const;
+
+  std::span<const float> voxels_;
   std::array<std::uint32_t, 3> dims_;
-  IsoMesh mesh_;  ///< Embree reads it in place; one vertex more, so that it may read 16 bytes at the last
-  std::unique_ptr<EmbreeScene> scene_;
+  double isovalue_;
+  std::unique_ptr<TracedMesh> mesh_;
 };
 
 /// Adds one ray by the rule above; frame: blocks are used.
