@@ -112,6 +112,12 @@ Quantiles quantiles(std::vector<double> values) {
   return {at(0.5), at(0.99), at(1.0)};
 }
 
+bool depth_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord &record,
+                const RendererHit &hit) {
+  const double difference = std::abs(double(record.t) / double(frame.t_scale) - hit.t);
+  return difference <= 0x1p-21 * (std::abs(hit.t) + 1 / speed_of(ray));
+}
+
 void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
            Accuracy &tally) {
   const OracleRay exact = exact_ray(ray);
@@ -120,6 +126,10 @@ void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, co
   const double speed = speed_of(exact);
   ++tally.rays;
   tally.hits += truth.hit;
+  if (got.hit && !depth_fits(frame, exact, record, got)) {
+    ++tally.wrong_depths;
+    if (std::isnan(got.t)) return;  // no position to judge
+  }
   const Vec from_centre{exact.origin[0] - 0.5 * (frame.dims_x - 1),
                         exact.origin[1] - 0.5 * (frame.dims_y - 1),
                         exact.origin[2] - 0.5 * (frame.dims_z - 1)};
@@ -154,6 +164,7 @@ void merge(Accuracy &into, const Accuracy &from) {
   into.false_hits += from.false_hits;
   into.wrong_cells += from.wrong_cells;
   into.at_faces += from.at_faces;
+  into.wrong_depths += from.wrong_depths;
   into.unstable += from.unstable;
   into.distance.insert(into.distance.end(), from.distance.begin(), from.distance.end());
   into.residual.insert(into.residual.end(), from.residual.begin(), from.residual.end());

@@ -263,11 +263,12 @@ class TracedMesh {
     scene_.build(geometry);
   }
 
-  /// t of the first triangle, infinity for none.
-  double first_hit(const OracleRay &ray) const {
+  /// t of the first triangle behind t = `from`, infinity for none.
+  double first_hit(const OracleRay &ray, double from = 0) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit embree = to_embree(ray);
+    embree.ray.tnear = static_cast<float>(from);
     rtcIntersect1(scene_.scene(), &context, &embree);
     return embree.hit.geomID == RTC_INVALID_GEOMETRY_ID ? kInfinity : embree.ray.tfar;
   }
@@ -279,19 +280,6 @@ class TracedMesh {
   EmbreeScene scene_;
 };
 
-namespace {
-
-/// Does a ray moved sideways by up to `distance` give an answer that `agrees`?
-template <class FirstHit, class Agrees>
-bool agrees_beside(const OracleRay &ray, double distance, const FirstHit &first_hit, const Agrees &agrees) {
-  for (const double offset : {0.25 * distance, 0.5 * distance, distance}) {
-    for (int direction = 0; direction < 8; ++direction) {
-      if (agrees(first_hit(moved_sideways(ray, offset, direction)))) return true;
-    }
-  }
-  return false;
-}
-
 /// A box of points `spacing` voxels apart, numbered from the volume's origin: [begin, begin + count) along each axis.
 struct FineGrid {
   double spacing;
@@ -301,7 +289,7 @@ struct FineGrid {
   /// kHalfWidth points to each side of `centre`, as far as the domain reaches.
   FineGrid(double spacing_in, const std::array<double, 3> &centre, const std::array<std::uint32_t, 3> &dims)
       : spacing(spacing_in) {
-    constexpr std::int64_t kHalfWidth = 24;
+    constexpr std::int64_t kHalfWidth = 9;  // more than sqrt(3) voxels at a spacing of 1/4
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto last = static_cast<std::int64_t>((dims[axis] - 1) / spacing);
       const std::int64_t middle =
@@ -331,8 +319,6 @@ struct FineGrid {
   }
 };
 
-}  // namespace
-
 MeshOracle::MeshOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
     : voxels_(voxels),
       dims_(dims),
@@ -345,11 +331,11 @@ std::uint64_t MeshOracle::num_triangles() const {
   return mesh_->num_triangles();
 }
 
-double MeshOracle::first_hit(const OracleRay &ray) const {
+double MeshOracle::first_hit(const OracleRay &ray, double from) const {
   if (!within_embree_reach(ray.origin, dims_)) {
     throw std::invalid_argument("MeshOracle: " + out_of_reach(ray.origin, dims_));
   }
-  return mesh_->first_hit(ray);
+  return mesh_->first_hit(ray, from);
 }
 
 /// The trilinear field minus the isovalue.
@@ -371,57 +357,76 @@ double MeshOracle::value(const std::array<double, 3> &point) const {
   return sum;
 }
 
-bool MeshOracle::refined_agrees(const OracleRay &ray, const RendererHit &got, double at) const {
+/// The triangles of the field at the points of a fine grid, in its units.
+TracedMesh MeshOracle::refined(const FineGrid &grid) const {
+  std::vector<float> values;
+  values.reserve(std::size_t{grid.count[0]} * grid.count[1] * grid.count[2]);
+  for (std::uint32_t z = 0; z < grid.count[2]; ++z) {
+    for (std::uint32_t y = 0; y < grid.count[1]; ++y) {
+      for (std::uint32_t x = 0; x < grid.count[0]; ++x) {
+        values.push_back(static_cast<float>(value({grid.place(0, x), grid.place(1, y), grid.place(2, z)})));
+      }
+    }
+  }
+  return TracedMesh(extract_isosurface(values, grid.count, 0));
+}
+
+std::optional<double> MeshOracle::agrees_refined(const OracleRay &ray, const RendererHit &got, double from,
+                                                 double at) const {
   const double speed = speed_of(ray);
-  for (const double spacing : {1.0 / 8, 1.0 / 64, 1.0 / 512}) {
+  for (const double spacing : {1.0 / 4, 1.0 / 16, 1.0 / 64, 1.0 / 256}) {
     std::array<double, 3> centre;
     for (std::size_t axis = 0; axis < 3; ++axis) centre[axis] = ray.origin[axis] + at * ray.direction[axis];
     const FineGrid grid(spacing, centre, dims_);
-    std::vector<float> values;
-    for (std::uint32_t z = 0; z < grid.count[2]; ++z) {
-      for (std::uint32_t y = 0; y < grid.count[1]; ++y) {
-        for (std::uint32_t x = 0; x < grid.count[0]; ++x) {
-          values.push_back(static_cast<float>(value({grid.place(0, x), grid.place(1, y), grid.place(2, z)})));
-        }
-      }
-    }
-    const TracedMesh mesh(extract_isosurface(values, grid.count, 0));
-    // From before the grid, so that the fine ray's float32 numbers are small: its diagonal is 84 spacings.
-    const double start = std::max(0.0, at - 100 * spacing / speed);
+    const TracedMesh mesh = refined(grid);
+    // From just before the grid, whose diagonal is 31 spacings: the fine ray's float32 numbers are small.
+    const double start = std::max(from, at - 40 * spacing / speed);
     const auto agrees = [&](double t) {
       return t == kInfinity ? !(got.hit && grid.contains(got.point))
-                            : got.hit && std::abs(start + t - got.t) * speed <= 8 * spacing * kCellDiagonal;
+                            : got.hit && std::abs(start + t - got.t) * speed <= 4 * spacing * kCellDiagonal;
     };
-    const auto first_hit = [&](const OracleRay &fine) { return mesh.first_hit(fine); };
     const OracleRay fine = grid.local(ray, start);
     const double t = mesh.first_hit(fine);
-    // Lengths beside the fine ray are in units of the grid.
-    if (agrees(t) || agrees_beside(fine, 1.0, first_hit, agrees)) return true;
+    bool agreed = agrees(t);
+    if (spacing == 1.0 / 256) {
+      for (const double offset : {0.5, 1.0}) {  // spacings
+        for (int i = 0; i < 8 && !agreed; ++i)
+          agreed = agrees(mesh.first_hit(moved_sideways(fine, offset, i)));
+      }
+    }
+    if (agreed) return at + 8 * spacing / speed;  // within the grid
     at = got.hit ? std::min(start + t, got.t) : start + t;
   }
-  return false;
+  return std::nullopt;
 }
 
 void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
            Accuracy &tally) {
   const OracleRay exact = exact_ray(ray);
   const RendererHit got = renderer_hit(frame, exact, record);
-  const double t_got = got.hit ? got.t : kInfinity;
-  const double t_mesh = oracle.first_hit(exact), speed = speed_of(exact);
-  const auto agrees = [&](double t) { return t == t_got || std::abs(t - t_got) * speed <= kCellDiagonal; };
+  const double t_got = got.hit ? got.t : kInfinity, speed = speed_of(exact);
+  double t_mesh = oracle.first_hit(exact);
+  const auto agrees = [&] { return t_mesh == t_got || std::abs(t_mesh - t_got) * speed <= kCellDiagonal; };
   ++tally.rays;
   tally.hits += std::isfinite(t_mesh);
-  if (agrees(t_mesh)) {
+  if (got.hit && !depth_fits(frame, exact, record, got)) ++tally.wrong_depths;
+  if (std::isnan(t_got)) return;
+  if (agrees()) {
     if (got.hit) tally.distance.push_back(std::abs(t_mesh - t_got) * speed);
     return;
   }
-  const auto first_hit = [&](const OracleRay &beside) { return oracle.first_hit(beside); };
-  if (agrees_beside(exact, 1.0, first_hit, agrees) ||
-      oracle.refined_agrees(exact, got, std::min(t_mesh, t_got))) {
-    ++tally.unstable;
-    return;
+  double from = 0;
+  while (!agrees()) {
+    const std::optional<double> until = oracle.agrees_refined(exact, got, from, std::min(t_mesh, t_got));
+    if (!until) {
+      ++(t_mesh < t_got ? tally.missed : tally.false_hits);
+      return;
+    }
+    if (*until >= t_got) break;
+    from = *until;
+    t_mesh = oracle.first_hit(exact, from);
   }
-  ++(t_mesh < t_got ? tally.missed : tally.false_hits);
+  ++tally.unstable;
 }
 
 Accuracy judge_frame(const MeshOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits) {

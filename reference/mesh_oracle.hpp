@@ -9,20 +9,21 @@
 //
 // What can be judged by it: the triangles are not the trilinear surface, but both lie in the same cells. Rule:
 //   - renderer and mesh agree where both miss, or both hit within a cell's diagonal, sqrt(3) voxels, along the ray;
-//   - else the ray is moved sideways in eight directions by 1/4, 1/2 and 1 voxel: where the mesh then gives
-//     the renderer's answer (no hit; or a hit within sqrt(3) voxels along the ray), surfaces less than a
-//     cell apart explain the difference: a silhouette pixel, counted as unstable;
-//   - else, in a cell whose corners are inside and outside in turns, triangles and surface may be connected
-//     differently, and a ray may pass between sheets that the triangles join. So the field around the first of
-//     the two hits is sampled eight times as finely, which leaves the trilinear surface what it is and brings the
-//     triangles nearer, and the rule is asked again there, with all lengths an eighth (the first time sqrt(3) stays);
-//     and so on, to 1/512 voxel. Where the finer triangles agree with the renderer the pixel is unstable too;
+//   - else either may be right: at silhouettes, and in cells whose corners are inside and outside in turns, where a ray
+//     may pass between sheets that the triangles join. So the field around the first of the two hits is sampled
+//     four times as finely, which leaves the trilinear surface what it is and brings the triangles nearer to it. In that
+//     box the rule is asked again, with a tolerance of sqrt(3) voxels at first and a quarter of it each further time, to
+//     1/256 voxel. Of the finest triangles it is enough that a ray moved sideways by up to 1/256 voxel in one of
+//     eight directions gives the renderer's answer. Where finer triangles agree with the renderer, the pixel is
+//     counted as unstable, and the ray goes on behind that box;
 //   - the rest are failures: missed where the mesh's hit comes first, false where the renderer's does.
-// So it finds holes, leaks and surfaces in wrong places of more than a cell; the other oracles judge the rest.
+// So it finds holes, leaks and surfaces in wrong places, however small, but hits in the right place only to a cell's
+// diagonal; the other oracles judge those.
 
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -49,6 +50,7 @@ IsoMesh extract_isosurface(std::span<const float> voxels, std::array<std::uint32
 std::uint64_t num_open_edges(const IsoMesh &mesh);
 
 class TracedMesh;
+struct FineGrid;
 
 class MeshOracle {
  public:
@@ -59,18 +61,20 @@ class MeshOracle {
   MeshOracle(const MeshOracle &) = delete;
   MeshOracle &operator=(const MeshOracle &) = delete;
 
-  /// t of the first triangle along the ray, infinity for none; float32 accuracy. Thread-safe. Throws
-  /// std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp).
-  double first_hit(const OracleRay &ray) const;
+  /// t of the first triangle along the ray behind t = `from`, infinity for none; float32 accuracy. Thread-safe.
+  /// Throws std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp).
+  double first_hit(const OracleRay &ray, double from = 0) const;
 
-  /// Does the mesh of the field around `at` (t of the ray), sampled ever more finely, come to agree with the
-  /// renderer?
-  bool refined_agrees(const OracleRay &ray, const RendererHit &got, double at) const;
+  /// Samples the field around the ray's point at t = `at` ever more finely, until the triangles agree with the renderer.
+  /// Looks at nothing before t = `from` <= at. Returns the t, beyond `from`, up to which they do, or none.
+  std::optional<double> agrees_refined(const OracleRay &ray, const RendererHit &got, double from,
+                                       double at) const;
 
   std::uint64_t num_triangles() const;
 
  private:
   double value(const std::array<double, 3> &point) const;
+  TracedMesh refined(const FineGrid &grid) const;
 
   std::span<const float> voxels_;
   std::array<std::uint32_t, 3> dims_;
@@ -78,7 +82,7 @@ class MeshOracle {
   std::unique_ptr<TracedMesh> mesh_;
 };
 
-/// Adds one ray by the rule above; frame: blocks are used.
+/// Adds one ray by the rule above; frame: blocks and t_scale are used.
 void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &hit,
            Accuracy &tally);
 /// A whole frame, as judge_frame() of a HitOracle. No residuals, no cells.

@@ -13,16 +13,17 @@ nlohmann::ordered_json quantiles_json(const Quantiles &q) {
 }  // namespace
 
 void print_accuracy_header(std::string_view what) {
-  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays", "hits", "missed",
-             "false", "in wrong", "at faces", "unstable", "|dt| p50, p99, max [voxels]",
+  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays", "hits",
+             "missed", "false", "cell", "depth", "at faces", "unstable", "|dt| p50, p99, max [voxels]",
              "|f-iso|/|grad f| p99, max");
 }
 
 void print_accuracy(std::string_view name, const Accuracy &tally) {
   const Quantiles distance = quantiles(tally.distance), residual = quantiles(tally.residual);
-  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}  {:.1e}, {:.1e}, {:.1e}  {:.1e}, {:.1e}\n",
-             name, tally.rays, tally.hits, tally.missed, tally.false_hits, tally.wrong_cells, tally.at_faces,
-             tally.unstable, distance.p50, distance.p99, distance.max, residual.p99, residual.max);
+  fmt::print(
+      "{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:.1e}, {:.1e}, {:.1e}  {:.1e}, {:.1e}\n",
+      name, tally.rays, tally.hits, tally.missed, tally.false_hits, tally.wrong_cells, tally.wrong_depths,
+      tally.at_faces, tally.unstable, distance.p50, distance.p99, distance.max, residual.p99, residual.max);
 }
 
 nlohmann::ordered_json accuracy_json(const Accuracy &tally) {
@@ -31,6 +32,7 @@ nlohmann::ordered_json accuracy_json(const Accuracy &tally) {
           {"missed", tally.missed},
           {"false", tally.false_hits},
           {"wrong_cells", tally.wrong_cells},
+          {"wrong_depths", tally.wrong_depths},
           {"at_faces", tally.at_faces},
           {"unstable", tally.unstable},
           {"distance_voxels", quantiles_json(quantiles(tally.distance))},

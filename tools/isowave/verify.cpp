@@ -28,7 +28,7 @@ struct Options {
   std::string json;
 };
 
-/// Returns the failures of the solver: rays missed, false or leaked.
+/// Returns the failures of the solver: rays missed, false, wrong or leaked.
 std::uint64_t verify_solver(const Options &options, std::string_view name, ordered_json &document) {
   const Solver solver = solver_from_string(name);
   fmt::print("solver {}\n", name);
@@ -79,7 +79,8 @@ void run_verify(Options options) {
     }
   }
   if (!options.json.empty()) write_json(document, options.json);
-  if (failures != 0) throw Error("{} rays were missed, false, in a wrong cell or leaked", failures);
+  if (failures != 0)
+    throw Error("{} rays were missed, false, in a wrong cell, at a wrong depth or leaked", failures);
 }
 
 }  // namespace
