@@ -1,9 +1,10 @@
 #include "reference/accuracy.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <thread>
+#include <stdexcept>
+
+#include "core/parallel_for.hpp"
 
 namespace isowave {
 
@@ -35,23 +36,71 @@ std::array<Vec, 2> sideways(const Vec &d) {
 }
 
 /// Does the oracle give `first` for all of eight rays beside this one?
-bool stable(const RootOracle &oracle, const OracleRay &ray, const OracleHit &first, double offset) {
-  const double speed = length(ray.direction);
-  const auto [a, b] = sideways(ray.direction);
+bool stable(const HitOracle &oracle, const OracleRay &ray, const OracleHit &first, double offset) {
+  const double speed = speed_of(ray);
   for (int i = 0; i < 8; ++i) {
-    const double angle = 0.7853981633974483 * i;
-    OracleRay beside = ray;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      beside.origin[axis] += offset * (std::cos(angle) * a[axis] + std::sin(angle) * b[axis]);
-    }
-    const OracleHit moved = oracle.first_hit(beside);
+    const OracleHit moved = oracle.first_hit(moved_sideways(ray, offset, i));
     if (moved.hit != first.hit) return false;
     if (first.hit && std::abs(moved.t - first.t) * speed > kSameHit) return false;
   }
   return true;
 }
 
+/// Does the oracle find its hit in `cell` for any of eight rays beside this one?
+bool hits_beside(const HitOracle &oracle, const OracleRay &ray, const std::array<int, 3> &cell,
+                 double offset) {
+  for (int i = 0; i < 8; ++i) {
+    const OracleHit moved = oracle.first_hit(moved_sideways(ray, offset, i));
+    if (moved.hit && moved.cell == cell) return true;
+  }
+  return false;
+}
+
+/// Is the ray's point at t in the cell grown by `margin`?
+bool in_cell(const OracleRay &ray, double t, const std::array<int, 3> &cell, double margin) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double x = (ray.origin[axis] - cell[axis]) + t * ray.direction[axis];
+    if (x < -margin || x > 1 + margin) return false;
+  }
+  return true;
+}
+
 }  // namespace
+
+OracleRay exact_ray(const Ray &ray) {
+  return {{ray.x.o, ray.y.o, ray.z.o}, {ray.x.d, ray.y.d, ray.z.d}};
+}
+
+double speed_of(const OracleRay &ray) {
+  return length(ray.direction);
+}
+
+OracleRay moved_sideways(const OracleRay &ray, double offset, int direction) {
+  const auto [a, b] = sideways(ray.direction);
+  const double angle = 0.7853981633974483 * direction;
+  OracleRay beside = ray;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    beside.origin[axis] += offset * (std::cos(angle) * a[axis] + std::sin(angle) * b[axis]);
+  }
+  return beside;
+}
+
+RendererHit renderer_hit(const FrameParams &frame, const OracleRay &ray, const HitRecord &record) {
+  RendererHit result;
+  result.hit = std::isfinite(record.t);
+  if (!result.hit) return result;
+  const std::uint32_t block[3] = {record.block_id % frame.blocks_x,
+                                  record.block_id / frame.blocks_x % frame.blocks_y,
+                                  record.block_id / frame.blocks_x / frame.blocks_y};
+  const float local[3] = {record.x, record.y, record.z};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result.cell[axis] = static_cast<int>(4 * block[axis] + (record.cell >> (2 * axis) & 3u));
+    result.point[axis] = result.cell[axis] + double(local[axis]);
+    result.t += (result.point[axis] - ray.origin[axis]) * ray.direction[axis];
+  }
+  result.t /= dot(ray.direction, ray.direction);
+  return result;
+}
 
 Quantiles quantiles(std::vector<double> values) {
   if (values.empty()) return {};
@@ -63,46 +112,49 @@ Quantiles quantiles(std::vector<double> values) {
   return {at(0.5), at(0.99), at(1.0)};
 }
 
-void judge(const RootOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
+bool depth_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord &record,
+                const RendererHit &hit) {
+  const double difference = std::abs(double(record.t) / double(frame.t_scale) - hit.t);
+  return difference <= 0x1p-21 * (std::abs(hit.t) + 1 / speed_of(ray));
+}
+
+void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
            Accuracy &tally) {
-  const OracleRay exact{{ray.x.o, ray.y.o, ray.z.o}, {ray.x.d, ray.y.d, ray.z.d}};
+  const OracleRay exact = exact_ray(ray);
   const OracleHit truth = oracle.first_hit(exact);
-  const Vec &d = exact.direction;
-  const double speed = length(d);  // voxels per unit of t
-  const bool hit = std::isfinite(record.t);
+  const RendererHit got = renderer_hit(frame, exact, record);
+  const double speed = speed_of(exact);
   ++tally.rays;
   tally.hits += truth.hit;
-  // From cell and local position, not from t: a float32 t of 3,000 is only good to 2e-4.
-  Vec point{};
-  double along = 0;
-  if (hit) {
-    const std::uint32_t block[3] = {record.block_id % frame.blocks_x,
-                                    record.block_id / frame.blocks_x % frame.blocks_y,
-                                    record.block_id / frame.blocks_x / frame.blocks_y};
-    const float local[3] = {record.x, record.y, record.z};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      point[axis] = 4.0 * block[axis] + (record.cell >> (2 * axis) & 3u) + double(local[axis]);
-      along += (point[axis] - exact.origin[axis]) * d[axis];
-    }
-    along /= speed * speed;
+  if (got.hit && !depth_fits(frame, exact, record, got)) {
+    ++tally.wrong_depths;
+    if (std::isnan(got.t)) return;  // no position to judge
   }
-  const bool missed = truth.hit && (!hit || (along - truth.t) * speed > kSameHit);
-  const bool false_hit = hit && (!truth.hit || (truth.t - along) * speed > kSameHit);
+  const Vec from_centre{exact.origin[0] - 0.5 * (frame.dims_x - 1),
+                        exact.origin[1] - 0.5 * (frame.dims_y - 1),
+                        exact.origin[2] - 0.5 * (frame.dims_z - 1)};
+  const double offset = length(from_centre) >= 3000 ? 5e-5 : 1e-5;
+  const bool missed = truth.hit && (!got.hit || (got.t - truth.t) * speed > kSameHit);
+  const bool false_hit = got.hit && (!truth.hit || (truth.t - got.t) * speed > kSameHit);
   if (missed || false_hit) {
-    const Vec from_centre{exact.origin[0] - 0.5 * (frame.dims_x - 1),
-                          exact.origin[1] - 0.5 * (frame.dims_y - 1),
-                          exact.origin[2] - 0.5 * (frame.dims_z - 1)};
-    if (!stable(oracle, exact, truth, length(from_centre) >= 3000 ? 5e-5 : 1e-5)) {
+    if (!stable(oracle, exact, truth, offset)) {
       ++tally.unstable;
     } else {
       ++(missed ? tally.missed : tally.false_hits);
     }
     return;
   }
-  if (!hit) return;
-  tally.distance.push_back(std::abs(along - truth.t) * speed);
-  const double slope = length(oracle.gradient(point));
-  if (slope > 0) tally.residual.push_back(std::abs(oracle.field(point) - double(frame.isovalue)) / slope);
+  if (!got.hit) return;
+  if (got.cell != truth.cell) {
+    if (in_cell(exact, truth.t, got.cell, offset)) {
+      ++tally.at_faces;
+    } else {
+      ++(hits_beside(oracle, exact, got.cell, offset) ? tally.unstable : tally.wrong_cells);
+    }
+  }
+  tally.distance.push_back(std::abs(got.t - truth.t) * speed);
+  const double slope = length(oracle.gradient(got.point));
+  if (slope > 0) tally.residual.push_back(std::abs(oracle.field(got.point) - double(frame.isovalue)) / slope);
 }
 
 void merge(Accuracy &into, const Accuracy &from) {
@@ -110,29 +162,34 @@ void merge(Accuracy &into, const Accuracy &from) {
   into.hits += from.hits;
   into.missed += from.missed;
   into.false_hits += from.false_hits;
+  into.wrong_cells += from.wrong_cells;
+  into.at_faces += from.at_faces;
+  into.wrong_depths += from.wrong_depths;
   into.unstable += from.unstable;
   into.distance.insert(into.distance.end(), from.distance.begin(), from.distance.end());
   into.residual.insert(into.residual.end(), from.residual.begin(), from.residual.end());
 }
 
-Accuracy judge_frame(const RootOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits) {
-  std::atomic<std::uint32_t> next_row{0};
-  std::vector<Accuracy> tallies(std::max(1u, std::thread::hardware_concurrency()));
-  {
-    std::vector<std::jthread> pool;
-    for (Accuracy &tally : tallies) {
-      pool.emplace_back([&] {
-        for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
-          for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel) {
-            judge(oracle, frame, make_ray(&frame, pixel), hits[pixel], tally);
-          }
-        }
-      });
-    }
+Accuracy judge_rays(const FrameParams &frame, std::span<const HitRecord> hits, const JudgeRay &judge_ray) {
+  if (hits.size() != std::size_t{frame.width} * frame.height) {
+    throw std::invalid_argument("judge_rays: the hits do not fit the frame");
   }
+  std::vector<Accuracy> tallies(thread_count(0));
+  parallel_for(frame.height, 0, [&](std::uint64_t row, std::uint32_t thread) {
+    for (std::uint32_t column = 0; column < frame.width; ++column) {
+      const auto pixel = static_cast<std::uint32_t>(row * frame.width + column);
+      judge_ray(make_ray(&frame, pixel), hits[pixel], tallies[thread]);
+    }
+  });
   Accuracy sum;
   for (const Accuracy &tally : tallies) merge(sum, tally);
   return sum;
+}
+
+Accuracy judge_frame(const HitOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits) {
+  return judge_rays(frame, hits, [&](const Ray &ray, const HitRecord &hit, Accuracy &tally) {
+    judge(oracle, frame, ray, hit, tally);
+  });
 }
 
 }  // namespace isowave

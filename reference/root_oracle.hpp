@@ -13,32 +13,18 @@
 #include <optional>
 #include <span>
 
+#include "reference/hit_oracle.hpp"
+
 namespace isowave {
 
-/// A ray in index space: position = origin + t direction, t >= 0. The numbers are taken as exact; the
-/// renderer's float32 ones fit without rounding.
-struct OracleRay {
-  std::array<double, 3> origin{}, direction{};
-};
-
-struct OracleHit {
-  bool hit = false;
-  double t = 0;               ///< of the first change of inside, relative error about 1e-15
-  std::array<int, 3> cell{};  ///< dual cell in whose closed segment it lies
-};
-
-class RootOracle {
+class RootOracle final : public HitOracle {
  public:
   /// voxels [nz][ny][nx], x fastest, finite; they must outlive the oracle. dims >= 2.
   RootOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
 
-  /// The first t at which (field >= isovalue) differs from its value where the ray enters the domain [0,
-  /// dims-1], or starts in it. Thread-safe.
-  OracleHit first_hit(const OracleRay &ray) const;
-
-  /// The field at a point of the domain in double precision, and its gradient.
-  double field(const std::array<double, 3> &point) const;
-  std::array<double, 3> gradient(const std::array<double, 3> &point) const;
+  OracleHit first_hit(const OracleRay &ray) const override;
+  double field(const std::array<double, 3> &point) const override;
+  std::array<double, 3> gradient(const std::array<double, 3> &point) const override;
 
   /// How many cells needed exact arithmetic so far.
   std::uint64_t num_exact_cells() const { return num_exact_cells_; }

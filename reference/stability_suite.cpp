@@ -8,6 +8,7 @@
 
 #include "core/zfp_stream.hpp"
 #include "reference/random.hpp"
+#include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave {

@@ -32,8 +32,8 @@ struct CaseResult {
   Accuracy accuracy;
   std::uint64_t resumed_differently = 0;  ///< rays whose hit has other bits when walked block by block
 
-  /// Rays missed, false or resumed differently.
-  std::uint64_t failures() const { return accuracy.missed + accuracy.false_hits + resumed_differently; }
+  /// Rays missed, false, in a wrong cell, with a wrong depth or resumed differently.
+  std::uint64_t failures() const { return accuracy.failures() + resumed_differently; }
 };
 
 /// Every case, with about `rays_per_case` rays each. The same for the same seed on every machine.

@@ -1,0 +1,181 @@
+#include "tools/isowave/verify_frames.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "core/error.hpp"
+#include "core/renderer.hpp"
+#include "reference/cell_oracle.hpp"
+#include "reference/embree_reach.hpp"
+#include "reference/mesh_oracle.hpp"
+#include "reference/root_oracle.hpp"
+#include "reference/scalar_renderer.hpp"
+#include "tools/isowave/accuracy_report.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+using nlohmann::ordered_json;
+using Dims = std::array<std::uint32_t, 3>;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// One of the oracles, for one isovalue.
+struct FrameJudge {
+  std::string oracle;
+  std::string contents;  ///< what it is made of, for the reader
+  bool uses_embree = true;
+  std::function<Accuracy(const FrameParams &frame, std::span<const HitRecord> hits)> judge;
+};
+
+template <class Oracle>
+FrameJudge judge_by(std::string name, const std::shared_ptr<const Oracle> &oracle, std::string contents) {
+  return {std::move(name), std::move(contents), true,
+          [oracle](const FrameParams &frame, std::span<const HitRecord> hits) {
+            return judge_frame(*oracle, frame, hits);
+          }};
+}
+
+FrameJudge make_judge(const std::string &name, std::span<const float> voxels, const Dims &dims,
+                      float isovalue) {
+  if (name == "cells") {
+    const auto oracle = std::make_shared<const CellOracle>(voxels, dims, isovalue);
+    return judge_by(name, oracle, with_commas(oracle->num_cells()) + " dual cells in Embree");
+  }
+  if (name == "mesh") {
+    const auto oracle = std::make_shared<const MeshOracle>(voxels, dims, isovalue);
+    return judge_by(
+        name, oracle,
+        with_commas(oracle->num_triangles()) + " triangles in Embree; unstable: silhouette pixels");
+  }
+  FrameJudge judge =
+      judge_by(name, std::make_shared<const RootOracle>(voxels, dims, isovalue), "every cell, certified");
+  judge.uses_embree = false;
+  return judge;
+}
+
+/// Draws with the scalar reference, or with a device.
+class FrameDrawer {
+ public:
+  FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device, Solver solver)
+      : scene_(scene), voxels_(voxels), solver_(solver) {
+    if (device.empty()) return;
+    const ocl::DeviceInfo info = ocl::choose_device(device);
+    fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
+    device_ = std::make_unique<ocl::Device>(info);
+    RendererOptions options;
+    options.size = scene.size;
+    options.solver = solver;
+    renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
+  }
+
+  std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
+    if (!renderer_) return render_scalar(frame, voxels_, solver_);
+    renderer_->render(scene_.cameras[view], frame.isovalue);
+    return renderer_->hits();
+  }
+  std::string name() const { return device_ ? device_->info().name : "scalar reference"; }
+
+ private:
+  const Scene &scene_;
+  std::span<const float> voxels_;
+  Solver solver_;
+  std::unique_ptr<ocl::Device> device_;  // before the renderer, which it must outlive
+  std::unique_ptr<Renderer> renderer_;
+};
+
+/// What the rows and the JSON entries of a run add up to.
+struct Totals {
+  std::uint64_t failures = 0, judged = 0;
+};
+
+/// One frame before all judges: a row and an entry each.
+void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, std::size_t view,
+               std::span<const HitRecord> hits, const ordered_json &labels, ordered_json &document,
+               Totals &totals) {
+  const std::array<double, 3> eye{frame.eye_x, frame.eye_y, frame.eye_z};
+  const Dims dims{frame.dims_x, frame.dims_y, frame.dims_z};
+  for (const FrameJudge &judge : judges) {
+    const std::string row = fmt::format("{}, isovalue {}, view {}", judge.oracle, frame.isovalue, view);
+    ordered_json entry = {{"oracle", judge.oracle}};
+    if (judge.uses_embree && !within_embree_reach(eye, dims)) {
+      const std::string why = out_of_reach(eye, dims);
+      fmt::print("{:<28} left out: {}\n", row, why);
+      entry["left_out"] = why;
+    } else {
+      const auto begin = Clock::now();
+      const Accuracy tally = judge.judge(frame, hits);
+      print_accuracy(row, tally);
+      entry.update(accuracy_json(tally));
+      entry["seconds"] = seconds_since(begin);
+      totals.failures += tally.failures();
+      ++totals.judged;
+    }
+    entry.update(labels);
+    document["frames"].push_back(std::move(entry));
+  }
+}
+
+}  // namespace
+
+std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vector<std::string> &solvers,
+                            ordered_json &document) {
+  const Scene scene = load_scene(options.input, options.volume, options.frame);
+  const std::vector<float> voxels = decode_with_libzfp(scene.volume);
+  const glm::uvec3 dims = scene.volume.info.dims;
+  const std::vector<std::string> names =
+      options.oracles.empty() ? std::vector<std::string>{"roots", "cells", "mesh"} : options.oracles;
+  Totals totals;
+  for (const float isovalue : options.frame.isovalues) {
+    std::vector<FrameJudge> judges;
+    for (const std::string &name : names) {
+      const auto begin = Clock::now();
+      judges.push_back(make_judge(name, voxels, {dims.x, dims.y, dims.z}, isovalue));
+      fmt::print("oracle {}, isovalue {}: {} ({:.1f} s)\n", name, isovalue, judges.back().contents,
+                 seconds_since(begin));
+    }
+    for (const std::string &solver : solvers) {
+      FrameDrawer drawer(scene, voxels, options.device, solver_from_string(solver));
+      print_accuracy_header(solver);
+      for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
+        const FrameParams frame =
+            make_frame_params(scene.volume.info, scene.cameras[view], scene.size, isovalue);
+        const ordered_json labels = {{"volume", options.input},
+                                     {"drawn_by", drawer.name()},
+                                     {"solver", solver},
+                                     {"isovalue", isovalue},
+                                     {"view", view}};
+        judge_all(judges, frame, view, drawer.draw(view, frame), labels, document, totals);
+      }
+    }
+  }
+  if (totals.judged == 0)
+    throw Error("no frame of {} was judged: give --isovalue, or a nearer eye", options.input);
+  return totals.failures;
+}
+
+void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) {
+  command.add_option("VOLUME", options.input, "judge frames of this volume instead of the suite");
+  add_volume_options(command, options.volume);
+  add_frame_options(command, options.frame);
+  command
+      .add_option("--oracle", options.oracles,
+                  "who judges frames: roots (every root on the ray, certified), cells (Embree through the "
+                  "dual cells) "
+                  "or mesh (Embree and triangles); repeat it [all]")
+      ->check(CLI::IsMember({"roots", "cells", "mesh"}))
+      ->allow_extra_args(false);  // one name each time: VOLUME may follow
+  command.add_option(
+      "--device", options.device,
+      "who draws frames: index, cpu, gpu, or a part of a device's name [the scalar reference]");
+}
+
+}  // namespace isowave::tools

@@ -1,0 +1,31 @@
+#pragma once
+// `isowave verify VOLUME`: whole frames, drawn by the scalar reference or a device, judged by up to three oracles.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tools/isowave/frame_options.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::tools {
+
+struct VerifyFramesOptions {
+  std::string input;  ///< empty: no frames
+  VolumeOptions volume;
+  FrameOptions frame;
+  std::vector<std::string> oracles;  ///< roots, cells, mesh; none: all
+  std::string device;                ///< empty: the scalar reference draws
+};
+
+/// Adds VOLUME, the options of volumes and frames, --oracle and --device.
+void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options);
+
+/// Draws every view and isovalue with every solver, prints a row for each oracle and adds it to document["frames"].
+/// Returns the rays missed, false or in a wrong cell. Throws Error, also when every frame had to be left out.
+std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vector<std::string> &solvers,
+                            nlohmann::ordered_json &document);
+
+}  // namespace isowave::tools
