@@ -22,6 +22,7 @@
 #include "reference/accuracy.hpp"
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
+#include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/render_stats.hpp"
 
@@ -103,11 +104,11 @@ class FrameOracle final : public HitOracle {
     const std::size_t num_pixels = std::size_t{subject.frame.width} * subject.frame.height;
     std::vector<OracleHit> hits(num_pixels);
     parallel_for(num_pixels, 0, [&](std::uint64_t pixel, std::uint32_t) {
-      hits[pixel] =
-          oracle_.first_hit(exact_ray(make_ray(&subject.frame, static_cast<std::uint32_t>(pixel))));
+      hits[pixel] = oracle_.first_hit(exact_ray(make_ray(&subject.frame, static_cast<std::uint32_t>(pixel))));
     });
     for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
-      known_.emplace(key(exact_ray(make_ray(&subject.frame, static_cast<std::uint32_t>(pixel)))), hits[pixel]);
+      known_.emplace(key(exact_ray(make_ray(&subject.frame, static_cast<std::uint32_t>(pixel)))),
+                     hits[pixel]);
     }
   }
   OracleHit first_hit(const OracleRay &ray) const override {
@@ -122,7 +123,8 @@ class FrameOracle final : public HitOracle {
  private:
   using Key = std::array<double, 6>;
   static Key key(const OracleRay &ray) {
-    return {ray.origin[0], ray.origin[1], ray.origin[2], ray.direction[0], ray.direction[1], ray.direction[2]};
+    return {ray.origin[0],    ray.origin[1],    ray.origin[2],
+            ray.direction[0], ray.direction[1], ray.direction[2]};
   }
   RootOracle oracle_;
   std::map<Key, OracleHit> known_;
@@ -227,7 +229,8 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
         return {240, 200, 0};
       default: {
         const auto grey = static_cast<std::uint8_t>(
-            160 + (shaded.pixels[3 * pixel] + shaded.pixels[3 * pixel + 1] + shaded.pixels[3 * pixel + 2]) / 8);
+            160 +
+            (shaded.pixels[3 * pixel] + shaded.pixels[3 * pixel + 1] + shaded.pixels[3 * pixel + 2]) / 8);
         return {grey, grey, grey};
       }
     }
@@ -255,7 +258,8 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
   const auto set = [&](std::uint32_t x, std::uint32_t y, std::array<std::uint8_t, 3> rgb) {
     std::copy(rgb.begin(), rgb.end(), picture.pixels.begin() + std::ptrdiff_t{3} * (y * picture.width + x));
   };
-  for (std::uint32_t pixel = 0; pixel < width * height; ++pixel) set(pixel % width, pixel / width, color(pixel));
+  for (std::uint32_t pixel = 0; pixel < width * height; ++pixel)
+    set(pixel % width, pixel / width, color(pixel));
   if (width < kPartWidth || height < kPartHeight) return picture;
   for (std::uint32_t y = 0; y < kZoom * kPartHeight; ++y) {
     for (std::uint32_t x = 0; x < kZoom * kPartWidth; ++x) {
@@ -265,13 +269,14 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
   return picture;
 }
 
-void write_failure_picture(const Options &options, const Subject &subject, const HitOracle &oracle, Solver solver,
-                           Renderer &renderer) {
+void write_failure_picture(const Options &options, const Subject &subject, const HitOracle &oracle,
+                           Solver solver, Renderer &renderer) {
   const std::vector<HitRecord> hits = renderer.hits();
   std::vector<Verdict> verdicts(hits.size());
   parallel_for(hits.size(), 0, [&](std::uint64_t pixel, std::uint32_t) {
     Accuracy tally;
-    judge(oracle, subject.frame, make_ray(&subject.frame, static_cast<std::uint32_t>(pixel)), hits[pixel], tally);
+    judge(oracle, subject.frame, make_ray(&subject.frame, static_cast<std::uint32_t>(pixel)), hits[pixel],
+          tally);
     verdicts[pixel] = verdict_of(tally);
   });
   const auto stem = subject.name.substr(0, subject.name.find('_'));
@@ -289,11 +294,15 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject, const Opt
   };
   std::vector<Run> runs;
   for (const Solver solver : compared_solvers()) {
-    if (solver.max_steps != solver_from_string(to_string(solver)).max_steps && solver.max_steps != 1) continue;
+    if (solver.max_steps != solver_from_string(to_string(solver)).max_steps && solver.max_steps != 1)
+      continue;
     RendererOptions renderer_options;
     renderer_options.size = {subject.frame.width, subject.frame.height};
     renderer_options.solver = solver;
-    Run run{solver, std::make_unique<Renderer>(device, subject.volume, renderer_options), {}, solver_json(solver)};
+    Run run{solver,
+            std::make_unique<Renderer>(device, subject.volume, renderer_options),
+            {},
+            solver_json(solver)};
     run.renderer->render(subject.camera, subject.isovalue);
     run.entry.update(accuracy_json(judge_frame(oracle, subject.frame, run.renderer->hits())));
     if (!options.pictures.empty() && solver.max_steps != 1) {
@@ -329,8 +338,9 @@ void print_results(const ordered_json &document) {
     fmt::print("{} at {}\n{:<11} {:>5} {:>9} {:>8} {:>8} {:>8}\n", frame["volume"].get<std::string>(),
                frame["isovalue"].dump(), "solver", "steps", "ms", "missed", "false", "unstable");
     for (const ordered_json &e : frame["entries"]) {
-      fmt::print("{:<11} {:>5} {:>9.2f} {:>8} {:>8} {:>8}\n", e["solver"].get<std::string>(), e["steps"].get<int>(),
-                 e["ms"].get<double>(), e["missed"].dump(), e["false"].dump(), e["unstable"].dump());
+      fmt::print("{:<11} {:>5} {:>9.2f} {:>8} {:>8} {:>8}\n", e["solver"].get<std::string>(),
+                 e["steps"].get<int>(), e["ms"].get<double>(), e["missed"].dump(), e["false"].dump(),
+                 e["unstable"].dump());
     }
   }
 }
@@ -357,7 +367,8 @@ void run_bench_solvers(const Options &options) {
       {"rounds", options.rounds}};
   document["cells"] = bench_cells(device, subjects, options.rounds);
   document["frames"] = ordered_json::array();
-  for (const Subject &subject : subjects) document["frames"].push_back(bench_frames(device, subject, options));
+  for (const Subject &subject : subjects)
+    document["frames"].push_back(bench_frames(device, subject, options));
   print_results(document);
   if (!options.json.empty()) write_json(document, options.json);
 }
@@ -366,7 +377,8 @@ void run_bench_solvers(const Options &options) {
 
 void add_bench_solvers(CLI::App &bench) {
   CLI::App *command = bench.add_subcommand(
-      "solvers", "Root finders: ns per ray-cell test and ms per frame beside their errors, by the exact oracle");
+      "solvers",
+      "Root finders: ns per ray-cell test and ms per frame beside their errors, by the exact oracle");
   const auto options = std::make_shared<Options>();
   command->add_option("VOLUME:ISOVALUE", options->volumes, "volumes and the isovalue of each")->required();
   add_volume_options(*command, options->volume);

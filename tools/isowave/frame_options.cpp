@@ -7,8 +7,6 @@
 
 namespace isowave::tools {
 
-namespace {
-
 ImageSize parse_size(const std::string &text) {
   ImageSize size;
   const char *end = text.data() + text.size();
@@ -19,6 +17,8 @@ ImageSize parse_size(const std::string &text) {
   }
   throw Error("--size {}: give WIDTHxHEIGHT in pixels, such as 1280x720", text);
 }
+
+namespace {
 
 std::string dims_text(const glm::uvec3 &dims) {
   return fmt::format("{}x{}x{}", dims.x, dims.y, dims.z);

@@ -25,6 +25,9 @@ struct FrameOptions {
 /// Adds --isovalue, --size, --orbit, --cameras and --rate. Returns the option --isovalue.
 CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options);
 
+/// "1280x720". Throws Error.
+ImageSize parse_size(const std::string &text);
+
 /// The volume and the views of it.
 struct Scene {
   CompressedVolume volume;
