@@ -132,8 +132,9 @@ static inline float refine_by_newton(Cubic c, Bracket bracket, int max_steps) {
       hi = s;
     }
     next = s - value / derivative;
+    /* Before the bracket is asked: at the root itself rounding may point out of it. */
+    if (fabs(next - s) < ISO_ROOT_STEP) return s;
     if (!(next > lo && next < hi)) next = 0.5f * (lo + hi); /* also when derivative = 0 */
-    if (fabs(next - s) < ISO_ROOT_STEP) return next;
     s = next;
   }
   return s;
