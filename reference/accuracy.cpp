@@ -112,10 +112,15 @@ Quantiles quantiles(std::vector<double> values) {
   return {at(0.5), at(0.99), at(1.0)};
 }
 
-bool depth_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord &record,
+bool place_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord &record,
                 const RendererHit &hit) {
+  const double speed = speed_of(ray);
   const double difference = std::abs(double(record.t) / double(frame.t_scale) - hit.t);
-  return difference <= 0x1p-21 * (std::abs(hit.t) + 1 / speed_of(ray));
+  Vec beside;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    beside[axis] = hit.point[axis] - (ray.origin[axis] + hit.t * ray.direction[axis]);
+  }
+  return difference <= 0x1p-21 * (std::abs(hit.t) + 1 / speed) && length(beside) <= 0x1p-20;
 }
 
 void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
@@ -126,8 +131,8 @@ void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, co
   const double speed = speed_of(exact);
   ++tally.rays;
   tally.hits += truth.hit;
-  if (got.hit && !depth_fits(frame, exact, record, got)) {
-    ++tally.wrong_depths;
+  if (got.hit && !place_fits(frame, exact, record, got)) {
+    ++tally.wrong_places;
     if (std::isnan(got.t)) return;  // no position to judge
   }
   const Vec from_centre{exact.origin[0] - 0.5 * (frame.dims_x - 1),
@@ -164,7 +169,7 @@ void merge(Accuracy &into, const Accuracy &from) {
   into.false_hits += from.false_hits;
   into.wrong_cells += from.wrong_cells;
   into.at_faces += from.at_faces;
-  into.wrong_depths += from.wrong_depths;
+  into.wrong_places += from.wrong_places;
   into.unstable += from.unstable;
   into.distance.insert(into.distance.end(), from.distance.begin(), from.distance.end());
   into.residual.insert(into.residual.end(), from.residual.begin(), from.residual.end());

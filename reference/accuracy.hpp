@@ -1,5 +1,5 @@
 #pragma once
-// The renderer's hits against an oracle's: what is missed, what is false, what is in a wrong cell, and how far hits are off.
+// The renderer's hits against an oracle's: what is missed, false or in a wrong cell, and how far hits are off.
 
 #include <cstdint>
 #include <functional>
@@ -28,13 +28,13 @@ struct Accuracy {
   std::uint64_t false_hits = 0;   ///< the renderer hits where the oracle does not, on a stable ray
   std::uint64_t wrong_cells = 0;  ///< the same hit, but in a cell that does not hold it, on a stable ray
   std::uint64_t at_faces = 0;  ///< the same hit in two cells, so near their common face that both are right
-  std::uint64_t wrong_depths = 0;  ///< hits whose float32 t is not that of their own cell and position
-  std::uint64_t unstable = 0;    ///< disagreements on rays whose answer changes when they are moved sideways
-  std::vector<double> distance;  ///< |t - t_oracle| of hits in both, along the ray [voxels]
-  std::vector<double> residual;  ///< |field - isovalue| / |gradient| at the renderer's hit [voxels]; none
-                                 ///< where the gradient is 0
+  std::uint64_t wrong_places = 0;  ///< hits beside their ray, or whose float32 t is not that of their place
+  std::uint64_t unstable = 0;      ///< disagreements with nobody to blame: see judge() and mesh_oracle.hpp
+  std::vector<double> distance;    ///< |t - t_oracle| of hits in both, along the ray [voxels]
+  std::vector<double> residual;    ///< |field - isovalue| / |gradient| at the renderer's hit [voxels]; none
+                                   ///< where the gradient is 0
 
-  std::uint64_t failures() const { return missed + false_hits + wrong_cells + wrong_depths; }
+  std::uint64_t failures() const { return missed + false_hits + wrong_cells + wrong_places; }
 };
 
 /// A renderer's hit in double precision, index space.
@@ -50,9 +50,9 @@ RendererHit renderer_hit(const FrameParams &frame, const OracleRay &ray, const H
 
 /// The renderer's ray, its float32 numbers taken as exact.
 OracleRay exact_ray(const Ray &ray);
-/// Is the record's t, a depth in world units, that of its position to within float32? Both come from one place in the cell,
-/// each with a few roundings: of t, and of a local position of at most 1 voxel.
-bool depth_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord &record,
+/// Is the hit on its ray, and the record's t, a depth in world units, that of its place? To within float32: t and
+/// a local position of at most 1 voxel have a few roundings each.
+bool place_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord &record,
                 const RendererHit &hit);
 /// Voxels per unit of the ray's t.
 double speed_of(const OracleRay &ray);

@@ -280,6 +280,15 @@ class TracedMesh {
   EmbreeScene scene_;
 };
 
+namespace {
+
+std::array<double, 3> on_ray(const OracleRay &ray, double t) {
+  return {ray.origin[0] + t * ray.direction[0], ray.origin[1] + t * ray.direction[1],
+          ray.origin[2] + t * ray.direction[2]};
+}
+
+}  // namespace
+
 /// A box of points `spacing` voxels apart, numbered from the volume's origin: [begin, begin + count) along each axis.
 struct FineGrid {
   double spacing;
@@ -301,12 +310,6 @@ struct FineGrid {
 
   double place(std::size_t axis, std::uint32_t i) const {
     return spacing * static_cast<double>(begin[axis] + i);
-  }
-  bool contains(const std::array<double, 3> &point) const {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (point[axis] < place(axis, 0) || point[axis] > place(axis, count[axis] - 1)) return false;
-    }
-    return true;
   }
   /// The ray from its point at `t` on, in units of the grid; one unit of t is what it was.
   OracleRay local(const OracleRay &ray, double t) const {
@@ -375,15 +378,15 @@ std::optional<double> MeshOracle::agrees_refined(const OracleRay &ray, const Ren
                                                  double at) const {
   const double speed = speed_of(ray);
   for (const double spacing : {1.0 / 4, 1.0 / 16, 1.0 / 64, 1.0 / 256}) {
-    std::array<double, 3> centre;
-    for (std::size_t axis = 0; axis < 3; ++axis) centre[axis] = ray.origin[axis] + at * ray.direction[axis];
-    const FineGrid grid(spacing, centre, dims_);
+    const FineGrid grid(spacing, on_ray(ray, at), dims_);
     const TracedMesh mesh = refined(grid);
     // From just before the grid, whose diagonal is 31 spacings: the fine ray's float32 numbers are small.
     const double start = std::max(from, at - 40 * spacing / speed);
+    // The part of the ray that is in the grid for certain; the grid ends at the domain's border, a false hit may not.
+    const double reach = 8 * spacing / speed;
     const auto agrees = [&](double t) {
-      return t == kInfinity ? !(got.hit && grid.contains(got.point))
-                            : got.hit && std::abs(start + t - got.t) * speed <= 4 * spacing * kCellDiagonal;
+      if (t == kInfinity) return !(got.hit && std::abs(got.t - at) <= reach);
+      return got.hit && std::abs(start + t - got.t) * speed <= 4 * spacing * kCellDiagonal;
     };
     const OracleRay fine = grid.local(ray, start);
     const double t = mesh.first_hit(fine);
@@ -394,7 +397,7 @@ std::optional<double> MeshOracle::agrees_refined(const OracleRay &ray, const Ren
           agreed = agrees(mesh.first_hit(moved_sideways(fine, offset, i)));
       }
     }
-    if (agreed) return at + 8 * spacing / speed;  // within the grid
+    if (agreed) return at + reach;
     at = got.hit ? std::min(start + t, got.t) : start + t;
   }
   return std::nullopt;
@@ -409,7 +412,7 @@ void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, c
   const auto agrees = [&] { return t_mesh == t_got || std::abs(t_mesh - t_got) * speed <= kCellDiagonal; };
   ++tally.rays;
   tally.hits += std::isfinite(t_mesh);
-  if (got.hit && !depth_fits(frame, exact, record, got)) ++tally.wrong_depths;
+  if (got.hit && !place_fits(frame, exact, record, got)) ++tally.wrong_places;
   if (std::isnan(t_got)) return;
   if (agrees()) {
     if (got.hit) tally.distance.push_back(std::abs(t_mesh - t_got) * speed);

@@ -9,16 +9,16 @@
 //
 // What can be judged by it: the triangles are not the trilinear surface, but both lie in the same cells. Rule:
 //   - renderer and mesh agree where both miss, or both hit within a cell's diagonal, sqrt(3) voxels, along the ray;
-//   - else either may be right: at silhouettes, and in cells whose corners are inside and outside in turns, where a ray
-//     may pass between sheets that the triangles join. So the field around the first of the two hits is sampled
-//     four times as finely, which leaves the trilinear surface what it is and brings the triangles nearer to it. In that
-//     box the rule is asked again, with a tolerance of sqrt(3) voxels at first and a quarter of it each further time, to
+//   - else either may be right: at silhouettes, and in cells whose corners are inside and outside in turns, where a
+//     ray may pass between sheets that the triangles join. So the field around the first of the two hits is sampled
+//     four times as finely, which leaves the trilinear surface what it is and brings the triangles nearer to it. In
+//     that box the rule is asked again, with a tolerance of sqrt(3) voxels at first and a quarter of it each further time, to
 //     1/256 voxel. Of the finest triangles it is enough that a ray moved sideways by up to 1/256 voxel in one of
 //     eight directions gives the renderer's answer. Where finer triangles agree with the renderer, the pixel is
 //     counted as unstable, and the ray goes on behind that box;
 //   - the rest are failures: missed where the mesh's hit comes first, false where the renderer's does.
-// So it finds holes, leaks and surfaces in wrong places, however small, but hits in the right place only to a cell's
-// diagonal; the other oracles judge those.
+// So it finds holes, leaks and surfaces in wrong places, of single pixels too, but knows the right place only to a
+// cell's diagonal; the other oracles judge what is within.
 
 #include <array>
 #include <cstdint>
@@ -65,7 +65,7 @@ class MeshOracle {
   /// Throws std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp).
   double first_hit(const OracleRay &ray, double from = 0) const;
 
-  /// Samples the field around the ray's point at t = `at` ever more finely, until the triangles agree with the renderer.
+  /// Samples the field around the ray's point at t = `at` ever more finely, until triangles agree with the renderer.
   /// Looks at nothing before t = `from` <= at. Returns the t, beyond `from`, up to which they do, or none.
   std::optional<double> agrees_refined(const OracleRay &ray, const RendererHit &got, double from,
                                        double at) const;

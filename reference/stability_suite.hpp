@@ -32,7 +32,7 @@ struct CaseResult {
   Accuracy accuracy;
   std::uint64_t resumed_differently = 0;  ///< rays whose hit has other bits when walked block by block
 
-  /// Rays missed, false, in a wrong cell, with a wrong depth or resumed differently.
+  /// Rays missed, false, in a wrong cell, in a wrong place or resumed differently.
   std::uint64_t failures() const { return accuracy.failures() + resumed_differently; }
 };
 

@@ -263,7 +263,7 @@ TEST_F(CellOracleFrame, WithANeighboursCellIsWrong) {
 TEST_F(CellOracleFrame, WithAnotherDepthIsWrong) {
   hit_in_cell(7).t *= 1 + 1e-5f;
   const Accuracy tally = judge_frame(oracle, frame, hits);
-  EXPECT_EQ(tally.wrong_depths, 1u);
+  EXPECT_EQ(tally.wrong_places, 1u);
   EXPECT_EQ(tally.failures(), 1u);
 }
 

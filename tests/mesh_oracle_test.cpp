@@ -204,7 +204,7 @@ TEST_F(MeshOracleFrame, WithAHitInAnotherBlockIsWrong) {
   middle(hits).block_id += 1;
   const Accuracy tally = judge_hits(sphere, 0.5f, hits);
   EXPECT_EQ(tally.missed + tally.false_hits, 1u);
-  EXPECT_EQ(tally.wrong_depths, 1u) << "its t is still the old one";
+  EXPECT_EQ(tally.wrong_places, 1u) << "it is not on its ray";
 }
 
 /// Refinement excuses disagreements; on a noise volume, the worst case, lost hits must still be seen.

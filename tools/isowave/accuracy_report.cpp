@@ -14,7 +14,7 @@ nlohmann::ordered_json quantiles_json(const Quantiles &q) {
 
 void print_accuracy_header(std::string_view what) {
   fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays", "hits",
-             "missed", "false", "cell", "depth", "at faces", "unstable", "|dt| p50, p99, max [voxels]",
+             "missed", "false", "cell", "place", "at faces", "unstable", "|dt| p50, p99, max [voxels]",
              "|f-iso|/|grad f| p99, max");
 }
 
@@ -22,7 +22,7 @@ void print_accuracy(std::string_view name, const Accuracy &tally) {
   const Quantiles distance = quantiles(tally.distance), residual = quantiles(tally.residual);
   fmt::print(
       "{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:.1e}, {:.1e}, {:.1e}  {:.1e}, {:.1e}\n",
-      name, tally.rays, tally.hits, tally.missed, tally.false_hits, tally.wrong_cells, tally.wrong_depths,
+      name, tally.rays, tally.hits, tally.missed, tally.false_hits, tally.wrong_cells, tally.wrong_places,
       tally.at_faces, tally.unstable, distance.p50, distance.p99, distance.max, residual.p99, residual.max);
 }
 
@@ -32,7 +32,7 @@ nlohmann::ordered_json accuracy_json(const Accuracy &tally) {
           {"missed", tally.missed},
           {"false", tally.false_hits},
           {"wrong_cells", tally.wrong_cells},
-          {"wrong_depths", tally.wrong_depths},
+          {"wrong_places", tally.wrong_places},
           {"at_faces", tally.at_faces},
           {"unstable", tally.unstable},
           {"distance_voxels", quantiles_json(quantiles(tally.distance))},

@@ -79,8 +79,7 @@ void run_verify(Options options) {
     }
   }
   if (!options.json.empty()) write_json(document, options.json);
-  if (failures != 0)
-    throw Error("{} rays were missed, false, in a wrong cell, at a wrong depth or leaked", failures);
+  if (failures != 0) throw Error("{} rays were missed, false, in a wrong cell or place, or leaked", failures);
 }
 
 }  // namespace

@@ -52,9 +52,9 @@ FrameJudge make_judge(const std::string &name, std::span<const float> voxels, co
   }
   if (name == "mesh") {
     const auto oracle = std::make_shared<const MeshOracle>(voxels, dims, isovalue);
-    return judge_by(
-        name, oracle,
-        with_commas(oracle->num_triangles()) + " triangles in Embree; unstable: silhouette pixels");
+    return judge_by(name, oracle,
+                    with_commas(oracle->num_triangles()) +
+                        " triangles in Embree; unstable: finer ones agree with the frame");
   }
   FrameJudge judge =
       judge_by(name, std::make_shared<const RootOracle>(voxels, dims, isovalue), "every cell, certified");

@@ -1,0 +1,69 @@
+// `isowave verify VOLUME`, run as a user runs it: which oracles judge, what is left out, and how it fails.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "tests/run_program.hpp"
+
+namespace isowave {
+namespace {
+
+using nlohmann::json;
+using test::run_isowave;
+using test::TemporaryFolder;
+using test::write_file;
+
+const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
+
+TEST(CliVerify, JudgesFramesByEveryOracle) {
+  const TemporaryFolder folder;
+  const auto run = run_isowave(fmt::format("verify {} --isovalue 100 --size 64x48 --json '{}'", kNucleon,
+                                           (folder / "v.json").string()));
+  EXPECT_EQ(run.status, 0) << run.out << run.err;
+  const json document = json::parse(test::read_file(folder / "v.json"));
+  std::set<std::string> oracles;
+  for (const json &frame : document.at("frames")) {
+    oracles.insert(frame.at("oracle"));
+    EXPECT_EQ(frame.at("drawn_by"), "scalar reference");
+    EXPECT_GT(frame.at("hits"), 100);
+    for (const char *count : {"missed", "false", "wrong_cells", "wrong_places"})
+      EXPECT_EQ(frame.at(count), 0);
+  }
+  EXPECT_EQ(oracles, (std::set<std::string>{"cells", "mesh", "roots"}));
+}
+
+TEST(CliVerify, JudgesADevicesFramesByTheOraclesAskedFor) {
+  const auto run = run_isowave("verify --oracle cells --oracle mesh " + kNucleon +
+                               " --isovalue 100 --size 64x48 --device 0");
+  EXPECT_EQ(run.status, 0) << run.out << run.err;
+  EXPECT_NE(run.out.find("device 0: "), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("cells, isovalue 100, view 0"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("mesh, isovalue 100, view 0"), std::string::npos) << run.out;
+  EXPECT_EQ(run.out.find("roots, isovalue 100, view 0"), std::string::npos) << run.out;
+}
+
+TEST(CliVerify, NamesViewsOutOfEmbreesReach) {
+  const TemporaryFolder folder;
+  write_file(folder / "far.json",
+             R"({"dims":[41,41,41],"spacing":[1,1,1],"width":32,"height":24,"fovy_deg":0.05,
+    "cameras":[{"eye":[20,20,100000],"at":[20,20,20],"up":[0,1,0]}]})");
+  const std::string arguments =
+      fmt::format("verify {} --isovalue 100 --cameras '{}'", kNucleon, (folder / "far.json").string());
+  const auto run = run_isowave(arguments);
+  EXPECT_EQ(run.status, 0) << run.out << run.err;
+  EXPECT_NE(run.out.find("left out: the eye is 100000 voxels"), std::string::npos) << run.out;
+  const auto only_cells = run_isowave(arguments + " --oracle cells");
+  EXPECT_EQ(only_cells.status, 1) << "nothing was judged";
+  EXPECT_NE(only_cells.err.find("no frame"), std::string::npos) << only_cells.err;
+}
+
+TEST(CliVerify, RefusesWhatItCannotDo) {
+  test::expect_one_line_error("verify --oracle cells", "give a VOLUME");
+  EXPECT_NE(run_isowave("verify " + kNucleon + " --isovalue 100 --oracle nobody").status, 0);
+}
+
+}  // namespace
+}  // namespace isowave
