@@ -132,8 +132,8 @@ static inline float refine_by_newton(Cubic c, Bracket bracket, int max_steps) {
       hi = s;
     }
     next = s - value / derivative;
-    /* Before the bracket is asked: at the root itself rounding may point out of it. */
-    if (fabs(next - s) < ISO_ROOT_STEP) return s;
+    /* Not a root of the other direction just outside; and before the bracket is asked, of which s is an end now. */
+    if ((derivative > 0.0f) != in_lo && fabs(next - s) < ISO_ROOT_STEP) return s;
     if (!(next > lo && next < hi)) next = 0.5f * (lo + hi); /* also when derivative = 0 */
     s = next;
   }

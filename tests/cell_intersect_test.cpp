@@ -237,6 +237,10 @@ TEST(CellIntersect, FirstChangeIsHalfOpen) {
       {{-1, 3, -3, 1}, true, 0.11270167f},  // three roots: 1/2 and 1/2 +- sqrt(3/20)
       {{1, -3, 3, -1}, true, 0.11270167f},
       {{-1, 3, 3, -1}, true, 0.5f * (1 - 0.81649658f)},  // a hump; the far side is not asked for
+      {{-3, 3.5f, 4.8333335f, 0},
+       true,
+       0.17985765f},  // another root, at the end, is where Newton would start
+      {{0, 1.7488135f, -0.07187828f, -5.106889f}, true, 0.49816295f},
   };
   for (const Case &k : cases) {
     SCOPED_TRACE(text_of(k.c));
