@@ -4,13 +4,9 @@
 
 namespace isowave::tools {
 
-namespace {
-
 nlohmann::ordered_json quantiles_json(const Quantiles &q) {
   return {{"p50", q.p50}, {"p99", q.p99}, {"max", q.max}};
 }
-
-}  // namespace
 
 void print_accuracy_header(std::string_view what) {
   fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays", "hits",

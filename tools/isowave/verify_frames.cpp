@@ -12,6 +12,7 @@
 #include "reference/cell_oracle.hpp"
 #include "reference/embree_reach.hpp"
 #include "reference/mesh_oracle.hpp"
+#include "reference/ray_rounding.hpp"
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
 #include "tools/isowave/accuracy_report.hpp"
@@ -153,7 +154,13 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vecto
                                      {"solver", solver},
                                      {"isovalue", isovalue},
                                      {"view", view}};
-        judge_all(judges, frame, view, drawer.draw(view, frame), labels, document, totals);
+        const std::vector<HitRecord> hits = drawer.draw(view, frame);
+        judge_all(judges, frame, view, hits, labels, document, totals);
+        const Quantiles rounding =
+            quantiles(ray_rounding(scene.volume.info, scene.cameras[view], scene.size, hits));
+        fmt::print("{:<28} float32 rays are off the camera's by p50 {:.1e}, p99 {:.1e}, max {:.1e} voxels\n",
+                   "", rounding.p50, rounding.p99, rounding.max);
+        document["ray_rounding_voxels"].push_back(quantiles_json(rounding));
       }
     }
   }
