@@ -20,15 +20,14 @@ std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, I
   for (std::size_t pixel = 0; pixel < hits.size(); ++pixel) {
     const HitRecord &hit = hits[pixel];
     if (!std::isfinite(hit.t)) continue;
-    const auto column = static_cast<double>(pixel % size.width),
-               row = static_cast<double>(pixel / size.width);
-    const double u = (2 * (column + 0.5) / size.width - 1) * a * size.width / size.height;
-    const double v = (1 - 2 * (row + 0.5) / size.height) * a;
+    const std::size_t column = pixel % size.width, row = pixel / size.width;
+    const double u = (2 * (double(column) + 0.5) / size.width - 1) * a * size.width / size.height;
+    const double v = (1 - 2 * (double(row) + 0.5) / size.height) * a;
     const glm::dvec3 direction = glm::normalize(to_index * (fwd + u * right + v * up));
-    const glm::dvec3 block(hit.block_id % blocks.x, hit.block_id / blocks.x % blocks.y,
+    const glm::uvec3 block(hit.block_id % blocks.x, hit.block_id / blocks.x % blocks.y,
                            hit.block_id / blocks.x / blocks.y);
-    const glm::dvec3 cell(hit.cell & 3u, hit.cell >> 2 & 3u, hit.cell >> 4);
-    const glm::dvec3 point = 4.0 * block + cell + glm::dvec3(hit.x, hit.y, hit.z);
+    const glm::uvec3 cell = 4u * block + glm::uvec3(hit.cell & 3u, hit.cell >> 2 & 3u, hit.cell >> 4);
+    const glm::dvec3 point = glm::dvec3(cell) + glm::dvec3(hit.x, hit.y, hit.z);
     distances.push_back(glm::length(glm::cross(point - eye, direction)));
   }
   return distances;

@@ -177,6 +177,7 @@ ordered_json bench_cells(ocl::Device &device, const std::vector<Subject> &subjec
     truth[i] = first_change_of_cubic({c.b0, c.b1, c.b2, c.b3}).value_or(-1);
   });
   std::vector<Cubic> cubics;
+  cubics.reserve(segments.size());
   for (const CellSegment &segment : segments) cubics.push_back(segment.cubic);
   const ocl::Buffer<Cubic> on_device(device, "cubics", std::span<const Cubic>(cubics));
   ocl::Buffer<float> roots(device, "roots", cubics.size());
