@@ -13,7 +13,6 @@ namespace isowave {
 inline constexpr Solver kDefaultSolver{ISO_SOLVER_BERNSTEIN, 32};
 
 inline constexpr std::array<std::string_view, 4> kSolverNames{"linear", "marmitt", "analytic", "bernstein"};
-inline constexpr int kMaxSolverSteps = 64;
 
 /// "linear", "marmitt", "analytic", "bernstein".
 std::string_view to_string(Solver solver);

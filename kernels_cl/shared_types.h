@@ -66,8 +66,9 @@ ISO_CHECK_SIZE(FrameParams, 100);
 
 /// The result of one ray-block pair: which of the block's 64 dual cells the ray hits first, and where.
 typedef struct PairHit {
-  uint cell;  ///< x + 4 y + 16 z in the block, ISO_NO_HIT or ISO_NOT_TESTED
-  float s;    ///< position between the ray's entry (0) and exit (1) of that cell
+  uint
+      cell;  ///< x + 4 y + 16 z in the block, ISO_NO_HIT or ISO_NOT_TESTED; between kernels also + ISO_IN_DOUBT
+  float s;  ///< position between the ray's entry (0) and exit (1) of that cell
 } PairHit;
 ISO_CHECK_SIZE(PairHit, 8);
 

@@ -1,9 +1,9 @@
 /// solve_bernstein.h -- sign variations of Bernstein coefficients reject and isolate, bracketed Newton refines [Yuksel 2022];
 /// where float rounding would decide between crossing and passing by, 48-bit arithmetic decides.
 ///
-/// Guarantees: a change of inside between entry and exit is always found. A pair of crossings is found down to 2^-40
-/// or so of the largest coefficient. Nothing is divided by a leading coefficient. The result lies in a bracket
-/// whose ends differ in inside.
+/// Guarantees: a change of inside between entry and exit is always found. A pair of crossings is found also where it is
+/// shallower than the rounding of the float coefficients. Nothing is divided by a leading coefficient. The result
+/// lies in a bracket whose ends differ in inside.
 /// Fails: crossings that only the rounding of the positions of entry and exit (2^-25 voxels) removes or adds.
 #ifndef ISOWAVE_SOLVE_BERNSTEIN_H
 #define ISOWAVE_SOLVE_BERNSTEIN_H

@@ -11,7 +11,7 @@
 ///   linear      every even number of crossings          false position      least
 ///   marmitt     extrema lost to its naive quadratic     false position      low
 ///   analytic    roots lost to cancellation              none (closed form)  most: cube root, arc cosine
-///   bernstein   nothing above 2^-40                     bracketed Newton    low
+///   bernstein   nothing above rounding of entry, exit   bracketed Newton    low
 ///
 /// A kernel is built for one solver (-D ISO_SOLVER, -D ISO_ROOT_STEPS); the twin takes it as a value.
 #ifndef ISOWAVE_SOLVER_H

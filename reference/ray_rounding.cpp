@@ -4,6 +4,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "reference/accuracy.hpp"
+
 namespace isowave {
 
 std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, ImageSize size,
@@ -15,7 +17,7 @@ std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, I
   const glm::dvec3 fwd = glm::normalize(camera.at - camera.eye);
   const glm::dvec3 right = glm::normalize(glm::cross(fwd, camera.up)), up = glm::cross(right, fwd);
   const double a = std::tan(camera.fovy_deg * std::numbers::pi / 360);
-  const glm::uvec3 blocks = (info.dims + 3u) / 4u;
+  const FrameParams frame = make_frame_params(info, camera, size, 0);
   std::vector<double> distances;
   for (std::size_t pixel = 0; pixel < hits.size(); ++pixel) {
     const HitRecord &hit = hits[pixel];
@@ -24,10 +26,9 @@ std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, I
     const double u = (2 * (double(column) + 0.5) / size.width - 1) * a * size.width / size.height;
     const double v = (1 - 2 * (double(row) + 0.5) / size.height) * a;
     const glm::dvec3 direction = glm::normalize(to_index * (fwd + u * right + v * up));
-    const glm::uvec3 block(hit.block_id % blocks.x, hit.block_id / blocks.x % blocks.y,
-                           hit.block_id / blocks.x / blocks.y);
-    const glm::uvec3 cell = 4u * block + glm::uvec3(hit.cell & 3u, hit.cell >> 2 & 3u, hit.cell >> 4);
-    const glm::dvec3 point = glm::dvec3(cell) + glm::dvec3(hit.x, hit.y, hit.z);
+    const auto [x, y, z] =
+        renderer_hit(frame, exact_ray(make_ray(&frame, static_cast<std::uint32_t>(pixel))), hit).point;
+    const glm::dvec3 point(x, y, z);
     distances.push_back(glm::length(glm::cross(point - eye, direction)));
   }
   return distances;

@@ -53,12 +53,6 @@ std::vector<Solver> compared_solvers() {
   return result;
 }
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return 0.5 * (values[n / 2] + values[(n - 1) / 2]);
-}
-
 double ms_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
@@ -201,7 +195,7 @@ ordered_json bench_cells(ocl::Device &device, const std::vector<Subject> &subjec
       ns[i].push_back(ms_since(begin) * 1e6 / kLaunches / double(cubics.size()));
     }
   }
-  for (std::size_t i = 0; i < solvers.size(); ++i) entries[i]["ns"] = median(ns[i]);
+  for (std::size_t i = 0; i < solvers.size(); ++i) entries[i]["ns"] = quantiles(ns[i]).p50;
   return {{"segments", segments.size()},
           {"hits", std::count_if(truth.begin(), truth.end(), [](double s) { return s >= 0; })},
           {"entries", entries}};
@@ -316,7 +310,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject, const Opt
   }
   ordered_json entries = ordered_json::array();
   for (Run &run : runs) {
-    run.entry["ms"] = median(run.ms);
+    run.entry["ms"] = quantiles(run.ms).p50;
     entries.push_back(run.entry);
   }
   return {{"volume", subject.name},
@@ -347,11 +341,9 @@ void print_results(const ordered_json &document) {
 }
 
 void run_bench_solvers(const Options &options) {
-  for (const std::string &output : {options.json}) {
-    const std::filesystem::path folder = std::filesystem::path(output).parent_path();
-    if (!folder.empty() && !std::filesystem::is_directory(folder))
-      throw Error("cannot write {}: {} is no folder", output, folder.string());
-  }
+  const std::filesystem::path folder = std::filesystem::path(options.json).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    throw Error("cannot write {}: {} is no folder", options.json, folder.string());
   if (!options.pictures.empty() && !std::filesystem::is_directory(options.pictures))
     throw Error("cannot write pictures: {} is no folder", options.pictures);
   check_image_size(parse_size(options.size));
