@@ -24,9 +24,10 @@ class CacheInput {
               make_block_pairs(distribution, num_pairs, kNumVisible, static_cast<std::uint32_t>(key_bits),
                                1)},
         rays_(device, num_pairs),
-        cache_(device, std::uint64_t{1} << key_bits, static_cast<std::uint32_t>(num_needed()), num_pairs,
-               kGroupSize) {
-    const FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
+        cache_(device, cube_params(static_cast<std::uint32_t>(key_bits)),
+               static_cast<std::uint32_t>(num_needed()), num_pairs, kGroupSize) {
+    FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
+    params.table_groups = cache_.table_groups;
     rays_.frame.write({&params, 1});
     for (int set = 0; set < 2; ++set) {
       open_pass(true);
@@ -56,7 +57,8 @@ class CacheInput {
     requested_ = true;
   }
   void assign() {
-    cache_.assign_slots(rays_);
+    cache_.evict(rays_);
+    cache_.assign(rays_);
     requested_ = false;
   }
   /// Gives slots to requests that have none yet.
@@ -67,13 +69,13 @@ class CacheInput {
  private:
   void verify_requests() {
     std::vector<uint> ids(rays_.counts.read()[0].requested_count);
-    cache_.decode_block_ids().read(ids);
+    cache_.request_block_ids.read(ids);
     std::sort(ids.begin(), ids.end());
     check(ids == sets_[turn_].needed_block_ids, "list of missing blocks");
   }
   void verify_slots() {
     check(rays_.counts.read()[0].decoded_count == num_needed(), "number of blocks granted");
-    std::vector<uint> ids = cache_.slot_block_ids().read();
+    std::vector<uint> ids = cache_.slot_block_ids.read();
     std::sort(ids.begin(), ids.end());
     check(ids == sets_[turn_].needed_block_ids, "blocks in the slots");
   }

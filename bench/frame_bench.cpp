@@ -16,6 +16,7 @@
 #include "core/error.hpp"
 #include "core/renderer.hpp"
 #include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::bench {
@@ -24,12 +25,11 @@ namespace {
 
 struct Options {
   std::string volume, device, json;
-  std::string solver{to_string(kDefaultSolver)};
   tools::VolumeOptions volume_options;
   std::optional<float> isovalue;
   std::uint32_t rate = 4, orbit = 10, rounds = 3;
   std::vector<std::uint32_t> size = {1280, 720};
-  RendererOptions renderer;
+  tools::RendererFlags renderer;
 };
 
 /// The one asked for, or the middle of the volume's values.
@@ -89,9 +89,7 @@ FrameReport measure(const Options &options, std::string command) {
   report.command = std::move(command);
   report.volume = options.volume;
   report.isovalue = isovalue_of(options, volume);
-  report.options = options.renderer;
-  report.options.size = {options.size.at(0), options.size.at(1)};
-  report.options.solver = solver_from_string(options.solver);
+  report.options = tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1)});
   report.rounds = options.rounds;
   {
     ocl::Device device(device_info);
@@ -130,16 +128,7 @@ void add_options(CLI::App &app, Options &options) {
       ->capture_default_str();
   app.add_option("--device", options.device,
                  "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
-  app.add_option("--max-speculation", options.renderer.max_speculation,
-                 "most blocks a ray looks ahead, 1..64; 1 is none")
-      ->capture_default_str();
-  app.add_option("--cache-slots", options.renderer.cache_slots,
-                 "decoded blocks kept on the device, at least 8 [2^18 or all]")
-      ->check(CLI::Range(8u, 1u << 30));
-  app.add_option("--solver", options.solver, "root finder: linear, marmitt, analytic or bernstein")
-      ->capture_default_str();
-  app.add_option("--group-size", options.renderer.group_size, "work-items per work-group, 8..256")
-      ->capture_default_str();
+  tools::add_renderer_options(app, options.renderer);
   app.add_option("--json", options.json, "also write everything to this file");
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "bench/run_info.hpp"
+#include "tools/isowave/renderer_options.hpp"
 
 namespace isowave::bench {
 
@@ -192,20 +193,19 @@ std::string utc_now() {
 }
 
 ordered_json options_json(const FrameReport &report) {
-  return {{"volume", report.volume},
-          {"dims", {report.grid.info.dims.x, report.grid.info.dims.y, report.grid.info.dims.z}},
-          {"type", to_string(report.grid.info.type)},
-          {"blocks", report.grid.block_count()},
-          {"rate", report.grid.rate()},
-          {"isovalue", report.isovalue},
-          {"width", report.options.size.width},
-          {"height", report.options.size.height},
-          {"views", report.views.size()},
-          {"rounds", report.rounds},
-          {"cache_slots", report.options.cache_slots},
-          {"max_speculation", report.options.max_speculation},
-          {"solver", to_string(report.options.solver)},
-          {"group_size", report.options.group_size}};
+  nlohmann::ordered_json json = {
+      {"volume", report.volume},
+      {"dims", {report.grid.info.dims.x, report.grid.info.dims.y, report.grid.info.dims.z}},
+      {"type", to_string(report.grid.info.type)},
+      {"blocks", report.grid.block_count()},
+      {"rate", report.grid.rate()},
+      {"isovalue", report.isovalue},
+      {"width", report.options.size.width},
+      {"height", report.options.size.height},
+      {"views", report.views.size()},
+      {"rounds", report.rounds}};
+  json.update(tools::renderer_options_json(report.options));
+  return json;
 }
 
 }  // namespace

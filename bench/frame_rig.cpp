@@ -20,17 +20,18 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
       stream(device, volume),
       rays(device, setup.size.num_pixels()),
       macrocells(device, rays.frame, params, stream.words, stream.bits_per_block),
-      cache(device, volume.block_count(), slots_of(volume, setup), rays.num_pixels, kGroupSize),
+      cache(device, params, slots_of(volume, setup), rays.num_pixels, kGroupSize),
       compaction(device, rays.num_pixels, kGroupSize),
       initial_rays(device, rays.num_pixels),
       speculation(device),
       traverse(device, rays.num_pixels, kGroupSize),
-      zfp_decode(device, cache.num_slots()),
-      group(device, rays.num_pixels, cache.num_slots(), kGroupSize),
+      zfp_decode(device, cache.num_slots),
+      group(device, rays.num_pixels, cache.num_slots, kGroupSize),
       intersect(device, rays.num_pixels, kGroupSize),
       composite(device, rays.num_pixels) {
   params.isovalue_index = macrocells.isovalue_index(setup.isovalue);
   params.max_spec_count = setup.max_speculation;
+  params.table_groups = cache.table_groups;
   rays.frame.write({&params, 1});
   macrocells.select(rays.frame);
 }
@@ -55,8 +56,9 @@ void FrameRig::thin_wavefront(std::uint32_t spec_count) {
 void FrameRig::find_blocks() {
   traverse(macrocells, rays);
   cache.request(rays);
-  cache.assign_slots(rays);
-  zfp_decode(stream, rays.counts, cache.decode_block_ids(), cache.decode_slots(), cache.values());
+  cache.evict(rays);
+  cache.assign(rays);
+  zfp_decode(stream, rays.counts, cache.request_block_ids, cache.decode_slots, cache.values);
   group(cache, rays, compaction);
 }
 

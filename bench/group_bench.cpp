@@ -35,7 +35,7 @@ struct GroupInput {
   /// Pairs by slot, in their old order within a slot; where each block's pairs begin.
   void verify() const {
     const PassCounts counts = rays.counts.read()[0];
-    const std::vector<uint> slot_blocks = cache.slot_block_ids().read();
+    const std::vector<uint> slot_blocks = cache.slot_block_ids.read();
     std::unordered_map<uint, uint> slot_of;
     for (uint slot = 0; slot < slot_blocks.size(); ++slot) slot_of[slot_blocks[slot]] = slot;
     std::vector<uint> keys, order(pairs.pair_block_ids.size()), offsets;

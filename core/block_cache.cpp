@@ -17,54 +17,74 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
   return num_slots;
 }
 
-/// A pair asks for at most 8 blocks, and a block is listed once.
-std::size_t max_requests(std::uint64_t num_blocks, std::uint64_t num_pixels) {
-  return static_cast<std::size_t>(std::min(num_blocks, 8 * num_pixels));
+std::uint64_t block_count(const FrameParams &grid) {
+  return std::uint64_t{grid.blocks_x} * grid.blocks_y * grid.blocks_z;
+}
+
+/// Entries / 8: twice the slots, a quarter filled with evicted blocks' keys at most before it is rebuilt; not a multiple of
+/// 3, so that ISO_TABLE_STEP reaches every entry.
+std::uint32_t table_groups_for(std::uint32_t num_slots) {
+  const std::uint32_t groups = num_slots / 4 + 1;
+  return groups % 3 == 0 ? groups + 1 : groups;
+}
+
+std::size_t request_words(const FrameParams &grid) {
+  return 2 * std::size_t{(grid.blocks_x + 3) / 4} * ((grid.blocks_y + 3) / 4) * ((grid.blocks_z + 3) / 4);
 }
 
 }  // namespace
 
-BlockCache::BlockCache(ocl::Device &device, std::uint64_t num_blocks, std::uint32_t num_slots,
+BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t slots,
                        std::uint64_t num_pixels, std::uint32_t group_size)
-    : num_slots_(checked_slots(num_slots)),
+    : num_slots(checked_slots(slots)),
+      table_groups(table_groups_for(slots)),
+      capacity(static_cast<std::uint32_t>(
+          std::min<std::uint64_t>({slots, block_count(grid), 8 * ISO_MAX_SPECULATION * num_pixels}))),
+      table(device, "block table", 8 * std::size_t{table_groups}),
+      values(device, "block cache", std::size_t{slots} * ISO_BLOCK_VOXELS),
+      slot_block_ids(device, "cache slot blocks", slots),
+      slot_stamps(device, "cache slot stamps", slots),
+      requested_bits(device, "requested blocks", request_words(grid)),
+      request_block_ids(device, "block requests", capacity),
+      decode_slots(device, "decode slots", capacity),
+      state(device, "cache state", 1),
       group_size_(group_size),
       pairs_range_(ocl::Range::strided(num_pixels, group_size, device)),
-      slots_range_(ocl::Range::strided(num_slots, group_size, device)),
-      requests_range_(ocl::Range::strided(max_requests(num_blocks, num_pixels), group_size, device)),
-      page_table_(device, "page table", num_blocks),
-      slot_block_ids_(device, "cache slot blocks", num_slots),
-      slot_stamps_(device, "cache slot stamps", num_slots),
-      request_block_ids_(device, "block requests", max_requests(num_blocks, num_pixels)),
-      victim_slots_(device, "freed slots", num_slots),
+      slots_range_(ocl::Range::strided(slots, group_size, device)),
+      requests_range_(ocl::Range::strided(capacity, group_size, device)),
+      free_slots_(device, "free slots", slots),
       age_histogram_(device, "cache ages", ISO_AGE_BUCKETS),
-      selection_(device, "cache selection", 1),
-      values_(device, "block cache", std::size_t{num_slots} * ISO_BLOCK_VOXELS),
       request_(device, "block_cache", "cache_request", group_defines(group_size)),
       age_histogram_kernel_(device, "block_cache", "cache_age_histogram", group_defines(group_size)),
       select_(device, "block_cache", "cache_select", group_defines(group_size)),
-      collect_victims_(device, "block_cache", "cache_collect_victims", group_defines(group_size)),
-      assign_(device, "block_cache", "cache_assign", group_defines(group_size)) {
+      evict_(device, "block_cache", "cache_evict", group_defines(group_size)),
+      rebuild_(device, "block_cache", "cache_rebuild", group_defines(group_size)),
+      assign_(device, "block_cache", "cache_assign", group_defines(group_size)),
+      clear_(device, "block_cache", "cache_clear", group_defines(group_size)) {
   clear();
 }
 
 void BlockCache::clear() {
-  page_table_.fill(ISO_BLOCK_ABSENT);
-  slot_block_ids_.fill(ISO_INVALID_ID);
-  slot_stamps_.fill(0);  // older than every pass (Wavefront)
+  clear_(slots_range_, num_slots, 8 * table_groups, table, slot_block_ids, slot_stamps, free_slots_, state);
 }
 
 void BlockCache::request(Wavefront &rays) {
-  request_(pairs_range_, rays.frame, rays.counts, rays.pair_block_ids, page_table_, slot_stamps_,
-           request_block_ids_);
+  request_(pairs_range_, rays.frame, rays.counts, rays.pair_block_ids, table, slot_stamps, requested_bits,
+           request_block_ids, capacity, state);
 }
 
-void BlockCache::assign_slots(Wavefront &rays) {
-  age_histogram_kernel_(slots_range_, rays.counts, num_slots_, slot_stamps_, age_histogram_);
-  select_({1, group_size_}, rays.frame, rays.counts, num_slots_, rays.pair_block_ids, page_table_,
-          slot_stamps_, request_block_ids_, age_histogram_, selection_);
-  collect_victims_(slots_range_, rays.counts, num_slots_, slot_stamps_, selection_, victim_slots_);
-  assign_(requests_range_, rays.counts, request_block_ids_, victim_slots_, page_table_, slot_block_ids_,
-          slot_stamps_);
+void BlockCache::evict(Wavefront &rays) {
+  age_histogram_kernel_(slots_range_, rays.counts, num_slots, slot_block_ids, slot_stamps, age_histogram_);
+  select_({1, group_size_}, rays.frame, rays.counts, num_slots, table, slot_stamps, requested_bits,
+          request_block_ids, capacity, age_histogram_, state);
+  evict_(slots_range_, rays.frame, rays.counts, num_slots, slot_block_ids, slot_stamps, table, state,
+         free_slots_);
+  rebuild_(slots_range_, rays.frame, rays.counts, num_slots, slot_block_ids, state, table);
+}
+
+void BlockCache::assign(Wavefront &rays) {
+  assign_(requests_range_, rays.frame, rays.counts, request_block_ids, capacity, free_slots_, table,
+          slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
 }
 
 }  // namespace isowave

@@ -4,66 +4,69 @@
 
 #include "core/ocl/kernel.hpp"
 #include "core/wavefront.hpp"
+#include "kernels_cl/block_table.h"
 
 namespace isowave {
 
 /// The fewest slots that still draw every picture: one dual grid.
 inline constexpr std::uint32_t kMinCacheSlots = 8;
 
-class BlockCache {
- public:
-  /// num_slots is at least kMinCacheSlots; num_pixels bounds a pass's pairs. Throws Error when there are too
-  /// few slots, or more than 2^30.
-  BlockCache(ocl::Device &device, std::uint64_t num_blocks, std::uint32_t num_slots, std::uint64_t num_pixels,
+/// What the stages of one pass read of the cache, and add to its requests.
+struct BlockCache {
+  /// num_slots is at least kMinCacheSlots; num_pixels bounds a pass's pairs. `grid`: its blocks are used. Throws Error when
+  /// there are too few slots, or more than 2^30.
+  BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots, std::uint64_t num_pixels,
              std::uint32_t group_size);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones. Out:
-  /// counts.requested_count. Asynchronous.
+  /// counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request.)
   void request(Wavefront &rays);
-  /// Grants as many requests as slots can be freed without taking one that this pass uses; the first pair of
-  /// the first active ray is served whatever it takes. Out: counts.decoded_count; decode_block_ids() and
-  /// decode_slots() hold that many. Asynchronous.
-  void assign_slots(Wavefront &rays);
-
-  /// Forgets every block: the next pass finds the cache as it was made. O(blocks): not for the pass loop.
+  /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the free ones, but none that the
+  /// pass uses; the block served first gets what it takes. Asynchronous.
+  void evict(Wavefront &rays);
+  /// Gives the free slots to requests. Out: counts.decoded_count; request_block_ids and decode_slots hold that many.
   /// Asynchronous.
+  void assign(Wavefront &rays);
+
+  /// Forgets every block: the next pass finds the cache as it was made. Asynchronous.
   void clear();
 
-  std::uint32_t num_slots() const { return num_slots_; }
-  /// [blocks] slot of each block; ISO_BLOCK_ABSENT if not cached.
-  const ocl::Buffer<uint> &page_table() const { return page_table_; }
-  /// [num_slots] block in each slot or ISO_INVALID_ID.
-  const ocl::Buffer<uint> &slot_block_ids() const { return slot_block_ids_; }
-  /// [num_slots * 64] decoded values, x + 4y + 16z within a slot.
-  const ocl::Buffer<float> &values() const { return values_; }
-  ocl::Buffer<float> &values() { return values_; }
-  const ocl::Buffer<uint> &decode_block_ids() const { return request_block_ids_; }
-  const ocl::Buffer<uint> &decode_slots() const { return victim_slots_; }
+  std::uint32_t num_slots;
+  std::uint32_t table_groups;           ///< FrameParams::table_groups
+  std::uint32_t capacity;               ///< of the request list: requests beyond it are dropped
+  ocl::Buffer<BlockEntry> table;        ///< [8 * table_groups] see kernels_cl/block_table.h
+  ocl::Buffer<float> values;            ///< [num_slots * 64] decoded values, x + 4y + 16z within a slot
+  ocl::Buffer<uint> slot_block_ids;     ///< [num_slots] block in each slot or ISO_INVALID_ID
+  ocl::Buffer<uint> slot_stamps;        ///< [num_slots] pass that used it last
+  ocl::Buffer<uint> requested_bits;     ///< [2 * coarse macrocells] one bit per block; 0 between passes
+  ocl::Buffer<uint> request_block_ids;  ///< [capacity]
+  ocl::Buffer<uint> decode_slots;       ///< [capacity] slot of each request granted
+  ocl::Buffer<CacheState> state;        ///< [1]
 
  private:
-  /// Mirrors CacheSelection of block_cache.cl; only kernels look inside.
-  struct Selection {
-    uint fields[5];
-  };
-
-  std::uint32_t num_slots_;
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
-  ocl::Buffer<uint> page_table_, slot_block_ids_, slot_stamps_, request_block_ids_, victim_slots_,
-      age_histogram_;
-  ocl::Buffer<Selection> selection_;
-  ocl::Buffer<float> values_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>>
+  ocl::Buffer<uint> free_slots_, age_histogram_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_;
-  ocl::Kernel<ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::Out<uint>> age_histogram_kernel_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, uint, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<uint>, ocl::Out<Selection>>
+  ocl::Kernel<ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> age_histogram_kernel_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>,
+              ocl::In<uint>, ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
       select_;
-  ocl::Kernel<ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::Out<Selection>, ocl::Out<uint>> collect_victims_;
-  ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>>
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>,
+              ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>
+      evict_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<CacheState>,
+              ocl::Out<BlockEntry>>
+      rebuild_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, uint, ocl::In<uint>,
+              ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<CacheState>>
       assign_;
+  ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<CacheState>>
+      clear_;
 };
 
 }  // namespace isowave

@@ -20,7 +20,7 @@ class Composite {
  private:
   ocl::Range range_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<PairHit>,
-              ocl::In<uint>, ocl::In<float>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>>
+              ocl::In<BlockEntry>, ocl::In<float>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>>
       kernel_;
 };
 

@@ -21,11 +21,10 @@ Group::Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_sl
       heads_(device, "group", "group_heads") {}
 
 void Group::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction) {
-  select_(range_, rays.frame, rays.counts, rays.pair_block_ids, cache.page_table(), rays.pair_hits,
-          rays.mask);
+  select_(range_, rays.frame, rays.counts, rays.pair_block_ids, cache.table, rays.pair_hits, rays.mask);
   compaction.indices(rays.mask, rays.counts, ISO_COUNT_FIELD(pair_slot_count), groups_.pair_ids,
                      ISO_COUNT_FIELD(granted_count));
-  keys_(range_, rays.counts, groups_.pair_ids, rays.pair_block_ids, cache.page_table(), groups_.slots);
+  keys_(range_, rays.frame, rays.counts, groups_.pair_ids, rays.pair_block_ids, cache.table, groups_.slots);
   sort_(groups_.slots, groups_.pair_ids, rays.counts, ISO_COUNT_FIELD(granted_count), key_bits_);
   heads_(range_, rays.counts, groups_.slots, rays.mask);
   compaction.indices(rays.mask, rays.counts, ISO_COUNT_FIELD(granted_count), groups_.block_ray_offsets,

@@ -31,10 +31,12 @@ class Group {
   std::uint32_t key_bits_;
   BlockGroups groups_;
   RadixSort sort_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<PairHit>,
-              ocl::Out<uint>>
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
+              ocl::Out<PairHit>, ocl::Out<uint>>
       select_;
-  ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> keys_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<BlockEntry>,
+              ocl::Out<uint>>
+      keys_;
   ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> heads_;
 };
 

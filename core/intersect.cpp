@@ -22,10 +22,10 @@ Intersect::Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_
 
 void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays) {
   kernel_(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, groups.block_ray_offsets,
-          cache.slot_block_ids(), cache.page_table(), cache.values(), rays.active_ray_ids, rays.pair_hits);
+          cache.slot_block_ids, cache.table, cache.values, rays.active_ray_ids, rays.pair_hits);
   if (settle_doubts_) {
-    (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, cache.slot_block_ids(),
-                      cache.page_table(), cache.values(), rays.active_ray_ids, rays.pair_hits);
+    (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, cache.slot_block_ids,
+                      cache.table, cache.values, rays.active_ray_ids, rays.pair_hits);
   }
 }
 

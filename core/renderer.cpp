@@ -12,6 +12,9 @@ namespace isowave {
 
 namespace {
 
+/// Slots; below, slots may run out within one pass.
+constexpr std::uint32_t kSmallCache = 1u << 16;
+
 double ms_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
@@ -28,6 +31,7 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
                 ISO_MAX_SPECULATION);
   }
+  if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
   const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
   if (!std::has_single_bit(options.group_size) || options.group_size < 8 || options.group_size > largest) {
     throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
@@ -49,6 +53,17 @@ FrameParams grid_params(const CompressedVolume &volume) {
   return frame;
 }
 
+FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options) {
+  const FrameParams grid = grid_params(volume);
+  DeviceStream stream(device, volume);
+  Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks);
+  Macrocells macrocells(device, rays.frame, grid, stream.words, stream.bits_per_block);
+  BlockCache cache(device, grid, options.cache_slots, options.size.num_pixels(), options.group_size);
+  return {device,           std::move(stream),
+          std::move(rays),  std::move(macrocells),
+          std::move(cache), ZfpDecode(device, options.cache_slots)};
+}
+
 }  // namespace
 
 std::uint32_t default_cache_slots(const CompressedVolume &volume) {
@@ -61,19 +76,9 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       setup_begin_(std::chrono::steady_clock::now()),
       options_(checked(options, volume, device)),
       info_(volume.info),
-      stream_(device, volume),
-      rays_(device, options_.size.num_pixels()),
-      macrocells_(device, rays_.frame, grid_params(volume), stream_.words, stream_.bits_per_block),
-      cache_(device, volume.block_count(), options_.cache_slots, rays_.num_pixels, options_.group_size),
-      compaction_(device, rays_.num_pixels, options_.group_size),
-      initial_rays_(device, rays_.num_pixels),
-      speculation_(device),
-      traverse_(device, rays_.num_pixels, options_.group_size),
-      zfp_decode_(device, options_.cache_slots),
-      group_(device, rays_.num_pixels, options_.cache_slots, options_.group_size),
-      intersect_(device, rays_.num_pixels, options_.group_size, options_.solver),
-      composite_(device, rays_.num_pixels),
-      shade_(device, rays_.num_pixels) {
+      state_(make_state(device, volume, options_)),
+      pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver)),
+      shade_(device, options_.size.num_pixels()) {
   device.finish();
   setup_ms_ = ms_since(setup_begin_);
 }
@@ -85,8 +90,8 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   PassReadback readback;
   begin_frame(camera, isovalue);
   for (bool finished = false; !finished && !stats.cancelled;) {
-    enqueue_pass();
-    readback.push(rays_.counts);
+    pipeline_->enqueue_pass();
+    readback.push(state_.rays.counts);
     if (!in_step && readback.in_flight() < 2)
       continue;  // read one pass behind: the device never waits for us
     const PassStats pass = stats_of(readback.pop());
@@ -101,55 +106,28 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
 }
 
 void Renderer::begin_frame(const Camera &camera, float isovalue) {
-  const auto stage = device_.timer().stage("initial_rays");
   frame_ = make_frame_params(info_, camera, options_.size, isovalue);
-  frame_.isovalue_index = macrocells_.isovalue_index(isovalue);
+  frame_.isovalue_index = state_.macrocells.isovalue_index(isovalue);
   frame_.max_spec_count = options_.max_speculation;
-  rays_.frame.write({&frame_, 1});
-  if (selected_isovalue_ != isovalue) macrocells_.select(rays_.frame);
+  frame_.per_ray_speculation = options_.per_ray_speculation;
+  frame_.table_groups = state_.cache.table_groups;
+  state_.rays.frame.write({&frame_, 1});
+  if (selected_isovalue_ != isovalue) {
+    const auto stage = device_.timer().stage("macrocells");
+    state_.macrocells.select(state_.rays.frame);
+  }
   selected_isovalue_ = isovalue;
-  initial_rays_(rays_, compaction_);
-}
-
-/// One pass (Sec. 3.3 to 4.4): a chain of launches whose sizes live on the device.
-void Renderer::enqueue_pass() {
-  ocl::StageTimer &timer = device_.timer();
-  const auto pass = timer.stage("speculation");
-  speculation_.begin_pass(rays_);
-  {
-    const auto stage = timer.stage("traverse");
-    traverse_(macrocells_, rays_);
-  }
-  {
-    const auto stage = timer.stage("request");
-    cache_.request(rays_);
-  }
-  {
-    const auto stage = timer.stage("cache");
-    cache_.assign_slots(rays_);
-  }
-  {
-    const auto stage = timer.stage("decode");
-    zfp_decode_(stream_, rays_.counts, cache_.decode_block_ids(), cache_.decode_slots(), cache_.values());
-  }
-  {
-    const auto stage = timer.stage("group");
-    group_(cache_, rays_, compaction_);
-  }
-  {
-    const auto stage = timer.stage("intersect");
-    intersect_(cache_, group_.groups(), rays_);
-  }
-  {
-    const auto stage = timer.stage("composite");
-    composite_(cache_, rays_, compaction_);
-  }
+  pipeline_->begin_frame();
 }
 
 PassStats Renderer::stats_of(const PassCounts &counts) {
-  const double pixels = static_cast<double>(rays_.num_pixels);
+  const double pixels = static_cast<double>(state_.rays.num_pixels);
   PassStats stats;
   stats.counts = counts;
+  stats.counts.window_count = std::min(counts.window_count, counts.active_count);
+  // A launch that is not needed costs more than a pass that finds slots missing now and then.
+  state_.slots_are_scarce =
+      state_.cache.num_slots < kSmallCache || counts.free_count < state_.cache.num_slots / 2;
   stats.utilization_percent = 100.0 * counts.granted_count / pixels;
   stats.completed_percent = 100.0 * (pixels - counts.next_active_count) / pixels;
   stats.stage_ms = device_.timer().collect();
@@ -157,12 +135,12 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
 }
 
 void Renderer::clear_cache() {
-  cache_.clear();
+  state_.cache.clear();
   device_.finish();
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {
-  return shade_(frame_, make_shade_params(info_, appearance), rays_);
+  return shade_(frame_, make_shade_params(info_, appearance), state_.rays);
 }
 
 }  // namespace isowave

@@ -1,8 +1,7 @@
 #pragma once
 // Draws isosurfaces of one compressed volume on one device: the main loop of the program.
 //
-// camera -> rays -> [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]* -> hits ->
-// picture
+// camera -> rays -> [ pass of a pipeline ]* -> hits -> picture        (the pipelines: core/pipeline.hpp)
 
 #include <functional>
 #include <map>
@@ -10,26 +9,19 @@
 #include <string>
 #include <vector>
 
-#include "core/block_cache.hpp"
-#include "core/composite.hpp"
 #include "core/frame.hpp"
-#include "core/group.hpp"
-#include "core/initial_rays.hpp"
-#include "core/intersect.hpp"
-#include "core/macrocells.hpp"
+#include "core/pipeline.hpp"
 #include "core/shade.hpp"
-#include "core/speculation.hpp"
-#include "core/traverse.hpp"
-#include "core/wavefront.hpp"
-#include "core/zfp_decode.hpp"
 #include "core/zfp_stream.hpp"
 
 namespace isowave {
 
 struct RendererOptions {
   ImageSize size;
+  PipelineKind pipeline = PipelineKind::kAuto;
   std::uint32_t cache_slots = 0;       ///< decoded blocks kept, at least 8; 0: default_cache_slots()
   std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
+  bool per_ray_speculation = false;    ///< pipeline `rays`: each ray by what it has missed, not all alike
   Solver solver = kDefaultSolver;      ///< root finder in a cell
   std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
 };
@@ -73,17 +65,16 @@ class Renderer {
   void clear_cache();
 
   /// The hit buffer [height * width], row 0 at the top. Waits.
-  std::vector<HitRecord> hits() const { return rays_.hits.read(); }
+  std::vector<HitRecord> hits() const { return state_.rays.hits.read(); }
   /// The picture of the hit buffer. Waits.
   Image8 shade(const Appearance &appearance = {});
 
   const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
-  const Macrocells &macrocells() const { return macrocells_; }
+  const Macrocells &macrocells() const { return state_.macrocells; }
   double setup_ms() const { return setup_ms_; }  ///< upload, kernel builds, macrocell ranges
 
  private:
   void begin_frame(const Camera &camera, float isovalue);
-  void enqueue_pass();
   PassStats stats_of(const PassCounts &counts);
 
   ocl::Device &device_;
@@ -92,18 +83,8 @@ class Renderer {
   VolumeInfo info_;
   FrameParams frame_{};
   std::optional<float> selected_isovalue_;  ///< what the macrocell masks stand for
-  DeviceStream stream_;
-  Wavefront rays_;
-  Macrocells macrocells_;
-  BlockCache cache_;
-  Compaction compaction_;
-  InitialRays initial_rays_;
-  Speculation speculation_;
-  Traverse traverse_;
-  ZfpDecode zfp_decode_;
-  Group group_;
-  Intersect intersect_;
-  Composite composite_;
+  FrameState state_;
+  std::unique_ptr<Pipeline> pipeline_;
   Shade shade_;
   double setup_ms_ = 0;
 };

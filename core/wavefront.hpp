@@ -8,29 +8,33 @@
 namespace isowave {
 
 struct Wavefront {
-  Wavefront(ocl::Device &device, std::uint64_t pixels)
+  /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not.
+  explicit Wavefront(ocl::Device &device, std::uint64_t pixels, bool with_pairs = true)
       : num_pixels(pixels),
         frame(device, "frame", 1),
         counts(device, "pass counts", 1),
+        next_counts(device, "pass counts, next", 1),
         hits(device, "hits", pixels),
         ray_block_ids(device, "ray states", pixels),
         active_ray_ids(device, "active ray ids", pixels),
         next_active_ray_ids(device, "active ray ids, next", pixels),
-        mask(device, "mask", pixels),
-        pair_block_ids(device, "pair block ids", pixels),
-        pair_hits(device, "pair hits", pixels) {
+        mask(device, "mask", with_pairs ? pixels : 0),
+        pair_block_ids(device, "pair block ids", with_pairs ? pixels : 0),
+        pair_hits(device, "pair hits", with_pairs ? pixels : 0) {
     PassCounts start{};
     start.pixel_count = static_cast<uint>(pixels);
     start.pass = ISO_AGE_BUCKETS;  // so that slots never used, stamped 0, are the oldest
     counts.write({&start, 1});
+    next_counts.write({&start, 1});
   }
 
-  std::uint64_t num_pixels;               ///< R
-  ocl::Buffer<FrameParams> frame;         ///< [1]
-  CountsBuffer counts;                    ///< [1]
-  ocl::Buffer<HitRecord> hits;            ///< [R] by pixel: the picture so far
-  ocl::Buffer<uint> ray_block_ids;        ///< [R] by pixel: the block a ray goes on from (R_BID)
-  ocl::Buffer<uint> active_ray_ids;       ///< [active_count] pixels of the rays at work, ascending (R_ID)
+  std::uint64_t num_pixels;          ///< R
+  ocl::Buffer<FrameParams> frame;    ///< [1]
+  CountsBuffer counts;               ///< [1] of the pass at work
+  CountsBuffer next_counts;          ///< [1] of the pass before; then, of the one to come (pipeline `rays`)
+  ocl::Buffer<HitRecord> hits;       ///< [R] by pixel: the picture so far
+  ocl::Buffer<uint> ray_block_ids;   ///< [R] by pixel: the block a ray goes on from (R_BID)
+  ocl::Buffer<uint> active_ray_ids;  ///< [active_count] pixels of the rays at work, ascending (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
   ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
   ocl::Buffer<uint> pair_block_ids;       ///< [window_count * spec_count] blocks asked for, in ray order

@@ -1,69 +1,87 @@
 /// block_cache.cl -- gives cache slots to the blocks that a pass needs (Sec. 3.4, 3.5).
 ///
-/// page_table [blocks]: slot of a cached block, ISO_BLOCK_ABSENT or ISO_BLOCK_REQUESTED.
-/// slot_block_ids [slots]: the block in each slot, or ISO_INVALID_ID. slot_stamps [slots]: pass that used it
-/// last.
+/// table: block -> slot (block_table.h). slot_block_ids [slots]: the block in each slot, or ISO_INVALID_ID. slot_stamps
+/// [slots]: pass that used it last. free_slots [slots]: the first cache.free_count hold no block. requested_bits: one
+/// per block, 0 between passes.
 ///
-/// A pass: cache_request (stamp what is cached, list what is not) -> cache_age_histogram -> cache_select (how
-/// many, how old) -> cache_collect_victims -> cache_assign. The last four cost O(slots) or O(requests), never
-/// O(blocks), and do nothing when nothing is asked for. Which block gets which slot is left to chance; no hit
-/// depends on it.
+/// A pass: cache_request, or request_blocks of march.cl (stamp what is cached, list what is not) -> where free slots may not
+/// suffice: cache_age_histogram -> cache_select (how many, how old) -> cache_evict -> cache_rebuild -> then cache_assign. All
+/// cost O(slots) or O(requests), never O(blocks). Which block gets which slot is left to chance; no hit depends on it.
 ///
-/// Progress is certain: the first pair of the lowest-numbered active ray is served before all others. If old
-/// slots are too few even for it, slots that other pairs use in this very pass are taken; those pairs wait
-/// for the next. (Not in the paper, whose cache grows instead.)
-#include "block_grid.h"
+/// Progress is certain: the first block of the first active ray is served before all others. If old slots are too few even
+/// for it, slots that other rays use in this very pass are taken; those rays wait for the next. (Not in the paper, whose
+/// cache grows instead.)
+#include "block_requests.h"
 
-/// The outcome of cache_select, read by the kernels behind it.
-typedef struct CacheSelection {
-  uint victim_count;   ///< slots to free = requests to grant
-  uint cutoff_age;     ///< all slots older than this are victims ...
-  uint cutoff_count;   ///< ... and this many of just this age
-  uint num_collected;  ///< victims listed so far
-  uint num_cutoff;     ///< tickets drawn by slots of the cutoff age
-} CacheSelection;
-
-/// A slot that holds blocks of the pair served first is stamped with the next pass: younger than all.
+/// A slot that holds blocks of the ray served first is stamped with the next pass: younger than all.
 inline uint slot_age(uint stamp, uint pass) {
   return min(pass - stamp, ISO_AGE_BUCKETS - 1);
 }
 
+inline uint listed_count(global const PassCounts *counts, uint capacity) {
+  return min(counts->requested_count, capacity);
+}
+
+/// Adds a key to the table, or finds the one it has.
+inline void table_insert(constant FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
+  const BlockCoords b = block_coords(frame, block_id);
+  uint i = table_home(frame, b.x, b.y, b.z);
+  for (;;) {
+    const uint key = atomic_cmpxchg(&table[i].block_id, ISO_INVALID_ID, block_id);
+    if (key == ISO_INVALID_ID || key == block_id) break;
+    i = table_next(frame, i);
+  }
+  table[i].slot = slot;
+}
+
+/// Marks the block as not cached; its key stays.
+inline void table_evict(constant FrameParams *frame, global BlockEntry *table, uint block_id) {
+  const BlockCoords b = block_coords(frame, block_id);
+  uint i = table_home(frame, b.x, b.y, b.z);
+  while (table[i].block_id != block_id) i = table_next(frame, i);
+  table[i].slot = ISO_BLOCK_ABSENT;
+}
+
 /// Per pair: stamps the cached blocks of its dual grid and appends the missing ones, once each, to the
-/// request list. Grid-stride over pair slots.
+/// request list [capacity]. Grid-stride over pair slots.
 kernel void cache_request(constant FrameParams *frame, global PassCounts *counts,
-                          global const uint *pair_block_ids, global uint *page_table,
-                          global uint *slot_stamps, global uint *request_block_ids) {
+                          global const uint *pair_block_ids, global const BlockEntry *table,
+                          global uint *slot_stamps, global uint *requested_bits,
+                          global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count, pass = counts->pass;
+  if (get_global_id(0) == 0) {
+    open_requests(cache);
+    cache->first_block_id = pair_slots == 0 ? ISO_INVALID_ID : pair_block_ids[0];
+  }
   for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
     const uint block_id = pair_block_ids[pair];
     uint missing[8];
     uint num_missing = 0;
-    /* The neighbouring ray's pair asks for the same blocks: let it. Saves most of the atomics. */
+    /* The neighbouring ray's pair asks for the same blocks: let it. Saves most of the work. */
     if (block_id == ISO_INVALID_ID || (pair >= spec_count && pair_block_ids[pair - spec_count] == block_id))
       continue;
     const BlockCoords b = block_coords(frame, block_id);
     for (uint corner = 0; corner < 8; ++corner) {
-      const uint needed = dual_grid_block(frame, b, corner);
-      if (needed == ISO_INVALID_ID) continue;
-      const uint entry = atomic_cmpxchg(&page_table[needed], ISO_BLOCK_ABSENT, ISO_BLOCK_REQUESTED);
-      if (entry == ISO_BLOCK_ABSENT) {
-        missing[num_missing++] = needed;
-      } else if (entry != ISO_BLOCK_REQUESTED) {
-        slot_stamps[entry] = pass;
+      const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+      if (dual_grid_block(frame, b, corner) != ISO_INVALID_ID &&
+          request_block(frame, table, slot_stamps, pass, requested_bits, x, y, z)) {
+        missing[num_missing++] = block_id_at(frame, x, y, z);
       }
     }
     if (num_missing != 0) {
       /* One range per pair: when slots run out, dual grids are served whole as far as possible. */
       const uint first = atomic_add(&counts->requested_count, num_missing);
-      for (uint i = 0; i < num_missing; ++i) request_block_ids[first + i] = missing[i];
+      for (uint i = 0; i < num_missing; ++i) {
+        list_request(frame, request_block_ids, capacity, requested_bits, first + i, missing[i]);
+      }
     }
   }
 }
 
-/// Counts slots by age. age_histogram [ISO_AGE_BUCKETS]: zero before. Grid-stride over slots.
+/// Counts the slots in use by age. age_histogram [ISO_AGE_BUCKETS]: zero before. Grid-stride over slots.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_age_histogram(
-    global const PassCounts *counts, uint num_slots, global const uint *slot_stamps,
-    global uint *age_histogram) {
+    global const PassCounts *counts, uint num_slots, global const uint *slot_block_ids,
+    global const uint *slot_stamps, global uint *age_histogram) {
   local uint histogram[ISO_AGE_BUCKETS];
   const uint pass = counts->pass;
   /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
@@ -71,7 +89,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
   for (uint age = get_local_id(0); age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) histogram[age] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
-    atomic_inc(&histogram[slot_age(slot_stamps[slot], pass)]);
+    if (slot_block_ids[slot] != ISO_INVALID_ID) atomic_inc(&histogram[slot_age(slot_stamps[slot], pass)]);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint age = get_local_id(0); age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) {
@@ -79,30 +97,31 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
   }
 }
 
-/// Decides how many requests are granted and which ages pay for it. One work-group. age_histogram is zeroed
+/// Decides how many slots are freed and which ages pay for it. One work-group. age_histogram is zeroed
 /// again.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
-    constant FrameParams *frame, global PassCounts *counts, uint num_slots, global const uint *pair_block_ids,
-    global const uint *page_table, global uint *slot_stamps, global uint *request_block_ids,
-    global uint *age_histogram, global CacheSelection *selection) {
-  local uint first_missing[8]; /* blocks of the pair served first that are on the request list */
+    constant FrameParams *frame, global PassCounts *counts, uint num_slots, global const BlockEntry *table,
+    global uint *slot_stamps, global const uint *requested_bits, global uint *request_block_ids,
+    uint capacity, global uint *age_histogram, global CacheState *cache) {
+  local uint first_missing[8]; /* blocks of the dual grid served first that are on the request list */
   local uint places[8];        /* where they stand there */
   local uint num_first_missing;
-  const uint requested = counts->requested_count;
-  const uint in_use = age_histogram[0];
-  const uint item = get_local_id(0);
+  const uint requested = listed_count(counts, capacity), num_free = cache->free_count;
+  const uint in_use = age_histogram[0], item = get_local_id(0);
   const int scarce = requested > num_slots - in_use;
   const uint searched = scarce ? requested : 0;
   if (item == 0) {
-    const uint block_id = pair_block_ids[0]; /* invalid: that ray is leaving the volume and needs nothing */
+    const uint block_id = cache->first_block_id; /* invalid: that ray needs nothing */
     num_first_missing = 0;
     for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
-      const uint needed = dual_grid_block(frame, block_coords(frame, block_id), corner);
-      if (needed == ISO_INVALID_ID) continue;
-      if (page_table[needed] == ISO_BLOCK_REQUESTED) {
-        first_missing[num_first_missing++] = needed;
-      } else {
-        slot_stamps[page_table[needed]] = counts->pass + 1;
+      const BlockCoords b = block_coords(frame, block_id);
+      const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+      if (dual_grid_block(frame, b, corner) == ISO_INVALID_ID) continue;
+      const uint slot = cached_slot(frame, table, x, y, z);
+      if (slot != ISO_BLOCK_ABSENT) {
+        slot_stamps[slot] = counts->pass + 1;
+      } else if ((requested_bits[request_word(frame, x, y, z)] & request_bit(x, y, z)) != 0) {
+        first_missing[num_first_missing++] = block_id_at(frame, x, y, z);
       }
     }
   }
@@ -115,7 +134,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   }
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   if (item == 0) {
-    uint granted, age, older = 0;
+    uint granted, evicted, age, older = 0;
     for (uint j = 0; j < num_first_missing; ++j) { /* swap it to place j */
       const uint displaced = request_block_ids[j];
       request_block_ids[places[j]] = displaced;
@@ -125,52 +144,98 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
       }
     }
     granted = min(requested, max(num_slots - in_use, num_first_missing));
-    for (age = ISO_AGE_BUCKETS - 1; age > 0 && older + age_histogram[age] < granted; --age) {
+    evicted = granted > num_free ? granted - num_free : 0;
+    for (age = ISO_AGE_BUCKETS - 1; age > 0 && older + age_histogram[age] < evicted; --age) {
       older += age_histogram[age];
     }
-    selection->victim_count = granted;
-    selection->cutoff_age = age;
-    selection->cutoff_count = granted - older;
-    selection->num_collected = 0;
-    selection->num_cutoff = 0;
-    counts->decoded_count = granted;
+    cache->free_before = num_free;
+    cache->cutoff_age = evicted == 0 ? ISO_AGE_BUCKETS : age;
+    cache->cutoff_count = evicted - older;
+    cache->num_evicted = 0;
+    cache->num_cutoff = 0;
+    cache->free_count = num_free + evicted;
+    cache->rebuild = cache->table_count + granted > 6 * frame->table_groups; /* of 8 */
+    if (cache->rebuild) cache->table_count = num_slots - cache->free_count;
   }
   barrier(CLK_GLOBAL_MEM_FENCE); /* the histogram has been read */
   for (uint age = item; age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) age_histogram[age] = 0;
 }
 
-/// Lists the slots that are freed. Grid-stride over slots.
-kernel void cache_collect_victims(global const PassCounts *counts, uint num_slots,
-                                  global const uint *slot_stamps, global CacheSelection *selection,
-                                  global uint *victim_slots) {
-  const uint pass = counts->pass;
+/// Frees the slots selected; empties the table where it is to be rebuilt. Grid-stride over slots.
+kernel void cache_evict(constant FrameParams *frame, global const PassCounts *counts, uint num_slots,
+                        global uint *slot_block_ids, global const uint *slot_stamps, global BlockEntry *table,
+                        global CacheState *cache, global uint *free_slots) {
+  const uint pass = counts->pass, cutoff_age = cache->cutoff_age, rebuild = cache->rebuild;
   if (counts->requested_count == 0) return;
-  for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
-    const uint stamp = slot_stamps[slot];
+  for (uint i = get_global_id(0); rebuild && i < 8 * frame->table_groups; i += get_global_size(0)) {
+    table[i].block_id = ISO_INVALID_ID;
+    table[i].slot = ISO_BLOCK_ABSENT;
+  }
+  for (uint slot = get_global_id(0); cutoff_age < ISO_AGE_BUCKETS && slot < num_slots;
+       slot += get_global_size(0)) {
+    const uint stamp = slot_stamps[slot], block_id = slot_block_ids[slot];
     const uint age = slot_age(stamp, pass);
-    if (stamp == pass + 1 || age < selection->cutoff_age) continue;
-    if (age == selection->cutoff_age && atomic_inc(&selection->num_cutoff) >= selection->cutoff_count)
-      continue;
-    victim_slots[atomic_inc(&selection->num_collected)] = slot;
+    if (block_id == ISO_INVALID_ID || stamp == pass + 1 || age < cutoff_age) continue;
+    if (age == cutoff_age && atomic_inc(&cache->num_cutoff) >= cache->cutoff_count) continue;
+    if (!rebuild) table_evict(frame, table, block_id);
+    slot_block_ids[slot] = ISO_INVALID_ID;
+    free_slots[cache->free_before + atomic_inc(&cache->num_evicted)] = slot;
   }
 }
 
-/// Request i gets victim i; requests past the last victim are dropped. Grid-stride over requests.
-kernel void cache_assign(global const PassCounts *counts, global const uint *request_block_ids,
-                         global const uint *victim_slots, global uint *page_table,
-                         global uint *slot_block_ids, global uint *slot_stamps) {
-  const uint requested = counts->requested_count, granted = counts->decoded_count;
-  for (uint i = get_global_id(0); i < requested; i += get_global_size(0)) {
+/// Enters the blocks that are still cached into the emptied table. Grid-stride over slots.
+kernel void cache_rebuild(constant FrameParams *frame, global const PassCounts *counts, uint num_slots,
+                          global const uint *slot_block_ids, global const CacheState *cache,
+                          global BlockEntry *table) {
+  if (counts->requested_count == 0 || !cache->rebuild) return;
+  for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
+    if (slot_block_ids[slot] != ISO_INVALID_ID) table_insert(frame, table, slot_block_ids[slot], slot);
+  }
+}
+
+/// Request i gets the i-th free slot from the end; requests past the last are dropped. decode_slots [requests]: the slots.
+/// Takes the marks of all requests back. Grid-stride over requests.
+kernel void cache_assign(constant FrameParams *frame, global PassCounts *counts,
+                         global const uint *request_block_ids, uint capacity, global const uint *free_slots,
+                         global BlockEntry *table, global uint *slot_block_ids, global uint *slot_stamps,
+                         global uint *requested_bits, global uint *decode_slots, global CacheState *cache) {
+  const uint listed = listed_count(counts, capacity), num_free = cache->free_count;
+  const uint granted = min(listed, num_free);
+  if (get_global_id(0) == 0) {
+    cache->granted = granted;
+    counts->decoded_count = granted;
+    counts->free_count = num_free - granted;
+  }
+  for (uint i = get_global_id(0); i < listed; i += get_global_size(0)) {
     const uint block_id = request_block_ids[i];
+    const BlockCoords b = block_coords(frame, block_id);
+    requested_bits[request_word(frame, b.x, b.y, b.z)] = 0; /* every mark in it is of this pass */
     if (i < granted) {
-      const uint slot = victim_slots[i];
-      const uint evicted = slot_block_ids[slot];
-      if (evicted != ISO_INVALID_ID) page_table[evicted] = ISO_BLOCK_ABSENT;
-      page_table[block_id] = slot;
+      const uint slot = free_slots[num_free - 1 - i];
+      table_insert(frame, table, block_id, slot);
       slot_block_ids[slot] = block_id;
       slot_stamps[slot] = counts->pass;
-    } else {
-      page_table[block_id] = ISO_BLOCK_ABSENT;
+      decode_slots[i] = slot;
     }
+  }
+}
+
+/// The cache as it was made: every slot free. Grid-stride over slots and table.
+kernel void cache_clear(uint num_slots, uint table_size, global BlockEntry *table,
+                        global uint *slot_block_ids, global uint *slot_stamps, global uint *free_slots,
+                        global CacheState *cache) {
+  if (get_global_id(0) == 0) {
+    cache->free_count = num_slots;
+    cache->granted = 0;
+    cache->table_count = 0;
+  }
+  for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
+    slot_block_ids[slot] = ISO_INVALID_ID;
+    slot_stamps[slot] = 0; /* older than every pass */
+    free_slots[slot] = slot;
+  }
+  for (uint i = get_global_id(0); i < table_size; i += get_global_size(0)) {
+    table[i].block_id = ISO_INVALID_ID;
+    table[i].slot = ISO_BLOCK_ABSENT;
   }
 }

@@ -6,9 +6,7 @@
 
 ISO_NAMESPACE_BEGIN
 
-/// Page table entries that are no cache slot.
-#define ISO_BLOCK_ABSENT 0xFFFFFFFFu     ///< not in the cache
-#define ISO_BLOCK_REQUESTED 0xFFFFFFFEu  ///< not in the cache, on this pass's request list
+#define ISO_BLOCK_ABSENT 0xFFFFFFFFu  ///< instead of a cache slot: not in the cache
 #define ISO_MAX_CACHE_SLOTS 0x40000000u
 
 typedef struct BlockCoords {

@@ -2,16 +2,16 @@
 #ifndef ISOWAVE_CACHED_CELL_H
 #define ISOWAVE_CACHED_CELL_H
 
-#include "block_grid.h"
+#include "block_table.h"
 
 /// The corners of dual cell (x,y,z) from the cache, minus the isovalue; corner x + 2y + 4z. All its blocks
 /// are cached.
-inline void load_corners(constant FrameParams *frame, global const uint *page_table,
+inline void load_corners(constant FrameParams *frame, global const BlockEntry *table,
                          global const float *cache_values, int x, int y, int z, float *w) {
   for (int corner = 0; corner < 8; ++corner) {
     const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
                vz = (uint)(z + (corner >> 2));
-    const uint slot = page_table[block_id_at(frame, vx >> 2, vy >> 2, vz >> 2)];
+    const uint slot = cached_slot(frame, table, vx >> 2, vy >> 2, vz >> 2);
     w[corner] =
         cache_values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] - frame->isovalue;
   }

@@ -8,7 +8,7 @@
 /// slots; ray_active_mask [active_count] = 1 where it goes on. Grid-stride.
 kernel void composite(constant FrameParams *frame, global PassCounts *counts,
                       global const uint *active_ray_ids, global const uint *pair_block_ids,
-                      global const PairHit *pair_hits, global const uint *page_table,
+                      global const PairHit *pair_hits, global const BlockEntry *table,
                       global const float *cache_values, global uint *ray_block_ids, global HitRecord *hits,
                       global uint *ray_active_mask) {
   const LastPlanes last = last_planes(frame);
@@ -32,7 +32,7 @@ kernel void composite(constant FrameParams *frame, global PassCounts *counts,
                   z = (int)(4 * b.z + (pair_hit.cell >> 4));
         const GridWalk cell = walk_from(&ray, x, y, z, 1, last);
         float w[8];
-        load_corners(frame, page_table, cache_values, x, y, z, w);
+        load_corners(frame, table, cache_values, x, y, z, w);
         hits[ray_id] = make_hit(frame, &ray, w, x, y, z, region_entry(&ray, x, y, z, 1, last),
                                 walk_exit(&cell), pair_hit.s);
         atomic_inc(&counts->hit_count);

@@ -46,21 +46,29 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
     constant FrameParams *frame, global const PassCounts *counts, global const uint *pair_ids,
     global const uint *slots, global const uint *block_ray_offsets, global const uint *slot_block_ids,
-    global const uint *page_table, global const float *cache_values, global const uint *active_ray_ids,
+    global const BlockEntry *table, global const float *cache_values, global const uint *active_ray_ids,
     global PairHit *pair_hits) {
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
+  local uint corner_slots[8];
   const LastPlanes last = last_planes(frame);
   const uint visible_count = counts->visible_count, spec_count = counts->spec_count;
   for (uint visible = get_group_id(0); visible < visible_count; visible += get_num_groups(0)) {
     const uint begin = block_ray_offsets[visible];
     const uint end = visible + 1 < visible_count ? block_ray_offsets[visible + 1] : counts->granted_count;
     const BlockCoords b = block_coords(frame, slot_block_ids[slots[begin]]);
+    for (uint corner = get_local_id(0); corner < 8; corner += ISO_GROUP_SIZE) {
+      corner_slots[corner] =
+          dual_grid_block(frame, b, corner) == ISO_INVALID_ID
+              ? ISO_BLOCK_ABSENT
+              : cached_slot(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
     for (uint vertex = get_local_id(0); vertex < ISO_DUAL_GRID_VERTICES; vertex += ISO_GROUP_SIZE) {
       const uint x = vertex % 5, y = vertex / 5 % 5, z = vertex / 25;
-      const uint owner = dual_grid_block(frame, b, (x >> 2) + 2 * (y >> 2) + 4 * (z >> 2));
+      const uint slot = corner_slots[(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2)];
       float value = 0.0f; /* beyond the volume: no cell of the block uses it */
-      if (owner != ISO_INVALID_ID) {
-        value = cache_values[page_table[owner] * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] -
+      if (slot != ISO_BLOCK_ABSENT) {
+        value = cache_values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] -
                 frame->isovalue;
       }
       dual_grid[vertex] = value;
@@ -79,7 +87,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
 /// registers for them would cost a fifth of its speed (H100). Same arguments; grid-stride over the pairs.
 kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *counts,
                           global const uint *pair_ids, global const uint *slots,
-                          global const uint *slot_block_ids, global const uint *page_table,
+                          global const uint *slot_block_ids, global const BlockEntry *table,
                           global const float *cache_values, global const uint *active_ray_ids,
                           global PairHit *pair_hits) {
   const LastPlanes last = last_planes(frame);
@@ -102,7 +110,7 @@ kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *
         const RayEvent exit = walk_exit(&cell);
         CellChange change;
         float w[8];
-        load_corners(frame, page_table, cache_values, cell.x, cell.y, cell.z, w);
+        load_corners(frame, table, cache_values, cell.x, cell.y, cell.z, w);
         if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
           hit.cell = (uint)((cell.x - x0) + 4 * (cell.y - y0) + 16 * (cell.z - z0));
           hit.s = refine(solver, change.cubic, change.bracket);

@@ -57,8 +57,10 @@ typedef struct FrameParams {
   float isovalue;
   uint isovalue_index;  ///< the isovalue in the quantile table of macrocells.cl
   uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+  uint per_ray_speculation;  ///< pipeline `rays`: each ray looks as far ahead as it has missed before
+  uint table_groups;    ///< entries / 8 of the block cache's table (block_table.h)
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 100);
+ISO_CHECK_SIZE(FrameParams, 108);
 
 #define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED 65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass
@@ -98,8 +100,9 @@ typedef struct PassCounts {
   uint decoded_count;      ///< of those, blocks that got a slot
   uint hit_count;          ///< rays that hit in this pass
   uint next_active_count;  ///< rays left for the next pass
+  uint free_count;         ///< cache slots left without a block
 } PassCounts;
-ISO_CHECK_SIZE(PassCounts, 52);
+ISO_CHECK_SIZE(PassCounts, 56);
 
 ISO_NAMESPACE_END
 

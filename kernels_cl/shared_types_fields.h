@@ -10,14 +10,15 @@
   X(width) X(height)                                                        \
   X(eye_x) X(eye_y) X(eye_z) X(fwd_x) X(fwd_y) X(fwd_z)                     \
   X(right_x) X(right_y) X(right_z) X(up_x) X(up_y) X(up_z)                  \
-  X(pixel_scale) X(t_scale) X(isovalue) X(isovalue_index) X(max_spec_count)
+  X(pixel_scale) X(t_scale) X(isovalue) X(isovalue_index) X(max_spec_count) \
+  X(per_ray_speculation) X(table_groups)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
 #define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)
 #define ISO_PASS_COUNTS_FIELDS(X)                                           \
   X(pixel_count) X(pass) X(active_count) X(spec_count) X(window_count)      \
   X(pair_slot_count) X(pair_count)                                          \
   X(granted_count) X(visible_count) X(requested_count) X(decoded_count)     \
-  X(hit_count) X(next_active_count)
+  X(hit_count) X(next_active_count) X(free_count)
 
 // clang-format on
 #endif

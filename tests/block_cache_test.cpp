@@ -56,7 +56,7 @@ class CacheModel {
       }
     }
     ASSERT_EQ(world.counts().requested_count, wanted_.size());
-    std::vector<uint> requests = world.cache.decode_block_ids().read();
+    std::vector<uint> requests = world.cache.request_block_ids.read();
     requests.resize(wanted_.size());
     std::ranges::sort(requests);
     ASSERT_TRUE(std::ranges::equal(requests, wanted_)) << "requests";
@@ -76,10 +76,10 @@ class CacheModel {
     /* Slots of this pass stay with it, but as many as the first pair needs are found in any case. */
     ASSERT_EQ(decoded, std::min<std::size_t>(wanted_.size(), std::max(num_slots - in_use, first_missing)));
 
-    const std::vector<uint> table = world.cache.page_table().read(),
-                            slots = world.cache.slot_block_ids().read(),
-                            stream = world.cache.decode_block_ids().read(),
-                            targets = world.cache.decode_slots().read();
+    const std::vector<uint> table = world.cache.table.read(),
+                            slots = world.cache.slot_block_ids.read(),
+                            stream = world.cache.request_block_ids.read(),
+                            targets = world.cache.decode_slots.read();
     /* The decode list: distinct blocks that were asked for, in distinct slots. */
     const std::set<uint> blocks(stream.begin(), stream.begin() + decoded),
         into(targets.begin(), targets.begin() + decoded);

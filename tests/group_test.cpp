@@ -59,11 +59,11 @@ class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   static void check(const StageWorld &world, const Group &group, const std::vector<uint> &pairs,
                     Tally &tally) {
-    const std::vector<uint> table = world.cache.page_table().read();
+    const std::vector<uint> table = world.cache.table.read();
     const auto granted = [&](uint pair) {
       if (pairs[pair] == ISO_INVALID_ID) return false;
       return std::ranges::all_of(dual_grid_blocks(world.frame, pairs[pair]),
-                                 [&](uint block) { return table[block] < world.cache.num_slots(); });
+                                 [&](uint block) { return table[block] < world.cache.num_slots; });
     };
     std::map<uint, std::set<uint>> expected;  // by slot
     std::size_t num_granted = 0;
@@ -136,7 +136,7 @@ TEST_P(GroupOnDevice, OneMissingBlockIsEnoughToWait) {
     world.begin_pass(some, 1);
     world.cache.request(world.rays);
     world.cache.assign_slots(world.rays);
-    const std::vector<uint> table = world.cache.page_table().read();
+    const std::vector<uint> table = world.cache.table.read();
     for (const uint block : all) {
       const std::vector<uint> grid = dual_grid_blocks(frame, block);
       const auto absent = [&](uint b) { return table[b] == ISO_BLOCK_ABSENT; };

@@ -194,9 +194,9 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     intersect(world.cache, group.groups(), world.rays);
 
     const FrameParams &frame = world.frame;
-    const uint num_slots = world.cache.num_slots();
+    const uint num_slots = world.cache.num_slots;
     const std::vector<PairHit> got = world.rays.pair_hits.read();
-    const std::vector<uint> table = world.cache.page_table().read();
+    const std::vector<uint> table = world.cache.table.read();
     const auto cached = [&](uint block) { return table[block] < num_slots; };
     for (uint pair = 0; pair < pairs.size(); ++pair) {
       const uint pixel = world.active_ray_ids[pair / spec_count];

@@ -36,8 +36,7 @@ struct StageWorld {
   StageWorld(ocl::Device &device, const FrameParams &frame_params, uint num_slots, uint group_size)
       : frame(frame_params),
         rays(device, frame.width * frame.height),
-        cache(device, std::uint64_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z, num_slots,
-              rays.num_pixels, group_size),
+        cache(device, frame, num_slots, rays.num_pixels, group_size),
         compaction(device, rays.num_pixels, group_size) {
     set_frame(frame_params);
     std::vector<uint> ids(rays.num_pixels);
@@ -48,6 +47,7 @@ struct StageWorld {
   /// Another camera or isovalue; image size and volume stay.
   void set_frame(const FrameParams &frame_params) {
     frame = frame_params;
+    frame.table_groups = cache.table_groups;
     rays.frame.write({&frame, 1});
   }
 
@@ -77,7 +77,7 @@ struct StageWorld {
   /// padding, which nobody may use.
   void fill_slots(const std::vector<float> &voxels) {
     const uint granted = counts().decoded_count;
-    const std::vector<uint> blocks = cache.decode_block_ids().read(), slots = cache.decode_slots().read();
+    const std::vector<uint> blocks = cache.request_block_ids.read(), slots = cache.decode_slots.read();
     for (uint i = 0; i < granted; ++i) {
       const uint x0 = 4 * (blocks[i] % frame.blocks_x),
                  y0 = 4 * (blocks[i] / frame.blocks_x % frame.blocks_y),
@@ -88,7 +88,7 @@ struct StageWorld {
         if (x < frame.dims_x && y < frame.dims_y && z < frame.dims_z)
           values[v] = voxels[x + frame.dims_x * (y + std::size_t{frame.dims_y} * z)];
       }
-      cache.values().write(values, 64 * std::size_t{slots[i]});
+      cache.values.write(values, 64 * std::size_t{slots[i]});
     }
   }
 

@@ -17,6 +17,7 @@
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {
@@ -31,9 +32,8 @@ struct Options {
   VolumeOptions volume;
   FrameOptions frame;
   std::string device;
-  std::string speculation = "global";
-  std::string solver{to_string(kDefaultSolver)};
-  RendererOptions renderer;
+  RendererFlags renderer_flags;
+  RendererOptions renderer;  ///< what the flags ask for
   bool reference = false, no_stage_times = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
   std::string image, depth, stats, progress_dir;
@@ -154,15 +154,12 @@ nlohmann::ordered_json draw_frames(const Options &options, const Scene &scene, F
 }
 
 nlohmann::ordered_json options_json(const Options &options, const Scene &scene) {
-  return {{"size", {scene.size.width, scene.size.height}},
-          {"views", scene.cameras.size()},
-          {"isovalues", options.frame.isovalues},
-          {"reference", options.reference},
-          {"speculation", options.speculation},
-          {"max_speculation", options.renderer.max_speculation},
-          {"cache_slots", options.renderer.cache_slots},
-          {"solver", to_string(options.renderer.solver)},
-          {"group_size", options.renderer.group_size}};
+  nlohmann::ordered_json json = {{"size", {scene.size.width, scene.size.height}},
+                                 {"views", scene.cameras.size()},
+                                 {"isovalues", options.frame.isovalues},
+                                 {"reference", options.reference}};
+  json.update(renderer_options_json(options.renderer));
+  return json;
 }
 
 nlohmann::ordered_json volume_json(const Options &options, const CompressedVolume &volume) {
@@ -211,13 +208,11 @@ void run_render(Options options) {
     if (std::isnan(isovalue)) throw Error("--isovalue nan: give a number in the volume's value range");
   }
   check_outputs(options);
-  if (options.speculation == "off") options.renderer.max_speculation = 1;
-  options.renderer.solver = solver_from_string(options.solver);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
   const Scene scene = load_scene(options.input, options.volume, options.frame);
-  options.renderer.size = scene.size;
+  options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
   if (options.reference) {
@@ -249,23 +244,7 @@ void add_render(CLI::App &app) {
   add_frame_options(*command, options->frame)->required();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
-  command
-      ->add_option("--speculation", options->speculation,
-                   "blocks a ray looks ahead: off, or global (W*H / active rays)")
-      ->check(CLI::IsMember({"off", "global"}))
-      ->capture_default_str();
-  command
-      ->add_option("--max-speculation", options->renderer.max_speculation,
-                   "most blocks a ray looks ahead, 1..64")
-      ->capture_default_str();
-  command
-      ->add_option("--cache-slots", options->renderer.cache_slots,
-                   "decoded blocks kept on the device, at least 8 [2^18 or all]")
-      ->check(CLI::Range(8u, 1u << 30));
-  command->add_option("--solver", options->solver, "root finder: linear, marmitt, analytic or bernstein")
-      ->capture_default_str();
-  command->add_option("--group-size", options->renderer.group_size, "work-items per work-group, 8..256")
-      ->capture_default_str();
+  add_renderer_options(*command, options->renderer_flags);
   command->add_flag("--reference", options->reference, "use the scalar C++ reference instead of a device");
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")

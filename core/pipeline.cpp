@@ -1,0 +1,123 @@
+#include "core/pipeline.hpp"
+
+#include "core/composite.hpp"
+#include "core/group.hpp"
+#include "core/initial_rays.hpp"
+#include "core/intersect.hpp"
+#include "core/march.hpp"
+#include "core/speculation.hpp"
+#include "core/traverse.hpp"
+
+namespace isowave {
+
+namespace {
+
+class BlocksPipeline : public Pipeline {
+ public:
+  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
+      : state_(state),
+        compaction_(state.device, state.rays.num_pixels, group_size),
+        initial_rays_(state.device, state.rays.num_pixels),
+        speculation_(state.device),
+        traverse_(state.device, state.rays.num_pixels, group_size),
+        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size),
+        intersect_(state.device, state.rays.num_pixels, group_size, solver),
+        composite_(state.device, state.rays.num_pixels) {}
+
+  void begin_frame() override {
+    const auto stage = state_.device.timer().stage("initial_rays");
+    initial_rays_(state_.rays, compaction_);
+  }
+
+  void enqueue_pass() override {
+    ocl::StageTimer &timer = state_.device.timer();
+    const auto pass = timer.stage("speculation");
+    speculation_.begin_pass(state_.rays);
+    {
+      const auto stage = timer.stage("traverse");
+      traverse_(state_.macrocells, state_.rays);
+    }
+    {
+      const auto stage = timer.stage("request");
+      state_.cache.request(state_.rays);
+    }
+    state_.provide_blocks();
+    {
+      const auto stage = timer.stage("group");
+      group_(state_.cache, state_.rays, compaction_);
+    }
+    {
+      const auto stage = timer.stage("intersect");
+      intersect_(state_.cache, group_.groups(), state_.rays);
+    }
+    {
+      const auto stage = timer.stage("composite");
+      composite_(state_.cache, state_.rays, compaction_);
+    }
+  }
+
+ private:
+  FrameState &state_;
+  Compaction compaction_;
+  InitialRays initial_rays_;
+  Speculation speculation_;
+  Traverse traverse_;
+  Group group_;
+  Intersect intersect_;
+  Composite composite_;
+};
+
+class RaysPipeline : public Pipeline {
+ public:
+  RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
+      : state_(state), march_(state.device, state.rays.num_pixels, group_size, solver) {}
+
+  void begin_frame() override { first_pass_ = true; }
+
+  void enqueue_pass() override {
+    ocl::StageTimer &timer = state_.device.timer();
+    if (!first_pass_) {
+      {
+        const auto stage = timer.stage("request");
+        march_.request(state_.macrocells, state_.cache, state_.rays);
+      }
+      state_.provide_blocks();
+    }
+    const auto stage = timer.stage("march");
+    if (first_pass_) {
+      march_.march_all(state_.macrocells, state_.cache, state_.rays);
+    } else {
+      march_.march(state_.macrocells, state_.cache, state_.rays);
+    }
+    first_pass_ = false;
+  }
+
+ private:
+  FrameState &state_;
+  March march_;
+  bool first_pass_ = true;  ///< of the frame: nobody has asked for anything yet
+};
+
+}  // namespace
+
+std::string_view to_string(PipelineKind kind) {
+  return kind == PipelineKind::kBlocks ? "blocks" : "rays";
+}
+
+void FrameState::provide_blocks() {
+  {
+    const auto stage = device.timer().stage("cache");
+    if (slots_are_scarce) cache.evict(rays);
+    cache.assign(rays);
+  }
+  const auto stage = device.timer().stage("decode");
+  decode(stream, rays.counts, cache.request_block_ids, cache.decode_slots, cache.values);
+}
+
+std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
+                                        Solver solver) {
+  if (kind == PipelineKind::kBlocks) return std::make_unique<BlocksPipeline>(state, group_size, solver);
+  return std::make_unique<RaysPipeline>(state, group_size, solver);
+}
+
+}  // namespace isowave

@@ -1,0 +1,53 @@
+#pragma once
+// The passes of a frame: two ways to arrange the same stages, with the same finished picture bit for bit.
+//
+//   blocks  [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]*   the paper's (Sec. 3.3 to 4.4)
+//   rays    march -> [ request -> cache -> decode -> march ]*    each ray intersects what it meets, as far as it is cached
+
+#include <cstdint>
+#include <memory>
+#include <string_view>
+
+#include "core/block_cache.hpp"
+#include "core/macrocells.hpp"
+#include "core/solvers.hpp"
+#include "core/wavefront.hpp"
+#include "core/zfp_decode.hpp"
+
+namespace isowave {
+
+enum class PipelineKind {
+  kAuto,  ///< by what was measured for the kind of device
+  kBlocks,
+  kRays
+};
+std::string_view to_string(PipelineKind kind);
+
+/// What every pipeline works on.
+struct FrameState {
+  ocl::Device &device;
+  DeviceStream stream;
+  Wavefront rays;
+  Macrocells macrocells;
+  BlockCache cache;
+  ZfpDecode decode;
+  bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
+
+  /// Cache and decode: the blocks that the pass has asked for get slots and values. Asynchronous.
+  void provide_blocks();
+};
+
+class Pipeline {
+ public:
+  virtual ~Pipeline() = default;
+  /// Makes the frame's rays from state.rays.frame. Asynchronous.
+  virtual void begin_frame() = 0;
+  /// Enqueues one pass: a chain of launches whose sizes live on the device. Asynchronous.
+  virtual void enqueue_pass() = 0;
+};
+
+/// `state` must outlive the pipeline.
+std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
+                                        Solver solver);
+
+}  // namespace isowave

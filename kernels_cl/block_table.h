@@ -1,0 +1,65 @@
+/// block_table.h -- which cache slot a block is in: a hash table of O(slots), not of O(blocks).
+///
+/// Open addressing. The eight blocks of a 2^3 group begin their search side by side, for a ray asks for neighbours. An entry
+/// whose block was evicted keeps its key until the table is rebuilt (block_cache.cl); at least a quarter of the entries
+/// has no key, so every search ends.
+#ifndef ISOWAVE_BLOCK_TABLE_H
+#define ISOWAVE_BLOCK_TABLE_H
+
+#include "block_grid.h"
+
+ISO_NAMESPACE_BEGIN
+
+typedef struct BlockEntry {
+  uint block_id;  ///< ISO_INVALID_ID: never used
+  uint slot;      ///< ISO_BLOCK_ABSENT: evicted
+} BlockEntry;
+ISO_CHECK_SIZE(BlockEntry, 8);
+
+/// What the cache's kernels leave for each other, and for the next pass.
+typedef struct CacheState {
+  uint first_block_id;  ///< the block that the pass must serve, or ISO_INVALID_ID
+  uint free_count;      ///< slots that hold no block, before the pass's grants
+  uint granted;         ///< slots given in the pass
+  uint
+      table_count;  ///< at least the keys in the table before the pass's grants, those of evicted blocks included
+  /* The outcome of cache_select: */
+  uint free_before;   ///< free slots before eviction
+  uint cutoff_age;    ///< all slots older than this are victims ...
+  uint cutoff_count;  ///< ... and this many of just this age
+  uint num_evicted;   ///< so far
+  uint num_cutoff;    ///< tickets drawn by slots of the cutoff age
+  uint rebuild;       ///< the table has too many keys of evicted blocks
+} CacheState;
+
+#define ISO_TABLE_STEP 9u  ///< from entry to entry of a search; odd, and no factor of the table's size
+
+/// Where the search for block (x,y,z) begins. frame->table_groups: entries / 8.
+static inline uint table_home(ISO_CONSTANT const FrameParams *frame, uint x, uint y, uint z) {
+  uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((z >> 1) * 0xC2B2AE3Du);
+  h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
+  h ^= h >> 13;
+  return 8u * (uint)(((ulong)h * frame->table_groups) >> 32) + (x & 1u) + 2u * (y & 1u) + 4u * (z & 1u);
+}
+
+static inline uint table_next(ISO_CONSTANT const FrameParams *frame, uint entry) {
+  const uint next = entry + ISO_TABLE_STEP, size = 8u * frame->table_groups;
+  return next >= size ? next - size : next;
+}
+
+/// The slot of block (x,y,z), or ISO_BLOCK_ABSENT.
+static inline uint cached_slot(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
+                               uint x, uint y, uint z) {
+  const uint block_id = block_id_at(frame, x, y, z);
+  uint i = table_home(frame, x, y, z);
+  for (;;) {
+    const BlockEntry entry = table[i];
+    if (entry.block_id == block_id) return entry.slot;
+    if (entry.block_id == ISO_INVALID_ID) return ISO_BLOCK_ABSENT;
+    i = table_next(frame, i);
+  }
+}
+
+ISO_NAMESPACE_END
+
+#endif

@@ -1,0 +1,50 @@
+#include "tools/isowave/renderer_options.hpp"
+
+namespace isowave::tools {
+
+void add_renderer_options(CLI::App &app, RendererFlags &flags) {
+  app.add_option("--pipeline", flags.pipeline,
+                 "arrangement of the passes: blocks (the paper's), rays, or auto (by what was measured for "
+                 "the kind of "
+                 "device)")
+      ->check(CLI::IsMember({"auto", "blocks", "rays"}))
+      ->capture_default_str();
+  app.add_option(
+         "--speculation", flags.speculation,
+         "blocks a ray looks ahead: off (1), global (W*H / active rays), or per-ray (twice as many after "
+         "every miss; pipeline rays)")
+      ->check(CLI::IsMember({"off", "global", "per-ray"}))
+      ->capture_default_str();
+  app.add_option("--max-speculation", flags.values.max_speculation, "most blocks a ray looks ahead, 1..64")
+      ->capture_default_str();
+  app.add_option("--cache-slots", flags.values.cache_slots,
+                 "decoded blocks kept on the device, at least 8 [2^18 or all]")
+      ->check(CLI::Range(8u, 1u << 30));
+  app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
+      ->capture_default_str();
+  app.add_option("--group-size", flags.values.group_size, "work-items per work-group, 8..256")
+      ->capture_default_str();
+}
+
+RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) {
+  RendererOptions options = flags.values;
+  options.size = size;
+  options.pipeline = flags.pipeline == "blocks" ? PipelineKind::kBlocks
+                     : flags.pipeline == "rays" ? PipelineKind::kRays
+                                                : PipelineKind::kAuto;
+  if (flags.speculation == "off") options.max_speculation = 1;
+  options.per_ray_speculation = flags.speculation == "per-ray";
+  options.solver = solver_from_string(flags.solver);
+  return options;
+}
+
+nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
+  const char *speculation = options.max_speculation == 1  ? "off"
+                            : options.per_ray_speculation ? "per-ray"
+                                                          : "global";
+  return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
+          {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
+          {"solver", to_string(options.solver)},        {"group_size", options.group_size}};
+}
+
+}  // namespace isowave::tools
