@@ -119,7 +119,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
       if (dual_grid_block(frame, b, corner) == ISO_INVALID_ID) continue;
       const uint slot = cached_slot(frame, table, x, y, z);
       if (slot != ISO_BLOCK_ABSENT) {
-        slot_stamps[slot] = counts->pass + 1;
+        /* Only what the pass has stamped is counted as in use; the rest the block served first does not touch. */
+        if (slot_stamps[slot] == counts->pass) slot_stamps[slot] = counts->pass + 1;
       } else if ((requested_bits[request_word(frame, x, y, z)] & request_bit(x, y, z)) != 0) {
         first_missing[num_first_missing++] = block_id_at(frame, x, y, z);
       }
@@ -154,7 +155,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     cache->num_evicted = 0;
     cache->num_cutoff = 0;
     cache->free_count = num_free + evicted;
-    cache->rebuild = cache->table_count + granted > 6 * frame->table_groups; /* of 8 */
+    cache->rebuild = requested != 0 && cache->table_count + granted > 6 * frame->table_groups; /* of 8 */
     if (cache->rebuild) cache->table_count = num_slots - cache->free_count;
   }
   barrier(CLK_GLOBAL_MEM_FENCE); /* the histogram has been read */
