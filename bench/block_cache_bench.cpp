@@ -57,8 +57,8 @@ class CacheInput {
     requested_ = true;
   }
   void assign() {
-    cache_.evict(rays_);
-    cache_.assign(rays_);
+    cache_.evict(rays_.counts, rays_);
+    cache_.assign(rays_.counts, rays_);
     requested_ = false;
   }
   /// Gives slots to requests that have none yet.

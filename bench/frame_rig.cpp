@@ -56,8 +56,8 @@ void FrameRig::thin_wavefront(std::uint32_t spec_count) {
 void FrameRig::find_blocks() {
   traverse(macrocells, rays);
   cache.request(rays);
-  cache.evict(rays);
-  cache.assign(rays);
+  cache.evict(rays.counts, rays);
+  cache.assign(rays.counts, rays);
   zfp_decode(stream, rays.counts, cache.request_block_ids, cache.decode_slots, cache.values);
   group(cache, rays, compaction);
 }

@@ -73,17 +73,16 @@ void BlockCache::request(Wavefront &rays) {
            request_block_ids, capacity, state);
 }
 
-void BlockCache::evict(Wavefront &rays) {
-  age_histogram_kernel_(slots_range_, rays.counts, num_slots, slot_block_ids, slot_stamps, age_histogram_);
-  select_({1, group_size_}, rays.frame, rays.counts, num_slots, table, slot_stamps, requested_bits,
+void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
+  age_histogram_kernel_(slots_range_, asked, num_slots, slot_block_ids, slot_stamps, age_histogram_);
+  select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, age_histogram_, state);
-  evict_(slots_range_, rays.frame, rays.counts, num_slots, slot_block_ids, slot_stamps, table, state,
-         free_slots_);
-  rebuild_(slots_range_, rays.frame, rays.counts, num_slots, slot_block_ids, state, table);
+  evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, table, state, free_slots_);
+  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, state, table);
 }
 
-void BlockCache::assign(Wavefront &rays) {
-  assign_(requests_range_, rays.frame, rays.counts, request_block_ids, capacity, free_slots_, table,
+void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {
+  assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots_, table,
           slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
 }
 

@@ -22,11 +22,11 @@ struct BlockCache {
   /// counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request.)
   void request(Wavefront &rays);
   /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the free ones, but none that the
-  /// pass uses; the block served first gets what it takes. Asynchronous.
-  void evict(Wavefront &rays);
+  /// pass uses; the block served first gets what it takes. asked: the counts that hold requested_count. Asynchronous.
+  void evict(const CountsBuffer &asked, Wavefront &rays);
   /// Gives the free slots to requests. Out: counts.decoded_count; request_block_ids and decode_slots hold that many.
   /// Asynchronous.
-  void assign(Wavefront &rays);
+  void assign(const CountsBuffer &asked, Wavefront &rays);
 
   /// Forgets every block: the next pass finds the cache as it was made. Asynchronous.
   void clear();
@@ -60,8 +60,8 @@ struct BlockCache {
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<CacheState>,
               ocl::Out<BlockEntry>>
       rebuild_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, uint, ocl::In<uint>,
-              ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint,
+              ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<CacheState>>
       assign_;
   ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,

@@ -41,7 +41,7 @@ class BlocksPipeline : public Pipeline {
       const auto stage = timer.stage("request");
       state_.cache.request(state_.rays);
     }
-    state_.provide_blocks();
+    state_.provide_blocks(state_.rays.counts);
     {
       const auto stage = timer.stage("group");
       group_(state_.cache, state_.rays, compaction_);
@@ -75,27 +75,22 @@ class RaysPipeline : public Pipeline {
   void begin_frame() override { first_pass_ = true; }
 
   void enqueue_pass() override {
-    ocl::StageTimer &timer = state_.device.timer();
-    if (!first_pass_) {
-      {
-        const auto stage = timer.stage("request");
-        march_.request(state_.macrocells, state_.cache, state_.rays);
-      }
-      state_.provide_blocks();
-    }
-    const auto stage = timer.stage("march");
-    if (first_pass_) {
-      march_.march_all(state_.macrocells, state_.cache, state_.rays);
-    } else {
-      march_.march(state_.macrocells, state_.cache, state_.rays);
-    }
+    Wavefront &rays = state_.rays;
+    rays.open_pass();
+    if (!first_pass_ || unanswered_) state_.provide_blocks(rays.previous_counts);
+    const auto stage = state_.device.timer().stage("march");
+    march_(first_pass_, state_.macrocells, state_.cache, rays);
     first_pass_ = false;
+    unanswered_ = true;
   }
+
+  void end_frame() override { unanswered_ = false; }
 
  private:
   FrameState &state_;
   March march_;
-  bool first_pass_ = true;  ///< of the frame: nobody has asked for anything yet
+  bool first_pass_ = true;   ///< of the frame
+  bool unanswered_ = false;  ///< the last pass may have asked for blocks
 };
 
 }  // namespace
@@ -104,11 +99,11 @@ std::string_view to_string(PipelineKind kind) {
   return kind == PipelineKind::kBlocks ? "blocks" : "rays";
 }
 
-void FrameState::provide_blocks() {
+void FrameState::provide_blocks(const CountsBuffer &asked) {
   {
     const auto stage = device.timer().stage("cache");
-    if (slots_are_scarce) cache.evict(rays);
-    cache.assign(rays);
+    if (slots_are_scarce) cache.evict(asked, rays);
+    cache.assign(asked, rays);
   }
   const auto stage = device.timer().stage("decode");
   decode(stream, rays.counts, cache.request_block_ids, cache.decode_slots, cache.values);

@@ -2,7 +2,7 @@
 // The passes of a frame: two ways to arrange the same stages, with the same finished picture bit for bit.
 //
 //   blocks  [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]*   the paper's (Sec. 3.3 to 4.4)
-//   rays    march -> [ request -> cache -> decode -> march ]*    each ray intersects what it meets, as far as it is cached
+//   rays    march -> [ cache -> decode -> march ]*    each ray intersects what it meets, as far as it is cached
 
 #include <cstdint>
 #include <memory>
@@ -33,8 +33,8 @@ struct FrameState {
   ZfpDecode decode;
   bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
 
-  /// Cache and decode: the blocks that the pass has asked for get slots and values. Asynchronous.
-  void provide_blocks();
+  /// Cache and decode: the blocks asked for, asked.requested_count, get slots and values. Asynchronous.
+  void provide_blocks(const CountsBuffer &asked);
 };
 
 class Pipeline {
@@ -44,6 +44,8 @@ class Pipeline {
   virtual void begin_frame() = 0;
   /// Enqueues one pass: a chain of launches whose sizes live on the device. Asynchronous.
   virtual void enqueue_pass() = 0;
+  /// Says that no ray is left. Without it, the next frame knows that passes of this one were not followed up.
+  virtual void end_frame() {}
 };
 
 /// `state` must outlive the pipeline.

@@ -100,6 +100,7 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
     stats.cancelled = on_pass && !on_pass(pass);
     finished = pass.counts.next_active_count == 0;
   }
+  if (!stats.cancelled) pipeline_->end_frame();
   device_.finish();
   stats.total_ms = ms_since(begin);
   return stats;

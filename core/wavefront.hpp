@@ -2,6 +2,8 @@
 // The rays of a frame on the device and the arrays of one pass. R = pixels; nothing here grows with the
 // volume.
 
+#include <utility>
+
 #include "core/device_counts.hpp"
 #include "core/frame.hpp"
 
@@ -13,6 +15,7 @@ struct Wavefront {
       : num_pixels(pixels),
         frame(device, "frame", 1),
         counts(device, "pass counts", 1),
+        previous_counts(device, "pass counts, previous", 1),
         next_counts(device, "pass counts, next", 1),
         hits(device, "hits", pixels),
         ray_block_ids(device, "ray states", pixels),
@@ -25,13 +28,22 @@ struct Wavefront {
     start.pixel_count = static_cast<uint>(pixels);
     start.pass = ISO_AGE_BUCKETS;  // so that slots never used, stamped 0, are the oldest
     counts.write({&start, 1});
+    previous_counts.write({&start, 1});
     next_counts.write({&start, 1});
+  }
+
+  /// Pipeline `rays`: the counts and the rays left by one pass go to the next.
+  void open_pass() {
+    std::swap(previous_counts, counts);
+    std::swap(counts, next_counts);
+    std::swap(active_ray_ids, next_active_ray_ids);
   }
 
   std::uint64_t num_pixels;          ///< R
   ocl::Buffer<FrameParams> frame;    ///< [1]
-  CountsBuffer counts;               ///< [1] of the pass at work
-  CountsBuffer next_counts;          ///< [1] of the pass before; then, of the one to come (pipeline `rays`)
+  CountsBuffer counts;                    ///< [1] of the pass at work
+  CountsBuffer previous_counts;           ///< [1] of the pass before (pipeline `rays`)
+  CountsBuffer next_counts;               ///< [1] of the next pass, opened by this one (pipeline `rays`)
   ocl::Buffer<HitRecord> hits;       ///< [R] by pixel: the picture so far
   ocl::Buffer<uint> ray_block_ids;   ///< [R] by pixel: the block a ray goes on from (R_BID)
   ocl::Buffer<uint> active_ray_ids;  ///< [active_count] pixels of the rays at work, ascending (R_ID)

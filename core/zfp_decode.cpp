@@ -8,7 +8,7 @@ constexpr std::uint32_t kGroupSize = 64;
 
 ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks)
     : range_(ocl::Range::strided(max_blocks, kGroupSize, device)),
-      kernel_(device, "zfp_decode", "zfp_decode") {}
+      kernel_(device, "zfp_decode", "zfp_decode", group_defines(kGroupSize)) {}
 
 void ZfpDecode::operator()(const DeviceStream &stream, const CountsBuffer &counts,
                            const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,

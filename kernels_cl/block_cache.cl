@@ -4,7 +4,7 @@
 /// [slots]: pass that used it last. free_slots [slots]: the first cache.free_count hold no block. requested_bits: one
 /// per block, 0 between passes.
 ///
-/// A pass: cache_request, or request_blocks of march.cl (stamp what is cached, list what is not) -> where free slots may not
+/// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may not
 /// suffice: cache_age_histogram -> cache_select (how many, how old) -> cache_evict -> cache_rebuild -> then cache_assign. All
 /// cost O(slots) or O(requests), never O(blocks). Which block gets which slot is left to chance; no hit depends on it.
 ///
@@ -100,7 +100,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
 /// Decides how many slots are freed and which ages pay for it. One work-group. age_histogram is zeroed
 /// again.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
-    constant FrameParams *frame, global PassCounts *counts, uint num_slots, global const BlockEntry *table,
+    constant FrameParams *frame, global const PassCounts *counts, uint num_slots, global const BlockEntry *table,
     global uint *slot_stamps, global const uint *requested_bits, global uint *request_block_ids,
     uint capacity, global uint *age_histogram, global CacheState *cache) {
   local uint first_missing[8]; /* blocks of the dual grid served first that are on the request list */
@@ -194,13 +194,13 @@ kernel void cache_rebuild(constant FrameParams *frame, global const PassCounts *
   }
 }
 
-/// Request i gets the i-th free slot from the end; requests past the last are dropped. decode_slots [requests]: the slots.
+/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free slot from the end; requests past the last are dropped. decode_slots [requests]: the slots.
 /// Takes the marks of all requests back. Grid-stride over requests.
-kernel void cache_assign(constant FrameParams *frame, global PassCounts *counts,
+kernel void cache_assign(constant FrameParams *frame, global const PassCounts *asked, global PassCounts *counts,
                          global const uint *request_block_ids, uint capacity, global const uint *free_slots,
                          global BlockEntry *table, global uint *slot_block_ids, global uint *slot_stamps,
                          global uint *requested_bits, global uint *decode_slots, global CacheState *cache) {
-  const uint listed = listed_count(counts, capacity), num_free = cache->free_count;
+  const uint listed = listed_count(asked, capacity), num_free = cache->free_count;
   const uint granted = min(listed, num_free);
   if (get_global_id(0) == 0) {
     cache->granted = granted;
@@ -215,7 +215,7 @@ kernel void cache_assign(constant FrameParams *frame, global PassCounts *counts,
       const uint slot = free_slots[num_free - 1 - i];
       table_insert(frame, table, block_id, slot);
       slot_block_ids[slot] = block_id;
-      slot_stamps[slot] = counts->pass;
+      slot_stamps[slot] = asked->pass;
       decode_slots[i] = slot;
     }
   }

@@ -1,39 +1,15 @@
-/// block_walk.h -- a ray's walk over the blocks that the isovalue is in the range of (Sec. 3.3). OpenCL C 1.2.
+/// block_walk.h -- a ray's way through the blocks that the isovalue is in the range of (Sec. 3.3). OpenCL C 1.2.
 /// Two-level grid: a coarse macrocell is 4^3 blocks; its 64 bits say which of them are active (macrocells.cl). A coarse
 /// cell with no bit is left in one step.
+///
+/// Define ISO_FOUND, the address space of the list, before including this.
 #ifndef ISOWAVE_BLOCK_WALK_H
 #define ISOWAVE_BLOCK_WALK_H
 
 #include "block_grid.h"
 #include "grid_dda.h"
 
-typedef struct BlockWalk {
-  GridWalk block;   ///< the block the ray is in; of no meaning in a coarse cell without a bit
-  GridWalk coarse;  ///< its coarse cell
-  uint low, high;   ///< that cell's bits
-} BlockWalk;
-
-inline void load_coarse_bits(constant FrameParams *frame, global const uint *macrocell_masks,
-                             BlockWalk *walk) {
-  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
-  const uint cell =
-      (uint)walk->coarse.x + coarse_x * ((uint)walk->coarse.y + coarse_y * (uint)walk->coarse.z);
-  walk->low = macrocell_masks[2 * cell];
-  walk->high = macrocell_masks[2 * cell + 1];
-}
-
-/// A walk that stands in block (x,y,z).
-inline BlockWalk block_walk_from(constant FrameParams *frame, global const uint *macrocell_masks,
-                                 const Ray *ray, int x, int y, int z, LastPlanes last) {
-  BlockWalk walk;
-  walk.block = walk_from(ray, x, y, z, 4, last);
-  walk.coarse = walk_from(ray, x / ISO_MACROCELL_BLOCKS, y / ISO_MACROCELL_BLOCKS, z / ISO_MACROCELL_BLOCKS,
-                          4 * ISO_MACROCELL_BLOCKS, last);
-  load_coarse_bits(frame, macrocell_masks, &walk);
-  return walk;
-}
-
-/// The block of the walk's coarse cell that the ray is in just after event `e`, by which it entered that cell.
+/// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it entered the cell.
 inline GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e, LastPlanes last) {
   const int bx = coarse->x * ISO_MACROCELL_BLOCKS, by = coarse->y * ISO_MACROCELL_BLOCKS,
             bz = coarse->z * ISO_MACROCELL_BLOCKS;
@@ -43,42 +19,58 @@ inline GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent
   return walk_from(ray, x, y, z, 4, last);
 }
 
-/// Goes on to the first active block, which may be the one that the walk stands in. Returns 0 when the ray has left the
-/// volume.
-inline int find_active_block(constant FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
-                             LastPlanes last, BlockWalk *walk) {
-  for (;;) {
-    RayEvent entry;
-    if ((walk->low | walk->high) != 0) {
-      while (walk->block.x >> 2 == walk->coarse.x && walk->block.y >> 2 == walk->coarse.y &&
-             walk->block.z >> 2 == walk->coarse.z) {
-        const uint bit = (uint)((walk->block.x & 3) + 4 * (walk->block.y & 3) + 16 * (walk->block.z & 3));
-        if (4 * walk->block.x >= last.x || 4 * walk->block.y >= last.y || 4 * walk->block.z >= last.z)
-          return 0;
-        if ((bit < 32 ? walk->low >> bit : walk->high >> (bit - 32)) & 1u) return 1;
-        walk_step(&walk->block, ray, walk_exit(&walk->block), 4, last);
+/// Is region (x,y,z) one that owns cells? size: of the region [voxels].
+inline int owns_cells(int x, int y, int z, int size, LastPlanes last) {
+  return x >= 0 && size * x < last.x && y >= 0 && size * y < last.y && z >= 0 && size * z < last.z;
+}
+
+/// Walks on from block *block_id to the next `wanted` active blocks, into found [wanted], `stride` apart. Returns how many
+/// there are before the ray leaves the volume; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
+inline uint find_blocks(constant FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
+                        uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
+  const LastPlanes last = last_planes(frame);
+  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  const BlockCoords from = block_coords(frame, *block_id);
+  /* The outer walk steps from coarse cell to coarse cell; only in those with a bit is there an inner one. */
+  GridWalk w = walk_from(ray, (int)from.x, (int)from.y, (int)from.z, 4, last);
+  GridWalk coarse = walk_from(ray, w.x / ISO_MACROCELL_BLOCKS, w.y / ISO_MACROCELL_BLOCKS,
+                              w.z / ISO_MACROCELL_BLOCKS, 4 * ISO_MACROCELL_BLOCKS, last);
+  RayEvent entry = start_event();
+  int within = 1, entered = 1; /* entered: w is in this coarse cell */
+  uint k = 0;
+  while (within && k < wanted) {
+    const uint cell = (uint)coarse.x + coarse_x * ((uint)coarse.y + coarse_y * (uint)coarse.z);
+    const uint low = macrocell_masks[2 * cell], high = macrocell_masks[2 * cell + 1];
+    if ((low | high) != 0) {
+      if (!entered) w = enter_macrocell(ray, &coarse, entry, last);
+      entered = 1;
+      while (entered && within && k < wanted) {
+        const uint bit = (uint)((w.x & 3) + 4 * (w.y & 3) + 16 * (w.z & 3));
+        if ((bit < 32 ? low >> bit : high >> (bit - 32)) & 1u) {
+          found[stride * k++] = block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z);
+        }
+        walk_step(&w, ray, walk_exit(&w), 4, last);
+        within = owns_cells(w.x, w.y, w.z, 4, last);
+        entered = w.x >> 2 == coarse.x && w.y >> 2 == coarse.y && w.z >> 2 == coarse.z;
       }
     }
-    entry = walk_exit(&walk->coarse);
-    walk_step(&walk->coarse, ray, entry, 4 * ISO_MACROCELL_BLOCKS, last);
-    if (walk->coarse.x < 0 || 16 * walk->coarse.x >= last.x || walk->coarse.y < 0 ||
-        16 * walk->coarse.y >= last.y || walk->coarse.z < 0 || 16 * walk->coarse.z >= last.z) {
-      return 0;
+    if (k < wanted) {
+      entry = walk_exit(&coarse);
+      walk_step(&coarse, ray, entry, 4 * ISO_MACROCELL_BLOCKS, last);
+      within = owns_cells(coarse.x, coarse.y, coarse.z, 4 * ISO_MACROCELL_BLOCKS, last);
+      entered = 0;
     }
-    load_coarse_bits(frame, macrocell_masks, walk);
-    if ((walk->low | walk->high) != 0) walk->block = enter_macrocell(ray, &walk->coarse, entry, last);
   }
+  *block_id = within ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z) : ISO_INVALID_ID;
+  return k;
 }
 
-inline uint walk_block_id(constant FrameParams *frame, const BlockWalk *walk) {
-  return block_id_at(frame, (uint)walk->block.x, (uint)walk->block.y, (uint)walk->block.z);
-}
-
-/// Leaves the block that the walk stands in. Returns 0 when that leaves the volume.
-inline int leave_block(const Ray *ray, LastPlanes last, BlockWalk *walk) {
-  walk_step(&walk->block, ray, walk_exit(&walk->block), 4, last);
-  return walk->block.x >= 0 && 4 * walk->block.x < last.x && walk->block.y >= 0 &&
-         4 * walk->block.y < last.y && walk->block.z >= 0 && 4 * walk->block.z < last.z;
+/// The block behind block b on the ray, or ISO_INVALID_ID outside the volume.
+inline uint block_behind(constant FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
+  GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  walk_step(&w, ray, walk_exit(&w), 4, last);
+  return owns_cells(w.x, w.y, w.z, 4, last) ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
+                                            : ISO_INVALID_ID;
 }
 
 #endif

@@ -198,17 +198,34 @@ static inline RayEvent walk_exit(const GridWalk *w) {
   return e;
 }
 
-/// Goes through the region's exit into the next region, which may lie outside the grid.
+/// Goes through the region's exit into the next region, which may lie outside the grid. One path for all axes: the
+/// work-items of a GPU take turns at branches.
 static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
-  if (exit.axis == 0) {
-    w->x += r->x.d > 0.0f ? 1 : -1;
-    w->fx = far_t(r->x, w->x, size, last.x);
-  } else if (exit.axis == 1) {
-    w->y += r->y.d > 0.0f ? 1 : -1;
-    w->fy = far_t(r->y, w->y, size, last.y);
+  const int on_x = exit.axis == 0, on_y = exit.axis == 1;
+  RayAxis a = r->z;
+  int c = w->z, last_plane = last.z;
+  TwoFloat t;
+  if (on_y) {
+    a = r->y;
+    c = w->y;
+    last_plane = last.y;
+  }
+  if (on_x) {
+    a = r->x;
+    c = w->x;
+    last_plane = last.x;
+  }
+  c += a.d > 0.0f ? 1 : -1;
+  t = far_t(a, c, size, last_plane);
+  if (on_x) {
+    w->x = c;
+    w->fx = t;
+  } else if (on_y) {
+    w->y = c;
+    w->fy = t;
   } else {
-    w->z += r->z.d > 0.0f ? 1 : -1;
-    w->fz = far_t(r->z, w->z, size, last.z);
+    w->z = c;
+    w->fz = t;
   }
 }
 

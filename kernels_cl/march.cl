@@ -1,8 +1,9 @@
 /// march.cl -- pipeline `rays`: each ray walks through the active blocks and intersects those that are cached; at the first
 /// that is not it waits, and asks for that block and its next candidates (Sec. 3.3, 4).
 ///
-/// march_all (every pixel) -> [ request_blocks -> cache -> decode -> march ]*. No sort and no composite: a ray's blocks come in
-/// ray order, so its first change is its hit.
+/// march of every pixel -> [ cache -> decode -> march ]*. No sort and no composite: a ray's blocks come in ray order, so its
+/// first change is its hit.
+#define ISO_FOUND local
 #include "block_requests.h"
 #include "block_walk.h"
 #include "cell_intersect.h"
@@ -16,7 +17,7 @@
 /// What became of a ray.
 #define ISO_RAY_LEFT 0   ///< it left the volume
 #define ISO_RAY_HIT 1    ///< equal to what isolate() returns, as is
-#define ISO_RAY_DOUBT 2  ///< request_blocks() settles it
+#define ISO_RAY_DOUBT 2  ///< the next march settles it
 #define ISO_RAY_WAITS 3  ///< for a block that is not cached
 #if ISO_RAY_DOUBT != ISO_DOUBTFUL
 #error "a result of isolate() must stand for itself"
@@ -122,12 +123,13 @@ inline uint tiled_pixel(constant FrameParams *frame, uint i) {
   return x < frame->width && y < frame->height ? x + frame->width * y : ISO_INVALID_ID;
 }
 
-/// Opens the counts of the pass after this one. One work-item; nobody else reads *next now.
-inline void open_next_counts(global const PassCounts *counts, global PassCounts *next, int first) {
+/// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
+inline void open_next_counts(global const PassCounts *prev, global const PassCounts *counts, global PassCounts *next,
+                             int first) {
   uint window = counts->pixel_count;
   if (!first) { /* see begin_pass() in speculation.cl */
     window = counts->window_count;
-    window = counts->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
+    window = prev->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
     window = clamp(window, 1u, counts->pixel_count);
   }
   next->pixel_count = counts->pixel_count;
@@ -137,92 +139,6 @@ inline void open_next_counts(global const PassCounts *counts, global PassCounts 
   next->granted_count = next->visible_count = next->requested_count = next->decoded_count = 0;
   next->hit_count = next->next_active_count = 0;
   next->free_count = counts->free_count;
-}
-
-/// Walks rays on until they hit, leave or wait. first: every pixel's ray from the eye; otherwise active_ray_ids
-/// [counts->active_count], each from ray_block_ids [pixel] (ISO_INVALID_ID: settled, nothing to do). Out: hits [pixel],
-/// next_active_ray_ids [counts->next_active_count] and their ray_block_ids; *next is opened for the next pass.
-/// macrocell_masks: as traverse(). Groups stride over the rays.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    constant FrameParams *frame, uint first, global const uint *macrocell_masks,
-    global const BlockEntry *table, global const float *cache_values, global PassCounts *counts,
-    global PassCounts *next, global const uint *active_ray_ids, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global HitRecord *hits) {
-  local uint slots[8 * ISO_GROUP_SIZE];
-  local uint counters[2], group_hits, group_blocks;
-  const LastPlanes last = last_planes(frame);
-  const uint item = get_local_id(0);
-  const uint num_rays =
-      first ? (frame->width + 7) / 8 * ((frame->height + 3) / 4) * 32 : counts->active_count;
-  uint num_hits = 0, num_blocks = 0;
-  if (get_global_id(0) == 0) {
-    open_next_counts(counts, next, (int)first);
-    if (first) counts->active_count = counts->pixel_count;
-  }
-  if (item == 0) counters[0] = group_hits = group_blocks = 0;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
-       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint i = begin + item;
-    uint pixel = ISO_INVALID_ID, entry = 0, block_id = ISO_INVALID_ID;
-    int result = ISO_RAY_LEFT;
-    if (first) {
-      pixel = tiled_pixel(frame, i);
-      entry = pixel | 1u << ISO_RAY_AHEAD_SHIFT;
-    } else if (i < num_rays) {
-      entry = active_ray_ids[i];
-      block_id = ray_block_ids[entry & ISO_RAY_PIXEL];
-      pixel = block_id == ISO_INVALID_ID ? ISO_INVALID_ID : entry & ISO_RAY_PIXEL;
-    }
-    if (pixel != ISO_INVALID_ID) {
-      const Ray ray = make_ray(frame, pixel);
-      const BlockCoords from = block_coords(frame, first ? 0 : block_id);
-      int x = (int)from.x, y = (int)from.y, z = (int)from.z;
-      int within = 1;
-      BlockChange found;
-      BlockWalk walk;
-      if (first) {
-        RayEvent enter;
-        within = domain_entry(&ray, last, &enter);
-        if (within) { /* blocks that own no cell (one last voxel layer) are never entered */
-          x = locate(ray.x, 0, enter, 4, 0, (last.x - 1) / 4);
-          y = locate(ray.y, 1, enter, 4, 0, (last.y - 1) / 4);
-          z = locate(ray.z, 2, enter, 4, 0, (last.z - 1) / 4);
-        }
-      }
-      if (within) walk = block_walk_from(frame, macrocell_masks, &ray, x, y, z, last);
-      while (within && result == ISO_RAY_LEFT) {
-        within = find_active_block(frame, macrocell_masks, &ray, last, &walk);
-        if (within) {
-          const BlockCoords b = {(uint)walk.block.x, (uint)walk.block.y, (uint)walk.block.z};
-          result = march_block(frame, table, cache_values, &ray, b, last, slots + item, 0, &found);
-          if (result == ISO_RAY_LEFT) within = leave_block(&ray, last, &walk);
-          num_blocks += result != ISO_RAY_WAITS;
-        }
-      }
-      if (result == ISO_RAY_HIT) {
-        hits[pixel] = hit_of(frame, &ray, &found);
-        ++num_hits;
-      } else if (first || result == ISO_RAY_LEFT) {
-        hits[pixel] = no_hit();
-      }
-      if (result == ISO_RAY_WAITS || result == ISO_RAY_DOUBT) {
-        const uint waits_at = walk_block_id(frame, &walk);
-        const uint ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
-        ray_block_ids[pixel] = waits_at;
-        entry = pixel | (waits_at == block_id ? ahead : min(ahead + 1, ISO_RAY_AHEAD_MAX))
-                            << ISO_RAY_AHEAD_SHIFT;
-        if (result == ISO_RAY_DOUBT) entry |= ISO_RAY_IN_DOUBT;
-      }
-    }
-    append_ray(result == ISO_RAY_WAITS || result == ISO_RAY_DOUBT, entry, counters,
-               &counts->next_active_count, next_active_ray_ids);
-  }
-  if (num_hits != 0) atomic_add(&group_hits, num_hits);
-  if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (item == 0 && group_hits != 0) atomic_add(&counts->hit_count, group_hits);
-  if (item == 0 && group_blocks != 0) atomic_add(&counts->granted_count, group_blocks);
 }
 
 /// The blocks of the dual grid of block b that the ray's cells there touch (bits 0..7, corner x + 2y + 4z).
@@ -237,97 +153,179 @@ inline uint touched_blocks(const Ray *ray, BlockCoords b, LastPlanes last) {
   return touched;
 }
 
+#define ISO_BLOCKS_AT_ONCE 4u      ///< that a ray looks for before it intersects them
 #define ISO_REQUEST_STAGING 256u  ///< requests that a work-group collects before it writes them out
 
-/// Of the rays that wait, those among the first counts->window_count settle their doubt, if any, and ask for the blocks that
-/// they touch in the next active blocks: N_Spec of them (Sec. 4), or their own number of
-/// frame->per_ray_speculation. prev: the counts of the pass before.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_blocks(
-    constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
-    global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
-    global const uint *active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
-    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids, uint capacity,
-    global CacheState *cache) {
-  local uint slots[8 * ISO_GROUP_SIZE];
-  local uint staged[ISO_REQUEST_STAGING];
-  local uint num_staged, list_begin, group_hits;
-  const LastPlanes last = last_planes(frame);
-  const uint item = get_local_id(0), pass = counts->pass;
-  const uint active = prev->next_active_count, window = min(active, counts->window_count);
-  const uint fair_share = active == 0 ? 0 : min(frame->max_spec_count, counts->pixel_count / active);
-  uint num_hits = 0;
-  if (get_global_id(0) == 0) {
-    open_requests(cache);
-    counts->active_count = active;
-    counts->spec_count = fair_share;
-    if (active == 0) cache->first_block_id = ISO_INVALID_ID;
+/// How far a ray has come. found: this work-item's place for ISO_BLOCKS_AT_ONCE, ISO_GROUP_SIZE apart.
+typedef struct RayMarch {
+  int result;      ///< ISO_RAY_*
+  uint next;       ///< the first block not looked for, or ISO_INVALID_ID
+  uint num_found;  ///< active blocks looked for ...
+  uint at;         ///< ... and the one of them at which the ray stands
+} RayMarch;
+
+/// The block in which a ray begins, or ISO_INVALID_ID if it does not meet the volume. Blocks that own no cell (one last
+/// voxel layer) are never entered.
+inline uint first_block(constant FrameParams *frame, const Ray *ray, LastPlanes last) {
+  RayEvent enter;
+  if (!domain_entry(ray, last, &enter)) return ISO_INVALID_ID;
+  return block_id_at(frame, (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4),
+                     (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4),
+                     (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4));
+}
+
+/// Walks a ray on from block `from`. in_doubt: about that one. num_blocks: counts the blocks intersected.
+inline RayMarch march_ray(constant FrameParams *frame, global const uint *macrocell_masks,
+                          global const BlockEntry *table, global const float *cache_values, const Ray *ray,
+                          uint from, int in_doubt, LastPlanes last, local uint *slots, local uint *found,
+                          uint *num_blocks, BlockChange *change) {
+  RayMarch m;
+  m.result = ISO_RAY_LEFT;
+  m.next = from;
+  m.num_found = m.at = 0;
+  if (in_doubt) {
+    const BlockCoords b = block_coords(frame, from);
+    m.result = march_block(frame, table, cache_values, ray, b, last, slots, 1, change);
+    m.next = block_behind(frame, ray, b, last);
+    m.num_found = 1;
+    found[0] = from;
   }
-  if (item == 0) num_staged = group_hits = 0;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < window;
-       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint a = begin + item;
-    if (a < window) {
-      const uint entry = active_ray_ids[a];
-      const uint pixel = entry & ISO_RAY_PIXEL, block_id = ray_block_ids[pixel];
-      const Ray ray = make_ray(frame, pixel);
-      const BlockCoords from = block_coords(frame, block_id);
-      const uint ahead = frame->per_ray_speculation
-                             ? min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count)
-                             : fair_share;
-      BlockWalk walk =
-          block_walk_from(frame, macrocell_masks, &ray, (int)from.x, (int)from.y, (int)from.z, last);
-      int within = 1;
-      if (entry & ISO_RAY_IN_DOUBT) {
-        BlockChange found;
-        const int result = march_block(frame, table, cache_values, &ray, from, last, slots + item, 1, &found);
-        if (result == ISO_RAY_HIT) {
-          hits[pixel] = hit_of(frame, &ray, &found);
-          ray_block_ids[pixel] = ISO_INVALID_ID;
-          ++num_hits;
-          within = 0;
-        } else if (result == ISO_RAY_LEFT) {
-          within = leave_block(&ray, last, &walk);
-          ray_block_ids[pixel] = within ? walk_block_id(frame, &walk) : ISO_INVALID_ID;
-        }
-      }
-      if (a == 0) cache->first_block_id = ISO_INVALID_ID;
-      for (uint k = 0; within && k < ahead; ++k) {
-        within = find_active_block(frame, macrocell_masks, &ray, last, &walk);
-        if (within) {
-          const BlockCoords b = {(uint)walk.block.x, (uint)walk.block.y, (uint)walk.block.z};
-          const uint touched = touched_blocks(&ray, b, last);
-          if (a == 0 && k == 0) cache->first_block_id = walk_block_id(frame, &walk);
-          for (uint corner = 0; corner < 8; ++corner) {
-            const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-            if ((touched >> corner & 1u) != 0 &&
-                request_block(frame, table, slot_stamps, pass, requested_bits, x, y, z)) {
-              const uint place = atomic_inc(&num_staged), wanted = block_id_at(frame, x, y, z);
-              if (place < ISO_REQUEST_STAGING) {
-                staged[place] = wanted;
-              } else {
-                list_request(frame, request_block_ids, capacity, requested_bits,
-                             atomic_inc(&counts->requested_count), wanted);
-              }
-            }
+  while (m.next != ISO_INVALID_ID && m.result == ISO_RAY_LEFT) {
+    m.num_found =
+        find_blocks(frame, macrocell_masks, ray, &m.next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
+    m.at = 0;
+    while (m.at < m.num_found && m.result == ISO_RAY_LEFT) {
+      const BlockCoords b = block_coords(frame, found[m.at * ISO_GROUP_SIZE]);
+      m.result = march_block(frame, table, cache_values, ray, b, last, slots, 0, change);
+      if (m.result == ISO_RAY_LEFT) ++m.at;
+    }
+    *num_blocks += m.at;
+  }
+  return m;
+}
+
+/// The request list, and where a work-group collects what it will add to it.
+typedef struct Requests {
+  global uint *bits, *block_ids;
+  uint capacity;
+  volatile global uint *count;
+  local uint *staged;
+  volatile local uint *num_staged;
+} Requests;
+
+/// Asks for the blocks that the ray touches in the next `ahead` active blocks, from the one where it stands.
+inline void request_ahead(constant FrameParams *frame, global const uint *macrocell_masks,
+                          global const BlockEntry *table, global uint *slot_stamps, uint pass, const Ray *ray,
+                          RayMarch m, uint ahead, LastPlanes last, local uint *found, Requests requests) {
+  uint next = m.next, num_found = m.num_found, at = m.at;
+  for (uint asked = 0; asked < ahead && (at < num_found || next != ISO_INVALID_ID);) {
+    if (at == num_found) {
+      num_found = find_blocks(frame, macrocell_masks, ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE), found,
+                              ISO_GROUP_SIZE);
+      at = 0;
+    }
+    if (at < num_found) {
+      const BlockCoords b = block_coords(frame, found[at * ISO_GROUP_SIZE]);
+      const uint touched = touched_blocks(ray, b, last);
+      for (uint corner = 0; corner < 8; ++corner) {
+        const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+        if ((touched >> corner & 1u) != 0 &&
+            request_block(frame, table, slot_stamps, pass, requests.bits, x, y, z)) {
+          const uint place = atomic_inc(requests.num_staged), block_id = block_id_at(frame, x, y, z);
+          if (place < ISO_REQUEST_STAGING) {
+            requests.staged[place] = block_id;
+          } else {
+            list_request(frame, requests.block_ids, requests.capacity, requests.bits,
+                         atomic_inc(requests.count), block_id);
           }
-          within = leave_block(&ray, last, &walk);
+        }
+      }
+      ++at;
+      ++asked;
+    }
+  }
+}
+
+/// Walks rays on until they hit, leave or wait. first: every pixel's ray from the eye; otherwise active_ray_ids
+/// [prev->next_active_count], each from ray_block_ids [pixel]. Of those that wait, the first counts->window_count ask for
+/// the blocks that they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of
+/// frame->per_ray_speculation. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] and their
+/// ray_block_ids; request_block_ids [counts->requested_count, at most capacity]; *next, opened. macrocell_masks: as
+/// traverse(). Groups stride over the rays.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
+    constant FrameParams *frame, uint first, global const uint *macrocell_masks, global const BlockEntry *table,
+    global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
+    global PassCounts *next, global const uint *active_ray_ids, global uint *next_active_ray_ids,
+    global uint *ray_block_ids, global HitRecord *hits, global uint *slot_stamps, global uint *requested_bits,
+    global uint *request_block_ids, uint capacity, global CacheState *cache) {
+  local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+  local uint counters[2], num_staged, list_begin, group_hits, group_blocks;
+  const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
+                             staged,         &num_staged};
+  const LastPlanes last = last_planes(frame);
+  const uint item = get_local_id(0);
+  const uint num_rays =
+      first ? (frame->width + 7) / 8 * ((frame->height + 3) / 4) * 32 : prev->next_active_count;
+  const uint fair_share =
+      num_rays == 0 ? 0 : clamp(counts->pixel_count / num_rays, 1u, frame->max_spec_count);
+  uint num_hits = 0, num_blocks = 0;
+  if (get_global_id(0) == 0) {
+    open_next_counts(prev, counts, next, (int)first);
+    open_requests(cache);
+    cache->first_block_id = ISO_INVALID_ID;
+    counts->active_count = first ? counts->pixel_count : num_rays;
+    counts->spec_count = fair_share;
+  }
+  if (item == 0) counters[0] = num_staged = group_hits = group_blocks = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    const uint i = begin + item;
+    uint entry = ISO_INVALID_ID;
+    int waits = 0;
+    if (i < num_rays) entry = first ? tiled_pixel(frame, i) : active_ray_ids[i];
+    if (entry != ISO_INVALID_ID) {
+      const uint pixel = entry & ISO_RAY_PIXEL;
+      const Ray ray = make_ray(frame, pixel);
+      const uint from = first ? first_block(frame, &ray, last) : ray_block_ids[pixel];
+      BlockChange change;
+      const RayMarch m =
+          march_ray(frame, macrocell_masks, table, cache_values, &ray, from, (entry & ISO_RAY_IN_DOUBT) != 0,
+                    last, slots + item, found + item, &num_blocks, &change);
+      waits = m.result >= ISO_RAY_DOUBT;
+      if (m.result == ISO_RAY_HIT) {
+        hits[pixel] = hit_of(frame, &ray, &change);
+        ++num_hits;
+      } else if (first) {
+        hits[pixel] = no_hit();
+      }
+      if (waits) {
+        const uint block_id = found[m.at * ISO_GROUP_SIZE + item];
+        uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
+        if (block_id != from || first) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
+        entry = pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
+        ray_block_ids[pixel] = block_id;
+        if (i == 0) cache->first_block_id = block_id;
+        if (i < counts->window_count) {
+          request_ahead(frame, macrocell_masks, table, slot_stamps, counts->pass, &ray, m,
+                        frame->per_ray_speculation ? min(1u << log_ahead, frame->max_spec_count) : fair_share,
+                        last, found + item, requests);
         }
       }
     }
+    append_ray(waits, entry, counters, &counts->next_active_count, next_active_ray_ids);
+    if (item == 0) list_begin = atomic_add(requests.count, min(num_staged, ISO_REQUEST_STAGING));
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (item == 0 && num_staged != 0) {
-      list_begin = atomic_add(&counts->requested_count, min(num_staged, ISO_REQUEST_STAGING));
-    }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = item; i < min(num_staged, ISO_REQUEST_STAGING); i += ISO_GROUP_SIZE) {
-      list_request(frame, request_block_ids, capacity, requested_bits, list_begin + i, staged[i]);
+    for (uint j = item; j < min(num_staged, ISO_REQUEST_STAGING); j += ISO_GROUP_SIZE) {
+      list_request(frame, request_block_ids, capacity, requested_bits, list_begin + j, staged[j]);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     if (item == 0) num_staged = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
   }
   if (num_hits != 0) atomic_add(&group_hits, num_hits);
+  if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);
   barrier(CLK_LOCAL_MEM_FENCE);
   if (item == 0 && group_hits != 0) atomic_add(&counts->hit_count, group_hits);
+  if (item == 0 && group_blocks != 0) atomic_add(&counts->granted_count, group_blocks);
 }

@@ -1,26 +1,6 @@
 /// traverse.cl -- each active ray's next N_Spec blocks that may hold the isosurface (Sec. 3.3, 4.1).
+#define ISO_FOUND global
 #include "block_walk.h"
-
-/// Walks on from block *block_id to the next `wanted` active blocks, into found. Returns how many there are before the ray
-/// leaves the volume; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
-inline uint find_blocks(constant FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
-                        uint *block_id, uint wanted, global uint *found) {
-  const LastPlanes last = last_planes(frame);
-  const BlockCoords from = block_coords(frame, *block_id);
-  BlockWalk walk =
-      block_walk_from(frame, macrocell_masks, ray, (int)from.x, (int)from.y, (int)from.z, last);
-  uint k = 0;
-  int within = 1;
-  while (within && k < wanted) {
-    within = find_active_block(frame, macrocell_masks, ray, last, &walk);
-    if (within) {
-      found[k++] = walk_block_id(frame, &walk);
-      within = leave_block(ray, last, &walk);
-    }
-  }
-  *block_id = within ? walk_block_id(frame, &walk) : ISO_INVALID_ID;
-  return k;
-}
 
 /// pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k ascending along the ray; ISO_INVALID_ID behind
 /// the last. ray_block_ids [pixel]: in, the block to go on from; out, the first block not yet looked at, or
@@ -39,7 +19,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
     const Ray ray = make_ray(frame, ray_id);
     uint block_id = ray_block_ids[ray_id];
     const uint found =
-        find_blocks(frame, macrocell_masks, &ray, &block_id, spec_count, pair_block_ids + a * spec_count);
+        find_blocks(frame, macrocell_masks, &ray, &block_id, spec_count, pair_block_ids + a * spec_count, 1);
     for (uint k = found; k < spec_count; ++k) pair_block_ids[a * spec_count + k] = ISO_INVALID_ID;
     ray_block_ids[ray_id] = block_id;
     pairs += found;

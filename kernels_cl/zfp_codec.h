@@ -102,6 +102,13 @@ static inline float power_of_two(int e) {
   return bits.f;
 }
 
+/// All loops over the 64 values are unrolled, so that they stay in registers: a GPU has no fast indexed ones.
+#ifdef __OPENCL_C_VERSION__
+#define ISO_UNROLL _Pragma("unroll")
+#else
+#define ISO_UNROLL
+#endif
+
 /// Decodes the block that starts at `first_bit` of `words` and has max_bits bits.
 /// values [64]: x + 4 y + 16 z. Reads at most one word past the block's last bit.
 static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
@@ -110,8 +117,10 @@ static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bi
   uint coefficients[64];
   float scale;
   uint bits, plane, n, i;
+  ISO_UNROLL
   for (i = 0; i < 64u; ++i) coefficients[i] = 0u;
   if (!read_bit(&r)) {
+    ISO_UNROLL
     for (i = 0; i < 64u; ++i) values[i] = 0.0f;
     return;
   }
@@ -132,14 +141,21 @@ static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bi
       }
       x += (ulong)1 << n++;
     }
-    for (i = 0; x != 0; ++i, x >>= 1) {
-      if (x & 1u) coefficients[iso_zfp_order[i]] += 1u << plane;
+    ISO_UNROLL
+    for (i = 0; i < 32u; ++i) {
+      coefficients[iso_zfp_order[i]] |= ((uint)x >> i & 1u) << plane;
+      coefficients[iso_zfp_order[i + 32u]] |= ((uint)(x >> 32) >> i & 1u) << plane;
     }
   }
+  ISO_UNROLL
   for (i = 0; i < 64u; ++i) coefficients[i] = (coefficients[i] ^ 0xAAAAAAAAu) - 0xAAAAAAAAu; /* negabinary */
+  ISO_UNROLL
   for (i = 0; i < 16u; ++i) inverse_lift(coefficients + i, 16);
+  ISO_UNROLL
   for (i = 0; i < 16u; ++i) inverse_lift(coefficients + (i & 3u) + 16u * (i >> 2), 4);
+  ISO_UNROLL
   for (i = 0; i < 16u; ++i) inverse_lift(coefficients + 4u * i, 1);
+  ISO_UNROLL
   for (i = 0; i < 64u; ++i) values[i] = (float)(int)coefficients[i] * scale;
 }
 

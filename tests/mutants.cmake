@@ -29,8 +29,7 @@ set_tests_properties(mutant.none_at_all PROPERTIES WILL_FAIL TRUE)
 
 # Traversal.
 add_mutant(accumulated_t grid_dda.h
-  "    w->fx = far_t(r->x, w->x, size, last.x);\n  } else if"
-  "    w->fx.hi += fabs(r->x.inv_d.hi) * (float)size;\n    (void)last;\n  } else if")
+  "    w->fx = t;" "    w->fx.hi += fabs(a.inv_d.hi) * (float)size;")
 add_mutant(missing_carry two_float.h
   "return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);" "return a.hi < b.hi;")
 add_mutant(float_plane_t grid_dda.h
