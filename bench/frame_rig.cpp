@@ -58,7 +58,7 @@ void FrameRig::find_blocks() {
   cache.request(rays);
   cache.evict(rays.counts, rays);
   cache.assign(rays.counts, rays);
-  zfp_decode(stream, rays.counts, cache.request_block_ids, cache.decode_slots, cache.values);
+  zfp_decode(stream, rays.frame, rays.counts, cache);
   group(cache, rays, compaction);
 }
 

@@ -47,6 +47,7 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       requested_bits(device, "requested blocks", request_words(grid)),
       request_block_ids(device, "block requests", capacity),
       decode_slots(device, "decode slots", capacity),
+      decode_entries(device, "decode entries", capacity),
       state(device, "cache state", 1),
       group_size_(group_size),
       pairs_range_(ocl::Range::strided(num_pixels, group_size, device)),
@@ -59,6 +60,7 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       select_(device, "block_cache", "cache_select", group_defines(group_size)),
       evict_(device, "block_cache", "cache_evict", group_defines(group_size)),
       rebuild_(device, "block_cache", "cache_rebuild", group_defines(group_size)),
+      classify_(device, "block_cache", "cache_classify", group_defines(group_size)),
       assign_(device, "block_cache", "cache_assign", group_defines(group_size)),
       clear_(device, "block_cache", "cache_clear", group_defines(group_size)) {
   clear();
@@ -66,6 +68,10 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
 
 void BlockCache::clear() {
   clear_(slots_range_, num_slots, 8 * table_groups, table, slot_block_ids, slot_stamps, free_slots_, state);
+}
+
+void BlockCache::classify(Wavefront &rays) {
+  classify_(slots_range_, rays.frame, values, table);
 }
 
 void BlockCache::request(Wavefront &rays) {
@@ -78,12 +84,12 @@ void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, age_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, table, state, free_slots_);
-  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, state, table);
+  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, values, state, table);
 }
 
 void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {
   assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots_, table,
-          slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
+          slot_block_ids, slot_stamps, requested_bits, decode_slots, decode_entries, state);
 }
 
 }  // namespace isowave

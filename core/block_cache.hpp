@@ -28,6 +28,9 @@ struct BlockCache {
   /// Asynchronous.
   void assign(const CountsBuffer &asked, Wavefront &rays);
 
+  /// Brings the table up to date with another isovalue of rays.frame. Asynchronous.
+  void classify(Wavefront &rays);
+
   /// Forgets every block: the next pass finds the cache as it was made. Asynchronous.
   void clear();
 
@@ -41,6 +44,7 @@ struct BlockCache {
   ocl::Buffer<uint> requested_bits;     ///< [2 * coarse macrocells] one bit per block; 0 between passes
   ocl::Buffer<uint> request_block_ids;  ///< [capacity]
   ocl::Buffer<uint> decode_slots;       ///< [capacity] slot of each request granted
+  ocl::Buffer<uint> decode_entries;  ///< [capacity] and its table entry
   ocl::Buffer<CacheState> state;        ///< [1]
 
  private:
@@ -57,12 +61,13 @@ struct BlockCache {
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>,
               ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>
       evict_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<CacheState>,
-              ocl::Out<BlockEntry>>
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<float>,
+              ocl::In<CacheState>, ocl::Out<BlockEntry>>
       rebuild_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<float>, ocl::Out<BlockEntry>> classify_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint,
               ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<CacheState>>
+              ocl::Out<uint>, ocl::Out<CacheState>>
       assign_;
   ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<CacheState>>

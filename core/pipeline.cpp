@@ -106,7 +106,7 @@ void FrameState::provide_blocks(const CountsBuffer &asked) {
     cache.assign(asked, rays);
   }
   const auto stage = device.timer().stage("decode");
-  decode(stream, rays.counts, cache.request_block_ids, cache.decode_slots, cache.values);
+  decode(stream, rays.frame, rays.counts, cache);
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,

@@ -116,6 +116,7 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
   if (selected_isovalue_ != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
     state_.macrocells.select(state_.rays.frame);
+    state_.cache.classify(state_.rays);
   }
   selected_isovalue_ = isovalue;
   pipeline_->begin_frame();

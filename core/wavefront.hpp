@@ -26,6 +26,7 @@ struct Wavefront {
         pair_hits(device, "pair hits", with_pairs ? pixels : 0) {
     PassCounts start{};
     start.pixel_count = static_cast<uint>(pixels);
+    start.window_count = start.pixel_count;
     start.pass = ISO_AGE_BUCKETS;  // so that slots never used, stamped 0, are the oldest
     counts.write({&start, 1});
     previous_counts.write({&start, 1});

@@ -11,10 +11,12 @@
 ISO_NAMESPACE_BEGIN
 
 typedef struct BlockEntry {
-  uint block_id;  ///< ISO_INVALID_ID: never used
-  uint slot;      ///< ISO_BLOCK_ABSENT: evicted
+  uint block_id;     ///< ISO_INVALID_ID: never used
+  uint slot;         ///< ISO_BLOCK_ABSENT: evicted
+  uint inside_low;   ///< bit x + 4y + 16z: is the voxel inside, value >= isovalue? z = 0, 1
+  uint inside_high;  ///< z = 2, 3
 } BlockEntry;
-ISO_CHECK_SIZE(BlockEntry, 8);
+ISO_CHECK_SIZE(BlockEntry, 16);
 
 /// What the cache's kernels leave for each other, and for the next pass.
 typedef struct CacheState {
@@ -47,17 +49,23 @@ static inline uint table_next(ISO_CONSTANT const FrameParams *frame, uint entry)
   return next >= size ? next - size : next;
 }
 
-/// The slot of block (x,y,z), or ISO_BLOCK_ABSENT.
-static inline uint cached_slot(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
-                               uint x, uint y, uint z) {
+/// What the table knows of block (x,y,z); its slot is ISO_BLOCK_ABSENT if it is not cached.
+static inline BlockEntry find_block(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
+                                    uint y, uint z) {
   const uint block_id = block_id_at(frame, x, y, z);
   uint i = table_home(frame, x, y, z);
-  for (;;) {
-    const BlockEntry entry = table[i];
-    if (entry.block_id == block_id) return entry.slot;
-    if (entry.block_id == ISO_INVALID_ID) return ISO_BLOCK_ABSENT;
+  BlockEntry entry = table[i];
+  while (entry.block_id != block_id && entry.block_id != ISO_INVALID_ID) {
     i = table_next(frame, i);
+    entry = table[i];
   }
+  if (entry.block_id != block_id) entry.slot = ISO_BLOCK_ABSENT;
+  return entry;
+}
+
+static inline uint cached_slot(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
+                               uint y, uint z) {
+  return find_block(frame, table, x, y, z).slot;
 }
 
 ISO_NAMESPACE_END

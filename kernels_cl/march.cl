@@ -50,6 +50,26 @@ typedef struct BlockChange {
   float w[8];
 } BlockChange;
 
+/// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which voxels of the blocks of
+/// its dual grid are inside; where one is not known, the cells that need it have any bit.
+inline ulong changing_cells(const ulong *inside) {
+  /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The same for +y, +z. */
+  const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul, not_z3 = 0x0000FFFFFFFFFFFFul;
+  ulong v[8], any = 0, all = ~0ul;
+  for (int i = 0; i < 8; ++i) v[i] = inside[i];
+  for (int i = 0; i < 8; i += 2) v[i + 1] = (v[i] >> 1 & not_x3) | (v[i + 1] << 3 & ~not_x3);
+  for (int i = 0; i < 8; i += 4) {
+    v[i + 2] = (v[i] >> 4 & not_y3) | (v[i + 2] << 12 & ~not_y3);
+    v[i + 3] = (v[i + 1] >> 4 & not_y3) | (v[i + 3] << 12 & ~not_y3);
+  }
+  for (int i = 0; i < 4; ++i) v[i + 4] = (v[i] >> 16 & not_z3) | (v[i + 4] << 48 & ~not_z3);
+  for (int i = 0; i < 8; ++i) {
+    any |= v[i];
+    all &= v[i];
+  }
+  return any & ~all;
+}
+
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, or ISO_RAY_WAITS where a block of
 /// the dual grid is not cached. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
 /// precise: settle doubts on the spot.
@@ -57,41 +77,43 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
                        global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
                        local uint *slots, int precise, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  ulong inside[8], changing;
   uint have = 0;
+  int result = ISO_RAY_LEFT;
+  for (uint corner = 0; corner < 8; ++corner) {
+    const BlockEntry entry = find_block(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
+    slots[corner * ISO_GROUP_SIZE] = entry.slot;
+    inside[corner] = (ulong)entry.inside_high << 32 | entry.inside_low;
+    have |= (uint)(entry.slot != ISO_BLOCK_ABSENT) << corner;
+  }
+  changing = changing_cells(inside);
+  if (changing == 0 && have == 0xFFu) return ISO_RAY_LEFT;
   found->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   found->cell = enter_block(ray, b, found->enter, last);
-  while (in_block(&found->cell, b, last)) {
+  while (result == ISO_RAY_LEFT && in_block(&found->cell, b, last)) {
     const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
     const RayEvent exit = walk_exit(&found->cell);
-    const uint need = cell_blocks(x, y, z) & ~have;
-    int result;
-    if (need != 0) {
-      for (uint corner = 0; corner < 8; ++corner) {
-        if ((need >> corner & 1u) != 0) {
-          const uint slot =
-              cached_slot(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
-          if (slot == ISO_BLOCK_ABSENT) return ISO_RAY_WAITS;
-          slots[corner * ISO_GROUP_SIZE] = slot;
-        }
+    if ((cell_blocks(x, y, z) & ~have) != 0) {
+      result = ISO_RAY_WAITS;
+    } else if ((changing >> (x + 4 * y + 16 * z) & 1ul) != 0) {
+      for (int corner = 0; corner < 8; ++corner) {
+        const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
+        const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+        found->w[corner] =
+            cache_values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
+            frame->isovalue;
       }
-      have |= need;
+      result = precise ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y, found->cell.z,
+                                        found->enter, exit, &found->change)
+                       : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                                 found->cell.z, found->enter, exit, &found->change);
     }
-    for (int corner = 0; corner < 8; ++corner) {
-      const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
-      const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
-      found->w[corner] =
-          cache_values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
-          frame->isovalue;
+    if (result == ISO_RAY_LEFT) {
+      walk_step(&found->cell, ray, exit, 1, last);
+      found->enter = exit;
     }
-    result = precise ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y, found->cell.z,
-                                      found->enter, exit, &found->change)
-                     : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
-                                               found->cell.z, found->enter, exit, &found->change);
-    if (result != 0) return result;
-    walk_step(&found->cell, ray, exit, 1, last);
-    found->enter = exit;
   }
-  return ISO_RAY_LEFT;
+  return result;
 }
 
 inline HitRecord hit_of(constant FrameParams *frame, const Ray *ray, const BlockChange *found) {

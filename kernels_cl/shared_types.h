@@ -11,6 +11,7 @@
 #define ISO_GLOBAL global      ///< address space of buffers
 #define ISO_CONSTANT constant  ///< address space of FrameParams and tables
 #else
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #define ISO_CHECK_SIZE(T, n) static_assert(sizeof(T) == (n), #T " layout changed")
@@ -30,6 +31,7 @@ using std::fabs;
 using std::floor;
 using std::fma;
 using std::sqrt;
+inline uint popcount(uint x) { return static_cast<uint>(std::popcount(x)); }
 #endif
 
 #define ISO_INVALID_ID 0xFFFFFFFFu   ///< "no block", "no ray": UINT_MAX in R_BID (Sec. 3.3)

@@ -20,38 +20,29 @@ ISO_CONSTANT static const uchar iso_zfp_order[64] = {
 /// Reads bits from 32-bit little-endian words, lowest bit first.
 typedef struct BitReader {
   ISO_GLOBAL const uint *words;  ///< the next word
-  ulong buffer;                  ///< bits read ahead, the next one lowest
-  uint buffered;                 ///< how many, 0..32
+  ulong buffer;                  ///< bits read ahead, the next one lowest; 0 above them
+  uint buffered;                 ///< how many, 0..63
 } BitReader;
 
-static inline uint read_bit(BitReader *r) {
-  uint bit;
-  if (r->buffered == 0u) {
-    r->buffer = *r->words++;
-    r->buffered = 32u;
+/// Makes at least 32 bits of the buffer valid.
+static inline void fill_bits(BitReader *r) {
+  if (r->buffered < 32u) {
+    r->buffer |= (ulong)*r->words++ << r->buffered;
+    r->buffered += 32u;
   }
-  bit = (uint)r->buffer & 1u;
-  r->buffer >>= 1;
-  --r->buffered;
-  return bit;
 }
 
-/// The next `count` bits, 0..64.
-static inline ulong read_bits(BitReader *r, uint count) {
-  ulong value = 0;
-  uint done = 0;
-  while (done < count) {
-    uint take = count - done;
-    if (r->buffered == 0u) {
-      r->buffer = *r->words++;
-      r->buffered = 32u;
-    }
-    if (take > r->buffered) take = r->buffered;
-    value |= (r->buffer & (((ulong)1 << take) - 1u)) << done;
-    r->buffer >>= take;
-    r->buffered -= take;
-    done += take;
-  }
+static inline void skip_bits(BitReader *r, uint count) {
+  r->buffer >>= count;
+  r->buffered -= count;
+}
+
+/// The next `count` bits, 0..32.
+static inline uint read_bits(BitReader *r, uint count) {
+  uint value;
+  fill_bits(r);
+  value = (uint)(r->buffer & (((ulong)1 << count) - 1u));
+  skip_bits(r, count);
   return value;
 }
 
@@ -62,6 +53,27 @@ static inline BitReader open_bits(ISO_GLOBAL const uint *words, ulong first_bit)
   r.buffered = 0;
   read_bits(&r, (uint)(first_bit & 31u));
   return r;
+}
+
+/// Skips zeros up to and with the next one, but reads no more than `limit` bits. Returns the number of zeros.
+static inline uint read_zeros(BitReader *r, uint limit) {
+  uint zeros = 0;
+  for (;;) {
+    uint window, run;
+    fill_bits(r);
+    window = (uint)r->buffer;
+    run = window == 0u ? 32u : popcount((window & (0u - window)) - 1u);
+    if (zeros + run >= limit) { /* there is none among them */
+      skip_bits(r, limit - zeros);
+      return limit;
+    }
+    zeros += run;
+    if (window != 0u) {
+      skip_bits(r, run + 1u);
+      return zeros;
+    }
+    skip_bits(r, 32u);
+  }
 }
 
 /// Inverse of zfp's lifted 4-point transform, in place on v[0], v[stride], ... Sums wrap, shifts right keep
@@ -110,7 +122,7 @@ static inline float power_of_two(int e) {
 #endif
 
 /// Decodes the block that starts at `first_bit` of `words` and has max_bits bits.
-/// values [64]: x + 4 y + 16 z. Reads at most one word past the block's last bit.
+/// values [64]: x + 4 y + 16 z. Reads at most two words past the block's last bit.
 static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
                                     float *values) {
   BitReader r = open_bits(words, first_bit);
@@ -119,7 +131,7 @@ static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bi
   uint bits, plane, n, i;
   ISO_UNROLL
   for (i = 0; i < 64u; ++i) coefficients[i] = 0u;
-  if (!read_bit(&r)) {
+  if (!read_bits(&r, 1)) {
     ISO_UNROLL
     for (i = 0; i < 64u; ++i) values[i] = 0.0f;
     return;
@@ -129,22 +141,28 @@ static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bi
   n = 0; /* coefficients known to be significant: their bits come verbatim */
   for (plane = 32; bits > 0u && plane-- > 0u;) {
     const uint verbatim = n < bits ? n : bits;
-    ulong x = read_bits(&r, verbatim);
+    uint low = read_bits(&r, verbatim < 32u ? verbatim : 32u);
+    uint high = read_bits(&r, verbatim < 32u ? 0u : verbatim - 32u);
     bits -= verbatim;
     while (n < 64u && bits > 0u) {
+      uint limit, zeros;
       --bits;
-      if (!read_bit(&r)) break; /* group test: no more ones in this plane */
-      while (n < 63u && bits > 0u) {
-        --bits;
-        if (read_bit(&r)) break;
-        ++n;
+      if (!read_bits(&r, 1)) break; /* group test: no more ones in this plane */
+      limit = 63u - n < bits ? 63u - n : bits;
+      zeros = read_zeros(&r, limit);
+      bits -= zeros < limit ? zeros + 1u : limit;
+      n += zeros;
+      if (n < 32u) {
+        low |= 1u << n;
+      } else {
+        high |= 1u << (n - 32u);
       }
-      x += (ulong)1 << n++;
+      ++n;
     }
     ISO_UNROLL
     for (i = 0; i < 32u; ++i) {
-      coefficients[iso_zfp_order[i]] |= ((uint)x >> i & 1u) << plane;
-      coefficients[iso_zfp_order[i + 32u]] |= ((uint)(x >> 32) >> i & 1u) << plane;
+      coefficients[iso_zfp_order[i]] |= (low >> i & 1u) << plane;
+      coefficients[iso_zfp_order[i + 32u]] |= (high >> i & 1u) << plane;
     }
   }
   ISO_UNROLL

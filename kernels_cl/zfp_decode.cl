@@ -1,14 +1,17 @@
 /// zfp_decode.cl -- decodes the pass's new blocks into their cache slots (Sec. 3.5).
+#include "block_table.h"
 #include "zfp_codec.h"
 
 #define ISO_STAGED_VALUES 16u  ///< of each block that go to the cache together: 64 bytes
 
 /// One work-item decodes one block; the work-group stores them together, so that neighbouring work-items write neighbouring
 /// values. The block of request i goes to slot slots[i]: cache_values [slots * 64], x + 4y + 16z within a slot.
-/// words: the payload of the zfp stream; block b starts at bit b * bits_per_block. Groups stride over decoded_count.
+/// words: the payload of the zfp stream; block b starts at bit b * bits_per_block. Which of its voxels are inside goes to
+/// entry entries[i] of the table. Groups stride over decoded_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_decode(
-    global const uint *words, uint bits_per_block, global const PassCounts *counts, global const uint *block_ids,
-    global const uint *slots, global float *cache_values) {
+    constant FrameParams *frame, global const uint *words, uint bits_per_block, global const PassCounts *counts,
+    global const uint *block_ids, global const uint *slots, global const uint *entries,
+    global float *cache_values, global BlockEntry *table) {
   local float staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
   const uint count = counts->decoded_count, item = get_local_id(0);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < count;
@@ -16,13 +19,25 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     const uint num_blocks = min(count - begin, ISO_GROUP_SIZE);
     float values[ISO_BLOCK_VOXELS];
     if (item < num_blocks) {
+      uint low = 0, high = 0;
       zfp_decode_block(words, (ulong)block_ids[begin + item] * bits_per_block, bits_per_block, values);
+      ISO_UNROLL
+      for (uint v = 0; v < 32; ++v) {
+        low |= (uint)(values[v] - frame->isovalue >= 0.0f) << v;
+        high |= (uint)(values[v + 32] - frame->isovalue >= 0.0f) << v;
+      }
+      table[entries[begin + item]].inside_low = low;
+      table[entries[begin + item]].inside_high = high;
     }
     ISO_UNROLL
     for (uint first = 0; first < ISO_BLOCK_VOXELS; first += ISO_STAGED_VALUES) {
       barrier(CLK_LOCAL_MEM_FENCE);
-      ISO_UNROLL
-      for (uint v = 0; v < ISO_STAGED_VALUES; ++v) staged[item * (ISO_STAGED_VALUES + 1) + v] = values[first + v];
+      if (item < num_blocks) {
+        ISO_UNROLL
+        for (uint v = 0; v < ISO_STAGED_VALUES; ++v) {
+          staged[item * (ISO_STAGED_VALUES + 1) + v] = values[first + v];
+        }
+      }
       barrier(CLK_LOCAL_MEM_FENCE);
       for (uint i = item; i < num_blocks * ISO_STAGED_VALUES; i += ISO_GROUP_SIZE) {
         const uint block = i / ISO_STAGED_VALUES, v = i % ISO_STAGED_VALUES;
