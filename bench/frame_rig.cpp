@@ -29,11 +29,10 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
       group(device, rays.num_pixels, cache.num_slots, kGroupSize),
       intersect(device, rays.num_pixels, kGroupSize),
       composite(device, rays.num_pixels) {
-  params.isovalue_index = macrocells.isovalue_index(setup.isovalue);
   params.max_spec_count = setup.max_speculation;
   params.table_groups = cache.table_groups;
+  macrocells.select(rays.frame, params);
   rays.frame.write({&params, 1});
-  macrocells.select(rays.frame);
 }
 
 void FrameRig::start() {

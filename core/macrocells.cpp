@@ -1,6 +1,7 @@
 #include "core/macrocells.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <utility>
 
@@ -29,6 +30,7 @@ Macrocells::Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, con
       ranges_(device, "block ranges", block_count(params)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
       masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
+      box_(device, "active box", 6),
       masks_kernel_(device, "macrocells", "macrocell_masks") {
   const auto stage = device.timer().stage("macrocells");
   frame.write({&params, 1});
@@ -90,13 +92,25 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, ocl::Buffe
   return thresholds;
 }
 
-std::uint32_t Macrocells::isovalue_index(float isovalue) const {
-  return static_cast<std::uint32_t>(std::lower_bound(thresholds_.begin(), thresholds_.end(), isovalue) -
-                                    thresholds_.begin());
+void Macrocells::select(ocl::Buffer<FrameParams> &frame, FrameParams &params) {
+  params.isovalue_index = static_cast<std::uint32_t>(
+      std::lower_bound(thresholds_.begin(), thresholds_.end(), params.isovalue) - thresholds_.begin());
+  frame.write({&params, 1});
+  constexpr int kNone = std::numeric_limits<int>::max();
+  box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
+  masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_, box_);
+  box_.read(active_box_);
+  for (int &cell : active_box_) cell = cell == kNone ? 0 : ISO_MACROCELL_BLOCKS * cell;
+  set_active_box(params);
 }
 
-void Macrocells::select(ocl::Buffer<FrameParams> &frame) {
-  masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_);
+void Macrocells::set_active_box(FrameParams &params) const {
+  params.active_begin_x = active_box_[0];
+  params.active_begin_y = active_box_[1];
+  params.active_begin_z = active_box_[2];
+  params.active_end_x = active_box_[3];
+  params.active_end_y = active_box_[4];
+  params.active_end_z = active_box_[5];
 }
 
 }  // namespace isowave

@@ -3,6 +3,7 @@
 // blocks, built once per volume from decoded data, and one bit per block for the isovalue at hand. See
 // kernels_cl/macrocells.cl.
 
+#include <array>
 #include <vector>
 
 #include "core/device_counts.hpp"
@@ -17,11 +18,11 @@ class Macrocells {
   Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, const FrameParams &params,
              const ocl::Buffer<uint> &words, std::uint32_t bits_per_block);
 
-  /// The first threshold at or above the isovalue: FrameParams::isovalue_index.
-  std::uint32_t isovalue_index(float isovalue) const;
-
-  /// Rebuilds masks() for frame.isovalue_index. Asynchronous.
-  void select(ocl::Buffer<FrameParams> &frame);
+  /// Rebuilds masks() for params.isovalue and sets what the frames of this isovalue need: params.isovalue_index and the
+  /// active box. Waits.
+  void select(ocl::Buffer<FrameParams> &frame, FrameParams &params);
+  /// Sets the active box of the isovalue selected last.
+  void set_active_box(FrameParams &params) const;
 
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
   const ocl::Buffer<uint> &masks() const { return masks_; }
@@ -46,8 +47,11 @@ class Macrocells {
   ocl::Range coarse_range_;
   ocl::Buffer<cl_ushort> ranges_, coarse_ranges_;
   ocl::Buffer<uint> masks_;
+  ocl::Buffer<int> box_;
+  std::array<int, 6> active_box_{};  ///< begin x, y, z, end x, y, z [blocks]
   std::vector<float> thresholds_;
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::Out<uint>>
+  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::Out<uint>,
+              ocl::Out<int>>
       masks_kernel_;
 };
 

@@ -108,16 +108,16 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
 
 void Renderer::begin_frame(const Camera &camera, float isovalue) {
   frame_ = make_frame_params(info_, camera, options_.size, isovalue);
-  frame_.isovalue_index = state_.macrocells.isovalue_index(isovalue);
   frame_.max_spec_count = options_.max_speculation;
   frame_.per_ray_speculation = options_.per_ray_speculation;
   frame_.table_groups = state_.cache.table_groups;
-  state_.rays.frame.write({&frame_, 1});
   if (selected_isovalue_ != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
-    state_.macrocells.select(state_.rays.frame);
+    state_.macrocells.select(state_.rays.frame, frame_);
     state_.cache.classify(state_.rays);
   }
+  state_.macrocells.set_active_box(frame_);
+  state_.rays.frame.write({&frame_, 1});
   selected_isovalue_ = isovalue;
   pipeline_->begin_frame();
 }

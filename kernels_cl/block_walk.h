@@ -19,13 +19,15 @@ inline GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent
   return walk_from(ray, x, y, z, 4, last);
 }
 
-/// Is region (x,y,z) one that owns cells? size: of the region [voxels].
-inline int owns_cells(int x, int y, int z, int size, LastPlanes last) {
-  return x >= 0 && size * x < last.x && y >= 0 && size * y < last.y && z >= 0 && size * z < last.z;
+/// May region (x,y,z) hold an active block? edge: of the region [blocks].
+inline int may_be_active(constant FrameParams *frame, int x, int y, int z, int edge) {
+  return edge * x >= frame->active_begin_x && edge * x < frame->active_end_x &&
+         edge * y >= frame->active_begin_y && edge * y < frame->active_end_y &&
+         edge * z >= frame->active_begin_z && edge * z < frame->active_end_z;
 }
 
 /// Walks on from block *block_id to the next `wanted` active blocks, into found [wanted], `stride` apart. Returns how many
-/// there are before the ray leaves the volume; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
+/// there are before the ray has left all active blocks behind; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
 inline uint find_blocks(constant FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
                         uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
   const LastPlanes last = last_planes(frame);
@@ -50,14 +52,14 @@ inline uint find_blocks(constant FrameParams *frame, global const uint *macrocel
           found[stride * k++] = block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z);
         }
         walk_step(&w, ray, walk_exit(&w), 4, last);
-        within = owns_cells(w.x, w.y, w.z, 4, last);
+        within = may_be_active(frame, w.x, w.y, w.z, 1);
         entered = w.x >> 2 == coarse.x && w.y >> 2 == coarse.y && w.z >> 2 == coarse.z;
       }
     }
     if (k < wanted) {
       entry = walk_exit(&coarse);
       walk_step(&coarse, ray, entry, 4 * ISO_MACROCELL_BLOCKS, last);
-      within = owns_cells(coarse.x, coarse.y, coarse.z, 4 * ISO_MACROCELL_BLOCKS, last);
+      within = may_be_active(frame, coarse.x, coarse.y, coarse.z, ISO_MACROCELL_BLOCKS);
       entered = 0;
     }
   }
@@ -65,11 +67,28 @@ inline uint find_blocks(constant FrameParams *frame, global const uint *macrocel
   return k;
 }
 
-/// The block behind block b on the ray, or ISO_INVALID_ID outside the volume.
+/// The block in which a ray enters the box of active blocks, or starts in it; ISO_INVALID_ID if it does not meet the box.
+inline uint first_block(constant FrameParams *frame, const Ray *ray) {
+  const LastPlanes last = last_planes(frame);
+  LastPlanes begin, end;
+  RayEvent enter;
+  begin.x = 4 * frame->active_begin_x;
+  begin.y = 4 * frame->active_begin_y;
+  begin.z = 4 * frame->active_begin_z;
+  end.x = min(4 * frame->active_end_x, last.x);
+  end.y = min(4 * frame->active_end_y, last.y);
+  end.z = min(4 * frame->active_end_z, last.z);
+  if (begin.x >= end.x || !box_entry(ray, begin, end, &enter)) return ISO_INVALID_ID;
+  return block_id_at(frame, (uint)locate(ray->x, 0, enter, 4, frame->active_begin_x, (end.x - 1) / 4),
+                     (uint)locate(ray->y, 1, enter, 4, frame->active_begin_y, (end.y - 1) / 4),
+                     (uint)locate(ray->z, 2, enter, 4, frame->active_begin_z, (end.z - 1) / 4));
+}
+
+/// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones.
 inline uint block_behind(constant FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   walk_step(&w, ray, walk_exit(&w), 4, last);
-  return owns_cells(w.x, w.y, w.z, 4, last) ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
+  return may_be_active(frame, w.x, w.y, w.z, 1) ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
                                             : ISO_INVALID_ID;
 }
 

@@ -229,26 +229,34 @@ static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size,
   }
 }
 
-/// Shrinks [*enter, *exit] to one axis of the domain box. Returns 0 if the ray runs beside the box.
-static inline int clip_to_slab(RayAxis a, int axis, int last_plane, RayEvent *enter, RayEvent *exit) {
+/// Shrinks [*enter, *exit] to one axis of a box. Returns 0 if the ray runs beside it.
+static inline int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *enter, RayEvent *exit) {
   RayEvent near, far;
-  if (a.d == 0.0f) return a.o >= 0.0f && a.o <= (float)last_plane;
-  near = make_event(plane_t(a, a.d > 0.0f ? 0 : last_plane), axis);
-  far = make_event(plane_t(a, a.d > 0.0f ? last_plane : 0), axis);
+  if (a.d == 0.0f) return a.o >= (float)begin && a.o <= (float)end;
+  near = make_event(plane_t(a, a.d > 0.0f ? begin : end), axis);
+  far = make_event(plane_t(a, a.d > 0.0f ? end : begin), axis);
   if (event_before(*enter, near)) *enter = near;
   if (event_before(far, *exit)) *exit = far;
   return 1;
 }
 
-/// Where the ray enters the domain [0, dims-1], or starts in it. Returns 0 if it never does.
-static inline int domain_entry(const Ray *r, LastPlanes last, RayEvent *enter) {
+/// Where the ray enters the box from planes `begin` to planes `end`, or starts in it. Returns 0 if it never does.
+static inline int box_entry(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter) {
   RayEvent exit;
   exit.t.hi = INFINITY;
   exit.t.lo = 0.0f;
   exit.axis = ISO_AXIS_START;
   *enter = start_event();
-  return clip_to_slab(r->x, 0, last.x, enter, &exit) && clip_to_slab(r->y, 1, last.y, enter, &exit) &&
-         clip_to_slab(r->z, 2, last.z, enter, &exit) && event_before(*enter, exit);
+  return clip_to_slab(r->x, 0, begin.x, end.x, enter, &exit) &&
+         clip_to_slab(r->y, 1, begin.y, end.y, enter, &exit) &&
+         clip_to_slab(r->z, 2, begin.z, end.z, enter, &exit) && event_before(*enter, exit);
+}
+
+/// Where the ray enters the domain [0, dims-1], or starts in it. Returns 0 if it never does.
+static inline int domain_entry(const Ray *r, LastPlanes last, RayEvent *enter) {
+  LastPlanes zero;
+  zero.x = zero.y = zero.z = 0;
+  return box_entry(r, zero, last, enter);
 }
 
 ISO_NAMESPACE_END

@@ -127,10 +127,10 @@ kernel void macrocell_coarse_ranges(constant FrameParams *frame, uint num_coarse
   }
 }
 
-/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. Once per isovalue.
-/// Grid-stride.
+/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. box [6]: in, INT_MAX three
+/// times and 0 three times; out, first and behind the last macrocell with a bit, x, y, z. Once per isovalue. Grid-stride.
 kernel void macrocell_masks(constant FrameParams *frame, uint num_coarse, global const ushort *ranges,
-                            global const ushort *coarse_ranges, global uint *masks) {
+                            global const ushort *coarse_ranges, global uint *masks, global int *box) {
   const uint a = frame->isovalue_index;
   for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {
     uint words[2] = {0, 0};
@@ -144,5 +144,14 @@ kernel void macrocell_masks(constant FrameParams *frame, uint num_coarse, global
     }
     masks[2 * coarse] = words[0];
     masks[2 * coarse + 1] = words[1];
+    if ((words[0] | words[1]) != 0) {
+      const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+      const int at[3] = {(int)(coarse % coarse_x), (int)(coarse / coarse_x % coarse_y),
+                         (int)(coarse / coarse_x / coarse_y)};
+      for (int axis = 0; axis < 3; ++axis) {
+        atomic_min(&box[axis], at[axis]);
+        atomic_max(&box[3 + axis], at[axis] + 1);
+      }
+    }
   }
 }

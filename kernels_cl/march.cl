@@ -175,7 +175,7 @@ inline uint touched_blocks(const Ray *ray, BlockCoords b, LastPlanes last) {
   return touched;
 }
 
-#define ISO_BLOCKS_AT_ONCE 4u      ///< that a ray looks for before it intersects them
+#define ISO_BLOCKS_AT_ONCE 8u     ///< that a ray looks for before it intersects them
 #define ISO_REQUEST_STAGING 256u  ///< requests that a work-group collects before it writes them out
 
 /// How far a ray has come. found: this work-item's place for ISO_BLOCKS_AT_ONCE, ISO_GROUP_SIZE apart.
@@ -185,16 +185,6 @@ typedef struct RayMarch {
   uint num_found;  ///< active blocks looked for ...
   uint at;         ///< ... and the one of them at which the ray stands
 } RayMarch;
-
-/// The block in which a ray begins, or ISO_INVALID_ID if it does not meet the volume. Blocks that own no cell (one last
-/// voxel layer) are never entered.
-inline uint first_block(constant FrameParams *frame, const Ray *ray, LastPlanes last) {
-  RayEvent enter;
-  if (!domain_entry(ray, last, &enter)) return ISO_INVALID_ID;
-  return block_id_at(frame, (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4),
-                     (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4),
-                     (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4));
-}
 
 /// Walks a ray on from block `from`. in_doubt: about that one. num_blocks: counts the blocks intersected.
 inline RayMarch march_ray(constant FrameParams *frame, global const uint *macrocell_masks,
@@ -309,7 +299,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     if (entry != ISO_INVALID_ID) {
       const uint pixel = entry & ISO_RAY_PIXEL;
       const Ray ray = make_ray(frame, pixel);
-      const uint from = first ? first_block(frame, &ray, last) : ray_block_ids[pixel];
+      const uint from = first ? first_block(frame, &ray) : ray_block_ids[pixel];
       BlockChange change;
       const RayMarch m =
           march_ray(frame, macrocell_masks, table, cache_values, &ray, from, (entry & ISO_RAY_IN_DOUBT) != 0,

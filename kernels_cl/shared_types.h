@@ -59,10 +59,12 @@ typedef struct FrameParams {
   float isovalue;
   uint isovalue_index;  ///< the isovalue in the quantile table of macrocells.cl
   uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+  int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
+  int active_end_x, active_end_y, active_end_z;        ///< from begin to below end [blocks]; empty if end_x = 0
   uint per_ray_speculation;  ///< pipeline `rays`: each ray looks as far ahead as it has missed before
   uint table_groups;    ///< entries / 8 of the block cache's table (block_table.h)
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 108);
+ISO_CHECK_SIZE(FrameParams, 132);
 
 #define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED 65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass

@@ -11,6 +11,8 @@
   X(eye_x) X(eye_y) X(eye_z) X(fwd_x) X(fwd_y) X(fwd_z)                     \
   X(right_x) X(right_y) X(right_z) X(up_x) X(up_y) X(up_z)                  \
   X(pixel_scale) X(t_scale) X(isovalue) X(isovalue_index) X(max_spec_count) \
+  X(active_begin_x) X(active_begin_y) X(active_begin_z)                     \
+  X(active_end_x) X(active_end_y) X(active_end_z)                           \
   X(per_ray_speculation) X(table_groups)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
 #define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)
