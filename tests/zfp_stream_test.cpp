@@ -12,6 +12,7 @@
 #include <random>
 
 #include "core/error.hpp"
+#include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {
@@ -22,21 +23,6 @@ using test::write_file;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-class ArrayReader : public VolumeReader {
- public:
-  ArrayReader(const glm::uvec3 &dims, std::vector<float> voxels) : voxels_(std::move(voxels)) {
-    info_.dims = dims;
-  }
-  VolumeInfo &mutable_info() { return info_; }
-  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
-    const std::size_t layer = std::size_t(info_.dims.x) * info_.dims.y;
-    std::copy_n(voxels_.begin() + std::ptrdiff_t(z_begin * layer), num_layers * layer, out.begin());
-  }
-
- private:
-  std::vector<float> voxels_;
-};
 
 /// Smooth with noise on top, so that blocks differ in exponent and in how many bits they would like.
 std::vector<float> wavy(const glm::uvec3 &dims, std::uint32_t seed = 1) {
