@@ -49,6 +49,21 @@ TEST(Cli, ConvertAndInfo) {
   EXPECT_NE(text.out.find("value_range    0.0 249.0"), std::string::npos) << text.out;
 }
 
+TEST(Cli, ConvertOnADeviceWritesTheSameFile) {
+  const TemporaryFolder folder;
+  const std::string host = quoted(folder / "host.zfp"), device = quoted(folder / "device.zfp");
+  const auto on_host = run_isowave("convert " + kNucleon + " --rate 5 -o " + host);
+  ASSERT_EQ(on_host.status, 0) << on_host.err;
+  const auto on_device = run_isowave("convert " + kNucleon + " --rate 5 --device cpu -o " + device);
+  ASSERT_EQ(on_device.status, 0) << on_device.err;
+  EXPECT_EQ(on_device.err, "");
+  EXPECT_EQ(on_device.out.substr(on_device.out.find(':')), on_host.out.substr(on_host.out.find(':')));
+  EXPECT_EQ(test::read_file(folder / "device.zfp"), test::read_file(folder / "host.zfp"));
+  expect_one_line_error("convert " + kNucleon + " --device no_such_device -o " + quoted(folder / "a.zfp"),
+                        "no_such_device");
+  EXPECT_EQ(folder.num_files(), 2u);
+}
+
 TEST(Cli, GeneratedFilesAndGeneratorsAreTheSameVolume) {
   const TemporaryFolder folder;
   const auto generate =
