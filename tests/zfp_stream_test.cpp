@@ -201,6 +201,24 @@ TEST(Compress, MagnitudesThatZfpCannotHold) {
   }
 }
 
+TEST(Compress, RangeOfValuesThatNeedAndNeedNoLook) {
+  CompressOptions options;
+  options.map_nan = 5.0f;
+  for (const float other : {-0.0f, 1e-40f, -1e-40f, std::numeric_limits<float>::infinity(), -3.0f}) {
+    for (const float most : {0.0f, -0.0f, 2.0f}) {
+      std::vector<float> voxels(64 * 8, most);
+      voxels[77] = other;
+      ArrayReader reader({8, 8, 8}, voxels);
+      const float mapped = std::isfinite(other) ? other : 5.0f;
+      const auto range = compress(reader, options).value_range;
+      EXPECT_EQ(range, (std::array{std::min(most, mapped), std::max(most, mapped)}));
+      EXPECT_FALSE(range[0] == 0.0f && std::signbit(range[0]))
+          << "a range does not depend on the order of zeros";
+      EXPECT_FALSE(range[1] == 0.0f && std::signbit(range[1]));
+    }
+  }
+}
+
 TEST(Compress, RatesOutsideOneTo32) {
   ArrayReader reader({4, 4, 4}, std::vector<float>(64));
   CompressOptions options;
