@@ -103,7 +103,7 @@ static inline void write_bit_planes(BitWriter *w, const uint *coefficients, uint
       uint length = 1, zeros = 0;
       if (x != 0u) { /* the test's one, zeros, and a one that goes without saying for the last coefficient */
         zeros = trailing_zeros(x);
-        run = n + zeros < 63u ? (ulong)2 << zeros | 1u : 1u;
+        run = (ulong)2 << zeros | 1u;
         length = n + zeros < 63u ? zeros + 2u : zeros + 1u;
       }
       if (length > bits) length = bits;
