@@ -64,6 +64,13 @@ std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camer
   return views;
 }
 
+/// On a device of its own, so that the memory reported is that of drawing.
+CompressedVolume load(const Options &options, const ocl::DeviceInfo &device_info) {
+  ocl::Device device(device_info);
+  return tools::load_volume(options.volume, tools::to_overrides(options.volume_options), options.rate,
+                            &device);
+}
+
 /// Stage -> ms of a cold frame, for each view.
 std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, Renderer &renderer,
                                                           const std::vector<Camera> &cameras,
@@ -82,8 +89,7 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, R
 
 FrameReport measure(const Options &options, std::string command) {
   const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
-  CompressedVolume volume =
-      tools::load_volume(options.volume, tools::to_overrides(options.volume_options), options.rate);
+  CompressedVolume volume = load(options, device_info);
   const std::vector<Camera> cameras = orbit_cameras(volume.info, options.orbit);
   FrameReport report;
   report.command = std::move(command);

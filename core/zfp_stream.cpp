@@ -1,10 +1,12 @@
-// Compression and decompression of whole volumes by libzfp. With a whole number of bits per voxel a block is
-// a whole number of 64-bit words, so rows of blocks are compressed apart, in parallel, and laid end to end:
-// the same bytes as one call for the whole array.
+// Compression and decompression of whole volumes by libzfp, or compression by a device. With a whole number
+// of bits per voxel a block is a whole number of 64-bit words, so rows of blocks are compressed apart, in
+// parallel, and laid end to end: the same bytes as one call for the whole array. A device gets whole layers
+// (zfp_encode); voxels are checked here in both cases.
 
 #include "core/zfp_stream.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <future>
@@ -14,14 +16,15 @@
 #include "core/error.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"
+#include "core/zfp_encode.hpp"
 #include "core/zfp_file.hpp"
 
 namespace isowave {
 
 namespace {
 
-using Words = std::span<const std::uint64_t>;
-using Sink = std::function<void(Words)>;
+using Payload = std::span<const std::byte>;
+using Sink = std::function<void(Payload)>;
 
 /// What is learnt of a run of voxels while it is compressed.
 struct Findings {
@@ -29,6 +32,8 @@ struct Findings {
   std::uint64_t too_large_count = 0, first_too_large = ~std::uint64_t(0);
   float min = std::numeric_limits<float>::infinity(), max = -std::numeric_limits<float>::infinity();
   double max_error = 0;
+
+  bool refused() const { return bad_count > 0 || too_large_count > 0; }
 
   void add(const Findings &other) {
     bad_count += other.bad_count;
@@ -41,6 +46,31 @@ struct Findings {
   }
 };
 
+/// Adds the range of `values` to `found` if each of them is compressed as it is. Else returns false. Made for
+/// vector instructions: no branches, and the bits of floats as integers of the same order.
+bool add_plain_values(std::span<const float> values, Findings &found) {
+  constexpr std::int32_t kMagnitudeBits = 0x7FFFFFFF;
+  constexpr auto kLeast = std::bit_cast<std::int32_t>(kMinMagnitude);
+  constexpr auto kEnd = std::bit_cast<std::int32_t>(kMaxMagnitude);
+  const auto ordered = [](std::int32_t bits) {
+    return bits ^ ((bits >> 31) & kMagnitudeBits);
+  };  // its own inverse
+  std::int32_t min = std::numeric_limits<std::int32_t>::max(), max = std::numeric_limits<std::int32_t>::min();
+  std::uint32_t others = 0;
+  for (const float value : values) {
+    const auto bits = std::bit_cast<std::int32_t>(value);
+    const std::int32_t magnitude = bits & kMagnitudeBits, order = ordered(bits);
+    others |= std::uint32_t(magnitude != 0) &
+              (std::uint32_t(magnitude < kLeast) | std::uint32_t(magnitude >= kEnd));
+    min = std::min(min, order);
+    max = std::max(max, order);
+  }
+  if (others != 0) return false;
+  found.min = std::min(found.min, std::bit_cast<float>(ordered(min)));
+  found.max = std::max(found.max, std::bit_cast<float>(ordered(max)));
+  return true;
+}
+
 /// Reads chunks of voxel layers, always one ahead of the chunk being compressed.
 class Compressor {
  public:
@@ -49,9 +79,10 @@ class Compressor {
     const std::uint64_t slab_voxels = kBlock * layer_size();
     const std::uint64_t slabs = std::max<std::uint64_t>(1, kChunkVoxels / slab_voxels);
     chunk_layers_ = std::uint32_t(std::min<std::uint64_t>(slabs * kBlock, (dims_.z + 3u) / 4u * 4u));
+    if (options.device) encoder_.emplace(*options.device, dims_, 64 * options.rate, options.measure_error);
   }
 
-  /// Hands all payload words to `sink`, in order. Throws Error on voxels that cannot be compressed, after
+  /// Hands the payload to `sink`, in order. Throws Error on voxels that cannot be compressed, after
   /// all of them were looked at.
   Findings run(const Sink &sink) {
     Findings total;
@@ -62,10 +93,20 @@ class Compressor {
       std::swap(current, next);
       pending = read_ahead(std::uint64_t(z) + chunk_layers_, next);
       total.add(compress_chunk(z, current));
-      if (total.bad_count == 0 && total.too_large_count == 0) sink(words_);
+      if (!total.refused()) {
+        if (encoder_) {
+          encoder_->encode(current, layers_at(z), sink);
+        } else {
+          sink(std::as_bytes(std::span(words_)));
+        }
+      }
       if (options_.progress) options_.progress(z + layers_at(z), dims_.z);
     }
     refuse_bad_voxels(total);
+    if (encoder_) {
+      encoder_->finish(sink);
+      total.max_error = encoder_->max_error();
+    }
     return total;
   }
 
@@ -86,13 +127,14 @@ class Compressor {
     });
   }
 
-  /// Compresses the layers in `voxels`, which start at layer z, to words_.
+  /// Checks the layers in `voxels`, which start at layer z, and compresses them to words_ unless a device does
+  /// that.
   Findings compress_chunk(std::uint32_t z, std::vector<float> &voxels) {
     const std::uint32_t layers = layers_at(z);
     const std::uint64_t rows_per_slab = (dims_.y + 3u) / 4u;
     const std::uint64_t num_rows = rows_per_slab * ((layers + 3u) / 4u);
     const std::uint64_t row_words = std::uint64_t((dims_.x + 3u) / 4u) * options_.rate;
-    words_.resize(num_rows * row_words);
+    if (!encoder_) words_.resize(num_rows * row_words);
     std::vector<Findings> findings(thread_count(options_.num_threads));
     parallel_for(num_rows, options_.num_threads, [&](std::uint64_t row, std::uint32_t thread) {
       const auto slab = std::uint32_t(row / rows_per_slab), by = std::uint32_t(row % rows_per_slab);
@@ -101,7 +143,7 @@ class Compressor {
       Findings &found = findings[thread];
       check_voxels(voxels, where, z, found);
       // One bad voxel refuses the volume: what follows is only counted.
-      if (found.bad_count > 0 || found.too_large_count > 0) return;
+      if (found.refused() || encoder_) return;
       code_row(voxels, where, std::span(words_).subspan(row * row_words, row_words), found);
     });
     Findings total;
@@ -124,6 +166,7 @@ class Compressor {
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y) {
         const std::uint64_t begin = voxel_at(row, y, z);
+        if (add_plain_values(std::span(voxels).subspan(begin, dims_.x), found)) continue;
         for (std::uint32_t x = 0; x < dims_.x; ++x) {
           float &value = voxels[begin + x];
           if (!std::isfinite(value)) {
@@ -201,7 +244,8 @@ class Compressor {
   const CompressOptions &options_;
   glm::uvec3 dims_;
   std::uint32_t chunk_layers_ = 0;
-  std::vector<std::uint64_t> words_;  ///< of the present chunk
+  std::vector<std::uint64_t> words_;     ///< of the present chunk
+  std::optional<LayerEncoder> encoder_;  ///< where a device encodes
 };
 
 void check_options(const VolumeReader &reader, const CompressOptions &options) {
@@ -221,7 +265,8 @@ CompressedVolume describe(const VolumeReader &reader, const CompressOptions &opt
 }
 
 void add_findings(CompressedVolume &volume, const CompressOptions &options, const Findings &found) {
-  volume.value_range = {found.min, found.max};
+  // Not -0: of equal values, the one met first would depend on the threads.
+  volume.value_range = {found.min + 0.0f, found.max + 0.0f};
   if (options.measure_error) volume.max_error = found.max_error;
 }
 
@@ -232,9 +277,9 @@ CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) 
   CompressedVolume volume = describe(reader, options);
   volume.words.resize(volume.block_count() * volume.bits_per_block / 32 + 2);
   std::size_t begin = 0;
-  const Findings found = Compressor(reader, options).run([&](Words words) {
-    std::memcpy(volume.words.data() + begin, words.data(), words.size_bytes());
-    begin += words.size() * 2;
+  const Findings found = Compressor(reader, options).run([&](Payload payload) {
+    std::memcpy(volume.words.data() + begin, payload.data(), payload.size());
+    begin += payload.size() / sizeof(std::uint32_t);
   });
   add_findings(volume, options, found);
   return volume;
@@ -245,8 +290,7 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
   check_options(reader, options);
   CompressedVolume volume = describe(reader, options);
   ZfpFileWriter file(path, volume);
-  const Findings found =
-      Compressor(reader, options).run([&](Words words) { file.write(std::as_bytes(words)); });
+  const Findings found = Compressor(reader, options).run([&](Payload payload) { file.write(payload); });
   add_findings(volume, options, found);
   file.commit(volume);
   return volume;

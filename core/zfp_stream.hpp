@@ -18,6 +18,10 @@
 
 namespace isowave {
 
+namespace ocl {
+class Device;
+}
+
 /// done and total in voxel layers; called from the calling thread.
 using Progress = std::function<void(std::uint32_t done, std::uint32_t total)>;
 
@@ -31,6 +35,7 @@ struct CompressOptions {
   std::uint32_t rate = 8;          ///< bits per voxel, 1..32
   std::optional<float> map_nan{};  ///< replaces NaN and +-Inf; unset: refused with count and first position
   Progress progress{};
+  ocl::Device *device = nullptr;  ///< encodes there instead of with libzfp: the same result, bit for bit
   bool measure_error = false;     ///< decode everything again for CompressedVolume::max_error
   std::uint32_t num_threads = 0;  ///< 0: one per processor; the result is the same for any number
 };

@@ -1,5 +1,6 @@
 // The program's volume subcommands, run as a user runs them: what they print, and how they fail.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -19,7 +20,7 @@ using test::write_file;
 const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
 
 std::string quoted(const std::filesystem::path &path) {
-  return "'" + path.string() + "'";
+  return fmt::format("'{}'", path.string());
 }
 
 TEST(Cli, ConvertAndInfo) {
@@ -47,6 +48,20 @@ TEST(Cli, ConvertAndInfo) {
   const auto text = run_isowave("info " + kNucleon);
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("value_range    0.0 249.0"), std::string::npos) << text.out;
+}
+
+TEST(Cli, ConvertOnADeviceWritesTheSameFile) {
+  const TemporaryFolder folder;
+  const std::string host = quoted(folder / "host.zfp"), device = quoted(folder / "device.zfp");
+  const auto on_host = run_isowave("convert " + kNucleon + " --rate 5 -o " + host);
+  ASSERT_EQ(on_host.status, 0) << on_host.err;
+  const auto on_device = run_isowave("convert " + kNucleon + " --rate 5 --device cpu -o " + device);
+  ASSERT_EQ(on_device.status, 0) << on_device.err;
+  EXPECT_EQ(on_device.err, "");
+  EXPECT_EQ(test::read_file(folder / "device.zfp"), test::read_file(folder / "host.zfp"));
+  expect_one_line_error("convert " + kNucleon + " --device no_such_device -o " + quoted(folder / "a.zfp"),
+                        "no_such_device");
+  EXPECT_EQ(folder.num_files(), 2u);
 }
 
 TEST(Cli, GeneratedFilesAndGeneratorsAreTheSameVolume) {

@@ -127,6 +127,16 @@ TEST_P(OclBufferOnDevice, AsyncReadsArriveInQueueOrder) {
   EXPECT_THAT(after, Each(5u));
 }
 
+TEST_P(OclBufferOnDevice, FinishWaitsForReadsThatWereFlushed) {
+  const ocl::Buffer<std::uint32_t> buffer(device_, "many", std::size_t{1} << 24);
+  std::vector<std::uint32_t> values(buffer.size());
+  cl::Event event;
+  buffer.read_async(values, event);
+  device_.finish();
+  EXPECT_EQ(event.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>(), CL_COMPLETE);
+  event.wait();
+}
+
 TEST_P(OclBufferOnDevice, EmptyBuffersWork) {
   ocl::Buffer<std::uint32_t> buffer(device_, "none", 0);
   EXPECT_EQ(buffer.size(), 0u);

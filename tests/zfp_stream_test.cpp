@@ -12,6 +12,7 @@
 #include <random>
 
 #include "core/error.hpp"
+#include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {
@@ -22,21 +23,6 @@ using test::write_file;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-class ArrayReader : public VolumeReader {
- public:
-  ArrayReader(const glm::uvec3 &dims, std::vector<float> voxels) : voxels_(std::move(voxels)) {
-    info_.dims = dims;
-  }
-  VolumeInfo &mutable_info() { return info_; }
-  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
-    const std::size_t layer = std::size_t(info_.dims.x) * info_.dims.y;
-    std::copy_n(voxels_.begin() + std::ptrdiff_t(z_begin * layer), num_layers * layer, out.begin());
-  }
-
- private:
-  std::vector<float> voxels_;
-};
 
 /// Smooth with noise on top, so that blocks differ in exponent and in how many bits they would like.
 std::vector<float> wavy(const glm::uvec3 &dims, std::uint32_t seed = 1) {
@@ -211,6 +197,24 @@ TEST(Compress, MagnitudesThatZfpCannotHold) {
       for (const float value : decode_with_libzfp(compress(reader, options))) {
         EXPECT_TRUE(std::isnormal(value) || value == 0.0f) << value << " at rate " << options.rate;
       }
+    }
+  }
+}
+
+TEST(Compress, RangeOfValuesThatNeedAndNeedNoLook) {
+  CompressOptions options;
+  options.map_nan = 5.0f;
+  for (const float other : {-0.0f, 1e-40f, -1e-40f, std::numeric_limits<float>::infinity(), -3.0f}) {
+    for (const float most : {0.0f, -0.0f, 2.0f}) {
+      std::vector<float> voxels(64 * 8, most);
+      voxels[77] = other;
+      ArrayReader reader({8, 8, 8}, voxels);
+      const float mapped = std::isfinite(other) ? other : 5.0f;
+      const auto range = compress(reader, options).value_range;
+      EXPECT_EQ(range, (std::array{std::min(most, mapped), std::max(most, mapped)}));
+      EXPECT_FALSE(range[0] == 0.0f && std::signbit(range[0]))
+          << "a range does not depend on the order of zeros";
+      EXPECT_FALSE(range[1] == 0.0f && std::signbit(range[1]));
     }
   }
 }

@@ -122,6 +122,8 @@ std::uint32_t Device::max_resident_groups() const {
 
 void Device::finish() {
   try {
+    // Mesa rusticl 22.3 waits only for what was enqueued since the last flush.
+    if (info_.platform == "rusticl") queue_.enqueueMarkerWithWaitList();
     queue_.finish();
   } catch (const cl::Error &error) {
     throw Error("device '{}' failed: {}: {}", info_.name, error.what(), error_name(error.err()));

@@ -4,8 +4,11 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "core/error.hpp"
+#include "core/ocl/device.hpp"
 #include "core/zfp_stream.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/volume_options.hpp"
@@ -16,6 +19,7 @@ namespace {
 
 struct Options {
   std::string input, output;
+  std::optional<std::string> device;
   VolumeOptions volume;
   CompressOptions compress;
   bool no_verify = false;
@@ -28,6 +32,8 @@ void run(const Options &options) {
   CompressOptions compress = options.compress;
   compress.measure_error = !options.no_verify;
   compress.progress = make_progress_bar("compressing");
+  std::optional<ocl::Device> device;
+  if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   const CompressedVolume volume = compress_to_file(*reader, compress, options.output);
 
   const glm::uvec3 dims = volume.info.dims;
@@ -48,6 +54,10 @@ void add_convert(CLI::App &app) {
   command->add_option("--rate", options->compress.rate, "bits per voxel, 1 to 32")->capture_default_str();
   command->add_option("--map-nan", options->compress.map_nan,
                       "replace NaN and infinite voxels by this value");
+  command->add_option(
+      "--device", options->device,
+      "compress on this device: index, cpu, gpu, or a part of its name [the host's processors]; the file "
+      "is the same");
   command->add_option("--threads", options->compress.num_threads, "0: one per processor")
       ->capture_default_str();
   command->add_flag("--no-verify", options->no_verify, "do not decode again to measure the largest error");

@@ -26,14 +26,15 @@ std::string dims_text(const glm::uvec3 &dims) {
 
 }  // namespace
 
-Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options) {
+Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
+                 ocl::Device *device) {
   Scene scene;  // what is cheap to refuse comes before the volume, which may take minutes
   std::optional<CameraFile> file;
   if (!options.cameras.empty()) file = read_camera_file(options.cameras);
   if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
   if (!options.size.empty()) scene.size = parse_size(options.size);
   check_image_size(scene.size);
-  scene.volume = load_volume(path, to_overrides(volume), options.rate);
+  scene.volume = load_volume(path, to_overrides(volume), options.rate, device);
   const VolumeInfo &info = scene.volume.info;
   if (file && file->dims && *file->dims != info.dims) {
     throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims), path,

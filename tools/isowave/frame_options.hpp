@@ -36,7 +36,8 @@ struct Scene {
 };
 
 /// Reads or compresses the volume and makes its cameras. Throws Error in one line, also when a camera file is for another
-/// volume.
-Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options);
+/// volume. Where a device is given, it compresses the volume.
+Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
+                 ocl::Device *device = nullptr);
 
 }  // namespace isowave::tools

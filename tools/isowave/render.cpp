@@ -188,7 +188,7 @@ void check_outputs(const Options &options) {
   if (failure) throw Error("cannot make the folder {}: {}", options.progress_dir, failure.message());
 }
 
-ocl::Device open_device(const Options &options) {
+std::unique_ptr<ocl::Device> open_device(const Options &options) {
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index, info.name,
              info.platform);
@@ -198,7 +198,7 @@ ocl::Device open_device(const Options &options) {
         "bits",
         info.name);
   }
-  return ocl::Device(info, !options.stats.empty() && !options.no_stage_times);
+  return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
 }
 
 void run_render(Options options) {
@@ -211,25 +211,25 @@ void run_render(Options options) {
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
-  const Scene scene = load_scene(options.input, options.volume, options.frame);
+  const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
+  const Scene scene = load_scene(options.input, options.volume, options.frame, device.get());
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
-  if (options.reference) {
+  if (!device) {
     TwinFrames frames(scene, appearance, options.renderer.solver);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {
-    ocl::Device device = open_device(options);
-    DeviceFrames frames(device, scene, appearance, options.renderer);
+    DeviceFrames frames(*device, scene, appearance, options.renderer);
     options.renderer = frames.renderer().options();
-    document["device"] = device_json(device.info());
+    document["device"] = device_json(device->info());
     document["options"] = options_json(options, scene);
     document["setup_ms"] = frames.renderer().setup_ms();
     document["frames"] = draw_frames(options, scene, frames);
-    document["memory"] = memory_json(device.ledger());
+    document["memory"] = memory_json(device->ledger());
     fmt::print("setup {:.0f} ms; device memory: peak {:.1f} MiB\n", frames.renderer().setup_ms(),
-               double(device.ledger().peak()) / (1 << 20));
+               double(device->ledger().peak()) / (1 << 20));
   }
   if (!options.stats.empty()) write_json(document, options.stats);
 }

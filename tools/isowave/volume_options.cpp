@@ -8,6 +8,7 @@
 #include "core/error.hpp"
 #include "core/generate.hpp"
 #include "core/io/raw_reader.hpp"
+#include "core/ocl/device.hpp"
 
 namespace isowave::tools {
 
@@ -93,7 +94,8 @@ bool is_zfp_name(const std::string &path) {
   return path.ends_with(".zfp");
 }
 
-CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate) {
+CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate,
+                             ocl::Device *device) {
   if (is_zfp_name(path)) {
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
     CompressedVolume volume = read_zfp_file(path);
@@ -105,7 +107,10 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   CompressOptions options;
   options.rate = rate;
   options.progress = make_progress_bar("compressing");
-  return compress(*reader, options);
+  options.device = device;
+  CompressedVolume volume = compress(*reader, options);
+  if (device) device->timer().collect();  // they belong to no frame
+  return volume;
 }
 
 Progress make_progress_bar(std::string_view label) {

@@ -38,8 +38,9 @@ inline constexpr const char *kVolumeHelp =
 /// Whether the name ends in .zfp.
 bool is_zfp_name(const std::string &path);
 /// Reads a .zfp file (its spacing may be overridden), or compresses any other volume at `rate` bits per
-/// voxel.
-CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate);
+/// voxel, on `device` where one is given. Clears that device's stage times.
+CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate,
+                             ocl::Device *device = nullptr);
 
 /// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with the last.
 Progress make_progress_bar(std::string_view label);
