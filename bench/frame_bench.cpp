@@ -24,7 +24,7 @@ namespace {
 
 struct Options {
   std::string volume, device, json;
-  std::string solver{to_string(kDefaultSolver)};
+  std::string solver{to_string(kDefaultSolver)}, grouping{to_string(kDefaultGrouping)};
   tools::VolumeOptions volume_options;
   std::optional<float> isovalue;
   std::uint32_t rate = 4, orbit = 10, rounds = 3;
@@ -92,6 +92,7 @@ FrameReport measure(const Options &options, std::string command) {
   report.options = options.renderer;
   report.options.size = {options.size.at(0), options.size.at(1)};
   report.options.solver = solver_from_string(options.solver);
+  report.options.grouping = grouping_from_string(options.grouping);
   report.rounds = options.rounds;
   {
     ocl::Device device(device_info);
@@ -137,6 +138,8 @@ void add_options(CLI::App &app, Options &options) {
                  "decoded blocks kept on the device, at least 8 [2^18 or all]")
       ->check(CLI::Range(8u, 1u << 30));
   app.add_option("--solver", options.solver, "root finder: linear, marmitt, analytic or bernstein")
+      ->capture_default_str();
+  app.add_option("--grouping", options.grouping, "how rays are gathered by block: radix or counting")
       ->capture_default_str();
   app.add_option("--group-size", options.renderer.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();

@@ -205,6 +205,7 @@ ordered_json options_json(const FrameReport &report) {
           {"cache_slots", report.options.cache_slots},
           {"max_speculation", report.options.max_speculation},
           {"solver", to_string(report.options.solver)},
+          {"grouping", to_string(report.options.grouping)},
           {"group_size", report.options.group_size}};
 }
 

@@ -70,7 +70,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       speculation_(device),
       traverse_(device, rays_.num_pixels, options_.group_size),
       zfp_decode_(device, options_.cache_slots),
-      group_(device, rays_.num_pixels, options_.cache_slots, options_.group_size),
+      group_(device, rays_.num_pixels, options_.cache_slots, options_.group_size, options_.grouping),
       intersect_(device, rays_.num_pixels, options_.group_size, options_.solver),
       composite_(device, rays_.num_pixels),
       shade_(device, rays_.num_pixels) {

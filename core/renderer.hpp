@@ -32,6 +32,8 @@ struct RendererOptions {
   std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
   Solver solver = kDefaultSolver;      ///< root finder in a cell
   std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
+  /// How a pass's pairs are gathered by block.
+  Grouping grouping = kDefaultGrouping;
 };
 
 /// What one pass did: the counts of the device, and what follows from them.

@@ -32,7 +32,7 @@ struct Options {
   FrameOptions frame;
   std::string device;
   std::string speculation = "global";
-  std::string solver{to_string(kDefaultSolver)};
+  std::string solver{to_string(kDefaultSolver)}, grouping{to_string(kDefaultGrouping)};
   RendererOptions renderer;
   bool reference = false, no_stage_times = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
@@ -162,6 +162,7 @@ nlohmann::ordered_json options_json(const Options &options, const Scene &scene) 
           {"max_speculation", options.renderer.max_speculation},
           {"cache_slots", options.renderer.cache_slots},
           {"solver", to_string(options.renderer.solver)},
+          {"grouping", to_string(options.renderer.grouping)},
           {"group_size", options.renderer.group_size}};
 }
 
@@ -213,6 +214,7 @@ void run_render(Options options) {
   check_outputs(options);
   if (options.speculation == "off") options.renderer.max_speculation = 1;
   options.renderer.solver = solver_from_string(options.solver);
+  options.renderer.grouping = grouping_from_string(options.grouping);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
@@ -263,6 +265,8 @@ void add_render(CLI::App &app) {
                    "decoded blocks kept on the device, at least 8 [2^18 or all]")
       ->check(CLI::Range(8u, 1u << 30));
   command->add_option("--solver", options->solver, "root finder: linear, marmitt, analytic or bernstein")
+      ->capture_default_str();
+  command->add_option("--grouping", options->grouping, "how rays are gathered by block: radix or counting")
       ->capture_default_str();
   command->add_option("--group-size", options->renderer.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();
