@@ -6,7 +6,7 @@
 
 #include "bench/run_info.hpp"
 #include "core/error.hpp"
-#include "core/ocl/buffer.hpp"
+#include "core/ocl/kernel.hpp"
 
 namespace isowave::bench {
 
@@ -20,20 +20,46 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// The best of a few copies of 64 MiB.
-double measure_copy_bandwidth(ocl::Device &device) {
-  constexpr std::size_t kBytes = 64u << 20;
+/// Seconds of `run`, by events or else by the wall clock.
+double seconds_of(ocl::Device &device, const Step &run) {
+  device.finish();
+  device.timer().collect();
+  const auto begin = Clock::now();
+  run();
+  device.finish();
+  const double wall_seconds = seconds_since(begin);
+  if (device.timer().source() != ocl::TimerSource::kEvents) return wall_seconds;
+  double event_ms = 0;
+  for (const auto &[stage, ms] : device.timer().collect()) event_ms += ms;
+  return 1e-3 * event_ms;
+}
+
+double best_seconds(ocl::Device &device, const Step &run) {
   constexpr int kRounds = 5;
-  const ocl::Buffer<cl_uchar> source(device, "copy source", kBytes), target(device, "copy target", kBytes);
   double best = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < kRounds; ++round) {
-    device.finish();
-    const auto begin = Clock::now();
-    device.queue().enqueueCopyBuffer(source.mem(), target.mem(), 0, 0, kBytes);
-    device.finish();
-    best = std::min(best, seconds_since(begin));
-  }
-  return 2.0 * kBytes / best;
+  for (int round = 0; round < kRounds; ++round) best = std::min(best, seconds_of(device, run));
+  return best;
+}
+
+Ceiling measure_ceiling(ocl::Device &device) {
+  constexpr std::uint64_t kCopyBytes = 256u << 20;
+  constexpr int kLaunches = 200;
+  const std::uint64_t bytes = std::min(kCopyBytes, device.capabilities().largest_allocation / 4);
+  const auto count = static_cast<uint>(bytes / sizeof(uint));
+  const ocl::Buffer<uint> source(device, "copy source", count);
+  ocl::Buffer<uint> target(device, "copy target", count);
+  ocl::Kernel<ocl::In<uint>, uint, uint, ocl::Out<uint>> scale(device, "launch_probe", "scale_values");
+  ocl::Kernel<> empty(device, "launch_probe", "launch_empty");
+  const ocl::Range range = ocl::Range::strided(count, 256, device);
+  const double copy = best_seconds(device, [&] {
+    device.queue().enqueueCopyBuffer(source.mem(), target.mem(), 0, 0, bytes, nullptr,
+                                     device.timer().next_event());
+  });
+  const double kernel = best_seconds(device, [&] { scale(range, source, count, 1, target); });
+  const double launches = best_seconds(device, [&] {
+    for (int i = 0; i < kLaunches; ++i) empty({1, 64});
+  });
+  return {2.0 * static_cast<double>(bytes) / std::min(copy, kernel), launches / kLaunches};
 }
 
 /// Difference of the quartiles in percent of the median.
@@ -46,7 +72,7 @@ double spread_percent(std::vector<double> seconds) {
 }  // namespace
 
 Session::Session(const ocl::DeviceInfo &info, bool profiling)
-    : device_(info, profiling), copy_bandwidth_(measure_copy_bandwidth(device_)) {
+    : device_(info, profiling), ceiling_(measure_ceiling(device_)) {
   current_session = this;
 }
 
@@ -81,13 +107,16 @@ void measure(benchmark::State &state, const Work &work, const Step &prepare, con
   ocl::StageTimer &timer = device.timer();
   const bool has_events = timer.source() == ocl::TimerSource::kEvents;
   std::vector<double> wall_seconds, event_seconds;
+  std::uint64_t launches = 0;
   for (auto _ : state) {
     prepare();
     device.finish();
     timer.collect();
+    const std::uint64_t commands_before = timer.num_commands();
     const auto begin = Clock::now();
     run();
     device.finish();
+    launches = timer.num_commands() - commands_before;
     wall_seconds.push_back(seconds_since(begin));
     double event_ms = 0;
     for (const auto &[stage, ms] : timer.collect()) event_ms += ms;
@@ -102,7 +131,10 @@ void measure(benchmark::State &state, const Work &work, const Step &prepare, con
   state.counters["wall_ms"] = 1e3 * median(wall_seconds);
   if (has_events) state.counters["event_ms"] = 1e3 * median(event_seconds);
   state.counters["spread_%"] = spread_percent(timed);
-  state.counters["of_copy_%"] = 100.0 * work.bytes / median(timed) / session.copy_bandwidth();
+  const double ceiling_seconds = session.ceiling().seconds(work.bytes, static_cast<double>(launches));
+  state.counters["launches"] = static_cast<double>(launches);
+  state.counters["ceiling_ms"] = 1e3 * ceiling_seconds;
+  state.counters["of_ceiling_%"] = 100.0 * ceiling_seconds / median(timed);
 }
 
 benchmark::internal::Benchmark *stage_benchmark(const std::string &name,

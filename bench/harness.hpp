@@ -26,6 +26,18 @@
 
 namespace isowave::bench {
 
+/// What no stage can beat, measured in the same run and by the clock that stages are timed with: OpenCL events where
+/// the driver reports them, else the wall clock.
+struct Ceiling {
+  double bytes_per_second = 0;  ///< read and written by a copy of 256 MiB: the better of command and kernel
+  double launch_seconds = 0;    ///< an empty kernel
+
+  /// Least time of a stage that moves `bytes` in `launches`. Data that a cache still holds may move faster.
+  double seconds(double bytes, double launches) const {
+    return std::max(bytes / bytes_per_second, launches * launch_seconds);
+  }
+};
+
 /// Opens the device of all benchmarks; closes it, and frees the input kept, when it goes. One at a time.
 class Session {
  public:
@@ -39,8 +51,7 @@ class Session {
   static Session &current();
 
   ocl::Device &device() { return device_; }
-  /// Bytes per second, read and written, of a large device-to-device copy: the peak that stages are held to.
-  double copy_bandwidth() const { return copy_bandwidth_; }
+  const Ceiling &ceiling() const { return ceiling_; }
 
   /// Whether a benchmark failed: it threw, its check included.
   bool failed = false;
@@ -50,7 +61,7 @@ class Session {
 
  private:
   ocl::Device device_;
-  double copy_bandwidth_;
+  Ceiling ceiling_;
 };
 
 /// Work-items per group of the stages that take it: the renderer's default.
@@ -69,6 +80,8 @@ std::string to_string(Distribution distribution);
 
 /// The image sizes that stages are swept over: 640x360 and 1280x720.
 inline constexpr std::array<std::int64_t, 2> kWidths = {640, 1280};
+/// Beyond them, for stages whose cost at that size is memory's: 3840x2160.
+inline constexpr std::int64_t kLargeWidth = 3840;
 inline ImageSize image_of_width(std::int64_t width) {
   return {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(width * 9 / 16)};
 }
@@ -112,8 +125,8 @@ using Step = std::function<void()>;
 
 /// The benchmark loop: prepare, not timed; then run, timed from its first launch to the end of its last. The
 /// time is that of the OpenCL events, or the wall clock's where there are none. Counters, medians over the
-/// iterations: wall_ms, event_ms; spread_%: distance of the quartiles; of_copy_%: bytes per second against
-/// copy_bandwidth().
+/// iterations: wall_ms, event_ms; spread_%: distance of the quartiles; launches; ceiling_ms: Ceiling::seconds()
+/// of work and launches; of_ceiling_%: the fraction of the ceiling that is reached, ceiling_ms of the time.
 void measure(benchmark::State &state, const Work &work, const Step &prepare, const Step &run);
 
 /// Registers `body` under `name`. What it throws becomes the error of that benchmark alone.

@@ -1,6 +1,7 @@
 // isowave_bench: every stage of the pipeline alone, on one device. The options that are not ours are Google
 // Benchmark's: --benchmark_filter=REGEX picks stages, --benchmark_out=FILE writes JSON. A default
-// run is for looking around: for numbers to quote, add --benchmark_min_time=1 or --benchmark_repetitions=9.
+// run is for looking around: for numbers to quote or to compare (tools/compare-bench), add --benchmark_min_time=1 or
+// --benchmark_repetitions=9.
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
@@ -33,7 +34,9 @@ int run_benchmarks(const std::string &device, bool profiling, std::vector<std::s
   for (const auto &[name, value] : isowave::bench::run_info(session.device())) {
     benchmark::AddCustomContext(name, value);
   }
-  benchmark::AddCustomContext("copy_GB_per_s", fmt::format("{:.1f}", session.copy_bandwidth() * 1e-9));
+  const isowave::bench::Ceiling &ceiling = session.ceiling();
+  benchmark::AddCustomContext("copy_GB_per_s", fmt::format("{:.1f}", ceiling.bytes_per_second * 1e-9));
+  benchmark::AddCustomContext("launch_us", fmt::format("{:.2f}", ceiling.launch_seconds * 1e6));
   const std::size_t num_run = benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return session.failed || num_run == 0 ? 1 : 0;

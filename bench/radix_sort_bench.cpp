@@ -67,7 +67,8 @@ const bool kRegistered = [] {
     stage_benchmark(fmt::format("radix_sort/{}", to_string(distribution)),
                     [=](benchmark::State &state) { sort_rays_by_block(state, distribution); })
         ->ArgNames({"width", "key_bits"})
-        ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {18, 27}});
+        ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {18, 27}})
+        ->Args({kLargeWidth, 18});
   }
   return true;
 }();

@@ -106,7 +106,7 @@ void compact(benchmark::State &state, Distribution distribution, bool indices) {
 const bool kRegistered = [] {
   stage_benchmark("scan/exclusive", exclusive_scan)
       ->ArgName("entries")
-      ->ArgsProduct({{640 * 360 / 512, 1280 * 720 / 512, 1280 * 720 / 1024 * 16}})
+      ->ArgsProduct({{640 * 360 / 512, 1280 * 720 / 512, 1280 * 720 / 1024 * 16, 3840 * 2160 / 1024 * 16}})
       ->Iterations(1000);  // microseconds each: --benchmark_min_time would ask for far more
   for (const Distribution distribution : kDistributions) {
     for (const bool indices : {true, false}) {
@@ -114,7 +114,8 @@ const bool kRegistered = [] {
           fmt::format("scan/compact_{}/{}", indices ? "indices" : "values", to_string(distribution)),
           [=](benchmark::State &state) { compact(state, distribution, indices); })
           ->ArgName("width")
-          ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
+          ->ArgsProduct({{kWidths.begin(), kWidths.end()}})
+          ->Arg(kLargeWidth);
     }
   }
   return true;

@@ -56,7 +56,7 @@ struct BlockCache {
       request_;
   ocl::Kernel<ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> age_histogram_kernel_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>,
-              ocl::In<uint>, ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
+              ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
       select_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>,
               ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>

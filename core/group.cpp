@@ -3,32 +3,106 @@
 #include <algorithm>
 #include <bit>
 
+#include "core/error.hpp"
+
 namespace isowave {
 
 namespace {
+
+/// Work-items per group of the kernels that take any number.
 constexpr std::uint32_t kGroupSize = 64;
+
+/// Distinct blocks that a pass's pairs can belong to.
+std::uint64_t max_visible(std::uint64_t num_pixels, std::uint32_t num_slots) {
+  return std::min<std::uint64_t>(num_pixels, num_slots);
 }
 
-Group::Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size)
-    : range_(ocl::Range::strided(num_pixels, kGroupSize, device)),
-      key_bits_(std::max(1, static_cast<int>(std::bit_width(num_slots - 1)))),
-      groups_{{device, "grouped pair ids", num_pixels},
+/// Tiles of group_size * ISO_SCAN_ITEMS entries.
+std::uint64_t num_tiles(std::uint64_t count, std::uint32_t group_size) {
+  const std::uint64_t tile = std::uint64_t{group_size} * ISO_SCAN_ITEMS;
+  return (count + tile - 1) / tile;
+}
+
+/// A launch over `count` entries in such tiles.
+ocl::Range tiles_range(std::uint64_t count, std::uint32_t group_size, const ocl::Device &device) {
+  return ocl::Range::strided(num_tiles(count, group_size) * group_size, group_size, device);
+}
+
+}  // namespace
+
+std::string_view to_string(Grouping grouping) {
+  return grouping == Grouping::kRadix ? "radix" : "counting";
+}
+
+Grouping grouping_from_string(std::string_view name) {
+  for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
+    if (name == to_string(grouping)) return grouping;
+  }
+  throw Error("no grouping is called '{}'; there are: radix, counting", name);
+}
+
+Group::Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size,
+             Grouping grouping)
+    : groups_{{device, "grouped pair ids", num_pixels},
               {device, "grouped slots", num_pixels},
-              {device, "block ray offsets", std::min<std::uint64_t>(num_pixels, num_slots)}},
-      sort_(device, num_pixels, group_size),
-      select_(device, "group", "group_select"),
-      keys_(device, "group", "group_keys"),
-      heads_(device, "group", "group_heads") {}
+              {device, "block ray offsets", max_visible(num_pixels, num_slots)}},
+      gather_(grouping == Grouping::kRadix
+                  ? decltype(gather_)(std::in_place_type<ByRadix>, device, num_pixels, num_slots, group_size)
+                  : decltype(gather_)(std::in_place_type<ByCounting>, device, num_pixels, num_slots,
+                                      group_size)) {}
 
 void Group::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction) {
-  select_(range_, rays.frame, rays.counts, rays.pair_block_ids, cache.table, rays.pair_hits, rays.mask);
-  compaction.indices(rays.mask, rays.counts, ISO_COUNT_FIELD(pair_slot_count), groups_.pair_ids,
+  if (auto *by_radix = std::get_if<ByRadix>(&gather_)) {
+    (*by_radix)(cache, rays, compaction, groups_);
+  } else {
+    std::get<ByCounting>(gather_)(cache, rays, groups_);
+  }
+}
+
+Group::ByRadix::ByRadix(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots,
+                        std::uint32_t group_size)
+    : range(ocl::Range::strided(num_pixels, kGroupSize, device)),
+      key_bits(std::max(1, static_cast<int>(std::bit_width(num_slots - 1)))),
+      sort(device, num_pixels, group_size),
+      select(device, "group", "group_select", group_defines(group_size)),
+      keys(device, "group", "group_keys", group_defines(group_size)),
+      heads(device, "group", "group_heads", group_defines(group_size)) {}
+
+void Group::ByRadix::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction,
+                                BlockGroups &groups) {
+  select(range, rays.frame, rays.counts, rays.pair_block_ids, cache.table, rays.pair_hits, rays.mask);
+  compaction.indices(rays.mask, rays.counts, ISO_COUNT_FIELD(pair_slot_count), groups.pair_ids,
                      ISO_COUNT_FIELD(granted_count));
-  keys_(range_, rays.frame, rays.counts, groups_.pair_ids, rays.pair_block_ids, cache.table, groups_.slots);
-  sort_(groups_.slots, groups_.pair_ids, rays.counts, ISO_COUNT_FIELD(granted_count), key_bits_);
-  heads_(range_, rays.counts, groups_.slots, rays.mask);
-  compaction.indices(rays.mask, rays.counts, ISO_COUNT_FIELD(granted_count), groups_.block_ray_offsets,
+  keys(range, rays.frame, rays.counts, groups.pair_ids, rays.pair_block_ids, cache.table, groups.slots);
+  sort(groups.slots, groups.pair_ids, rays.counts, ISO_COUNT_FIELD(granted_count), key_bits);
+  heads(range, rays.counts, groups.slots, rays.mask);
+  compaction.indices(rays.mask, rays.counts, ISO_COUNT_FIELD(granted_count), groups.block_ray_offsets,
                      ISO_COUNT_FIELD(visible_count));
+}
+
+Group::ByCounting::ByCounting(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots,
+                              std::uint32_t group_size)
+    : pairs_range(ocl::Range::strided(num_pixels, kGroupSize, device)),
+      pair_tiles_range(tiles_range(num_pixels, group_size, device)),
+      visible_range(ocl::Range::strided(max_visible(num_pixels, num_slots), kGroupSize, device)),
+      visible_tiles_range(tiles_range(max_visible(num_pixels, num_slots), group_size, device)),
+      slot_counts(device, "pairs by slot", num_slots),
+      tile_sums(device, "group tile sums", num_tiles(max_visible(num_pixels, num_slots), group_size)),
+      count(device, "group", "group_count", group_defines(group_size)),
+      sum_tiles(device, "group", "group_tile_sums", group_defines(group_size)),
+      offsets(device, "group", "group_offsets", group_defines(group_size)),
+      scatter(device, "group", "group_scatter", group_defines(group_size)),
+      clear(device, "group", "group_clear", group_defines(group_size)) {}
+
+void Group::ByCounting::operator()(const BlockCache &cache, Wavefront &rays, BlockGroups &groups) {
+  const ocl::Buffer<uint> &pair_ranks = rays.mask, &visible_slots = groups.block_ray_offsets;
+  count(pair_tiles_range, rays.frame, rays.counts, rays.pair_block_ids, cache.table, rays.pair_hits,
+        rays.mask, slot_counts, groups.block_ray_offsets);
+  sum_tiles(visible_tiles_range, rays.counts, visible_slots, slot_counts, tile_sums);
+  offsets(visible_tiles_range, rays.counts, tile_sums, slot_counts, groups.block_ray_offsets);
+  scatter(pairs_range, rays.frame, rays.counts, rays.pair_block_ids, cache.table, pair_ranks, slot_counts,
+          groups.pair_ids, groups.slots);
+  clear(visible_range, rays.counts, groups.slots, groups.block_ray_offsets, slot_counts);
 }
 
 }  // namespace isowave

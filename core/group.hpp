@@ -1,6 +1,9 @@
 #pragma once
 // Ray-block pairs whose dual grid is cached -> the same pairs gathered by block (Sec. 3.6, 4.2).
 
+#include <string_view>
+#include <variant>
+
 #include "core/block_cache.hpp"
 #include "core/ocl/kernel.hpp"
 #include "core/radix_sort.hpp"
@@ -9,35 +12,76 @@
 
 namespace isowave {
 
-/// The pass's work for intersection.
+/// How pairs are gathered. The picture has the same bits either way.
+enum class Grouping {
+  kRadix,    ///< stable radix sort by cache slot (Sec. 3.6): scratch of 8 bytes a pixel
+  kCounting  ///< counts per slot, scan over the visible ones, scatter: scratch of 4 bytes a cache slot
+};
+inline constexpr Grouping kDefaultGrouping = Grouping::kRadix;
+
+/// "radix", "counting".
+std::string_view to_string(Grouping grouping);
+/// Throws Error naming both.
+Grouping grouping_from_string(std::string_view name);
+
+/// The pass's work for intersection. Pairs of one block lie together; which block comes first is left open.
 struct BlockGroups {
-  ocl::Buffer<uint> pair_ids;  ///< [granted_count] entries of pair_block_ids, sorted by slot (I_RAct)
+  ocl::Buffer<uint> pair_ids;  ///< [granted_count] entries of pair_block_ids, by block (I_RAct)
   ocl::Buffer<uint> slots;     ///< [granted_count] slot of each pair's block (I_RActBID)
-  ocl::Buffer<uint> block_ray_offsets;  ///< [visible_count] where each block's pairs begin (O_BRays)
+  ocl::Buffer<uint>
+      block_ray_offsets;  ///< [visible_count] where each block's pairs begin, ascending (O_BRays)
 };
 
 class Group {
  public:
-  Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size);
+  Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size,
+        Grouping grouping = kDefaultGrouping);
 
-  /// Out: groups(), counts.granted_count, counts.visible_count; pair_hits are marked "not tested".
-  /// Asynchronous.
+  /// In: counts.granted_count and counts.visible_count are 0, as begin_pass leaves them.
+  /// Out: groups(), both counts; pair_hits are marked "not tested"; rays.mask is overwritten.
+  /// O(pairs). Asynchronous.
   void operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction);
 
   const BlockGroups &groups() const { return groups_; }
 
  private:
-  ocl::Range range_;
-  std::uint32_t key_bits_;
+  struct ByRadix {
+    ByRadix(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size);
+    void operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction, BlockGroups &groups);
+
+    ocl::Range range;
+    std::uint32_t key_bits;
+    RadixSort sort;
+    ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
+                ocl::Out<PairHit>, ocl::Out<uint>>
+        select;
+    ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<BlockEntry>,
+                ocl::Out<uint>>
+        keys;
+    ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> heads;
+  };
+
+  struct ByCounting {
+    ByCounting(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots,
+               std::uint32_t group_size);
+    void operator()(const BlockCache &cache, Wavefront &rays, BlockGroups &groups);
+
+    ocl::Range pairs_range, pair_tiles_range, visible_range, visible_tiles_range;
+    ocl::Buffer<uint> slot_counts;  ///< [slots] 0 between passes
+    ocl::Buffer<uint> tile_sums;
+    ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
+                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+        count;
+    ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> sum_tiles;
+    ocl::Kernel<ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>> offsets;
+    ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<uint>,
+                ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>>
+        scatter;
+    ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> clear;
+  };
+
   BlockGroups groups_;
-  RadixSort sort_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-              ocl::Out<PairHit>, ocl::Out<uint>>
-      select_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<BlockEntry>,
-              ocl::Out<uint>>
-      keys_;
-  ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> heads_;
+  std::variant<ByRadix, ByCounting> gather_;
 };
 
 }  // namespace isowave

@@ -14,13 +14,13 @@ namespace {
 
 class BlocksPipeline : public Pipeline {
  public:
-  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
+  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping)
       : state_(state),
         compaction_(state.device, state.rays.num_pixels, group_size),
         initial_rays_(state.device, state.rays.num_pixels),
         speculation_(state.device),
         traverse_(state.device, state.rays.num_pixels, group_size),
-        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size),
+        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size, grouping),
         intersect_(state.device, state.rays.num_pixels, group_size, solver),
         composite_(state.device, state.rays.num_pixels) {}
 
@@ -110,8 +110,9 @@ void FrameState::provide_blocks(const CountsBuffer &asked) {
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
-                                        Solver solver) {
-  if (kind == PipelineKind::kBlocks) return std::make_unique<BlocksPipeline>(state, group_size, solver);
+                                        Solver solver, Grouping grouping) {
+  if (kind == PipelineKind::kBlocks)
+    return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping);
   return std::make_unique<RaysPipeline>(state, group_size, solver);
 }
 

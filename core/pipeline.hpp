@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "core/block_cache.hpp"
+#include "core/group.hpp"
 #include "core/macrocells.hpp"
 #include "core/solvers.hpp"
 #include "core/wavefront.hpp"
@@ -50,6 +51,6 @@ class Pipeline {
 
 /// `state` must outlive the pipeline.
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
-                                        Solver solver);
+                                        Solver solver, Grouping grouping);
 
 }  // namespace isowave

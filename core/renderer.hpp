@@ -24,6 +24,8 @@ struct RendererOptions {
   bool per_ray_speculation = false;    ///< pipeline `rays`: each ray by what it has missed, not all alike
   Solver solver = kDefaultSolver;      ///< root finder in a cell
   std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
+  /// How a pass's pairs are gathered by block.
+  Grouping grouping = kDefaultGrouping;
 };
 
 /// What one pass did: the counts of the device, and what follows from them.

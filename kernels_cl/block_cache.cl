@@ -64,6 +64,7 @@ kernel void cache_request(constant FrameParams *frame, global PassCounts *counts
   if (get_global_id(0) == 0) {
     open_requests(cache);
     cache->first_block_id = pair_slots == 0 ? ISO_INVALID_ID : pair_block_ids[0];
+    cache->first_touched = 0xFFu;
   }
   for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
     const uint block_id = pair_block_ids[pair];
@@ -113,10 +114,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
 /// again.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
     constant FrameParams *frame, global const PassCounts *counts, uint num_slots, global const BlockEntry *table,
-    global uint *slot_stamps, global const uint *requested_bits, global uint *request_block_ids,
+    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids,
     uint capacity, global uint *age_histogram, global CacheState *cache) {
-  local uint first_missing[8]; /* blocks of the dual grid served first that are on the request list */
-  local uint places[8];        /* where they stand there */
+  local uint first_missing[8]; /* blocks served first that are not cached */
+  local uint places[8];        /* where they stand on the request list */
   local uint num_first_missing;
   const uint requested = listed_count(counts, capacity), num_free = cache->free_count;
   const uint in_use = age_histogram[0], item = get_local_id(0);
@@ -128,12 +129,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
       const BlockCoords b = block_coords(frame, block_id);
       const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-      if (dual_grid_block(frame, b, corner) == ISO_INVALID_ID) continue;
+      if ((cache->first_touched >> corner & 1u) == 0 || dual_grid_block(frame, b, corner) == ISO_INVALID_ID) continue;
       const uint slot = cached_slot(frame, table, x, y, z);
       if (slot != ISO_BLOCK_ABSENT) {
-        /* Only what the pass has stamped is counted as in use; the rest the block served first does not touch. */
-        if (slot_stamps[slot] == counts->pass) slot_stamps[slot] = counts->pass + 1;
-      } else if ((requested_bits[request_word(frame, x, y, z)] & request_bit(x, y, z)) != 0) {
+        slot_stamps[slot] = counts->pass + 1;
+      } else {
+        places[num_first_missing] = ISO_INVALID_ID;
         first_missing[num_first_missing++] = block_id_at(frame, x, y, z);
       }
     }
@@ -148,9 +149,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   if (item == 0) {
     uint granted, evicted, age, older = 0;
-    for (uint j = 0; j < num_first_missing; ++j) { /* swap it to place j */
+    for (uint j = 0; j < num_first_missing; ++j) { /* swap it to place j; where the list ended too early, put it there */
       const uint displaced = request_block_ids[j];
-      request_block_ids[places[j]] = displaced;
+      if (places[j] == ISO_INVALID_ID) {
+        const BlockCoords b = block_coords(frame, displaced);
+        requested_bits[request_word(frame, b.x, b.y, b.z)] &= ~request_bit(b.x, b.y, b.z);
+      } else {
+        request_block_ids[places[j]] = displaced;
+      }
       request_block_ids[j] = first_missing[j];
       for (uint later = j + 1; later < num_first_missing; ++later) {
         if (places[later] == j) places[later] = places[j];

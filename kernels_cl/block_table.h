@@ -20,7 +20,8 @@ ISO_CHECK_SIZE(BlockEntry, 16);
 
 /// What the cache's kernels leave for each other, and for the next pass.
 typedef struct CacheState {
-  uint first_block_id;  ///< the block that the pass must serve, or ISO_INVALID_ID
+  uint first_block_id;  ///< the block that the pass must serve, or ISO_INVALID_ID; of its dual grid,
+  uint first_touched;   ///< these blocks (bits 0..7, corner x + 2y + 4z)
   uint free_count;      ///< slots that hold no block, before the pass's grants
   uint granted;         ///< slots given in the pass
   uint

@@ -317,7 +317,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         if (block_id != from || first) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
         entry = pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
         ray_block_ids[pixel] = block_id;
-        if (i == 0) cache->first_block_id = block_id;
+        if (i == 0) {
+          cache->first_block_id = block_id;
+          cache->first_touched = touched_blocks(&ray, block_coords(frame, block_id), last);
+        }
         if (i < counts->window_count) {
           request_ahead(frame, macrocell_masks, table, slot_stamps, counts->pass, &ray, m,
                         frame->per_ray_speculation ? min(1u << log_ahead, frame->max_spec_count) : fair_share,

@@ -4,28 +4,9 @@
 /// = compact_count -> scan_exclusive of the tile sums -> compact_values or compact_indices. A tile is
 /// ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever waits for another
 /// one.
-#include "shared_types.h"
+#include "work_group.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
-
-/// Exclusive prefix sum of one value per work-item; *total gets the sum. sums [ISO_GROUP_SIZE]. All items
-/// must call it.
-inline uint group_scan(local uint *sums, uint value, uint *total) {
-  const uint item = get_local_id(0);
-  uint inclusive = value;
-  sums[item] = value;
-  for (uint distance = 1; distance < ISO_GROUP_SIZE; distance *= 2) {
-    barrier(CLK_LOCAL_MEM_FENCE);
-    const uint left = item >= distance ? sums[item - distance] : 0;
-    barrier(CLK_LOCAL_MEM_FENCE);
-    inclusive += left;
-    sums[item] = inclusive;
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  *total = sums[ISO_GROUP_SIZE - 1];
-  barrier(CLK_LOCAL_MEM_FENCE);
-  return inclusive - value;
-}
 
 /// values[i] = sum of values[0..i), in place, for ceil(count / divisor) * multiplier entries; their sum goes
 /// to total_field, unless that is ISO_INVALID_ID. One work-group: made for tables of tiles, which are short.

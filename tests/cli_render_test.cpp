@@ -226,6 +226,7 @@ TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
   expect_refused(good + "--max-speculation 65" + to, "1 to 64");
   expect_refused(good + "--speculation often" + to, "speculation");
   expect_refused(good + "--group-size 48" + to, "48");
+  expect_refused(good + "--grouping bubble" + to, "radix, counting");
   expect_refused(good + "--orbit 0" + to, "orbit");
   expect_refused(good + "--orbit 2 --cameras x.json" + to, "orbit");
   expect_refused(good + "--rate 0" + to, "1 to 32");

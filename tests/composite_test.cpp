@@ -104,7 +104,7 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       for (uint b = first; b < std::min(first + num_pixels, 4u * 4 * 3); ++b) pairs.push_back(b);
       world.begin_pass(pairs, 1);
       world.cache.request(world.rays);
-      world.cache.assign_slots(world.rays);
+      world.assign_slots();
       world.fill_slots(voxels);
     }
   }

@@ -1,4 +1,4 @@
-// core/group: pairs gathered by block, exactly those whose dual grid is cached, against plain loops.
+// core/group: pairs gathered by block, exactly those whose dual grid is cached, against plain loops, by either grouping.
 
 #include "core/group.hpp"
 
@@ -13,14 +13,14 @@
 
 #include "tests/stage_support.hpp"
 #include "tests/stage_world.hpp"
-#include "tests/test_devices.hpp"
+#include "tests/test_groupings.hpp"
 
 namespace isowave {
 namespace {
 
 constexpr glm::uvec3 kDims(29, 25, 22);  // 8 x 7 x 6 blocks
 
-class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
  protected:
   /// How many pairs got their dual grids, of how many.
   struct Tally {
@@ -36,7 +36,7 @@ class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const FrameParams frame = plain_frame(kDims, num_pixels);
     const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
     StageWorld world(device_, frame, num_slots, group_size);
-    Group group(device_, num_pixels, num_slots, group_size);
+    Group group(device_, num_pixels, num_slots, group_size, grouping_);
     Tally tally;
     for (uint pass = 0; pass < num_passes; ++pass) {
       SCOPED_TRACE(fmt::format("pass {}", pass));
@@ -49,7 +49,7 @@ class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       }
       world.begin_pass(pairs, spec_count);
       world.cache.request(world.rays);
-      world.cache.assign_slots(world.rays);
+      world.assign_slots();
       group(world.cache, world.rays, world.compaction);
       check(world, group, pairs, tally);
       if (HasFatalFailure()) return tally;
@@ -59,7 +59,7 @@ class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   static void check(const StageWorld &world, const Group &group, const std::vector<uint> &pairs,
                     Tally &tally) {
-    const std::vector<uint> table = world.cache.table.read();
+    const std::vector<uint> table = world.slots_by_block();
     const auto granted = [&](uint pair) {
       if (pairs[pair] == ISO_INVALID_ID) return false;
       return std::ranges::all_of(dual_grid_blocks(world.frame, pairs[pair]),
@@ -78,6 +78,7 @@ class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const std::vector<uint> pair_ids = group.groups().pair_ids.read(), slots = group.groups().slots.read(),
                             offsets = group.groups().block_ray_offsets.read();
     std::set<uint> seen;
+    ASSERT_TRUE(counts.visible_count == 0 || offsets[0] == 0);
     for (uint visible = 0; visible < counts.visible_count; ++visible) {
       const uint begin = offsets[visible];
       const uint end = visible + 1 < counts.visible_count ? offsets[visible + 1] : counts.granted_count;
@@ -97,7 +98,8 @@ class GroupOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     tally.blocks += expected.size();
   }
 
-  ocl::Device device_{GetParam()};
+  ocl::Device device_{GetParam().device};
+  Grouping grouping_ = GetParam().grouping;
 };
 
 TEST_P(GroupOnDevice, SmallGroups) {
@@ -130,13 +132,13 @@ TEST_P(GroupOnDevice, OneMissingBlockIsEnoughToWait) {
   for (uint trial = 0; trial < 12; ++trial) {
     SCOPED_TRACE(fmt::format("trial {}, seed 40", trial));
     StageWorld world(device_, frame, 8 * 7 * 6, 64);
-    Group group(device_, 8 * 7 * 6, 8 * 7 * 6, 64);
+    Group group(device_, 8 * 7 * 6, 8 * 7 * 6, 64, grouping_);
     std::vector<uint> some;
     std::ranges::copy_if(all, std::back_inserter(some), [&](uint) { return random() % 5 == 0; });
     world.begin_pass(some, 1);
     world.cache.request(world.rays);
-    world.cache.assign_slots(world.rays);
-    const std::vector<uint> table = world.cache.table.read();
+    world.assign_slots();
+    const std::vector<uint> table = world.slots_by_block();
     for (const uint block : all) {
       const std::vector<uint> grid = dual_grid_blocks(frame, block);
       const auto absent = [&](uint b) { return table[b] == ISO_BLOCK_ABSENT; };
@@ -157,17 +159,42 @@ TEST_P(GroupOnDevice, OneHotBlock) {
   EXPECT_EQ(tally.blocks, 3u);
 }
 
+/// More tiles of blocks than work-groups: each group goes on with sums of its own and of others' tiles.
+TEST_P(GroupOnDevice, MoreVisibleBlocksThanOneSweepTakes) {
+  constexpr uint kNumBlocks = 20 * 20 * 20, kNumPixels = 2 * kNumBlocks + 5;
+  const FrameParams frame = plain_frame({80, 80, 80}, kNumPixels);
+  StageWorld world(device_, frame, kNumBlocks, 8);
+  Group group(device_, kNumPixels, kNumBlocks, 8, grouping_);
+  std::vector<uint> pairs(kNumPixels);
+  Random random(50);
+  Tally tally;
+  for (const uint num_distinct : {kNumBlocks, kNumBlocks - 77, 3u}) {
+    SCOPED_TRACE(fmt::format("{} blocks, seed 50", num_distinct));
+    for (uint i = 0; i < kNumPixels; ++i) pairs[i] = i % num_distinct;
+    std::ranges::shuffle(pairs, random);
+    world.begin_pass(pairs, 1);
+    world.cache.request(world.rays);
+    world.assign_slots();
+    group(world.cache, world.rays, world.compaction);
+    check(world, group, pairs, tally);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_EQ(tally.blocks, 2 * kNumBlocks - 77 + 3);
+  EXPECT_EQ(tally.granted, tally.pairs);
+}
+
 TEST_P(GroupOnDevice, NoPairs) {
   const FrameParams frame = plain_frame(kDims, 10);
   StageWorld world(device_, frame, 8, 64);
-  Group group(device_, 10, 8, 64);
+  Group group(device_, 10, 8, 64, grouping_);
   world.begin_pass(std::vector<uint>(10, ISO_INVALID_ID), 1);
   group(world.cache, world.rays, world.compaction);
   EXPECT_EQ(world.counts().granted_count, 0u);
   EXPECT_EQ(world.counts().visible_count, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, GroupOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, GroupOnDevice, testing::ValuesIn(groupings_under_test()),
+                         grouping_test_name);
 
 }  // namespace
 }  // namespace isowave

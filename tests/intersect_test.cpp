@@ -188,7 +188,7 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     auto &[world, group, intersect] = stages;
     world.begin_pass(pairs, spec_count);
     world.cache.request(world.rays);
-    world.cache.assign_slots(world.rays);
+    world.assign_slots();
     world.fill_slots(voxels);
     group(world.cache, world.rays, world.compaction);
     intersect(world.cache, group.groups(), world.rays);
@@ -196,7 +196,7 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const FrameParams &frame = world.frame;
     const uint num_slots = world.cache.num_slots;
     const std::vector<PairHit> got = world.rays.pair_hits.read();
-    const std::vector<uint> table = world.cache.table.read();
+    const std::vector<uint> table = world.slots_by_block();
     const auto cached = [&](uint block) { return table[block] < num_slots; };
     for (uint pair = 0; pair < pairs.size(); ++pair) {
       const uint pixel = world.active_ray_ids[pair / spec_count];

@@ -1,4 +1,4 @@
-// What must not change the picture: speculation, cache size, work-group size, what was drawn before, and who
+// What must not change the picture: speculation, cache size, grouping, work-group size, what was drawn before, and who
 // watches. And what the counts of a frame's passes must say of each other.
 
 #include <fmt/format.h>
@@ -8,7 +8,7 @@
 
 #include "core/renderer.hpp"
 #include "tests/frame_scene.hpp"
-#include "tests/test_devices.hpp"
+#include "tests/test_groupings.hpp"
 
 namespace isowave {
 namespace {
@@ -28,16 +28,21 @@ TestVolume medium_volume() {
 constexpr ImageSize kTiny{6, 5}, kSmall{12, 8}, kMedium{80, 54};
 constexpr float kIsovalue = 0.8f;  // both fields: many candidate blocks that rays only graze
 
-class InvarianceOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+class InvarianceOnDevice : public testing::TestWithParam<GroupingOnDevice> {
  protected:
   /// Mesa's llvmpipe needs a millisecond of processor time a launch, a hundred times PoCL's, and half a minute
   /// to compile the kernels for one more group size: there the long tests draw fewer frames.
   bool is_slow() const { return device_.info().platform == "rusticl"; }
 
+  static RendererOptions with_grouping(RendererOptions options) {
+    options.grouping = GetParam().grouping;
+    return options;
+  }
+
   /// Draws the default view with fresh options; it must be the twin's.
   FrameStats check(const TestVolume &volume, const RendererOptions &options) {
     const Camera camera = orbit_cameras(volume.info(), 1)[0];
-    Renderer renderer(device_, volume.compressed, options);
+    Renderer renderer(device_, volume.compressed, with_grouping(options));
     const FrameStats stats = renderer.render(camera, kIsovalue);
     expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue), options.size.width);
     expect_consistent(stats, renderer.options());
@@ -90,10 +95,10 @@ class InvarianceOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         [&](std::uint64_t sum, const PassStats &pass) { return sum + pass.counts.*count; });
   }
 
-  ocl::Device device_{GetParam()};
+  ocl::Device device_{GetParam().device};
 };
-INSTANTIATE_TEST_SUITE_P(Devices, InvarianceOnDevice, testing::ValuesIn(devices_under_test()),
-                         device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, InvarianceOnDevice, testing::ValuesIn(groupings_under_test()),
+                         grouping_test_name);
 
 // ---- speculation
 
@@ -156,9 +161,9 @@ TEST_P(InvarianceOnDevice, ManyViewsThroughFewSlots) {
   const TestVolume volume = medium_volume();
   constexpr ImageSize size{14, 10};
   for (const std::uint32_t slots : {13u, 9u, 31u}) {
-    if (is_slow() && slots != 13) continue;
+    if (is_slow() && (slots != 13 || GetParam().grouping != kDefaultGrouping)) continue;
     SCOPED_TRACE(fmt::format("{} slots", slots));
-    Renderer renderer(device_, volume.compressed, {.size = size, .cache_slots = slots});
+    Renderer renderer(device_, volume.compressed, with_grouping({.size = size, .cache_slots = slots}));
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
       expect_consistent(renderer.render(camera, kIsovalue), renderer.options());
       expect_same_hits(renderer.hits(), twin_hits(volume, camera, size, kIsovalue), size.width);
@@ -202,7 +207,7 @@ TEST_P(InvarianceOnDevice, ImageShapes) {
 TEST_P(InvarianceOnDevice, SmallWarmCacheDecodesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed, {.size = kSmall});
+  Renderer renderer(device_, volume.compressed, with_grouping({.size = kSmall}));
   const FrameStats cold = renderer.render(camera, kIsovalue);
   const auto hits = renderer.hits();
   const FrameStats warm = renderer.render(camera, kIsovalue);
@@ -229,7 +234,7 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
   std::mt19937 random(kSeed);
   SCOPED_TRACE(fmt::format("seed {}", kSeed));
   for (const std::uint32_t slots : {0u, 150u}) {
-    Renderer renderer(device_, volume.compressed, {.size = kFrame, .cache_slots = slots});
+    Renderer renderer(device_, volume.compressed, with_grouping({.size = kFrame, .cache_slots = slots}));
     std::shuffle(frames.begin(), frames.end(), random);
     for (const Frame &frame : frames) {
       SCOPED_TRACE(fmt::format("{} slots, isovalue {}, view {}", slots, isovalues[frame.iso], frame.view));
@@ -242,7 +247,7 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
 
 TEST_P(InvarianceOnDevice, SmallMemoryIsFixedBeforeTheFirstFrame) {
   const TestVolume volume = small_volume();
-  Renderer renderer(device_, volume.compressed, {.size = kTiny, .cache_slots = 20});
+  Renderer renderer(device_, volume.compressed, with_grouping({.size = kTiny, .cache_slots = 20}));
   const ocl::MemoryLedger &ledger = device_.ledger();
   const std::uint64_t current = ledger.current(), peak = ledger.peak();
   EXPECT_GT(current, 0u);
@@ -275,7 +280,7 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
   for (const std::uint32_t slots : {0u, 100u}) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
     Renderer renderer(device_, volume.compressed,
-                      {.size = kFrame, .cache_slots = slots, .max_speculation = 4});
+                      with_grouping({.size = kFrame, .cache_slots = slots, .max_speculation = 4}));
     std::uint64_t found = 0;
     std::size_t calls = 0;
     const FrameStats stats = renderer.render(camera, kIsovalue, [&](const PassStats &pass) {
@@ -300,7 +305,8 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
 TEST_P(InvarianceOnDevice, SmallCancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
-  Renderer renderer(device_, volume.compressed, {.size = kTiny, .cache_slots = 20, .max_speculation = 2});
+  Renderer renderer(device_, volume.compressed,
+                    with_grouping({.size = kTiny, .cache_slots = 20, .max_speculation = 2}));
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
@@ -321,8 +327,8 @@ TEST_P(InvarianceOnDevice, SmallCancelledFrameLeavesNoTrace) {
 TEST_P(InvarianceOnDevice, SmallProfilingChangesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  ocl::Device device(GetParam(), true);
-  Renderer renderer(device, volume.compressed, {.size = kSmall});
+  ocl::Device device(GetParam().device, true);
+  Renderer renderer(device, volume.compressed, with_grouping({.size = kSmall}));
   const FrameStats stats = renderer.render(camera, kIsovalue);
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   expect_consistent(stats, renderer.options());

@@ -30,6 +30,21 @@ class OclTimerOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 };
 
+TEST_P(OclTimerOnDevice, CountsCommandsOnAndOff) {
+  for (const bool profiling : {false, true}) {
+    SCOPED_TRACE(profiling);
+    ocl::Device device(GetParam(), profiling);
+    ocl::Kernel<> empty(device, "launch_probe", "launch_empty");
+    ocl::Buffer<uint> buffer(device, "buffer", 4);
+    const std::uint64_t before = device.timer().num_commands();
+    empty({1, 1});
+    empty({0, 1});  // enqueues nothing
+    buffer.fill(7);
+    empty({1, 1});
+    EXPECT_EQ(device.timer().num_commands() - before, 3u);
+  }
+}
+
 TEST_P(OclTimerOnDevice, OffKeepsNothing) {
   ocl::Device device(GetParam());
   EXPECT_EQ(device.timer().source(), ocl::TimerSource::kOff);

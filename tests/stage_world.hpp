@@ -73,6 +73,21 @@ struct StageWorld {
     rays.pair_block_ids.write(pair_block_ids);
   }
 
+  /// Slots for the blocks requested in this pass.
+  void assign_slots() {
+    cache.evict(rays.counts, rays);
+    cache.assign(rays.counts, rays);
+  }
+
+  /// [blocks] slot of each block, ISO_BLOCK_ABSENT if it is not cached.
+  std::vector<uint> slots_by_block() const {
+    std::vector<uint> slots(std::size_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z, ISO_BLOCK_ABSENT);
+    for (const BlockEntry &entry : cache.table.read()) {
+      if (entry.block_id != ISO_INVALID_ID) slots.at(entry.block_id) = entry.slot;
+    }
+    return slots;
+  }
+
   /// Instead of decoding: puts the voxels [nz][ny][nx] of the blocks just granted into their slots, and NaN into
   /// padding, which nobody may use.
   void fill_slots(const std::vector<float> &voxels) {

@@ -41,6 +41,7 @@ void StageTimer::finish_segment() {
 }
 
 cl::Event *StageTimer::next_event() {
+  ++num_commands_;
   if (source_ != TimerSource::kEvents) return nullptr;
   return &events_.emplace_back(current_, cl::Event()).second;
 }

@@ -7,6 +7,7 @@
 
 #include <CL/opencl.hpp>
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
@@ -42,8 +43,10 @@ class StageTimer {
   /// every launch keeps an event until then. Throws Error when the device failed.
   std::map<std::string, double> collect();
 
-  /// For Kernel and Buffer: the event a launch must fill, or nullptr when none is wanted.
+  /// For Kernel and Buffer: the event a launch must fill, or nullptr when none is wanted. Counts the launch.
   cl::Event *next_event();
+  /// Launches, fills and transfers enqueued so far, timed or not.
+  std::uint64_t num_commands() const { return num_commands_; }
 
  private:
   friend class Device;
@@ -55,6 +58,7 @@ class StageTimer {
   cl::CommandQueue queue_;
   std::string current_ = "other";
   int depth_ = 0;  ///< stages alive
+  std::uint64_t num_commands_ = 0;
   std::chrono::steady_clock::time_point segment_start_;
   std::vector<std::pair<std::string, cl::Event>> events_;
   std::map<std::string, double> milliseconds_;

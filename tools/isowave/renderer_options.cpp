@@ -22,6 +22,9 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->check(CLI::Range(8u, 1u << 30));
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
+  app.add_option("--grouping", flags.grouping,
+                 "how pipeline blocks gathers rays by block: radix or counting")
+      ->capture_default_str();
   app.add_option("--group-size", flags.values.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();
 }
@@ -35,6 +38,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
   if (flags.speculation == "off") options.max_speculation = 1;
   options.per_ray_speculation = flags.speculation == "per-ray";
   options.solver = solver_from_string(flags.solver);
+  options.grouping = grouping_from_string(flags.grouping);
   return options;
 }
 
