@@ -21,14 +21,16 @@ struct GroupInput {
         pairs(make_block_pairs(distribution, num_pairs, std::size_t{1} << visible_bits, kKeyBits, 0)),
         rays(device, num_pairs),
         compaction(device, num_pairs, kGroupSize),
-        cache(device, 1u << kKeyBits, num_slots, num_pairs, kGroupSize),
+        cache(device, cube_params(kKeyBits), num_slots, num_pairs, kGroupSize),
         group(device, num_pairs, num_slots, kGroupSize, grouping) {
-    const FrameParams params = cube_params(kKeyBits);
+    FrameParams params = cube_params(kKeyBits);
+    params.table_groups = cache.table_groups;
     rays.frame.write({&params, 1});
     rays.pair_block_ids.write(pairs.pair_block_ids);
     open_pass();
     cache.request(rays);
-    cache.assign_slots(rays);
+    cache.evict(rays.counts, rays);
+    cache.assign(rays.counts, rays);
     for (int pass = 0; pass < 2; ++pass) {  // the second starts from what the first leaves behind
       open_pass();
       run();

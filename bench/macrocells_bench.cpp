@@ -22,9 +22,7 @@ struct MacrocellsInput {
         stream(device, volume),
         frame(device, "frame", 1),
         macrocells(device, frame, params, stream.words, stream.bits_per_block) {
-    params.isovalue_index = macrocells.isovalue_index(kMixingLayerIsovalue);
-    frame.write({&params, 1});
-    macrocells.select(frame);
+    macrocells.select(frame, params);
     verify();
   }
 
@@ -80,7 +78,7 @@ void select_isovalue(benchmark::State &state) {
   const auto blocks = static_cast<double>(in.volume.block_count());
   measure(
       state, {blocks, blocks * (sizeof(cl_ushort) + 1.0 / 8)}, [] {},
-      [&] { in.macrocells.select(in.frame); });
+      [&] { in.macrocells.select(in.frame, in.params); });
 }
 
 const bool kRegistered = [] {

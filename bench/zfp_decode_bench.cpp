@@ -37,6 +37,8 @@ struct DecodeInput {
         counts(device, "counts", 1),
         block_ids(device, "block ids", kNumDecoded),
         slots(device, "slots", kNumDecoded),
+        frame(device, "frame", 1),
+        table(device, "table", kNumDecoded),
         values(device, "values", std::size_t{kNumDecoded} * ISO_BLOCK_VOXELS) {
     const CompressedVolume &volume = mixing_layer(kEdge, rate);
     const auto num_blocks = static_cast<uint>(kCopies * volume.block_count());
@@ -56,7 +58,7 @@ struct DecodeInput {
     run();
     verify(volume, ids, slot_ids);
   }
-  void run() { decode(stream, counts, block_ids, slots, values); }
+  void run() { decode(stream, frame, counts, block_ids, slots, slots, values, table); }
 
   /// Every block, bit for bit, against libzfp.
   void verify(const CompressedVolume &volume, const std::vector<uint> &ids,
@@ -78,6 +80,8 @@ struct DecodeInput {
   ZfpDecode decode;
   CountsBuffer counts;
   ocl::Buffer<uint> block_ids, slots;
+  ocl::Buffer<FrameParams> frame;
+  ocl::Buffer<BlockEntry> table;
   ocl::Buffer<float> values;
 };
 

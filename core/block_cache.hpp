@@ -44,7 +44,7 @@ struct BlockCache {
   ocl::Buffer<uint> requested_bits;     ///< [2 * coarse macrocells] one bit per block; 0 between passes
   ocl::Buffer<uint> request_block_ids;  ///< [capacity]
   ocl::Buffer<uint> decode_slots;       ///< [capacity] slot of each request granted
-  ocl::Buffer<uint> decode_entries;  ///< [capacity] and its table entry
+  ocl::Buffer<uint> decode_entries;     ///< [capacity] and its table entry
   ocl::Buffer<CacheState> state;        ///< [1]
 
  private:
@@ -66,8 +66,8 @@ struct BlockCache {
       rebuild_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<float>, ocl::Out<BlockEntry>> classify_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint,
-              ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<CacheState>>
+              ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<uint>, ocl::Out<CacheState>>
       assign_;
   ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<CacheState>>

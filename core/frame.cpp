@@ -63,6 +63,9 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   frame.blocks_x = (info.dims.x + 3) / 4;
   frame.blocks_y = (info.dims.y + 3) / 4;
   frame.blocks_z = (info.dims.z + 3) / 4;
+  frame.active_end_x = static_cast<int>(num_owning_blocks(info.dims.x));
+  frame.active_end_y = static_cast<int>(num_owning_blocks(info.dims.y));
+  frame.active_end_z = static_cast<int>(num_owning_blocks(info.dims.z));
   frame.width = size.width;
   frame.height = size.height;
   frame.eye_x = flush_tiny(eye.x);

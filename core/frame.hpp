@@ -18,8 +18,13 @@ struct ImageSize {
 /// Throws Error: an image of 0 or more than 2^28 pixels.
 void check_image_size(ImageSize size);
 
-/// Computes the camera basis once, in double, and maps it to index space. isovalue_index and max_spec_count
-/// are left for the renderer. Throws Error: a degenerate camera, an image of 0 or more than 2^28 pixels, a
+/// Blocks along an axis of `dim` voxels that own dual cells: all but a last one of a single voxel layer.
+inline std::uint32_t num_owning_blocks(std::uint32_t dim) {
+  return (dim + 2) / 4;
+}
+
+/// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume; isovalue_index,
+/// speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, an image of 0 or more than 2^28 pixels, a
 /// NaN isovalue.
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue);
 

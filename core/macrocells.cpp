@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/frame.hpp"
+
 namespace isowave {
 
 namespace {
@@ -100,7 +102,12 @@ void Macrocells::select(ocl::Buffer<FrameParams> &frame, FrameParams &params) {
   box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
   masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_, box_);
   box_.read(active_box_);
-  for (int &cell : active_box_) cell = cell == kNone ? 0 : ISO_MACROCELL_BLOCKS * cell;
+  const std::array<std::uint32_t, 3> dims = {params.dims_x, params.dims_y, params.dims_z};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const int num_blocks = static_cast<int>(num_owning_blocks(dims[i]));
+    active_box_[i] = std::min(active_box_[i], num_blocks) * ISO_MACROCELL_BLOCKS;
+    active_box_[3 + i] = std::min(active_box_[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
+  }
   set_active_box(params);
 }
 

@@ -21,9 +21,10 @@ class March {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<PassCounts>,
-              ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
+  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>,
+              ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint,
+              ocl::Out<CacheState>>
       kernel_;
 };
 

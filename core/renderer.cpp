@@ -77,8 +77,8 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       options_(checked(options, volume, device)),
       info_(volume.info),
       state_(make_state(device, volume, options_)),
-      pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
-                              options_.grouping)),
+      pipeline_(
+          make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver, options_.grouping)),
       shade_(device, options_.size.num_pixels()) {
   device.finish();
   setup_ms_ = ms_since(setup_begin_);

@@ -40,14 +40,14 @@ struct Wavefront {
     std::swap(active_ray_ids, next_active_ray_ids);
   }
 
-  std::uint64_t num_pixels;          ///< R
-  ocl::Buffer<FrameParams> frame;    ///< [1]
+  std::uint64_t num_pixels;               ///< R
+  ocl::Buffer<FrameParams> frame;         ///< [1]
   CountsBuffer counts;                    ///< [1] of the pass at work
   CountsBuffer previous_counts;           ///< [1] of the pass before (pipeline `rays`)
   CountsBuffer next_counts;               ///< [1] of the next pass, opened by this one (pipeline `rays`)
-  ocl::Buffer<HitRecord> hits;       ///< [R] by pixel: the picture so far
-  ocl::Buffer<uint> ray_block_ids;   ///< [R] by pixel: the block a ray goes on from (R_BID)
-  ocl::Buffer<uint> active_ray_ids;  ///< [active_count] pixels of the rays at work, ascending (R_ID)
+  ocl::Buffer<HitRecord> hits;            ///< [R] by pixel: the picture so far
+  ocl::Buffer<uint> ray_block_ids;        ///< [R] by pixel: the block a ray goes on from (R_BID)
+  ocl::Buffer<uint> active_ray_ids;       ///< [active_count] pixels of the rays at work, ascending (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
   ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
   ocl::Buffer<uint> pair_block_ids;       ///< [window_count * spec_count] blocks asked for, in ray order

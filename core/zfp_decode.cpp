@@ -14,7 +14,8 @@ void ZfpDecode::operator()(const DeviceStream &stream, const ocl::Buffer<FramePa
                            const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids,
                            const ocl::Buffer<uint> &slots, const ocl::Buffer<uint> &entries,
                            ocl::Buffer<float> &values, ocl::Buffer<BlockEntry> &table) {
-  kernel_(range_, frame, stream.words, stream.bits_per_block, counts, block_ids, slots, entries, values, table);
+  kernel_(range_, frame, stream.words, stream.bits_per_block, counts, block_ids, slots, entries, values,
+          table);
 }
 
 }  // namespace isowave

@@ -113,9 +113,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
 /// Decides how many slots are freed and which ages pay for it. One work-group. age_histogram is zeroed
 /// again.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
-    constant FrameParams *frame, global const PassCounts *counts, uint num_slots, global const BlockEntry *table,
-    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids,
-    uint capacity, global uint *age_histogram, global CacheState *cache) {
+    constant FrameParams *frame, global const PassCounts *counts, uint num_slots,
+    global const BlockEntry *table, global uint *slot_stamps, global uint *requested_bits,
+    global uint *request_block_ids, uint capacity, global uint *age_histogram, global CacheState *cache) {
   local uint first_missing[8]; /* blocks served first that are not cached */
   local uint places[8];        /* where they stand on the request list */
   local uint num_first_missing;
@@ -129,7 +129,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
       const BlockCoords b = block_coords(frame, block_id);
       const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-      if ((cache->first_touched >> corner & 1u) == 0 || dual_grid_block(frame, b, corner) == ISO_INVALID_ID) continue;
+      if ((cache->first_touched >> corner & 1u) == 0 || dual_grid_block(frame, b, corner) == ISO_INVALID_ID)
+        continue;
       const uint slot = cached_slot(frame, table, x, y, z);
       if (slot != ISO_BLOCK_ABSENT) {
         slot_stamps[slot] = counts->pass + 1;
@@ -149,7 +150,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   if (item == 0) {
     uint granted, evicted, age, older = 0;
-    for (uint j = 0; j < num_first_missing; ++j) { /* swap it to place j; where the list ended too early, put it there */
+    for (uint j = 0; j < num_first_missing;
+         ++j) { /* swap it to place j; where the list ended too early, put it there */
       const uint displaced = request_block_ids[j];
       if (places[j] == ISO_INVALID_ID) {
         const BlockCoords b = block_coords(frame, displaced);
@@ -216,7 +218,8 @@ kernel void cache_rebuild(constant FrameParams *frame, global const PassCounts *
 }
 
 /// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over the table.
-kernel void cache_classify(constant FrameParams *frame, global const float *cache_values, global BlockEntry *table) {
+kernel void cache_classify(constant FrameParams *frame, global const float *cache_values,
+                           global BlockEntry *table) {
   for (uint i = get_global_id(0); i < 8 * frame->table_groups; i += get_global_size(0)) {
     if (table[i].slot != ISO_BLOCK_ABSENT) store_inside(frame, cache_values, table[i].slot, &table[i]);
   }
@@ -224,10 +227,10 @@ kernel void cache_classify(constant FrameParams *frame, global const float *cach
 
 /// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free slot from the end; requests past the last are dropped. decode_slots, decode_entries [requests]: the slots, and their table entries.
 /// Takes the marks of all requests back. Grid-stride over requests.
-kernel void cache_assign(constant FrameParams *frame, global const PassCounts *asked, global PassCounts *counts,
-                         global const uint *request_block_ids, uint capacity, global const uint *free_slots,
-                         global BlockEntry *table, global uint *slot_block_ids, global uint *slot_stamps,
-                         global uint *requested_bits, global uint *decode_slots,
+kernel void cache_assign(constant FrameParams *frame, global const PassCounts *asked,
+                         global PassCounts *counts, global const uint *request_block_ids, uint capacity,
+                         global const uint *free_slots, global BlockEntry *table, global uint *slot_block_ids,
+                         global uint *slot_stamps, global uint *requested_bits, global uint *decode_slots,
                          global uint *decode_entries, global CacheState *cache) {
   const uint listed = listed_count(asked, capacity), num_free = cache->free_count;
   const uint granted = min(listed, num_free);

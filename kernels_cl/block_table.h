@@ -51,8 +51,8 @@ static inline uint table_next(ISO_CONSTANT const FrameParams *frame, uint entry)
 }
 
 /// What the table knows of block (x,y,z); its slot is ISO_BLOCK_ABSENT if it is not cached.
-static inline BlockEntry find_block(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
-                                    uint y, uint z) {
+static inline BlockEntry find_block(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
+                                    uint x, uint y, uint z) {
   const uint block_id = block_id_at(frame, x, y, z);
   uint i = table_home(frame, x, y, z);
   BlockEntry entry = table[i];
@@ -64,8 +64,8 @@ static inline BlockEntry find_block(ISO_CONSTANT const FrameParams *frame, ISO_G
   return entry;
 }
 
-static inline uint cached_slot(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
-                               uint y, uint z) {
+static inline uint cached_slot(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
+                               uint x, uint y, uint z) {
   return find_block(frame, table, x, y, z).slot;
 }
 

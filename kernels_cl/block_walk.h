@@ -89,7 +89,7 @@ inline uint block_behind(constant FrameParams *frame, const Ray *ray, BlockCoord
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   walk_step(&w, ray, walk_exit(&w), 4, last);
   return may_be_active(frame, w.x, w.y, w.z, 1) ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
-                                            : ISO_INVALID_ID;
+                                                : ISO_INVALID_ID;
 }
 
 #endif

@@ -49,8 +49,9 @@ kernel void group_select(constant FrameParams *frame, global const PassCounts *c
 
 /// keys [granted_count]: the cache slot of each pair's block, which sorts by block with the fewest bits.
 /// Grid-stride.
-kernel void group_keys(constant FrameParams *frame, global const PassCounts *counts, global const uint *pair_ids,
-                       global const uint *pair_block_ids, global const BlockEntry *table, global uint *keys) {
+kernel void group_keys(constant FrameParams *frame, global const PassCounts *counts,
+                       global const uint *pair_ids, global const uint *pair_block_ids,
+                       global const BlockEntry *table, global uint *keys) {
   const uint count = counts->granted_count;
   for (uint i = get_global_id(0); i < count; i += get_global_size(0))
     keys[i] = slot_of(frame, table, pair_block_ids[pair_ids[i]]);
@@ -152,9 +153,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_of
 
 /// pair_ids, slots [granted_count]: the pairs in their groups. slot_offsets: slot_counts after group_offsets.
 /// Grid-stride over pair slots.
-kernel void group_scatter(constant FrameParams *frame, global const PassCounts *counts, global const uint *pair_block_ids,
-                          global const BlockEntry *table, global const uint *pair_ranks,
-                          global const uint *slot_offsets, global uint *pair_ids, global uint *slots) {
+kernel void group_scatter(constant FrameParams *frame, global const PassCounts *counts,
+                          global const uint *pair_block_ids, global const BlockEntry *table,
+                          global const uint *pair_ranks, global const uint *slot_offsets,
+                          global uint *pair_ids, global uint *slots) {
   const uint pair_slots = counts->pair_slot_count;
   for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
     const uint rank = pair_ranks[pair];

@@ -68,8 +68,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
       const uint slot = corner_slots[(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2)];
       float value = 0.0f; /* beyond the volume: no cell of the block uses it */
       if (slot != ISO_BLOCK_ABSENT) {
-        value = cache_values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] -
-                frame->isovalue;
+        value =
+            cache_values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] - frame->isovalue;
       }
       dual_grid[vertex] = value;
     }

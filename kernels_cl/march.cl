@@ -81,7 +81,8 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
   uint have = 0;
   int result = ISO_RAY_LEFT;
   for (uint corner = 0; corner < 8; ++corner) {
-    const BlockEntry entry = find_block(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
+    const BlockEntry entry =
+        find_block(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
     slots[corner * ISO_GROUP_SIZE] = entry.slot;
     inside[corner] = (ulong)entry.inside_high << 32 | entry.inside_low;
     have |= (uint)(entry.slot != ISO_BLOCK_ABSENT) << corner;
@@ -146,8 +147,8 @@ inline uint tiled_pixel(constant FrameParams *frame, uint i) {
 }
 
 /// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
-inline void open_next_counts(global const PassCounts *prev, global const PassCounts *counts, global PassCounts *next,
-                             int first) {
+inline void open_next_counts(global const PassCounts *prev, global const PassCounts *counts,
+                             global PassCounts *next, int first) {
   uint window = counts->pixel_count;
   if (!first) { /* see begin_pass() in speculation.cl */
     window = counts->window_count;
@@ -201,6 +202,7 @@ inline RayMarch march_ray(constant FrameParams *frame, global const uint *macroc
     m.next = block_behind(frame, ray, b, last);
     m.num_found = 1;
     found[0] = from;
+    *num_blocks += m.result != ISO_RAY_WAITS;
   }
   while (m.next != ISO_INVALID_ID && m.result == ISO_RAY_LEFT) {
     m.num_found =
@@ -211,7 +213,7 @@ inline RayMarch march_ray(constant FrameParams *frame, global const uint *macroc
       m.result = march_block(frame, table, cache_values, ray, b, last, slots, 0, change);
       if (m.result == ISO_RAY_LEFT) ++m.at;
     }
-    *num_blocks += m.at;
+    *num_blocks += m.at + (m.result == ISO_RAY_HIT);
   }
   return m;
 }
@@ -232,8 +234,8 @@ inline void request_ahead(constant FrameParams *frame, global const uint *macroc
   uint next = m.next, num_found = m.num_found, at = m.at;
   for (uint asked = 0; asked < ahead && (at < num_found || next != ISO_INVALID_ID);) {
     if (at == num_found) {
-      num_found = find_blocks(frame, macrocell_masks, ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE), found,
-                              ISO_GROUP_SIZE);
+      num_found = find_blocks(frame, macrocell_masks, ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
+                              found, ISO_GROUP_SIZE);
       at = 0;
     }
     if (at < num_found) {
@@ -265,12 +267,14 @@ inline void request_ahead(constant FrameParams *frame, global const uint *macroc
 /// ray_block_ids; request_block_ids [counts->requested_count, at most capacity]; *next, opened. macrocell_masks: as
 /// traverse(). Groups stride over the rays.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    constant FrameParams *frame, uint first, global const uint *macrocell_masks, global const BlockEntry *table,
-    global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
-    global PassCounts *next, global const uint *active_ray_ids, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global HitRecord *hits, global uint *slot_stamps, global uint *requested_bits,
-    global uint *request_block_ids, uint capacity, global CacheState *cache) {
-  local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+    constant FrameParams *frame, uint first, global const uint *macrocell_masks,
+    global const BlockEntry *table, global const float *cache_values, global const PassCounts *prev,
+    global PassCounts *counts, global PassCounts *next, global const uint *active_ray_ids,
+    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
+    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids, uint capacity,
+    global CacheState *cache) {
+  local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE],
+      staged[ISO_REQUEST_STAGING];
   local uint counters[2], num_staged, list_begin, group_hits, group_blocks;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
                              staged,         &num_staged};
@@ -315,7 +319,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         const uint block_id = found[m.at * ISO_GROUP_SIZE + item];
         uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
         if (block_id != from || first) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
-        entry = pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
+        entry =
+            pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
         ray_block_ids[pixel] = block_id;
         if (i == 0) {
           cache->first_block_id = block_id;

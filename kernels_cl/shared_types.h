@@ -31,7 +31,9 @@ using std::fabs;
 using std::floor;
 using std::fma;
 using std::sqrt;
-inline uint popcount(uint x) { return static_cast<uint>(std::popcount(x)); }
+inline uint popcount(uint x) {
+  return static_cast<uint>(std::popcount(x));
+}
 #endif
 
 #define ISO_INVALID_ID 0xFFFFFFFFu   ///< "no block", "no ray": UINT_MAX in R_BID (Sec. 3.3)
@@ -60,9 +62,9 @@ typedef struct FrameParams {
   uint isovalue_index;  ///< the isovalue in the quantile table of macrocells.cl
   uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
-  int active_end_x, active_end_y, active_end_z;        ///< from begin to below end [blocks]; empty if end_x = 0
+  int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
   uint per_ray_speculation;  ///< pipeline `rays`: each ray looks as far ahead as it has missed before
-  uint table_groups;    ///< entries / 8 of the block cache's table (block_table.h)
+  uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 132);
 

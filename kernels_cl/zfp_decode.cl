@@ -9,9 +9,9 @@
 /// words: the payload of the zfp stream; block b starts at bit b * bits_per_block. Which of its voxels are inside goes to
 /// entry entries[i] of the table. Groups stride over decoded_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_decode(
-    constant FrameParams *frame, global const uint *words, uint bits_per_block, global const PassCounts *counts,
-    global const uint *block_ids, global const uint *slots, global const uint *entries,
-    global float *cache_values, global BlockEntry *table) {
+    constant FrameParams *frame, global const uint *words, uint bits_per_block,
+    global const PassCounts *counts, global const uint *block_ids, global const uint *slots,
+    global const uint *entries, global float *cache_values, global BlockEntry *table) {
   local float staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
   const uint count = counts->decoded_count, item = get_local_id(0);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < count;

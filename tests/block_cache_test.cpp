@@ -79,8 +79,7 @@ class CacheModel {
     const std::size_t listed = std::min<std::size_t>(wanted_.size(), world.cache.capacity);
     ASSERT_EQ(decoded, std::min<std::size_t>(listed, std::max(num_slots - in_use, first_missing)));
 
-    const std::vector<uint> table = world.slots_by_block(),
-                            slots = world.cache.slot_block_ids.read(),
+    const std::vector<uint> table = world.slots_by_block(), slots = world.cache.slot_block_ids.read(),
                             stream = world.cache.request_block_ids.read(),
                             targets = world.cache.decode_slots.read();
     /* The decode list: distinct blocks that were asked for, in distinct slots. */

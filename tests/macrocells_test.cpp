@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/frame.hpp"
 #include "core/zfp_decode.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
@@ -77,14 +78,38 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     std::size_t num_selected = 0, num_in_range = 0;
     for (const float isovalue : awkward_isovalues(expected, max_ranges)) {
       SCOPED_TRACE(fmt::format("isovalue {:a}", isovalue));
-      params.isovalue_index = macrocells.isovalue_index(isovalue);
-      frame.write({&params, 1});
-      macrocells.select(frame);
+      params.isovalue = isovalue;
+      macrocells.select(frame, params);
+      expect_box(params, macrocells.masks().read());
       expect_mask(macrocells, params, expected, isovalue, num_selected, num_in_range);
       if (HasFatalFailure()) return;
     }
     /* Not every selected block holds the isovalue, for a range has 8 bits; but a mask of ones would be useless. */
     EXPECT_LE(num_selected, 3 * num_in_range + 2 * expected.size());
+  }
+
+  /// The box around all set bits, to whole macrocells.
+  static void expect_box(const FrameParams &params, const std::vector<uint> &masks) {
+    const int cells[3] = {int(params.blocks_x + 3) / 4, int(params.blocks_y + 3) / 4,
+                          int(params.blocks_z + 3) / 4};
+    int begin[3] = {1 << 20, 1 << 20, 1 << 20}, end[3] = {0, 0, 0};
+    for (int cell = 0; cell < cells[0] * cells[1] * cells[2]; ++cell) {
+      if ((masks[2 * std::size_t(cell)] | masks[2 * std::size_t(cell) + 1]) == 0) continue;
+      const int at[3] = {cell % cells[0], cell / cells[0] % cells[1], cell / cells[0] / cells[1]};
+      for (int axis = 0; axis < 3; ++axis) {
+        begin[axis] = std::min(begin[axis], 4 * at[axis]);
+        end[axis] = std::max(end[axis], 4 * at[axis] + 4);
+      }
+    }
+    const int got_begin[3] = {params.active_begin_x, params.active_begin_y, params.active_begin_z};
+    const int got_end[3] = {params.active_end_x, params.active_end_y, params.active_end_z};
+    const uint dims[3] = {params.dims_x, params.dims_y, params.dims_z};
+    for (int axis = 0; axis < 3; ++axis) {
+      ASSERT_EQ(got_end[axis], std::min(end[axis], int(num_owning_blocks(dims[axis])))) << "axis " << axis;
+      if (end[axis] != 0) {
+        ASSERT_EQ(got_begin[axis], begin[axis]) << "axis " << axis;
+      }
+    }
   }
 
   static void expect_ranges(const Macrocells &macrocells, const std::vector<Range> &expected) {

@@ -243,9 +243,8 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   FrameParams frame = case_frame(dims, camera_cases(dims)[0], {40, 30}, 3.0f);
   Wavefront rays(device_, 40 * 30);
   Macrocells macrocells(device_, rays.frame, frame, stream.words, stream.bits_per_block);
-  frame.isovalue_index = macrocells.isovalue_index(3.0f);
+  macrocells.select(rays.frame, frame);
   rays.frame.write({&frame, 1});
-  macrocells.select(rays.frame);
   const std::vector<uint> masks = macrocells.masks().read();
   Selection selected(9 * 9 * 9);
   for (uint b = 0; b < selected.size(); ++b) {

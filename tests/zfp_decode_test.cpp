@@ -128,8 +128,13 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const ocl::Buffer<uint> d_block_ids(device_, "block ids", std::span<const uint>(block_ids)),
         d_slots(device_, "slots", std::span<const uint>(slots));
 
+    FrameParams frame_params{};
+    frame_params.isovalue = 0.25f;
+    const ocl::Buffer<FrameParams> frame(device_, "frame", std::span<const FrameParams>(&frame_params, 1));
+    ocl::Buffer<BlockEntry> table(device_, "table", num_slots);
+
     ZfpDecode decode(device_, num_blocks);
-    decode(stream, counts, d_block_ids, d_slots, values);
+    decode(stream, frame, counts, d_block_ids, d_slots, d_slots, values, table);
 
     const std::vector<float> decoded = decode_blocks_with_libzfp(volume);
     std::vector<float> expected(64 * std::size_t{num_slots}, kSentinel);
@@ -139,6 +144,14 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     }
     EXPECT_EQ(first_other_bits(values.read(), expected), kNoDifference);
     expect_counts(counts, start);
+    const std::vector<BlockEntry> entries = table.read();
+    for (uint i = 0; i < start.decoded_count; ++i) {
+      std::uint64_t inside = 0;
+      for (uint v = 0; v < 64; ++v)
+        inside |= std::uint64_t{expected[64 * std::size_t{slots[i]} + v] >= frame_params.isovalue} << v;
+      ASSERT_EQ(entries[slots[i]].inside_low | std::uint64_t{entries[slots[i]].inside_high} << 32, inside)
+          << "request " << i;
+    }
   }
 
   ocl::Device device_{GetParam()};
@@ -189,8 +202,10 @@ TEST_P(ZfpDecodeOnDevice, NothingToDecodeTouchesNothing) {
   const ocl::Buffer<uint> ids(device_, "block ids", 1), slots(device_, "slots", 1);
   ocl::Buffer<float> values(device_, "values", 64);
   values.fill(kSentinel);
+  const ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+  ocl::Buffer<BlockEntry> table(device_, "table", 1);
   ZfpDecode decode(device_, 1);
-  decode(stream, counts, ids, slots, values);
+  decode(stream, frame, counts, ids, slots, slots, values, table);
   EXPECT_EQ(values.read(), std::vector<float>(64, kSentinel));
 }
 
@@ -214,8 +229,10 @@ TEST_P(ZfpDecodeOnDevice, BlocksBehind32BitsOfBits) {
   start.decoded_count = 2;
   const CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
   ocl::Buffer<float> values(device_, "values", 128);
+  const ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+  ocl::Buffer<BlockEntry> table(device_, "table", 2);
   ZfpDecode decode(device_, 2);
-  decode(stream, counts, d_block_ids, d_slots, values);
+  decode(stream, frame, counts, d_block_ids, d_slots, d_slots, values, table);
   const std::vector<float> decoded = decode_blocks_with_libzfp(volume);
   std::vector<float> expected(decoded.begin() + 2 * 64, decoded.begin() + 3 * 64);
   expected.insert(expected.end(), decoded.begin() + 7 * 64, decoded.end());

@@ -1,8 +1,8 @@
 #include "core/ocl/device.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <cctype>
+#include <cstdlib>
 #include <stdexcept>
 #include <thread>
 
@@ -95,7 +95,8 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
     program.build(device_, options.c_str());
     if (std::getenv("ISOWAVE_CL_OPTIONS")) {
       fmt::print(stderr, "{}: {} bytes\n", stem, program.getInfo<CL_PROGRAM_BINARIES>()[0].size());
-      for (const auto &[device, text] : program.getBuildInfo<CL_PROGRAM_BUILD_LOG>()) fmt::print(stderr, "{}: {}\n", stem, text);
+      for (const auto &[device, text] : program.getBuildInfo<CL_PROGRAM_BUILD_LOG>())
+        fmt::print(stderr, "{}: {}\n", stem, text);
     }
     return programs_.emplace(std::move(key), std::move(program)).first->second;
   } catch (const cl::BuildError &error) {

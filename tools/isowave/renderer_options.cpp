@@ -22,8 +22,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->check(CLI::Range(8u, 1u << 30));
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
-  app.add_option("--grouping", flags.grouping,
-                 "how pipeline blocks gathers rays by block: radix or counting")
+  app.add_option("--grouping", flags.grouping, "how pipeline blocks gathers rays by block: radix or counting")
       ->capture_default_str();
   app.add_option("--group-size", flags.values.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();

@@ -1,0 +1,49 @@
+#pragma once
+// Every way of drawing on every device, for the suites that must not tell them apart.
+
+#include <string>
+#include <vector>
+
+#include "core/renderer.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+
+struct PipelineOnDevice {
+  ocl::DeviceInfo device;
+  const char *name;
+  PipelineKind pipeline;
+  Grouping grouping;
+  bool per_ray_speculation;
+
+  RendererOptions with(RendererOptions options) const {
+    options.pipeline = pipeline;
+    options.grouping = grouping;
+    options.per_ray_speculation = per_ray_speculation;
+    return options;
+  }
+};
+
+inline void PrintTo(const PipelineOnDevice &param, std::ostream *out) {
+  *out << param.name << " on " << param.device.name;
+}
+
+/// Mesa's llvmpipe needs half a minute to compile the kernels of one of them: there, one of each pipeline.
+inline std::vector<PipelineOnDevice> pipelines_under_test() {
+  std::vector<PipelineOnDevice> params;
+  for (const ocl::DeviceInfo &device : devices_under_test()) {
+    params.push_back({device, "blocks", PipelineKind::kBlocks, Grouping::kRadix, false});
+    params.push_back({device, "rays_per_ray", PipelineKind::kRays, kDefaultGrouping, true});
+    if (device.platform == "rusticl") continue;
+    params.push_back({device, "blocks_counting", PipelineKind::kBlocks, Grouping::kCounting, false});
+    params.push_back({device, "rays", PipelineKind::kRays, kDefaultGrouping, false});
+  }
+  return params;
+}
+
+/// "0_rusticl_blocks".
+inline std::string pipeline_test_name(const testing::TestParamInfo<PipelineOnDevice> &info) {
+  return device_test_name({info.param.device, info.index}) + "_" + info.param.name;
+}
+
+}  // namespace isowave
