@@ -21,25 +21,31 @@ std::uint64_t block_count(const FrameParams &grid) {
   return std::uint64_t{grid.blocks_x} * grid.blocks_y * grid.blocks_z;
 }
 
-/// Entries / 8: twice the slots, a quarter filled with evicted blocks' keys at most before it is rebuilt; not a multiple of
-/// 3, so that ISO_TABLE_STEP reaches every entry.
-std::uint32_t table_groups_for(std::uint32_t num_slots) {
-  const std::uint32_t groups = num_slots / 4 + 1;
-  return groups % 3 == 0 ? groups + 1 : groups;
-}
-
 std::size_t request_words(const FrameParams &grid) {
   return 2 * std::size_t{(grid.blocks_x + 3) / 4} * ((grid.blocks_y + 3) / 4) * ((grid.blocks_z + 3) / 4);
 }
 
 }  // namespace
 
+/// Twice as many entries as slots, a quarter of them with evicted blocks' keys at most before the table is rebuilt; not a
+/// multiple of 3, so that ISO_TABLE_STEP reaches every entry.
+std::uint32_t BlockCache::table_groups_for(std::uint32_t num_slots) {
+  const std::uint32_t groups = num_slots / 4 + 1;
+  return groups % 3 == 0 ? groups + 1 : groups;
+}
+
+/// No more than can be granted; a ray's block asks for at most 8, and a block is listed once.
+std::uint32_t BlockCache::capacity_for(std::uint32_t num_slots, std::uint64_t num_blocks,
+                                       std::uint64_t num_pixels) {
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>({num_slots, num_blocks, 8 * ISO_MAX_SPECULATION * num_pixels}));
+}
+
 BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t slots,
                        std::uint64_t num_pixels, std::uint32_t group_size)
     : num_slots(checked_slots(slots)),
       table_groups(table_groups_for(slots)),
-      capacity(static_cast<std::uint32_t>(
-          std::min<std::uint64_t>({slots, block_count(grid), 8 * ISO_MAX_SPECULATION * num_pixels}))),
+      capacity(capacity_for(slots, block_count(grid), num_pixels)),
       table(device, "block table", 8 * std::size_t{table_groups}),
       values(device, "block cache", std::size_t{slots} * ISO_BLOCK_VOXELS),
       slot_block_ids(device, "cache slot blocks", slots),

@@ -34,6 +34,12 @@ struct BlockCache {
   /// Forgets every block: the next pass finds the cache as it was made. Asynchronous.
   void clear();
 
+  /// Entries / 8 of the table for so many slots.
+  static std::uint32_t table_groups_for(std::uint32_t num_slots);
+  /// The most requests that are listed.
+  static std::uint32_t capacity_for(std::uint32_t num_slots, std::uint64_t num_blocks,
+                                    std::uint64_t num_pixels);
+
   std::uint32_t num_slots;
   std::uint32_t table_groups;           ///< FrameParams::table_groups
   std::uint32_t capacity;               ///< of the request list: requests beyond it are dropped

@@ -19,6 +19,14 @@ std::uint32_t block_count(const FrameParams &f) {
   return f.blocks_x * f.blocks_y * f.blocks_z;
 }
 
+/// One block in so many is decoded for the quantile table.
+std::uint64_t sample_stride(std::uint64_t num_blocks) {
+  return (num_blocks + kMaxSamples - 1) / kMaxSamples;
+}
+std::uint64_t num_samples(std::uint64_t num_blocks) {
+  return (num_blocks + sample_stride(num_blocks) - 1) / sample_stride(num_blocks);
+}
+
 std::uint32_t coarse_count(const FrameParams &f) {
   return (f.blocks_x + 3) / 4 * ((f.blocks_y + 3) / 4) * ((f.blocks_z + 3) / 4);
 }
@@ -63,21 +71,28 @@ Macrocells::Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, con
   device.finish();
 }
 
+std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
+  const std::uint64_t blocks = std::uint64_t{num_blocks.x} * num_blocks.y * num_blocks.z;
+  const std::uint64_t samples = num_samples(blocks),
+                      layer_blocks = std::uint64_t{num_blocks.x} * num_blocks.y;
+  return std::max(8 * sizeof(ValueRange) * samples,
+                  2 * 8 * sizeof(ValueRange) * layer_blocks + kNumThresholds * sizeof(float));
+}
+
 /// Quantiles of the block minima and maxima of an even sample of blocks, so that one outlier does not coarsen
 /// the rest.
 std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, ocl::Buffer<FrameParams> &frame,
                                                  const FrameParams &params, const ocl::Buffer<uint> &words,
                                                  std::uint32_t bits_per_block,
                                                  PartialsKernel &partials_kernel) {
-  const std::uint32_t num_blocks = block_count(params);
-  const std::uint32_t stride = (num_blocks + kMaxSamples - 1) / kMaxSamples;
-  const std::uint32_t num_samples = (num_blocks + stride - 1) / stride;
-  ocl::Buffer<ValueRange> partials(device, "range samples", 8 * std::size_t{num_samples});
-  partials_kernel(ocl::Range::strided(num_samples, kGroupSize, device), frame, words, bits_per_block, 0,
-                  stride, num_samples, partials);
+  const auto stride = static_cast<std::uint32_t>(sample_stride(block_count(params)));
+  const auto count = static_cast<std::uint32_t>(num_samples(block_count(params)));
+  ocl::Buffer<ValueRange> partials(device, "range samples", 8 * std::size_t{count});
+  partials_kernel(ocl::Range::strided(count, kGroupSize, device), frame, words, bits_per_block, 0, stride,
+                  count, partials);
   const std::vector<ValueRange> samples = partials.read();
   std::vector<float> values;
-  values.reserve(2 * std::size_t{num_samples});
+  values.reserve(2 * std::size_t{count});
   for (std::size_t i = 0; i < samples.size(); i += 8) {  // entry 0 of 8: the whole block
     values.push_back(samples[i].min);
     values.push_back(samples[i].max);

@@ -4,6 +4,7 @@
 // kernels_cl/macrocells.cl.
 
 #include <array>
+#include <glm/glm.hpp>
 #include <vector>
 
 #include "core/device_counts.hpp"
@@ -17,6 +18,9 @@ class Macrocells {
   /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z layer.
   Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, const FrameParams &params,
              const ocl::Buffer<uint> &words, std::uint32_t bits_per_block);
+
+  /// Bytes that the constructor needs beside what stays.
+  static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Rebuilds masks() for params.isovalue and sets what the frames of this isovalue need: params.isovalue_index and the
   /// active box. Waits.

@@ -26,7 +26,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", volume.block_count(),
                 ISO_MAX_CACHE_SLOTS);
   }
-  if (options.cache_slots == 0) options.cache_slots = default_cache_slots(volume);
   if (options.max_speculation < 1 || options.max_speculation > ISO_MAX_SPECULATION) {
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
                 ISO_MAX_SPECULATION);
@@ -38,6 +37,29 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
                 options.group_size, device.info().name, largest);
   }
   return options;
+}
+
+/// All memory, before any is taken.
+MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
+                     const RendererOptions &options) {
+  const MemoryRequest request{options.size.num_pixels(), options.pipeline, options.grouping,
+                              options.group_size};
+  const std::uint64_t budget =
+      options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
+  const std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
+  if (options.cache_slots != 0) {
+    MemoryPlan plan = plan_memory(volume, request, options.cache_slots);
+    if (options.memory_budget != 0 && plan.peak() > budget) {
+      throw Error(
+          "{} cache slots need {} bytes of device memory, more than the budget of {}: give one of the two "
+          "alone",
+          options.cache_slots, plan.peak(), budget);
+    }
+    return plan;
+  }
+  const std::uint64_t most =
+      options.memory_budget != 0 ? std::uint64_t{ISO_MAX_CACHE_SLOTS} : kAmpleCacheSlots;
+  return plan_within(device, volume, request, budget, static_cast<std::uint32_t>(std::min(all, most)));
 }
 
 /// Grid constants for the work that is done before there is a camera.
@@ -53,33 +75,31 @@ FrameParams grid_params(const CompressedVolume &volume) {
   return frame;
 }
 
-FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options) {
+FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
+                      std::uint32_t cache_slots) {
   const FrameParams grid = grid_params(volume);
   DeviceStream stream(device, volume);
   Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks);
   Macrocells macrocells(device, rays.frame, grid, stream.words, stream.bits_per_block);
-  BlockCache cache(device, grid, options.cache_slots, options.size.num_pixels(), options.group_size);
+  BlockCache cache(device, grid, cache_slots, options.size.num_pixels(), options.group_size);
   return {device,           std::move(stream),
           std::move(rays),  std::move(macrocells),
-          std::move(cache), ZfpDecode(device, options.cache_slots)};
+          std::move(cache), ZfpDecode(device, cache_slots)};
 }
 
 }  // namespace
-
-std::uint32_t default_cache_slots(const CompressedVolume &volume) {
-  return static_cast<std::uint32_t>(
-      std::clamp<std::uint64_t>(volume.block_count(), kMinCacheSlots, 1u << 18));
-}
 
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options)
     : device_(device),
       setup_begin_(std::chrono::steady_clock::now()),
       options_(checked(options, volume, device)),
+      plan_(make_plan(device, volume, options_)),
       info_(volume.info),
-      state_(make_state(device, volume, options_)),
+      state_(make_state(device, volume, options_, plan_.cache_slots)),
       pipeline_(
           make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver, options_.grouping)),
       shade_(device, options_.size.num_pixels()) {
+  options_.cache_slots = plan_.cache_slots;
   device.finish();
   setup_ms_ = ms_since(setup_begin_);
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/frame.hpp"
+#include "core/memory_plan.hpp"
 #include "core/pipeline.hpp"
 #include "core/shade.hpp"
 #include "core/zfp_stream.hpp"
@@ -19,7 +20,9 @@ namespace isowave {
 struct RendererOptions {
   ImageSize size;
   PipelineKind pipeline = PipelineKind::kAuto;
-  std::uint32_t cache_slots = 0;       ///< decoded blocks kept, at least 8; 0: default_cache_slots()
+  std::uint64_t memory_budget = 0;  ///< bound on all device memory [bytes]; 0: 3/4 of the device's
+  std::uint32_t cache_slots = 0;    ///< decoded blocks kept, at least 8; 0: as many as the budget allows, or
+                                    ///< kAmpleCacheSlots where there is none
   std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
   bool per_ray_speculation = false;    ///< pipeline `rays`: each ray by what it has missed, not all alike
   Solver solver = kDefaultSolver;      ///< root finder in a cell
@@ -47,9 +50,9 @@ struct FrameStats {
 /// stop. With a callback, or with profiling, the host waits after each pass; without, it stays a pass ahead.
 using OnPass = std::function<bool(const PassStats &)>;
 
-/// 2^18 slots (64 MiB), or all blocks if those are fewer: a 720p frame of a 1024^3 volume touches about as
-/// many.
-std::uint32_t default_cache_slots(const CompressedVolume &volume);
+/// Slots (308 MiB with their share of the tables) that no budget was asked for are enough: a cold 720p frame of a 1024^3 volume
+/// touches about 400,000 blocks.
+inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 
 class Renderer {
  public:
@@ -72,6 +75,7 @@ class Renderer {
   Image8 shade(const Appearance &appearance = {});
 
   const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
+  const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that was made
   const Macrocells &macrocells() const { return state_.macrocells; }
   double setup_ms() const { return setup_ms_; }  ///< upload, kernel builds, macrocell ranges
 
@@ -82,6 +86,7 @@ class Renderer {
   ocl::Device &device_;
   std::chrono::steady_clock::time_point setup_begin_;
   RendererOptions options_;
+  MemoryPlan plan_;
   VolumeInfo info_;
   FrameParams frame_{};
   std::optional<float> selected_isovalue_;  ///< what the macrocell masks stand for

@@ -16,7 +16,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
   const uint count = counts->decoded_count, item = get_local_id(0);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < count;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint num_blocks = min(count - begin, ISO_GROUP_SIZE);
+    const uint num_blocks = min(count - begin, (uint)ISO_GROUP_SIZE);
     float values[ISO_BLOCK_VOXELS];
     if (item < num_blocks) {
       uint low = 0, high = 0;

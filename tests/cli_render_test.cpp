@@ -43,11 +43,30 @@ std::string camera_file(const char *dims = "[41,41,41]") {
     "cameras":[{"eye":[20,30,90],"at":[20,20,20],"up":[0,1,0]},{"eye":[80,20,20],"at":[20,20,20],"up":[0,1,0]}]})";
 }
 
+/// A budget that is too small is refused with the smallest that would do, which then does, with the same bits.
+TEST(CliRender, MemoryBudget) {
+  const TemporaryFolder folder;
+  const std::string command = kNucleon + " --isovalue 80 --size 64x48 --device cpu";
+  const auto refused = run_isowave("render " + command + " --memory-budget 1KB");
+  EXPECT_EQ(refused.status, 1);
+  const std::string saying = "a memory budget of 1000 bytes is too small: ";
+  const std::size_t at = refused.err.find(saying);
+  ASSERT_NE(at, std::string::npos) << refused.err;
+  const std::string least =
+      refused.err.substr(at + saying.size(), refused.err.find(" would do") - at - saying.size());
+  const auto drawn =
+      render(command + " --verbose --memory-budget " + least + " --depth " + quoted(folder / "least.npy"));
+  EXPECT_NE(drawn.out.find("block cache"), std::string::npos) << drawn.out;
+  render(command + " --depth " + quoted(folder / "ample.npy"));
+  EXPECT_EQ(test::read_file(folder / "least.npy"), test::read_file(folder / "ample.npy"));
+}
+
 TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   const TemporaryFolder folder;
-  const auto run = render(kNucleon + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") +
-                          " --depth " + quoted(folder / "a.npy") + " --stats " + quoted(folder / "a.json") +
-                          " --progress-dir " + quoted(folder / "passes") + " --max-speculation 2");
+  const auto run =
+      render(kNucleon + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") + " --depth " +
+             quoted(folder / "a.npy") + " --stats " + quoted(folder / "a.json") + " --progress-dir " +
+             quoted(folder / "passes") + " --max-speculation 2 --pipeline blocks");
   EXPECT_NE(run.out.find("device "), std::string::npos) << run.out;
   EXPECT_NE(run.out.find("isovalue 80, view 0"), std::string::npos) << run.out;
   EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"a.png", "a.npy", "a.json", "passes"}));
@@ -226,6 +245,8 @@ TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
   expect_refused(good + "--max-speculation 65" + to, "1 to 64");
   expect_refused(good + "--speculation often" + to, "speculation");
   expect_refused(good + "--group-size 48" + to, "48");
+  expect_refused(good + "--pipeline tube" + to, "pipeline");
+  expect_refused(good + "--memory-budget much" + to, "memory-budget");
   expect_refused(good + "--grouping bubble" + to, "radix, counting");
   expect_refused(good + "--orbit 0" + to, "orbit");
   expect_refused(good + "--orbit 2 --cameras x.json" + to, "orbit");

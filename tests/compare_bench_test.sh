@@ -134,7 +134,7 @@ if [ $# -eq 2 ]; then
   "$1" generate:gyroid_16x16x16_uint8 --size 32x24 --orbit 2 --json real_frames.json >/dev/null
   compare 0 real_frames.json real_frames.json --fail
   row frame/cold '.* 1.000 .*'
-  row stage/intersect '.* 1.000'
+  row stage/march '.* 1.000'
   "$2" --benchmark_filter='scan/exclusive/entries:450' --benchmark_out=real_stages.json >/dev/null 2>&1
   compare 0 real_stages.json real_stages.json --fail
   row 'scan/exclusive/entries:450[^ ]*' '.* 1.000 .*'

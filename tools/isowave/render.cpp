@@ -34,7 +34,7 @@ struct Options {
   std::string device;
   RendererFlags renderer_flags;
   RendererOptions renderer;  ///< what the flags ask for
-  bool reference = false, no_stage_times = false;
+  bool reference = false, no_stage_times = false, verbose = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
   std::string image, depth, stats, progress_dir;
 };
@@ -201,6 +201,14 @@ std::unique_ptr<ocl::Device> open_device(const Options &options) {
   return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
 }
 
+void print_plan(const MemoryPlan &plan) {
+  for (const MemoryPlan::Buffer &buffer : plan.buffers) {
+    fmt::print("  {:>16} bytes  {}\n", with_commas(buffer.bytes), buffer.name);
+  }
+  fmt::print("  {:>16} bytes  in all, with {} cache slots; at most {} during setup\n",
+             with_commas(plan.total()), with_commas(plan.cache_slots), with_commas(plan.setup_bytes));
+}
+
 void run_render(Options options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
@@ -223,6 +231,7 @@ void run_render(Options options) {
   } else {
     DeviceFrames frames(*device, scene, appearance, options.renderer);
     options.renderer = frames.renderer().options();
+    if (options.verbose) print_plan(frames.renderer().memory_plan());
     document["device"] = device_json(device->info());
     document["options"] = options_json(options, scene);
     document["setup_ms"] = frames.renderer().setup_ms();
@@ -256,6 +265,7 @@ void add_render(CLI::App &app) {
   command->add_option("--stats", options->stats, "JSON statistics of every frame and pass");
   command->add_flag("--no-stage-times", options->no_stage_times,
                     "leave ms per stage out of --stats: measuring them makes the host wait after each pass");
+  command->add_flag("--verbose", options->verbose, "print the plan of the device's memory");
   command->add_option("--progress-dir", options->progress_dir, "folder for the picture after every pass");
   command->callback([options] { run_render(*options); });
 }

@@ -17,8 +17,12 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->capture_default_str();
   app.add_option("--max-speculation", flags.values.max_speculation, "most blocks a ray looks ahead, 1..64")
       ->capture_default_str();
+  app.add_option("--memory-budget", flags.values.memory_budget,
+                 "bound on all device memory, e.g. 600MB (1000^2) or 1GiB (1024^3) [3/4 of the device's]")
+      ->transform(CLI::AsSizeValue(true));
   app.add_option("--cache-slots", flags.values.cache_slots,
-                 "decoded blocks kept on the device, at least 8 [2^18 or all]")
+                 "decoded blocks kept on the device, at least 8 [as many as the budget allows; without one "
+                 "2^20 or all]")
       ->check(CLI::Range(8u, 1u << 30));
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();

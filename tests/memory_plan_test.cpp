@@ -1,0 +1,106 @@
+// The plan of all device memory against what is really booked, and budgets that are kept or refused.
+
+#include "core/memory_plan.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.hpp"
+#include "core/renderer.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_pipelines.hpp"
+
+namespace isowave {
+namespace {
+
+using test::TestVolume;
+using testing::HasSubstr;
+
+constexpr ImageSize kSize{37, 23};
+constexpr float kIsovalue = 0.8f;
+
+class MemoryPlanOnDevice : public testing::TestWithParam<PipelineOnDevice> {
+ protected:
+  /// What the renderer's device has booked is what the plan says, buffer by buffer.
+  static void expect_booked(ocl::Device &device, const MemoryPlan &plan) {
+    std::map<std::string, std::uint64_t> planned, booked;
+    for (const MemoryPlan::Buffer &buffer : plan.buffers) planned[buffer.name] += buffer.bytes;
+    for (const auto &[name, entry] : device.ledger().by_name()) {
+      if (entry.current != 0) booked[name] = entry.current;
+    }
+    EXPECT_EQ(booked, planned);
+    EXPECT_EQ(device.ledger().current(), plan.total());
+    EXPECT_LE(device.ledger().peak(), plan.peak());
+  }
+
+  static std::string refusal(const std::function<void()> &action) {
+    try {
+      action();
+    } catch (const Error &error) {
+      return error.what();
+    }
+    ADD_FAILURE() << "nothing was refused";
+    return {};
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Devices, MemoryPlanOnDevice, testing::ValuesIn(pipelines_under_test()),
+                         pipeline_test_name);
+
+TEST_P(MemoryPlanOnDevice, SmallPlanIsWhatIsBooked) {
+  for (const glm::uvec3 dims : {glm::uvec3(9, 10, 11), glm::uvec3(33, 5, 18)}) {
+    const TestVolume volume(dims, test::noise_field(3), 8);
+    for (const std::uint32_t slots : {0u, 8u, 100u}) {
+      SCOPED_TRACE(fmt::format("{} x {} x {}, {} slots", dims.x, dims.y, dims.z, slots));
+      ocl::Device device(GetParam().device);
+      const Renderer renderer(device, volume.compressed,
+                              GetParam().with({.size = kSize, .cache_slots = slots}));
+      expect_booked(device, renderer.memory_plan());
+    }
+  }
+}
+
+/// From the smallest budget accepted to an ample one: kept, used, and the same picture.
+TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
+  const TestVolume volume({30, 27, 33}, test::gyroid_field(10), 8);
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  const auto expected = test::twin_hits(volume, camera, kSize, kIsovalue);
+  const MemoryRequest request{kSize.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
+  std::uint32_t last_slots = 0;
+  for (const std::uint64_t budget : {least, least + 10'000, least + 50'000, least + 1'000'000}) {
+    SCOPED_TRACE(fmt::format("budget {}, least {}", budget, least));
+    ocl::Device device(GetParam().device);
+    Renderer renderer(device, volume.compressed, GetParam().with({.size = kSize, .memory_budget = budget}));
+    renderer.render(camera, kIsovalue);
+    test::expect_same_hits(renderer.hits(), expected, kSize.width);
+    renderer.shade();
+    expect_booked(device, renderer.memory_plan());
+    EXPECT_LE(device.ledger().peak(), budget);
+    const std::uint32_t slots = renderer.memory_plan().cache_slots;
+    EXPECT_EQ(renderer.options().cache_slots, slots);
+    EXPECT_TRUE(slots == volume.compressed.block_count() ||
+                plan_memory(volume.compressed, request, slots + 1).peak() > budget)
+        << "a slot more would have done";
+    EXPECT_GE(slots, last_slots);
+    last_slots = slots;
+  }
+  EXPECT_EQ(last_slots, volume.compressed.block_count());
+}
+
+TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) {
+  const TestVolume volume({9, 10, 11}, test::noise_field(3), 8);
+  const MemoryRequest request{kSize.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
+  ocl::Device device(GetParam().device);
+  const auto render_within = [&](std::uint64_t budget, std::uint32_t slots) {
+    Renderer(device, volume.compressed,
+             GetParam().with({.size = kSize, .memory_budget = budget, .cache_slots = slots}));
+  };
+  EXPECT_THAT(refusal([&] { render_within(least - 1, 0); }), HasSubstr(fmt::format("{} would do", least)));
+  EXPECT_THAT(refusal([&] { render_within(1, 0); }), HasSubstr(fmt::format("{} would do", least)));
+  EXPECT_THAT(refusal([&] { render_within(least, 9); }), HasSubstr("more than the budget"));
+  EXPECT_EQ(device.ledger().peak(), 0u) << "refused before any memory was taken";
+}
+
+}  // namespace
+}  // namespace isowave
