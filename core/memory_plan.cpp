@@ -70,7 +70,11 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                   {"macrocell ranges", 2 * num_cells},
                   {"macrocell masks", 8 * num_cells},
                   {"active box", 6 * sizeof(int)}};
-  if (request.pipeline == PipelineKind::kBlocks) add_pairs(plan, request);
+  if (request.pipeline == PipelineKind::kBlocks) {
+    add_pairs(plan, request);
+  } else {  // the pairs' arrays are empty: OpenCL has no buffers of 0 bytes
+    plan.buffers.insert(plan.buffers.end(), {{"mask", 1}, {"pair block ids", 1}, {"pair hits", 1}});
+  }
   plan.setup_bytes = plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks());
   plan.buffers.insert(plan.buffers.end(),
                       {{"block table", 8 * sizeof(BlockEntry) * BlockCache::table_groups_for(cache_slots)},
