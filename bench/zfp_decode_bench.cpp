@@ -13,7 +13,7 @@ namespace {
 /// A real stream of 128^3 voxels, eight times over: as many blocks as 256^3 voxels have.
 constexpr std::int64_t kEdge = 128;
 constexpr std::uint32_t kCopies = 8;
-constexpr std::uint32_t kNumDecoded = 1u << 16;
+constexpr std::uint32_t kNumDecoded = 1u << 18;  // a GPU holds 2^17 at a time
 
 CompressedVolume repeated_volume(std::int64_t rate) {
   CompressedVolume volume = mixing_layer(kEdge, rate);

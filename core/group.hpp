@@ -17,7 +17,7 @@ enum class Grouping {
   kRadix,    ///< stable radix sort by cache slot (Sec. 3.6): scratch of 8 bytes a pixel
   kCounting  ///< counts per slot, scan over the visible ones, scatter: scratch of 4 bytes a cache slot
 };
-inline constexpr Grouping kDefaultGrouping = Grouping::kRadix;
+inline constexpr Grouping kDefaultGrouping = Grouping::kCounting;
 
 /// "radix", "counting".
 std::string_view to_string(Grouping grouping);

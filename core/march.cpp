@@ -1,6 +1,4 @@
 #include "core/march.hpp"
-#include <cstdlib>
-#include <string>
 
 namespace isowave {
 
@@ -15,8 +13,7 @@ ocl::Defines march_defines(std::uint32_t group_size, Solver solver) {
 }  // namespace
 
 March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver)
-    : range_(std::getenv("XG") ? ocl::Range{std::stoul(std::getenv("XG")), group_size}
-                               : ocl::Range::strided(num_pixels, group_size, device)),
+    : range_(ocl::Range::strided(num_pixels, group_size, device)),
       kernel_(device, "march", "march", march_defines(group_size, solver)) {}
 
 void March::operator()(bool first, const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {

@@ -71,14 +71,14 @@ kernel void cache_request(constant FrameParams *frame, global PassCounts *counts
     uint missing[8];
     uint num_missing = 0;
     /* The neighbouring ray's pair asks for the same blocks: let it. Saves most of the work. */
-    if (block_id == ISO_INVALID_ID || (pair >= spec_count && pair_block_ids[pair - spec_count] == block_id))
-      continue;
-    const BlockCoords b = block_coords(frame, block_id);
-    for (uint corner = 0; corner < 8; ++corner) {
-      const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-      if (dual_grid_block(frame, b, corner) != ISO_INVALID_ID &&
-          request_block(frame, table, slot_stamps, pass, requested_bits, x, y, z)) {
-        missing[num_missing++] = block_id_at(frame, x, y, z);
+    if (block_id != ISO_INVALID_ID && (pair < spec_count || pair_block_ids[pair - spec_count] != block_id)) {
+      const BlockCoords b = block_coords(frame, block_id);
+      for (uint corner = 0; corner < 8; ++corner) {
+        const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+        if (dual_grid_block(frame, b, corner) != ISO_INVALID_ID &&
+            request_block(frame, table, slot_stamps, pass, requested_bits, x, y, z)) {
+          missing[num_missing++] = block_id_at(frame, x, y, z);
+        }
       }
     }
     if (num_missing != 0) {
@@ -121,7 +121,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   local uint num_first_missing;
   const uint requested = listed_count(counts, capacity), num_free = cache->free_count;
   const uint in_use = age_histogram[0], item = get_local_id(0);
-  const int scarce = requested > num_slots - in_use;
+  const int scarce = counts->requested_count > min(num_slots - in_use, capacity);
   const uint searched = scarce ? requested : 0;
   if (item == 0) {
     const uint block_id = cache->first_block_id; /* invalid: that ray needs nothing */
@@ -129,14 +129,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
       const BlockCoords b = block_coords(frame, block_id);
       const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-      if ((cache->first_touched >> corner & 1u) == 0 || dual_grid_block(frame, b, corner) == ISO_INVALID_ID)
-        continue;
-      const uint slot = cached_slot(frame, table, x, y, z);
-      if (slot != ISO_BLOCK_ABSENT) {
-        slot_stamps[slot] = counts->pass + 1;
-      } else {
-        places[num_first_missing] = ISO_INVALID_ID;
-        first_missing[num_first_missing++] = block_id_at(frame, x, y, z);
+      if ((cache->first_touched >> corner & 1u) != 0 && dual_grid_block(frame, b, corner) != ISO_INVALID_ID) {
+        const uint slot = cached_slot(frame, table, x, y, z);
+        if (slot != ISO_BLOCK_ABSENT) {
+          slot_stamps[slot] = counts->pass + 1;
+        } else {
+          places[num_first_missing] = ISO_INVALID_ID;
+          first_missing[num_first_missing++] = block_id_at(frame, x, y, z);
+        }
       }
     }
   }
@@ -196,11 +196,13 @@ kernel void cache_evict(constant FrameParams *frame, global const PassCounts *co
        slot += get_global_size(0)) {
     const uint stamp = slot_stamps[slot], block_id = slot_block_ids[slot];
     const uint age = slot_age(stamp, pass);
-    if (block_id == ISO_INVALID_ID || stamp == pass + 1 || age < cutoff_age) continue;
-    if (age == cutoff_age && atomic_inc(&cache->num_cutoff) >= cache->cutoff_count) continue;
-    if (!rebuild) table_evict(frame, table, block_id);
-    slot_block_ids[slot] = ISO_INVALID_ID;
-    free_slots[cache->free_before + atomic_inc(&cache->num_evicted)] = slot;
+    int is_victim = block_id != ISO_INVALID_ID && stamp != pass + 1 && age >= cutoff_age;
+    if (is_victim && age == cutoff_age) is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;
+    if (is_victim) {
+      if (!rebuild) table_evict(frame, table, block_id);
+      slot_block_ids[slot] = ISO_INVALID_ID;
+      free_slots[cache->free_before + atomic_inc(&cache->num_evicted)] = slot;
+    }
   }
 }
 

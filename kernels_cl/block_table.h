@@ -50,23 +50,23 @@ static inline uint table_next(ISO_CONSTANT const FrameParams *frame, uint entry)
   return next >= size ? next - size : next;
 }
 
-/// What the table knows of block (x,y,z); its slot is ISO_BLOCK_ABSENT if it is not cached.
-static inline BlockEntry find_block(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
-                                    uint x, uint y, uint z) {
+/// The table entry of block (x,y,z), or ISO_INVALID_ID if it has none.
+static inline uint find_entry(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
+                              uint x, uint y, uint z) {
   const uint block_id = block_id_at(frame, x, y, z);
-  uint i = table_home(frame, x, y, z);
-  BlockEntry entry = table[i];
-  while (entry.block_id != block_id && entry.block_id != ISO_INVALID_ID) {
+  uint i = table_home(frame, x, y, z), key = table[i].block_id;
+  while (key != block_id && key != ISO_INVALID_ID) {
     i = table_next(frame, i);
-    entry = table[i];
+    key = table[i].block_id;
   }
-  if (entry.block_id != block_id) entry.slot = ISO_BLOCK_ABSENT;
-  return entry;
+  return key == block_id ? i : ISO_INVALID_ID;
 }
 
+/// The slot of block (x,y,z), or ISO_BLOCK_ABSENT.
 static inline uint cached_slot(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
                                uint x, uint y, uint z) {
-  return find_block(frame, table, x, y, z).slot;
+  const uint entry = find_entry(frame, table, x, y, z);
+  return entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : table[entry].slot;
 }
 
 ISO_NAMESPACE_END

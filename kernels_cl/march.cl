@@ -81,11 +81,13 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
   uint have = 0;
   int result = ISO_RAY_LEFT;
   for (uint corner = 0; corner < 8; ++corner) {
-    const BlockEntry entry =
-        find_block(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
-    slots[corner * ISO_GROUP_SIZE] = entry.slot;
-    inside[corner] = (ulong)entry.inside_high << 32 | entry.inside_low;
-    have |= (uint)(entry.slot != ISO_BLOCK_ABSENT) << corner;
+    const uint entry =
+        find_entry(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
+    const uint slot = entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : table[entry].slot;
+    slots[corner * ISO_GROUP_SIZE] = slot;
+    inside[corner] =
+        slot == ISO_BLOCK_ABSENT ? 0 : (ulong)table[entry].inside_high << 32 | table[entry].inside_low;
+    have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
   }
   changing = changing_cells(inside);
   if (changing == 0 && have == 0xFFu) return ISO_RAY_LEFT;

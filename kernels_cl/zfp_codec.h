@@ -160,9 +160,10 @@ static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bi
       ++n;
     }
     ISO_UNROLL
-    for (i = 0; i < 32u; ++i) {
-      coefficients[iso_zfp_order[i]] |= (low >> i & 1u) << plane;
-      coefficients[iso_zfp_order[i + 32u]] |= (high >> i & 1u) << plane;
+    for (i = 0; i < 32u; ++i) coefficients[iso_zfp_order[i]] |= (low >> i & 1u) << plane;
+    if (high != 0u) { /* at low rates, seldom */
+      ISO_UNROLL
+      for (i = 0; i < 32u; ++i) coefficients[iso_zfp_order[i + 32u]] |= (high >> i & 1u) << plane;
     }
   }
   ISO_UNROLL

@@ -121,7 +121,8 @@ class CacheModel {
     for (const uint block : first_grid)
       ASSERT_TRUE(cached(block)) << "block " << block << " of the first pair";
     /* When slots are scarce, what the first pair had already stays for a pass more. */
-    for (uint slot = 0; slot < num_slots && listed > num_slots - in_use; ++slot) {
+    for (uint slot = 0;
+         slot < num_slots && wanted_.size() > std::min(num_slots - in_use, world.cache.capacity); ++slot) {
       if (first_grid.contains(slots_[slot]) && !into.contains(slot)) stamps_[slot] = pass + 1;
     }
     num_granted += decoded;

@@ -88,16 +88,10 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
   auto key = std::make_pair(std::string(stem), defines);
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
 
-  std::string options = build_options(info_.capabilities, defines);
-  if (const char *more = std::getenv("ISOWAVE_CL_OPTIONS")) options += std::string(" ") + more;
+  const std::string options = build_options(info_.capabilities, defines);
   try {
     cl::Program program(context_, std::string(kernel_text(stem)));
     program.build(device_, options.c_str());
-    if (std::getenv("ISOWAVE_CL_OPTIONS")) {
-      fmt::print(stderr, "{}: {} bytes\n", stem, program.getInfo<CL_PROGRAM_BINARIES>()[0].size());
-      for (const auto &[device, text] : program.getBuildInfo<CL_PROGRAM_BUILD_LOG>())
-        fmt::print(stderr, "{}: {}\n", stem, text);
-    }
     return programs_.emplace(std::move(key), std::move(program)).first->second;
   } catch (const cl::BuildError &error) {
     std::string log;

@@ -1,5 +1,7 @@
 #include "tools/isowave/renderer_options.hpp"
 
+#include "core/error.hpp"
+
 namespace isowave::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
@@ -11,9 +13,9 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->capture_default_str();
   app.add_option(
          "--speculation", flags.speculation,
-         "blocks a ray looks ahead: off (1), global (W*H / active rays), or per-ray (twice as many after "
-         "every miss; pipeline rays)")
-      ->check(CLI::IsMember({"off", "global", "per-ray"}))
+         "blocks a ray looks ahead: off (1), global (W*H / active rays), per-ray (twice as many after every "
+         "miss; not in pipeline blocks), or auto (per-ray where there is)")
+      ->check(CLI::IsMember({"auto", "off", "global", "per-ray"}))
       ->capture_default_str();
   app.add_option("--max-speculation", flags.values.max_speculation, "most blocks a ray looks ahead, 1..64")
       ->capture_default_str();
@@ -39,7 +41,10 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
                      : flags.pipeline == "rays" ? PipelineKind::kRays
                                                 : PipelineKind::kAuto;
   if (flags.speculation == "off") options.max_speculation = 1;
-  options.per_ray_speculation = flags.speculation == "per-ray";
+  options.per_ray_speculation = flags.speculation == "per-ray" || flags.speculation == "auto";
+  if (flags.speculation == "per-ray" && options.pipeline == PipelineKind::kBlocks) {
+    throw Error("pipeline blocks has no per-ray speculation: use --speculation global, or --pipeline rays");
+  }
   options.solver = solver_from_string(flags.solver);
   options.grouping = grouping_from_string(flags.grouping);
   return options;

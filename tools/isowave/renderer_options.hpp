@@ -10,14 +10,14 @@
 namespace isowave::tools {
 
 struct RendererFlags {
-  std::string pipeline = "auto", speculation = "global", solver{to_string(kDefaultSolver)};
+  std::string pipeline = "auto", speculation = "auto", solver{to_string(kDefaultSolver)};
   std::string grouping{to_string(kDefaultGrouping)};
   RendererOptions values;
 };
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags);
 
-/// Throws Error on a solver or grouping that there is not.
+/// Throws Error on a solver or grouping that there is not, and on per-ray speculation in pipeline `blocks`.
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
 /// pipeline, speculation, max_speculation, cache_slots, solver, grouping, group_size.
