@@ -199,23 +199,24 @@ inline RayMarch march_ray(constant FrameParams *frame, global const uint *macroc
   m.next = from;
   m.num_found = m.at = 0;
   if (in_doubt) {
-    const BlockCoords b = block_coords(frame, from);
-    m.result = march_block(frame, table, cache_values, ray, b, last, slots, 1, change);
-    m.next = block_behind(frame, ray, b, last);
+    m.next = block_behind(frame, ray, block_coords(frame, from), last);
     m.num_found = 1;
     found[0] = from;
-    *num_blocks += m.result != ISO_RAY_WAITS;
   }
-  while (m.next != ISO_INVALID_ID && m.result == ISO_RAY_LEFT) {
-    m.num_found =
-        find_blocks(frame, macrocell_masks, ray, &m.next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
-    m.at = 0;
+  /* One call of each walk: what compilers inline, they compile as often as it is called. */
+  while (m.result == ISO_RAY_LEFT && (m.at < m.num_found || m.next != ISO_INVALID_ID)) {
+    if (m.at == m.num_found) {
+      m.num_found =
+          find_blocks(frame, macrocell_masks, ray, &m.next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
+      m.at = 0;
+    }
     while (m.at < m.num_found && m.result == ISO_RAY_LEFT) {
       const BlockCoords b = block_coords(frame, found[m.at * ISO_GROUP_SIZE]);
-      m.result = march_block(frame, table, cache_values, ray, b, last, slots, 0, change);
+      m.result = march_block(frame, table, cache_values, ray, b, last, slots, in_doubt, change);
+      in_doubt = 0;
+      *num_blocks += m.result <= ISO_RAY_HIT;
       if (m.result == ISO_RAY_LEFT) ++m.at;
     }
-    *num_blocks += m.at + (m.result == ISO_RAY_HIT);
   }
   return m;
 }
@@ -229,11 +230,12 @@ typedef struct Requests {
   volatile local uint *num_staged;
 } Requests;
 
-/// Asks for the blocks that the ray touches in the next `ahead` active blocks, from the one where it stands.
-inline void request_ahead(constant FrameParams *frame, global const uint *macrocell_masks,
+/// Asks for the blocks that the ray touches in the next `ahead` active blocks, from the one where it stands. Returns which
+/// of that one's dual grid it touches.
+inline uint request_ahead(constant FrameParams *frame, global const uint *macrocell_masks,
                           global const BlockEntry *table, global uint *slot_stamps, uint pass, const Ray *ray,
                           RayMarch m, uint ahead, LastPlanes last, local uint *found, Requests requests) {
-  uint next = m.next, num_found = m.num_found, at = m.at;
+  uint next = m.next, num_found = m.num_found, at = m.at, first_touched = 0;
   for (uint asked = 0; asked < ahead && (at < num_found || next != ISO_INVALID_ID);) {
     if (at == num_found) {
       num_found = find_blocks(frame, macrocell_masks, ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
@@ -243,6 +245,7 @@ inline void request_ahead(constant FrameParams *frame, global const uint *macroc
     if (at < num_found) {
       const BlockCoords b = block_coords(frame, found[at * ISO_GROUP_SIZE]);
       const uint touched = touched_blocks(ray, b, last);
+      if (asked == 0) first_touched = touched;
       for (uint corner = 0; corner < 8; ++corner) {
         const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
         if ((touched >> corner & 1u) != 0 &&
@@ -260,6 +263,7 @@ inline void request_ahead(constant FrameParams *frame, global const uint *macroc
       ++asked;
     }
   }
+  return first_touched;
 }
 
 /// Walks rays on until they hit, leave or wait. first: every pixel's ray from the eye; otherwise active_ray_ids
@@ -324,14 +328,15 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         entry =
             pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
         ray_block_ids[pixel] = block_id;
-        if (i == 0) {
-          cache->first_block_id = block_id;
-          cache->first_touched = touched_blocks(&ray, block_coords(frame, block_id), last);
-        }
         if (i < counts->window_count) {
-          request_ahead(frame, macrocell_masks, table, slot_stamps, counts->pass, &ray, m,
-                        frame->per_ray_speculation ? min(1u << log_ahead, frame->max_spec_count) : fair_share,
-                        last, found + item, requests);
+          const uint touched = request_ahead(
+              frame, macrocell_masks, table, slot_stamps, counts->pass, &ray, m,
+              frame->per_ray_speculation ? min(1u << log_ahead, frame->max_spec_count) : fair_share, last,
+              found + item, requests);
+          if (i == 0) {
+            cache->first_block_id = block_id;
+            cache->first_touched = touched;
+          }
         }
       }
     }
