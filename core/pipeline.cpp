@@ -14,15 +14,16 @@ namespace {
 
 class BlocksPipeline : public Pipeline {
  public:
-  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping)
+  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping,
+                 ClosestHit closest)
       : state_(state),
         compaction_(state.device, state.rays.num_pixels, group_size),
         initial_rays_(state.device, state.rays.num_pixels),
         speculation_(state.device),
         traverse_(state.device, state.rays.num_pixels, group_size),
-        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size, grouping),
-        intersect_(state.device, state.rays.num_pixels, group_size, solver),
-        composite_(state.device, state.rays.num_pixels) {}
+        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size, grouping, closest),
+        intersect_(state.device, state.rays.num_pixels, group_size, solver, closest),
+        composite_(state.device, state.rays.num_pixels, closest) {}
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("initial_rays");
@@ -110,9 +111,9 @@ void FrameState::provide_blocks(const CountsBuffer &asked) {
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
-                                        Solver solver, Grouping grouping) {
+                                        Solver solver, Grouping grouping, ClosestHit closest) {
   if (kind == PipelineKind::kBlocks)
-    return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping);
+    return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping, closest);
   return std::make_unique<RaysPipeline>(state, group_size, solver);
 }
 

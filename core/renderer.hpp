@@ -24,11 +24,12 @@ struct RendererOptions {
   std::uint32_t cache_slots = 0;    ///< decoded blocks kept, at least 8; 0: as many as the budget allows, or
                                     ///< kAmpleCacheSlots where there is none
   std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
-  bool per_ray_speculation = true;     ///< pipeline `rays`: each ray by what it has missed, not all alike
+  bool per_ray_speculation = true;     ///< each ray by what it has missed, not all alike
   Solver solver = kDefaultSolver;      ///< root finder in a cell
   std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
   /// How a pass's pairs are gathered by block.
   Grouping grouping = kDefaultGrouping;
+  ClosestHit closest = kDefaultClosestHit;  ///< how a ray's closest result is found (pipeline `blocks`)
 };
 
 /// What one pass did: the counts of the device, and what follows from them.

@@ -8,12 +8,6 @@
 #include "block_walk.h"
 #include "cell_intersect.h"
 
-/// An entry of the active lists: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31.
-#define ISO_RAY_PIXEL 0x0FFFFFFFu
-#define ISO_RAY_AHEAD_SHIFT 28u
-#define ISO_RAY_AHEAD_MAX 6u
-#define ISO_RAY_IN_DOUBT 0x80000000u
-
 /// What became of a ray.
 #define ISO_RAY_LEFT 0   ///< it left the volume
 #define ISO_RAY_HIT 1    ///< equal to what isolate() returns, as is
