@@ -73,15 +73,18 @@ class RaysPipeline : public Pipeline {
   RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
       : state_(state), march_(state.device, state.rays.num_pixels, group_size, solver) {}
 
-  void begin_frame() override { first_pass_ = true; }
+  void begin_frame() override {
+    const auto stage = state_.device.timer().stage("start_rays");
+    if (unanswered_) state_.rays.forget_rays();
+    march_.start_rays(state_.macrocells, state_.rays);
+  }
 
   void enqueue_pass() override {
     Wavefront &rays = state_.rays;
     rays.open_pass();
-    if (!first_pass_ || unanswered_) state_.provide_blocks(rays.previous_counts);
+    if (unanswered_) state_.provide_blocks(rays.previous_counts);
     const auto stage = state_.device.timer().stage("march");
-    march_(first_pass_, state_.macrocells, state_.cache, rays);
-    first_pass_ = false;
+    march_(state_.macrocells, state_.cache, rays);
     unanswered_ = true;
   }
 
@@ -90,8 +93,7 @@ class RaysPipeline : public Pipeline {
  private:
   FrameState &state_;
   March march_;
-  bool first_pass_ = true;   ///< of the frame
-  bool unanswered_ = false;  ///< the last pass may have asked for blocks
+  bool unanswered_ = false;  ///< the last pass may have asked for blocks, and left rays
 };
 
 }  // namespace

@@ -52,6 +52,13 @@ struct Wavefront {
     next_counts.write({&start, 1});
   }
 
+  /// Pipeline `rays`: no ray goes on from the last pass. Waits.
+  void forget_rays() {
+    PassCounts last = counts.read().front();
+    last.next_active_count = 0;
+    counts.write({&last, 1});
+  }
+
   /// Pipeline `rays`: the counts and the rays left by one pass go to the next.
   void open_pass() {
     std::swap(previous_counts, counts);
