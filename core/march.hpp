@@ -18,9 +18,13 @@ class March {
   /// counts.next_active_count, the frame before having left 0 there. Asynchronous.
   void start_rays(const Macrocells &macrocells, Wavefront &rays);
 
-  /// Takes rays further, as far as what was requested in the pass before has been provided. Out: rays.hits, next_active_ray_ids, ray_block_ids; the cache's
-  /// requests; counts.hit_count, granted_count (blocks intersected), next_active_count, requested_count. Asynchronous.
+  /// Takes rays further, as far as what was requested in the pass before has been provided. Out: rays.hits,
+  /// next_active_ray_ids, ray_block_ids; counts.hit_count, granted_count (blocks intersected), next_active_count.
+  /// Asynchronous.
   void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
+
+  /// The rays that wait ask for blocks. Out: the cache's requests, counts.requested_count. Asynchronous.
+  void request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:
   ocl::Range range_;
@@ -29,8 +33,11 @@ class March {
       start_rays_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<PassCounts>,
               ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
-      kernel_;
+              ocl::Out<HitRecord>, ocl::Out<CacheState>>
+      march_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>,
+              ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
+      request_ahead_;
 };
 
 }  // namespace isowave

@@ -83,8 +83,12 @@ class RaysPipeline : public Pipeline {
     Wavefront &rays = state_.rays;
     rays.open_pass();
     if (unanswered_) state_.provide_blocks(rays.previous_counts);
-    const auto stage = state_.device.timer().stage("march");
-    march_(state_.macrocells, state_.cache, rays);
+    {
+      const auto stage = state_.device.timer().stage("march");
+      march_(state_.macrocells, state_.cache, rays);
+    }
+    const auto stage = state_.device.timer().stage("request");
+    march_.request_ahead(state_.macrocells, state_.cache, rays);
     unanswered_ = true;
   }
 

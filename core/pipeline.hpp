@@ -2,7 +2,8 @@
 // The passes of a frame: two ways to arrange the same stages, with the same finished picture bit for bit.
 //
 //   blocks  [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]*   the paper's (Sec. 3.3 to 4.4)
-//   rays    march -> [ cache -> decode -> march ]*    each ray intersects what it meets, as far as it is cached
+//   rays    start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
+//           each ray intersects what it meets, as far as it is cached
 
 #include <cstdint>
 #include <memory>

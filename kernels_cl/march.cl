@@ -1,12 +1,13 @@
 /// march.cl -- pipeline `rays`: each ray walks through the active blocks and intersects those that are cached; at the first
 /// that is not it waits, and asks for that block and its next candidates (Sec. 3.3, 4).
 ///
-/// start_rays -> march -> [ cache -> decode -> march ]*. No sort and no composite: a ray's blocks come in ray order, so its
+/// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort and no composite: a ray's blocks come in ray order, so its
 /// first change is its hit.
 #define ISO_FOUND local
 #include "block_requests.h"
 #include "block_walk.h"
 #include "cell_intersect.h"
+#include "touched_blocks.h"
 
 /// What became of a ray.
 #define ISO_RAY_LEFT 0   ///< it left the volume
@@ -83,6 +84,7 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
         slot == ISO_BLOCK_ABSENT ? 0 : (ulong)table[entry].inside_high << 32 | table[entry].inside_low;
     have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
   }
+  if ((have & 1u) == 0) return ISO_RAY_WAITS; /* every cell has voxels of the block itself */
   changing = changing_cells(inside);
   if (changing == 0 && have == 0xFFu) return ISO_RAY_LEFT;
   found->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
@@ -156,20 +158,7 @@ inline void open_next_counts(global const PassCounts *prev, global const PassCou
   next->free_count = counts->free_count;
 }
 
-/// The blocks of the dual grid of block b that the ray's cells there touch (bits 0..7, corner x + 2y + 4z).
-inline uint touched_blocks(const Ray *ray, BlockCoords b, LastPlanes last) {
-  const RayEvent enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  GridWalk cell = enter_block(ray, b, enter, last);
-  uint touched = 0;
-  while (in_block(&cell, b, last)) {
-    touched |= cell_blocks(cell.x & 3, cell.y & 3, cell.z & 3);
-    walk_step(&cell, ray, walk_exit(&cell), 1, last);
-  }
-  return touched;
-}
-
-#define ISO_BLOCKS_AT_ONCE 8u     ///< that a ray looks for before it intersects them
-#define ISO_REQUEST_STAGING 256u  ///< requests that a work-group collects before it writes them out
+#define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them
 
 /// How far a ray has come. found: this work-item's place for ISO_BLOCKS_AT_ONCE, ISO_GROUP_SIZE apart.
 typedef struct RayMarch {
@@ -208,51 +197,6 @@ inline RayMarch march_ray(constant FrameParams *frame, global const uint *macroc
   return m;
 }
 
-/// The request list, and where a work-group collects what it will add to it.
-typedef struct Requests {
-  global uint *bits, *block_ids;
-  uint capacity;
-  volatile global uint *count;
-  local uint *staged;
-  volatile local uint *num_staged;
-} Requests;
-
-/// Asks for the blocks that the ray touches in the next `ahead` active blocks, from the one where it stands. Returns which
-/// of that one's dual grid it touches.
-inline uint request_ahead(constant FrameParams *frame, global const uint *macrocell_masks,
-                          global const BlockEntry *table, global uint *slot_stamps, uint pass, const Ray *ray,
-                          RayMarch m, uint ahead, LastPlanes last, local uint *found, Requests requests) {
-  uint next = m.next, num_found = m.num_found, at = m.at, first_touched = 0;
-  for (uint asked = 0; asked < ahead && (at < num_found || next != ISO_INVALID_ID);) {
-    if (at == num_found) {
-      num_found = find_blocks(frame, macrocell_masks, ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
-                              found, ISO_GROUP_SIZE);
-      at = 0;
-    }
-    if (at < num_found) {
-      const BlockCoords b = block_coords(frame, found[at * ISO_GROUP_SIZE]);
-      const uint touched = touched_blocks(ray, b, last);
-      if (asked == 0) first_touched = touched;
-      for (uint corner = 0; corner < 8; ++corner) {
-        const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-        if ((touched >> corner & 1u) != 0 &&
-            request_block(frame, table, slot_stamps, pass, requests.bits, x, y, z)) {
-          const uint place = atomic_inc(requests.num_staged), block_id = block_id_at(frame, x, y, z);
-          if (place < ISO_REQUEST_STAGING) {
-            requests.staged[place] = block_id;
-          } else {
-            list_request(frame, requests.block_ids, requests.capacity, requests.bits,
-                         atomic_inc(requests.count), block_id);
-          }
-        }
-      }
-      ++at;
-      ++asked;
-    }
-  }
-  return first_touched;
-}
-
 /// Begins a frame. hits [pixel] = none; next_active_ray_ids [counts->next_active_count]: the pixels whose rays meet an
 /// active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
 /// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
@@ -285,41 +229,34 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
 }
 
 /// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel].
-/// Of those that wait, the first counts->window_count ask for the blocks that they touch in their next active blocks:
-/// N_Spec of them (Sec. 4), or their own number of frame->per_ray_speculation. Out: hits [pixel]; next_active_ray_ids
-/// [counts->next_active_count] and their ray_block_ids; request_block_ids [counts->requested_count, at most capacity];
-/// *next, opened. macrocell_masks: as traverse(). Groups stride over the rays.
+/// Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait, and in ray_block_ids the block they
+/// wait at; *next, opened. macrocell_masks: as traverse(). Groups stride over the rays.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
     global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
     global PassCounts *next, global const uint *active_ray_ids, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global HitRecord *hits, global uint *slot_stamps, global uint *requested_bits,
-    global uint *request_block_ids, uint capacity, global CacheState *cache) {
-  local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE],
-      staged[ISO_REQUEST_STAGING];
-  local uint counters[2], num_staged, list_begin, group_hits, group_blocks;
-  const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
-                             staged,         &num_staged};
+    global uint *ray_block_ids, global HitRecord *hits, global CacheState *cache) {
+  local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
+  local uint counters[2], group_hits, group_blocks;
   const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = prev->next_active_count;
-  const uint fair_share =
-      num_rays == 0 ? 0 : clamp(counts->pixel_count / num_rays, 1u, frame->max_spec_count);
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
     open_next_counts(prev, counts, next);
     open_requests(cache);
     cache->first_block_id = ISO_INVALID_ID;
     counts->active_count = num_rays;
-    counts->spec_count = fair_share;
+    counts->spec_count = num_rays == 0 ? 0 : clamp(counts->pixel_count / num_rays, 1u, frame->max_spec_count);
   }
-  if (item == 0) counters[0] = num_staged = group_hits = group_blocks = 0;
+  if (item == 0) counters[0] = group_hits = group_blocks = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint i = begin + item;
-    uint entry = i < num_rays ? active_ray_ids[i] : ISO_INVALID_ID;
+    uint entry = ISO_INVALID_ID;
     int waits = 0;
     if (i < num_rays) {
+      entry = active_ray_ids[i];
       const uint pixel = entry & ISO_RAY_PIXEL, from = ray_block_ids[pixel];
       const Ray ray = make_ray(frame, pixel);
       BlockChange change;
@@ -338,19 +275,93 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         entry =
             pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
         ray_block_ids[pixel] = block_id;
-        if (i < counts->window_count) {
-          const uint touched = request_ahead(
-              frame, macrocell_masks, table, slot_stamps, counts->pass, &ray, m,
-              frame->per_ray_speculation ? min(1u << log_ahead, frame->max_spec_count) : fair_share, last,
-              found + item, requests);
-          if (i == 0) {
-            cache->first_block_id = block_id;
-            cache->first_touched = touched;
-          }
-        }
       }
     }
     append_ray(waits, entry, counters, &counts->next_active_count, next_active_ray_ids);
+  }
+  if (num_hits != 0) atomic_add(&group_hits, num_hits);
+  if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0 && group_hits != 0) atomic_add(&counts->hit_count, group_hits);
+  if (item == 0 && group_blocks != 0) atomic_add(&counts->granted_count, group_blocks);
+}
+
+#define ISO_REQUEST_STAGING 256u  ///< requests that a work-group collects before it writes them out
+
+/// The request list, and where a work-group collects what it will add to it.
+typedef struct Requests {
+  global uint *bits, *block_ids;
+  uint capacity;
+  volatile global uint *count;
+  local uint *staged;
+  volatile local uint *num_staged;
+} Requests;
+
+/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others.
+inline void request_touched(constant FrameParams *frame, global const BlockEntry *table,
+                            global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
+                            Requests requests) {
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    if ((touched >> corner & 1u) != 0 &&
+        request_block(frame, table, slot_stamps, pass, requests.bits, x, y, z)) {
+      const uint place = atomic_inc(requests.num_staged), block_id = block_id_at(frame, x, y, z);
+      if (place < ISO_REQUEST_STAGING) {
+        requests.staged[place] = block_id;
+      } else {
+        list_request(frame, requests.block_ids, requests.capacity, requests.bits, atomic_inc(requests.count),
+                     block_id);
+      }
+    }
+  }
+}
+
+/// Of the rays that wait, active_ray_ids [counts->next_active_count], the first counts->window_count ask for the blocks that
+/// they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of frame->per_ray_speculation. Out:
+/// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over the rays.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
+    constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
+    global PassCounts *counts, global const uint *active_ray_ids, global const uint *ray_block_ids,
+    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids, uint capacity,
+    global CacheState *cache) {
+  local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+  local uint num_staged, list_begin;
+  const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
+                             staged,         &num_staged};
+  const LastPlanes last = last_planes(frame);
+  const uint item = get_local_id(0), num_rays = min(counts->next_active_count, counts->window_count);
+  if (item == 0) num_staged = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    const uint i = begin + item;
+    if (i < num_rays) {
+      const uint entry = active_ray_ids[i], pixel = entry & ISO_RAY_PIXEL;
+      const Ray ray = make_ray(frame, pixel);
+      const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
+      const uint ahead = frame->per_ray_speculation ? own : counts->spec_count;
+      uint next = ray_block_ids[pixel], num_found = 0, at = 0; /* it stands at an active block */
+      for (uint asked = 0; asked < ahead && (at < num_found || next != ISO_INVALID_ID);) {
+        if (at == num_found) {
+          num_found = find_blocks(frame, macrocell_masks, &ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
+                                  found + item, ISO_GROUP_SIZE);
+          at = 0;
+        }
+        if (at < num_found) {
+          const uint block_id = found[at * ISO_GROUP_SIZE + item];
+          const BlockCoords b = block_coords(frame, block_id);
+          const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
+          request_touched(frame, table, slot_stamps, counts->pass, b, touched, requests);
+          if (i == 0 && asked == 0) {
+            cache->first_block_id = block_id;
+            cache->first_touched = touched;
+          }
+          ++at;
+          ++asked;
+        }
+      }
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
     if (item == 0) list_begin = atomic_add(requests.count, min(num_staged, ISO_REQUEST_STAGING));
     barrier(CLK_LOCAL_MEM_FENCE);
     for (uint j = item; j < min(num_staged, ISO_REQUEST_STAGING); j += ISO_GROUP_SIZE) {
@@ -360,9 +371,4 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     if (item == 0) num_staged = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
   }
-  if (num_hits != 0) atomic_add(&group_hits, num_hits);
-  if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (item == 0 && group_hits != 0) atomic_add(&counts->hit_count, group_hits);
-  if (item == 0 && group_blocks != 0) atomic_add(&counts->granted_count, group_blocks);
 }

@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <random>
 #include <vector>
 
+#include "kernels_cl/touched_blocks.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 
@@ -215,6 +217,30 @@ TEST_P(GridDdaWalks, CoarseWalksEqualTheCellWalk) {
       }
     }
   });
+}
+
+/// What spans of layers say, against every cell.
+TEST_P(GridDdaWalks, TouchedBlocksAreThoseOfTheCells) {
+  std::array<std::size_t, 8> num_touched{};
+  for_each_ray([&](const Ray &ray, LastPlanes last) {
+    std::map<Cell, uint> expected;
+    for (const Visit &cell : walk(ray, last, 1)) {
+      const auto [x, y, z] = cell.region;
+      uint &touched = expected[{x / 4, y / 4, z / 4}];
+      for (int corner = 0; corner < 8; ++corner) {
+        const int voxel_x = x + (corner & 1), voxel_y = y + (corner >> 1 & 1), voxel_z = z + (corner >> 2);
+        touched |= 1u << (voxel_x / 4 - x / 4 + 2 * (voxel_y / 4 - y / 4) + 4 * (voxel_z / 4 - z / 4));
+      }
+    }
+    for (const auto &[block, touched] : expected) {
+      ASSERT_EQ(touched_blocks(&ray, block[0], block[1], block[2], last), touched)
+          << "block " << block[0] << ' ' << block[1] << ' ' << block[2];
+      for (uint corner = 0; corner < 8; ++corner) num_touched[corner] += touched >> corner & 1u;
+    }
+  });
+  if (GetParam() == glm::uvec3(18, 21, 17)) {
+    for (const std::size_t count : num_touched) EXPECT_GT(count, 100u) << "else this scene tests nothing";
+  }
 }
 
 /// Independent of all that is shared: the ray's stay in each cell by slabs, in double.
