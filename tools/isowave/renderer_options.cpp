@@ -26,6 +26,12 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
                  "decoded blocks kept on the device, at least 8 [as many as the budget allows; without one "
                  "2^20 or all]")
       ->check(CLI::Range(8u, 1u << 30));
+  app.add_option(
+         "--stream", flags.stream,
+         "where the compressed volume is: device, host (blocks are uploaded when they are asked for), or "
+         "auto (on the device if that leaves room for a useful cache)")
+      ->check(CLI::IsMember({"auto", "device", "host"}))
+      ->capture_default_str();
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
   app.add_option("--grouping", flags.grouping, "how pipeline blocks gathers rays by block: radix or counting")
@@ -47,6 +53,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
   }
   options.solver = solver_from_string(flags.solver);
   options.grouping = grouping_from_string(flags.grouping);
+  options.stream = stream_place_from_string(flags.stream);
   return options;
 }
 
@@ -54,9 +61,13 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
   const char *speculation = options.max_speculation == 1  ? "off"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
-  return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
-          {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
-          {"solver", to_string(options.solver)},        {"group_size", options.group_size}};
+  return {{"pipeline", to_string(options.pipeline)},
+          {"speculation", speculation},
+          {"max_speculation", options.max_speculation},
+          {"cache_slots", options.cache_slots},
+          {"stream", to_string(options.stream)},
+          {"solver", to_string(options.solver)},
+          {"group_size", options.group_size}};
 }
 
 }  // namespace isowave::tools

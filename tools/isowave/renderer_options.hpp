@@ -11,7 +11,7 @@ namespace isowave::tools {
 
 struct RendererFlags {
   std::string pipeline = "auto", speculation = "auto", solver{to_string(kDefaultSolver)};
-  std::string grouping{to_string(kDefaultGrouping)};
+  std::string grouping{to_string(kDefaultGrouping)}, stream = "auto";
   RendererOptions values;
 };
 
@@ -20,7 +20,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags);
 /// Throws Error on a solver or grouping that there is not, and on per-ray speculation in pipeline `blocks`.
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
-/// pipeline, speculation, max_speculation, cache_slots, solver, grouping, group_size.
+/// pipeline, speculation, max_speculation, cache_slots, stream, solver, grouping, group_size.
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options);
 
 }  // namespace isowave::tools
