@@ -86,11 +86,11 @@ void StreamWindow::bring(std::span<const uint> block_ids, const Use &use) {
     const std::size_t count = std::min<std::size_t>(window_blocks_, block_ids.size() - first);
     Half &half = halves_[next_half_++ % halves_.size()];
     wait(half.uploaded);
-    const std::span<uint> words = half.staging.words().first(count * words_per_block(volume_.bits_per_block));
+    const std::span<uint> words = half.staging.words().first(half_words(volume_.bits_per_block, count));
     gather(block_ids.subspan(first, count), words);
     {
       const auto stage = device_.timer().stage("upload");
-      half.words.upload(words, half.used, half.uploaded);
+      half.words.upload(words, half.used, half.uploaded);  // with what decoders read past the last block
     }
     hold_back(device_, half.uploaded);
     use(half.words, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count));
