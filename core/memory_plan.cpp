@@ -158,20 +158,17 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
 
 MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request, std::uint64_t budget,
                            std::uint32_t cache_slots) {
-  if (request.stream != StreamPlace::kAuto || fits_parts(volume, request)) {
+  if (request.stream != StreamPlace::kAuto) {
     MemoryPlan plan = plan_memory(volume, request, cache_slots);
-    if (request.stream != StreamPlace::kAuto) {
-      plan.reason = "as asked for";
-      return plan;
-    }
-    if (plan.peak() <= budget) {
-      plan.reason = "it fits beside the cache slots asked for";
-      return plan;
-    }
+    plan.reason = "as asked for";
+    return plan;
   }
-  MemoryPlan plan = plan_memory(volume, with_stream(request, StreamPlace::kHost), cache_slots);
-  plan.reason = "it does not fit beside the cache slots asked for";
-  return plan;
+  MemoryPlan on_host = plan_memory(volume, with_stream(request, StreamPlace::kHost), cache_slots);
+  on_host.reason = "it does not fit beside the cache slots asked for";
+  if (!fits_parts(volume, request)) return on_host;
+  MemoryPlan on_device = plan_memory(volume, with_stream(request, StreamPlace::kDevice), cache_slots);
+  on_device.reason = "it fits beside the cache slots asked for, or a window on it is no smaller";
+  return on_device.peak() <= budget || on_device.peak() <= on_host.peak() ? on_device : on_host;
 }
 
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
@@ -207,7 +204,7 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
   }
   if (plan) {
     if (request.stream != StreamPlace::kAuto) plan->reason = "as asked for";
-    if (plan->reason.empty()) plan->reason = "it fits beside a useful cache, or a larger one than without it";
+    if (plan->reason.empty()) plan->reason = "it fits beside a useful cache, or a window on it is no smaller";
     return *plan;
   }
   std::optional<MemoryPlan> least;

@@ -55,7 +55,8 @@ struct MemoryPlan {
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots);
 
-/// As plan_memory(), but of kAuto makes kHost where the plan would exceed `budget` bytes with the stream on the device.
+/// As plan_memory(), but kAuto leaves the stream on the host where the plan would otherwise exceed `budget` bytes, and that
+/// takes less.
 MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request, std::uint64_t budget,
                            std::uint32_t cache_slots);
 

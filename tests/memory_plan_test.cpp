@@ -132,21 +132,27 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
 
 /// Slots that were asked for leave the choice to the budget too; a place that was asked for is never left.
 TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
-  const TestVolume volume({9, 10, 11}, test::noise_field(3), 32);
+  const TestVolume volume({17, 18, 19}, test::noise_field(3), 32);
   MemoryRequest request{kSize.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  const auto plan_of = [&](std::uint64_t budget, std::uint32_t slots) {
+    return plan_with_slots(volume.compressed, request, budget, slots);
+  };
   const std::uint64_t on_device = plan_memory(volume.compressed, request, 10).peak();
-  EXPECT_EQ(plan_with_slots(volume.compressed, request, on_device, 10).stream, StreamPlace::kDevice);
-  const MemoryPlan on_host = plan_with_slots(volume.compressed, request, on_device - 1, 10);
+  EXPECT_EQ(plan_of(on_device, 10).stream, StreamPlace::kDevice);
+  EXPECT_EQ(plan_of(on_device, 10).peak(), on_device);
+  const MemoryPlan on_host = plan_of(on_device - 1, 10);
   EXPECT_EQ(on_host.stream, StreamPlace::kHost);
   EXPECT_EQ(on_host.window_blocks, 8u);
   EXPECT_LT(on_host.peak(), on_device);
-  request.largest_stream_part = 8 * 256 + 8;  // 27 blocks of 256 bytes: four parts
-  EXPECT_EQ(plan_with_slots(volume.compressed, request, ~std::uint64_t(0), 10).stream, StreamPlace::kDevice);
-  request.largest_stream_part = 6 * 256 + 8;  // five
-  EXPECT_EQ(plan_with_slots(volume.compressed, request, ~std::uint64_t(0), 10).stream, StreamPlace::kHost);
+  request.window_blocks = 200;  // more than the volume has
+  EXPECT_EQ(plan_of(on_device - 1, 10).stream, StreamPlace::kDevice);
+  request.window_blocks = 0;
+  request.largest_stream_part = 32 * 256 + 8;  // 125 blocks of 256 bytes: four parts
+  EXPECT_EQ(plan_of(~std::uint64_t(0), 10).stream, StreamPlace::kDevice);
+  request.largest_stream_part = 31 * 256 + 8;  // five
+  EXPECT_EQ(plan_of(~std::uint64_t(0), 10).stream, StreamPlace::kHost);
   request.stream = StreamPlace::kDevice;
-  EXPECT_THAT(refusal([&] { plan_with_slots(volume.compressed, request, on_device, 10); }),
-              HasSubstr("leave it on the host"));
+  EXPECT_THAT(refusal([&] { plan_of(on_device, 10); }), HasSubstr("leave it on the host"));
 }
 
 TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) {
