@@ -67,9 +67,7 @@ void build_ranges(benchmark::State &state) {
   const double bytes = blocks * (in.stream.bits_per_block / 8.0 + sizeof(cl_ushort));
   measure(
       state, {blocks, bytes}, [] {},
-      [&] {
-        const Macrocells built(Session::current().device(), in.frame, in.params, in.stream);
-      });
+      [&] { const Macrocells built(Session::current().device(), in.frame, in.params, in.stream); });
 }
 
 void select_isovalue(benchmark::State &state) {

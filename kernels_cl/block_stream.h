@@ -16,15 +16,11 @@
 inline void decode_block(global const uint *part_0, global const uint *part_1, global const uint *part_2,
                          global const uint *part_3, uint blocks_per_part, uint bits_per_block, uint block_id,
                          uint place, float *values) {
-#if ISO_STREAM_PARTS == 0
-  zfp_decode_block(part_0, (ulong)place * ((bits_per_block + 31u) & ~31u), bits_per_block, values);
-#elif ISO_STREAM_PARTS == 1
-  zfp_decode_block(part_0, (ulong)block_id * bits_per_block, bits_per_block, values);
-#else
-  const uint part = block_id / blocks_per_part, block = block_id % blocks_per_part;
+  const uint part = ISO_STREAM_PARTS > 1 ? block_id / blocks_per_part : 0;
   global const uint *words = part == 0 ? part_0 : part == 1 ? part_1 : part == 2 ? part_2 : part_3;
-  zfp_decode_block(words, (ulong)block * bits_per_block, bits_per_block, values);
-#endif
+  const ulong first_bit = ISO_STREAM_PARTS == 0 ? (ulong)place * ((bits_per_block + 31u) & ~31u)
+                                                : (ulong)(block_id - part * blocks_per_part) * bits_per_block;
+  zfp_decode_block(words, first_bit, bits_per_block, values);
 }
 
 #endif

@@ -41,6 +41,9 @@ std::uint64_t num_decoded(const FrameStats &stats) {
 
 class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
+  /// Mesa's llvmpipe needs a millisecond of processor time a launch: there the long tests draw fewer frames.
+  bool is_slow() const { return device_.info().platform == "rusticl"; }
+
   Renderer renderer_of(const CompressedVolume &volume, RendererOptions options) {
     options.stream = StreamPlace::kHost;
     return {device_, volume, GetParam().with(options)};
@@ -79,7 +82,9 @@ TEST_P(HostStreamOnDevice, SmallFrameIsTheTwins) {
 TEST_P(HostStreamOnDevice, WindowsAndCaches) {
   const TestVolume volume = medium_volume();
   for (const std::uint32_t slots : {13u, 64u, 200u, 504u}) {
+    if (is_slow() && slots != 200) continue;
     for (const std::uint32_t window : {8u, 33u, 0u, 5000u}) {
+      if (is_slow() && window != 33) continue;
       check(volume, {.size = slots < 64 ? kSmall : kMedium, .cache_slots = slots, .window_blocks = window});
     }
   }
@@ -88,7 +93,7 @@ TEST_P(HostStreamOnDevice, WindowsAndCaches) {
 /// One dual grid for all rays, and one at a time through the window.
 TEST_P(HostStreamOnDevice, OneDualGridAtATime) {
   check(small_volume(), {.size = kTiny, .cache_slots = 8, .max_speculation = 1, .window_blocks = 8});
-  check(medium_volume(), {.size = kTiny, .cache_slots = 8, .window_blocks = 8});
+  if (!is_slow()) check(medium_volume(), {.size = kTiny, .cache_slots = 8, .window_blocks = 8});
 }
 
 TEST_P(HostStreamOnDevice, AwkwardRates) {
