@@ -32,8 +32,8 @@ class StreamWindow {
 
   /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in `words`.
   using Use = std::function<void(const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count)>;
-  /// Brings blocks to the device, as many at a time as fit, and calls `use` for each of these runs, in order. Waits until all
-  /// but the last two are used up; the rest is asynchronous. Throws Error when the volume's file has become shorter.
+  /// Brings blocks to the device, as many at a time as fit, and calls `use` for each of these runs, in order. Waits for the
+  /// uploads of all runs but the last two; the rest is asynchronous. Throws Error when the volume's file has become shorter.
   void bring(std::span<const uint> block_ids, const Use &use);
 
   /// The first counts.decoded_count of block_ids. Waits for all that is enqueued before. Valid until the next call.
