@@ -12,16 +12,19 @@ namespace {
 constexpr std::int64_t kEdge = 128;
 
 struct CompositeInput : FrameRig {
-  CompositeInput(ocl::Device &device, std::int64_t width, std::int64_t spec_count)
+  CompositeInput(ocl::Device &device, std::int64_t width, std::int64_t spec_count, ClosestHit how)
       : FrameRig(device, mixing_layer(kEdge),
-                 mixing_layer_setup(kEdge, image_of_width(width), static_cast<std::uint32_t>(spec_count))) {
+                 mixing_layer_setup(kEdge, image_of_width(width), static_cast<std::uint32_t>(spec_count))),
+        closest(how),
+        composite(device, rays.num_pixels, how) {
     start();
     thin_wavefront(params.max_spec_count);
     begin_pass();
     find_blocks();
     intersect(cache, group.groups(), rays);
     before.emplace(rays);
-    num_pairs_looked_at = count_pairs_looked_at();
+    bytes_of_pairs = closest == ClosestHit::kScan ? double(count_pairs_looked_at()) * (4.0 + sizeof(PairHit))
+                                                  : 4.0 * read_counts().active_count;
     run();
     verify();
   }
@@ -60,22 +63,27 @@ struct CompositeInput : FrameRig {
 
   std::optional<WavefrontSnapshot> before;
   PassCounts counts{};
-  std::size_t num_pairs_looked_at = 0;
+  ClosestHit closest;
+  Composite composite;  ///< in place of the rig's
+  double bytes_of_pairs = 0;
 };
 
-void composite_pairs(benchmark::State &state) {
-  auto &in = input<CompositeInput>(state.range(0), state.range(1));
-  const double bytes = double(in.num_pairs_looked_at) * (4.0 + sizeof(PairHit)) +
-                       12.0 * in.counts.active_count + in.counts.hit_count * (sizeof(HitRecord) + 32.0);
+void composite_pairs(benchmark::State &state, ClosestHit closest) {
+  auto &in = input<CompositeInput>(state.range(0), state.range(1), closest);
+  const double bytes =
+      in.bytes_of_pairs + 12.0 * in.counts.active_count + in.counts.hit_count * (sizeof(HitRecord) + 32.0);
   measure(
       state, {double(in.counts.active_count), bytes}, [&] { in.before->restore(); }, [&] { in.run(); });
   state.counters["hits"] = in.counts.hit_count;
 }
 
 const bool kRegistered = [] {
-  stage_benchmark("composite", composite_pairs)
-      ->ArgNames({"width", "n_spec"})
-      ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {1, 8, 64}});
+  for (const ClosestHit closest : {ClosestHit::kScan, ClosestHit::kAtomicMin}) {
+    stage_benchmark(fmt::format("composite/{}", to_string(closest)),
+                    [=](benchmark::State &state) { composite_pairs(state, closest); })
+        ->ArgNames({"width", "n_spec"})
+        ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {1, 8, 64}});
+  }
   return true;
 }();
 

@@ -11,7 +11,7 @@ namespace isowave {
 
 class Composite {
  public:
-  Composite(ocl::Device &device, std::uint64_t num_pixels);
+  Composite(ocl::Device &device, std::uint64_t num_pixels, ClosestHit closest = kDefaultClosestHit);
 
   /// Out: rays.hits, rays.ray_block_ids (where rays without slots wait), rays.next_active_ray_ids,
   /// counts.hit_count and counts.next_active_count. Asynchronous.
@@ -19,8 +19,9 @@ class Composite {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<PairHit>,
-              ocl::In<BlockEntry>, ocl::In<float>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>>
+  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::In<uint>, ocl::In<PairHit>,
+              ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::Out<uint>, ocl::Out<HitRecord>,
+              ocl::Out<uint>>
       kernel_;
 };
 

@@ -35,10 +35,10 @@ struct BlockGroups {
 class Group {
  public:
   Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size,
-        Grouping grouping = kDefaultGrouping);
+        Grouping grouping = kDefaultGrouping, ClosestHit closest = kDefaultClosestHit);
 
   /// In: counts.granted_count and counts.visible_count are 0, as begin_pass leaves them.
-  /// Out: groups(), both counts; pair_hits are marked "not tested"; rays.mask is overwritten.
+  /// Out: groups(), both counts; the other pairs are marked "not tested"; rays.mask is overwritten.
   /// O(pairs). Asynchronous.
   void operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction);
 
@@ -46,14 +46,15 @@ class Group {
 
  private:
   struct ByRadix {
-    ByRadix(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size);
+    ByRadix(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size,
+            ClosestHit closest);
     void operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction, BlockGroups &groups);
 
     ocl::Range range;
     std::uint32_t key_bits;
     RadixSort sort;
     ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-                ocl::Out<PairHit>, ocl::Out<uint>>
+                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>>
         select;
     ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<BlockEntry>,
                 ocl::Out<uint>>
@@ -63,14 +64,14 @@ class Group {
 
   struct ByCounting {
     ByCounting(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots,
-               std::uint32_t group_size);
+               std::uint32_t group_size, ClosestHit closest);
     void operator()(const BlockCache &cache, Wavefront &rays, BlockGroups &groups);
 
     ocl::Range pairs_range, pair_tiles_range, visible_range, visible_tiles_range;
     ocl::Buffer<uint> slot_counts;  ///< [slots] 0 between passes
     ocl::Buffer<uint> tile_sums;
     ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
         count;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> sum_tiles;
     ocl::Kernel<ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>> offsets;

@@ -13,20 +13,21 @@ namespace isowave {
 class Intersect {
  public:
   Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
-            Solver solver = kDefaultSolver);
+            Solver solver = kDefaultSolver, ClosestHit closest = kDefaultClosestHit);
 
-  /// Out: rays.pair_hits of every pair in `groups`. Asynchronous.
+  /// Out: rays.pair_hits of every pair in `groups`; rays.closest_pairs. Asynchronous.
   void operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays);
 
  private:
   ocl::Range range_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>>
+              ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>,
+              ocl::Out<uint>>
       kernel_;
   /// Only a solver that can be in doubt has it.
   std::optional<
       ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-                  ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>>>
+                  ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>, ocl::Out<uint>>>
       settle_doubts_;
 };
 

@@ -14,10 +14,16 @@ ocl::Defines march_defines(std::uint32_t group_size, Solver solver) {
 
 March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver)
     : range_(ocl::Range::strided(num_pixels, group_size, device)),
+      start_rays_(device, "march", "start_rays", march_defines(group_size, solver)),
       kernel_(device, "march", "march", march_defines(group_size, solver)) {}
 
-void March::operator()(bool first, const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  kernel_(range_, rays.frame, first, macrocells.masks(), cache.table, cache.values, rays.previous_counts,
+void March::start_rays(const Macrocells &macrocells, Wavefront &rays) {
+  start_rays_(range_, rays.frame, macrocells.masks(), rays.counts, rays.next_counts, rays.next_active_ray_ids,
+              rays.ray_block_ids, rays.hits);
+}
+
+void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
+  kernel_(range_, rays.frame, macrocells.masks(), cache.table, cache.values, rays.previous_counts,
           rays.counts, rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids, rays.ray_block_ids,
           rays.hits, cache.slot_stamps, cache.requested_bits, cache.request_block_ids, cache.capacity,
           cache.state);

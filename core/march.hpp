@@ -14,17 +14,22 @@ class March {
  public:
   March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver);
 
-  /// Takes rays further. first: begins a frame, with every pixel's ray; otherwise those that waited, for blocks that were
-  /// requested in the pass before and provided in this one. Out: rays.hits, next_active_ray_ids, ray_block_ids; the cache's
+  /// Begins a frame: rays.hits are none, rays.next_active_ray_ids those that meet an active block; their count goes to
+  /// counts.next_active_count, the frame before having left 0 there. Asynchronous.
+  void start_rays(const Macrocells &macrocells, Wavefront &rays);
+
+  /// Takes rays further, as far as what was requested in the pass before has been provided. Out: rays.hits, next_active_ray_ids, ray_block_ids; the cache's
   /// requests; counts.hit_count, granted_count (blocks intersected), next_active_count, requested_count. Asynchronous.
-  void operator()(bool first, const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
+  void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:
   ocl::Range range_;
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>,
-              ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint,
-              ocl::Out<CacheState>>
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<HitRecord>>
+      start_rays_;
+  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<PassCounts>,
+              ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       kernel_;
 };
 

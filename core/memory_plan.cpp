@@ -73,6 +73,7 @@ void add_pairs(MemoryPlan &plan, const MemoryRequest &request) {
   plan.buffers.insert(plan.buffers.end(), {{"mask", 4 * pixels},
                                            {"pair block ids", 4 * pixels},
                                            {"pair hits", sizeof(PairHit) * pixels},
+                                           {"closest pairs", 4 * pixels},
                                            {"scan tile sums", 4 * ceil_div(pixels, scan_tile)},
                                            {"grouped pair ids", 4 * pixels},
                                            {"grouped slots", 4 * pixels},
@@ -136,7 +137,8 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   if (request.pipeline == PipelineKind::kBlocks) {
     add_pairs(plan, request);
   } else {  // the pairs' arrays are empty: OpenCL has no buffers of 0 bytes
-    plan.buffers.insert(plan.buffers.end(), {{"mask", 1}, {"pair block ids", 1}, {"pair hits", 1}});
+    plan.buffers.insert(plan.buffers.end(),
+                        {{"mask", 1}, {"pair block ids", 1}, {"pair hits", 1}, {"closest pairs", 1}});
   }
   plan.setup_bytes = plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks());
   plan.buffers.insert(plan.buffers.end(),

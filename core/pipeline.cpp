@@ -14,15 +14,16 @@ namespace {
 
 class BlocksPipeline : public Pipeline {
  public:
-  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping)
+  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping,
+                 ClosestHit closest)
       : state_(state),
         compaction_(state.device, state.rays.num_pixels, group_size),
         initial_rays_(state.device, state.rays.num_pixels),
         speculation_(state.device),
         traverse_(state.device, state.rays.num_pixels, group_size),
-        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size, grouping),
-        intersect_(state.device, state.rays.num_pixels, group_size, solver),
-        composite_(state.device, state.rays.num_pixels) {}
+        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size, grouping, closest),
+        intersect_(state.device, state.rays.num_pixels, group_size, solver, closest),
+        composite_(state.device, state.rays.num_pixels, closest) {}
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("initial_rays");
@@ -72,15 +73,18 @@ class RaysPipeline : public Pipeline {
   RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
       : state_(state), march_(state.device, state.rays.num_pixels, group_size, solver) {}
 
-  void begin_frame() override { first_pass_ = true; }
+  void begin_frame() override {
+    const auto stage = state_.device.timer().stage("start_rays");
+    if (unanswered_) state_.rays.forget_rays();
+    march_.start_rays(state_.macrocells, state_.rays);
+  }
 
   void enqueue_pass() override {
     Wavefront &rays = state_.rays;
     rays.open_pass();
-    if (!first_pass_ || unanswered_) state_.provide_blocks(rays.previous_counts);
+    if (unanswered_) state_.provide_blocks(rays.previous_counts);
     const auto stage = state_.device.timer().stage("march");
-    march_(first_pass_, state_.macrocells, state_.cache, rays);
-    first_pass_ = false;
+    march_(state_.macrocells, state_.cache, rays);
     unanswered_ = true;
   }
 
@@ -89,8 +93,7 @@ class RaysPipeline : public Pipeline {
  private:
   FrameState &state_;
   March march_;
-  bool first_pass_ = true;   ///< of the frame
-  bool unanswered_ = false;  ///< the last pass may have asked for blocks
+  bool unanswered_ = false;  ///< the last pass may have asked for blocks, and left rays
 };
 
 }  // namespace
@@ -115,9 +118,9 @@ void FrameState::provide_blocks(const CountsBuffer &asked) {
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
-                                        Solver solver, Grouping grouping) {
+                                        Solver solver, Grouping grouping, ClosestHit closest) {
   if (kind == PipelineKind::kBlocks)
-    return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping);
+    return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping, closest);
   return std::make_unique<RaysPipeline>(state, group_size, solver);
 }
 

@@ -52,6 +52,6 @@ class Pipeline {
 
 /// `state` must outlive the pipeline.
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
-                                        Solver solver, Grouping grouping);
+                                        Solver solver, Grouping grouping, ClosestHit closest);
 
 }  // namespace isowave

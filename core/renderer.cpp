@@ -32,7 +32,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   }
   // Measured faster by a CPU and by a GPU, cold and warm (README "Results").
   if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
-  if (options.pipeline == PipelineKind::kBlocks) options.per_ray_speculation = false;
   const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
   if (!std::has_single_bit(options.group_size) || options.group_size < 8 || options.group_size > largest) {
     throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
@@ -108,8 +107,8 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       plan_(make_plan(device, volume, options_)),
       info_(volume.info),
       state_(make_state(device, volume, options_, plan_)),
-      pipeline_(
-          make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver, options_.grouping)),
+      pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
+                              options_.grouping, options_.closest)),
       shade_(device, options_.size.num_pixels()) {
   options_.cache_slots = plan_.cache_slots;
   options_.stream = plan_.stream;

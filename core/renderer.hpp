@@ -24,17 +24,17 @@ struct RendererOptions {
   std::uint32_t cache_slots = 0;    ///< decoded blocks kept, at least 8; 0: as many as the budget allows, or
                                     ///< kAmpleCacheSlots where there is none
   std::uint32_t max_speculation = 64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
-  bool per_ray_speculation = true;     ///< pipeline `rays`: each ray by what it has missed, not all alike
+  bool per_ray_speculation = true;     ///< each ray by what it has missed, not all alike
   Solver solver = kDefaultSolver;      ///< root finder in a cell
   std::uint32_t group_size = 64;       ///< work-items per work-group, a power of two in 8..256
   /// How a pass's pairs are gathered by block.
   Grouping grouping = kDefaultGrouping;
+  ClosestHit closest = kDefaultClosestHit;  ///< how a ray's closest result is found (pipeline `blocks`)
   StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
-  std::uint64_t largest_stream_part =
-      0;  ///< bytes of one of its at most 4 buffers; 0: what the device allows
-  std::uint32_t window_blocks =
-      0;  ///< at least 8: blocks uploaded at a time from a volume on the host; 0: by the
-          ///< size of cache and blocks
+  /// Bytes of one of its at most four buffers; 0: what the device allows.
+  std::uint64_t largest_stream_part = 0;
+  /// Blocks uploaded at a time from a volume on the host, at least 8; 0: by the size of cache and blocks.
+  std::uint32_t window_blocks = 0;
 };
 
 /// What one pass did: the counts of the device, and what follows from them.

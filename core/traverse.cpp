@@ -8,7 +8,7 @@ Traverse::Traverse(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t 
 
 void Traverse::operator()(const Macrocells &macrocells, Wavefront &rays) {
   kernel_(range_, rays.frame, macrocells.masks(), rays.counts, rays.active_ray_ids, rays.ray_block_ids,
-          rays.pair_block_ids);
+          rays.pair_block_ids, rays.closest_pairs);
 }
 
 }  // namespace isowave

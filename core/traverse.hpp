@@ -18,7 +18,7 @@ class Traverse {
  private:
   ocl::Range range_;
   ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
-              ocl::Out<uint>>
+              ocl::Out<uint>, ocl::Out<uint>>
       kernel_;
 };
 

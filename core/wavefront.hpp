@@ -2,12 +2,30 @@
 // The rays of a frame on the device and the arrays of one pass. R = pixels; nothing here grows with the
 // volume.
 
+#include <string_view>
 #include <utility>
 
 #include "core/device_counts.hpp"
 #include "core/frame.hpp"
 
 namespace isowave {
+
+/// How the closest of a ray's results is found (pipeline `blocks`). The picture has the same bits either way.
+enum class ClosestHit {
+  kScan,      ///< composite looks at each of them
+  kAtomicMin  ///< whoever has a result offers its index: one word a ray to look at
+};
+inline constexpr ClosestHit kDefaultClosestHit = ClosestHit::kAtomicMin;
+
+/// "scan", "atomic-min".
+std::string_view to_string(ClosestHit closest);
+/// Throws Error naming both.
+ClosestHit closest_hit_from_string(std::string_view name);
+
+/// The macro for the kernels that take part.
+inline ocl::Defines closest_defines(ClosestHit closest) {
+  return {{"ISO_CLOSEST_BY_ATOMICS", closest == ClosestHit::kAtomicMin ? "1" : "0"}};
+}
 
 struct Wavefront {
   /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not.
@@ -23,7 +41,8 @@ struct Wavefront {
         next_active_ray_ids(device, "active ray ids, next", pixels),
         mask(device, "mask", with_pairs ? pixels : 0),
         pair_block_ids(device, "pair block ids", with_pairs ? pixels : 0),
-        pair_hits(device, "pair hits", with_pairs ? pixels : 0) {
+        pair_hits(device, "pair hits", with_pairs ? pixels : 0),
+        closest_pairs(device, "closest pairs", with_pairs ? pixels : 0) {
     PassCounts start{};
     start.pixel_count = static_cast<uint>(pixels);
     start.window_count = start.pixel_count;
@@ -31,6 +50,13 @@ struct Wavefront {
     counts.write({&start, 1});
     previous_counts.write({&start, 1});
     next_counts.write({&start, 1});
+  }
+
+  /// Pipeline `rays`: no ray goes on from the last pass. Waits.
+  void forget_rays() {
+    PassCounts last = counts.read().front();
+    last.next_active_count = 0;
+    counts.write({&last, 1});
   }
 
   /// Pipeline `rays`: the counts and the rays left by one pass go to the next.
@@ -47,11 +73,12 @@ struct Wavefront {
   CountsBuffer next_counts;               ///< [1] of the next pass, opened by this one (pipeline `rays`)
   ocl::Buffer<HitRecord> hits;            ///< [R] by pixel: the picture so far
   ocl::Buffer<uint> ray_block_ids;        ///< [R] by pixel: the block a ray goes on from (R_BID)
-  ocl::Buffer<uint> active_ray_ids;       ///< [active_count] pixels of the rays at work, ascending (R_ID)
+  ocl::Buffer<uint> active_ray_ids;       ///< [active_count] rays at work: ISO_RAY_PIXEL, flags (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
   ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
   ocl::Buffer<uint> pair_block_ids;       ///< [window_count * spec_count] blocks asked for, in ray order
   ocl::Buffer<PairHit> pair_hits;         ///< [window_count * spec_count] what intersection found
+  ocl::Buffer<uint> closest_pairs;  ///< [window_count] by active ray: its pair that decides (closest_pair.h)
 };
 
 }  // namespace isowave

@@ -1,43 +1,47 @@
 /// composite.cl -- the closest of a ray's N_Spec results becomes its hit; the other rays go on (Sec. 4.4).
-/// A ray's blocks come in ray order, so the closest hit is the one with the lowest index, provided that all
-/// before it were tested: no distances are compared.
 #include "cached_cell.h"
 #include "cell_intersect.h"
+#include "closest_pair.h"
 
-/// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block without
-/// slots; ray_active_mask [active_count] = 1 where it goes on. Grid-stride.
-kernel void composite(constant FrameParams *frame, global PassCounts *counts,
-                      global const uint *active_ray_ids, global const uint *pair_block_ids,
-                      global const PairHit *pair_hits, global const BlockEntry *table,
+/// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block without slots;
+/// ray_active_mask [active_count] = 1 where it goes on. active_ray_ids: a ray that moved on looks twice as far ahead.
+/// Grid-stride.
+kernel void composite(constant FrameParams *frame, global PassCounts *counts, global uint *active_ray_ids,
+                      global const uint *pair_block_ids, global const PairHit *pair_hits,
+                      global const uint *closest_pairs, global const BlockEntry *table,
                       global const float *cache_values, global uint *ray_block_ids, global HitRecord *hits,
                       global uint *ray_active_mask) {
   const LastPlanes last = last_planes(frame);
   const uint active_count = counts->active_count, spec_count = counts->spec_count,
              window = counts->window_count;
   for (uint a = get_global_id(0); a < active_count; a += get_global_size(0)) {
-    const uint ray_id = active_ray_ids[a];
+    const uint entry = active_ray_ids[a], ray_id = entry & ISO_RAY_PIXEL;
     uint goes_on = ray_block_ids[ray_id] != ISO_INVALID_ID; /* also for rays outside the window: untouched */
-    for (uint pair = a * spec_count; a < window && pair < (a + 1) * spec_count; ++pair) {
-      const uint block_id = pair_block_ids[pair];
-      const PairHit pair_hit = pair_hits[pair];
-      if (block_id == ISO_INVALID_ID) break;
-      if (pair_hit.cell == ISO_NO_HIT) continue;
-      goes_on = pair_hit.cell == ISO_NOT_TESTED;
-      if (goes_on) {
-        ray_block_ids[ray_id] = block_id;
-      } else {
-        const Ray ray = make_ray(frame, ray_id);
-        const BlockCoords b = block_coords(frame, block_id);
-        const int x = (int)(4 * b.x + (pair_hit.cell & 3)), y = (int)(4 * b.y + (pair_hit.cell >> 2 & 3)),
-                  z = (int)(4 * b.z + (pair_hit.cell >> 4));
-        const GridWalk cell = walk_from(&ray, x, y, z, 1, last);
-        float w[8];
-        load_corners(frame, table, cache_values, x, y, z, w);
-        hits[ray_id] = make_hit(frame, &ray, w, x, y, z, region_entry(&ray, x, y, z, 1, last),
-                                walk_exit(&cell), pair_hit.s);
-        atomic_inc(&counts->hit_count);
+    if (a < window) {
+      const uint pair = closest_pair(closest_pairs, pair_block_ids, pair_hits, a, spec_count);
+      if (pair == ISO_INVALID_ID || (pair_hits[pair].cell == ISO_NOT_TESTED && pair != a * spec_count)) {
+        const uint ahead = min((entry >> ISO_RAY_AHEAD_SHIFT) + 1, ISO_RAY_AHEAD_MAX);
+        if (frame->per_ray_speculation) active_ray_ids[a] = ray_id | ahead << ISO_RAY_AHEAD_SHIFT;
       }
-      break;
+      if (pair != ISO_INVALID_ID) {
+        const uint block_id = pair_block_ids[pair];
+        const PairHit pair_hit = pair_hits[pair];
+        goes_on = pair_hit.cell == ISO_NOT_TESTED;
+        if (goes_on) {
+          ray_block_ids[ray_id] = block_id;
+        } else {
+          const Ray ray = make_ray(frame, ray_id);
+          const BlockCoords b = block_coords(frame, block_id);
+          const int x = (int)(4 * b.x + (pair_hit.cell & 3)), y = (int)(4 * b.y + (pair_hit.cell >> 2 & 3)),
+                    z = (int)(4 * b.z + (pair_hit.cell >> 4));
+          const GridWalk cell = walk_from(&ray, x, y, z, 1, last);
+          float w[8];
+          load_corners(frame, table, cache_values, x, y, z, w);
+          hits[ray_id] = make_hit(frame, &ray, w, x, y, z, region_entry(&ray, x, y, z, 1, last),
+                                  walk_exit(&cell), pair_hit.s);
+          atomic_inc(&counts->hit_count);
+        }
+      }
     }
     ray_active_mask[a] = goes_on;
   }

@@ -114,9 +114,10 @@ static inline RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int s
   return event_before(e, near) ? near : e;
 }
 
-/// Has the ray crossed the plane when event `e` has happened? The event itself counts.
-static inline int crossed(RayAxis a, int axis, int plane, RayEvent e) {
-  return !event_before(e, make_event(plane_t(a, plane), axis));
+/// Is the ray, just after event `e`, on the far side of the plane as seen from -infinity? Needs d != 0.
+static inline int is_above(RayAxis a, int axis, int plane, RayEvent e) {
+  const int crossed = !event_before(e, make_event(plane_t(a, plane), axis)); /* the event itself counts */
+  return crossed == (a.d > 0.0f);
 }
 
 /// The region along one axis, within [first, last], that the ray is in just after event `e`. The position is
@@ -125,12 +126,11 @@ static inline int locate(RayAxis a, int axis, RayEvent e, int size, int first, i
   const float x =
       (a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o)) / (float)size; /* size is a power of two: exact */
   int c = x <= (float)first ? first : (x >= (float)last ? last : (int)floor(x));
-  if (a.d > 0.0f) {
-    while (c < last && crossed(a, axis, size * (c + 1), e)) ++c;
-    while (c > first && !crossed(a, axis, size * c, e)) --c;
-  } else if (a.d < 0.0f) {
-    while (c > first && crossed(a, axis, size * c, e)) --c;
-    while (c < last && !crossed(a, axis, size * (c + 1), e)) ++c;
+  int step = a.d != 0.0f;
+  while (step != 0) {
+    const int up = c < last && is_above(a, axis, size * (c + 1), e);
+    step = up ? 1 : (c > first && !is_above(a, axis, size * c, e) ? -1 : 0);
+    c += step;
   }
   return c;
 }

@@ -9,6 +9,7 @@
 /// here costs more than O(pairs), whatever the number of slots or blocks. One array holds the list, then the offsets:
 /// block_ray_offsets.
 #include "block_table.h"
+#include "closest_pair.h"
 #include "work_group.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
@@ -35,15 +36,17 @@ inline uint slot_of(constant FrameParams *frame, global const BlockEntry *table,
   return cached_slot(frame, table, b.x, b.y, b.z);
 }
 
-/// pair_active_mask [pair slots] = 1 where the pair can be intersected. Marks all pairs as not tested; intersect
-/// overwrites those it tests. Grid-stride.
+/// pair_active_mask [pair slots] = 1 where the pair can be intersected. Marks the others as not tested. Grid-stride.
 kernel void group_select(constant FrameParams *frame, global const PassCounts *counts,
                          global const uint *pair_block_ids, global const BlockEntry *table,
-                         global PairHit *pair_hits, global uint *pair_active_mask) {
-  const uint pair_slots = counts->pair_slot_count;
+                         global PairHit *pair_hits, global uint *closest_pairs,
+                         global uint *pair_active_mask) {
+  const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count;
   for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
-    pair_hits[pair].cell = ISO_NOT_TESTED;
-    pair_active_mask[pair] = (uint)dual_grid_is_cached(frame, pair_block_ids[pair], table);
+    const uint block_id = pair_block_ids[pair];
+    const int can_be_tested = dual_grid_is_cached(frame, block_id, table);
+    if (!can_be_tested) mark_not_tested(pair_hits, closest_pairs, pair, block_id, spec_count);
+    pair_active_mask[pair] = (uint)can_be_tested;
   }
 }
 
@@ -65,12 +68,12 @@ kernel void group_heads(global const PassCounts *counts, global const uint *keys
 }
 
 /// pair_ranks [pair slots]: place in the group of the pair's block, or ISO_INVALID_ID of a pair that cannot be
-/// intersected. Lists the slots of visible blocks, in any order. Marks all pairs as not tested. Groups stride over
+/// intersected. Lists the slots of visible blocks, in any order. Marks those as not tested. Groups stride over
 /// tiles of pairs; each appends with one global atomic a tile. counts->visible_count: 0 before.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_count(
     constant FrameParams *frame, global PassCounts *counts, global const uint *pair_block_ids,
-    global const BlockEntry *table, global PairHit *pair_hits, global uint *pair_ranks,
-    global uint *slot_counts, global uint *visible_slots) {
+    global const BlockEntry *table, global PairHit *pair_hits, global uint *closest_pairs,
+    global uint *pair_ranks, global uint *slot_counts, global uint *visible_slots) {
   local uint new_slots[TILE];
   local uint num_new, first_place;
   const uint pair_slots = counts->pair_slot_count, item = get_local_id(0);
@@ -86,8 +89,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_co
           const uint slot = slot_of(frame, table, block_id);
           rank = atomic_inc(&slot_counts[slot]);
           if (rank == 0) new_slots[atomic_inc(&num_new)] = slot;
+        } else {
+          mark_not_tested(pair_hits, closest_pairs, pair, block_id, counts->spec_count);
         }
-        pair_hits[pair].cell = ISO_NOT_TESTED;
         pair_ranks[pair] = rank;
       }
     }

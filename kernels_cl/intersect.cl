@@ -1,6 +1,7 @@
 /// intersect.cl -- a block's rays against its dual grid (Sec. 3.7, 4.3).
 #include "cached_cell.h"
 #include "cell_intersect.h"
+#include "closest_pair.h"
 
 /// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk came into doubt.
 /// dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
@@ -42,12 +43,12 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
 
 /// One work-group per visible block, striding over them. pair_ids, slots [granted_count]: pairs sorted by the
 /// slot of their block; block_ray_offsets [visible_count]: where each block's pairs begin. pair_hits [pair
-/// slots]: written for every pair.
+/// slots]: written for every pair. closest_pairs [active rays]: see closest_pair.h.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
     constant FrameParams *frame, global const PassCounts *counts, global const uint *pair_ids,
     global const uint *slots, global const uint *block_ray_offsets, global const uint *slot_block_ids,
     global const BlockEntry *table, global const float *cache_values, global const uint *active_ray_ids,
-    global PairHit *pair_hits) {
+    global PairHit *pair_hits, global uint *closest_pairs) {
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
   local uint corner_slots[8];
   const LastPlanes last = last_planes(frame);
@@ -76,8 +77,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
     barrier(CLK_LOCAL_MEM_FENCE);
     for (uint i = begin + get_local_id(0); i < end; i += ISO_GROUP_SIZE) {
       const uint pair = pair_ids[i];
-      const Ray ray = make_ray(frame, active_ray_ids[pair / spec_count]);
-      pair_hits[pair] = intersect_block(&ray, b, last, dual_grid);
+      const Ray ray = make_ray(frame, active_ray_ids[pair / spec_count] & ISO_RAY_PIXEL);
+      const PairHit hit = intersect_block(&ray, b, last, dual_grid);
+      pair_hits[pair] = hit;
+      if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, pair, spec_count);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
   }
@@ -89,13 +92,13 @@ kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *
                           global const uint *pair_ids, global const uint *slots,
                           global const uint *slot_block_ids, global const BlockEntry *table,
                           global const float *cache_values, global const uint *active_ray_ids,
-                          global PairHit *pair_hits) {
+                          global PairHit *pair_hits, global uint *closest_pairs) {
   const LastPlanes last = last_planes(frame);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   for (uint i = get_global_id(0); i < counts->granted_count; i += get_global_size(0)) {
     const uint pair = pair_ids[i], start = pair_hits[pair].cell;
     if (start >= ISO_IN_DOUBT) {
-      const Ray ray = make_ray(frame, active_ray_ids[pair / counts->spec_count]);
+      const Ray ray = make_ray(frame, active_ray_ids[pair / counts->spec_count] & ISO_RAY_PIXEL);
       const BlockCoords b = block_coords(frame, slot_block_ids[slots[i]]);
       const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
       const int end_x = min(x0 + 4, last.x), end_y = min(y0 + 4, last.y), end_z = min(z0 + 4, last.z);
@@ -120,6 +123,7 @@ kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *
         enter = exit;
       }
       pair_hits[pair] = hit;
+      if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, pair, counts->spec_count);
     }
   }
 }

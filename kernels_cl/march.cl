@@ -1,18 +1,12 @@
 /// march.cl -- pipeline `rays`: each ray walks through the active blocks and intersects those that are cached; at the first
 /// that is not it waits, and asks for that block and its next candidates (Sec. 3.3, 4).
 ///
-/// march of every pixel -> [ cache -> decode -> march ]*. No sort and no composite: a ray's blocks come in ray order, so its
+/// start_rays -> march -> [ cache -> decode -> march ]*. No sort and no composite: a ray's blocks come in ray order, so its
 /// first change is its hit.
 #define ISO_FOUND local
 #include "block_requests.h"
 #include "block_walk.h"
 #include "cell_intersect.h"
-
-/// An entry of the active lists: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31.
-#define ISO_RAY_PIXEL 0x0FFFFFFFu
-#define ISO_RAY_AHEAD_SHIFT 28u
-#define ISO_RAY_AHEAD_MAX 6u
-#define ISO_RAY_IN_DOUBT 0x80000000u
 
 /// What became of a ray.
 #define ISO_RAY_LEFT 0   ///< it left the volume
@@ -150,17 +144,13 @@ inline uint tiled_pixel(constant FrameParams *frame, uint i) {
 
 /// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
 inline void open_next_counts(global const PassCounts *prev, global const PassCounts *counts,
-                             global PassCounts *next, int first) {
-  uint window = counts->pixel_count;
-  if (!first) { /* see begin_pass() in speculation.cl */
-    window = counts->window_count;
-    window = prev->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
-    window = clamp(window, 1u, counts->pixel_count);
-  }
+                             global PassCounts *next) {
+  uint window = counts->window_count; /* see begin_pass() in speculation.cl */
+  window = prev->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
   next->pixel_count = counts->pixel_count;
   next->pass = counts->pass + 1;
   next->active_count = next->spec_count = next->pair_slot_count = next->pair_count = 0;
-  next->window_count = window;
+  next->window_count = clamp(window, 1u, counts->pixel_count);
   next->granted_count = next->visible_count = next->requested_count = next->decoded_count = 0;
   next->hit_count = next->next_active_count = 0;
   next->free_count = counts->free_count;
@@ -189,33 +179,31 @@ typedef struct RayMarch {
   uint at;         ///< ... and the one of them at which the ray stands
 } RayMarch;
 
-/// Walks a ray on from block `from`. in_doubt: about that one. num_blocks: counts the blocks intersected.
+/// Walks a ray on from block `from`, an active one. in_doubt: about that one. num_blocks: counts the blocks intersected.
 inline RayMarch march_ray(constant FrameParams *frame, global const uint *macrocell_masks,
                           global const BlockEntry *table, global const float *cache_values, const Ray *ray,
                           uint from, int in_doubt, LastPlanes last, local uint *slots, local uint *found,
                           uint *num_blocks, BlockChange *change) {
   RayMarch m;
   m.result = ISO_RAY_LEFT;
-  m.next = from;
-  m.num_found = m.at = 0;
-  if (in_doubt) {
-    const BlockCoords b = block_coords(frame, from);
-    m.result = march_block(frame, table, cache_values, ray, b, last, slots, 1, change);
-    m.next = block_behind(frame, ray, b, last);
-    m.num_found = 1;
-    found[0] = from;
-    *num_blocks += m.result != ISO_RAY_WAITS;
-  }
-  while (m.next != ISO_INVALID_ID && m.result == ISO_RAY_LEFT) {
-    m.num_found =
-        find_blocks(frame, macrocell_masks, ray, &m.next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
-    m.at = 0;
+  m.next = block_behind(frame, ray, block_coords(frame, from), last);
+  m.num_found = 1;
+  m.at = 0;
+  found[0] = from;
+  /* One call of each walk: what compilers inline, they compile as often as it is called. */
+  while (m.result == ISO_RAY_LEFT && (m.at < m.num_found || m.next != ISO_INVALID_ID)) {
+    if (m.at == m.num_found) {
+      m.num_found =
+          find_blocks(frame, macrocell_masks, ray, &m.next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
+      m.at = 0;
+    }
     while (m.at < m.num_found && m.result == ISO_RAY_LEFT) {
       const BlockCoords b = block_coords(frame, found[m.at * ISO_GROUP_SIZE]);
-      m.result = march_block(frame, table, cache_values, ray, b, last, slots, 0, change);
+      m.result = march_block(frame, table, cache_values, ray, b, last, slots, in_doubt, change);
+      in_doubt = 0;
+      *num_blocks += m.result <= ISO_RAY_HIT;
       if (m.result == ISO_RAY_LEFT) ++m.at;
     }
-    *num_blocks += m.at + (m.result == ISO_RAY_HIT);
   }
   return m;
 }
@@ -229,11 +217,12 @@ typedef struct Requests {
   volatile local uint *num_staged;
 } Requests;
 
-/// Asks for the blocks that the ray touches in the next `ahead` active blocks, from the one where it stands.
-inline void request_ahead(constant FrameParams *frame, global const uint *macrocell_masks,
+/// Asks for the blocks that the ray touches in the next `ahead` active blocks, from the one where it stands. Returns which
+/// of that one's dual grid it touches.
+inline uint request_ahead(constant FrameParams *frame, global const uint *macrocell_masks,
                           global const BlockEntry *table, global uint *slot_stamps, uint pass, const Ray *ray,
                           RayMarch m, uint ahead, LastPlanes last, local uint *found, Requests requests) {
-  uint next = m.next, num_found = m.num_found, at = m.at;
+  uint next = m.next, num_found = m.num_found, at = m.at, first_touched = 0;
   for (uint asked = 0; asked < ahead && (at < num_found || next != ISO_INVALID_ID);) {
     if (at == num_found) {
       num_found = find_blocks(frame, macrocell_masks, ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
@@ -243,6 +232,7 @@ inline void request_ahead(constant FrameParams *frame, global const uint *macroc
     if (at < num_found) {
       const BlockCoords b = block_coords(frame, found[at * ISO_GROUP_SIZE]);
       const uint touched = touched_blocks(ray, b, last);
+      if (asked == 0) first_touched = touched;
       for (uint corner = 0; corner < 8; ++corner) {
         const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
         if ((touched >> corner & 1u) != 0 &&
@@ -260,38 +250,66 @@ inline void request_ahead(constant FrameParams *frame, global const uint *macroc
       ++asked;
     }
   }
+  return first_touched;
 }
 
-/// Walks rays on until they hit, leave or wait. first: every pixel's ray from the eye; otherwise active_ray_ids
-/// [prev->next_active_count], each from ray_block_ids [pixel]. Of those that wait, the first counts->window_count ask for
-/// the blocks that they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of
-/// frame->per_ray_speculation. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] and their
-/// ray_block_ids; request_block_ids [counts->requested_count, at most capacity]; *next, opened. macrocell_masks: as
-/// traverse(). Groups stride over the rays.
+/// Begins a frame. hits [pixel] = none; next_active_ray_ids [counts->next_active_count]: the pixels whose rays meet an
+/// active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
+/// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
+/// that far more of its work-items fit a device at a time. Groups stride over the tiles.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
+    constant FrameParams *frame, global const uint *macrocell_masks, global PassCounts *counts,
+    global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global HitRecord *hits) {
+  local uint found[ISO_GROUP_SIZE], counters[2];
+  const uint item = get_local_id(0);
+  const uint num_tiled = (frame->width + 7) / 8 * ((frame->height + 3) / 4) * 32;
+  if (get_global_id(0) == 0) next->window_count = counts->pixel_count;
+  if (item == 0) counters[0] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    const uint pixel = begin + item < num_tiled ? tiled_pixel(frame, begin + item) : ISO_INVALID_ID;
+    uint num_found = 0;
+    if (pixel != ISO_INVALID_ID) {
+      const Ray ray = make_ray(frame, pixel);
+      uint block_id = first_block(frame, &ray);
+      if (block_id != ISO_INVALID_ID)
+        num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
+      if (num_found != 0) ray_block_ids[pixel] = found[item];
+      hits[pixel] = no_hit();
+    }
+    append_ray(num_found != 0, pixel | 1u << ISO_RAY_AHEAD_SHIFT, counters, &counts->next_active_count,
+               next_active_ray_ids);
+  }
+}
+
+/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel].
+/// Of those that wait, the first counts->window_count ask for the blocks that they touch in their next active blocks:
+/// N_Spec of them (Sec. 4), or their own number of frame->per_ray_speculation. Out: hits [pixel]; next_active_ray_ids
+/// [counts->next_active_count] and their ray_block_ids; request_block_ids [counts->requested_count, at most capacity];
+/// *next, opened. macrocell_masks: as traverse(). Groups stride over the rays.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    constant FrameParams *frame, uint first, global const uint *macrocell_masks,
-    global const BlockEntry *table, global const float *cache_values, global const PassCounts *prev,
-    global PassCounts *counts, global PassCounts *next, global const uint *active_ray_ids,
-    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
-    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids, uint capacity,
-    global CacheState *cache) {
+    constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
+    global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
+    global PassCounts *next, global const uint *active_ray_ids, global uint *next_active_ray_ids,
+    global uint *ray_block_ids, global HitRecord *hits, global uint *slot_stamps, global uint *requested_bits,
+    global uint *request_block_ids, uint capacity, global CacheState *cache) {
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE],
       staged[ISO_REQUEST_STAGING];
   local uint counters[2], num_staged, list_begin, group_hits, group_blocks;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
                              staged,         &num_staged};
   const LastPlanes last = last_planes(frame);
-  const uint item = get_local_id(0);
-  const uint num_rays =
-      first ? (frame->width + 7) / 8 * ((frame->height + 3) / 4) * 32 : prev->next_active_count;
+  const uint item = get_local_id(0), num_rays = prev->next_active_count;
   const uint fair_share =
       num_rays == 0 ? 0 : clamp(counts->pixel_count / num_rays, 1u, frame->max_spec_count);
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
-    open_next_counts(prev, counts, next, (int)first);
+    open_next_counts(prev, counts, next);
     open_requests(cache);
     cache->first_block_id = ISO_INVALID_ID;
-    counts->active_count = first ? counts->pixel_count : num_rays;
+    counts->active_count = num_rays;
     counts->spec_count = fair_share;
   }
   if (item == 0) counters[0] = num_staged = group_hits = group_blocks = 0;
@@ -299,13 +317,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint i = begin + item;
-    uint entry = ISO_INVALID_ID;
+    uint entry = i < num_rays ? active_ray_ids[i] : ISO_INVALID_ID;
     int waits = 0;
-    if (i < num_rays) entry = first ? tiled_pixel(frame, i) : active_ray_ids[i];
-    if (entry != ISO_INVALID_ID) {
-      const uint pixel = entry & ISO_RAY_PIXEL;
+    if (i < num_rays) {
+      const uint pixel = entry & ISO_RAY_PIXEL, from = ray_block_ids[pixel];
       const Ray ray = make_ray(frame, pixel);
-      const uint from = first ? first_block(frame, &ray) : ray_block_ids[pixel];
       BlockChange change;
       const RayMarch m =
           march_ray(frame, macrocell_masks, table, cache_values, &ray, from, (entry & ISO_RAY_IN_DOUBT) != 0,
@@ -314,24 +330,23 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       if (m.result == ISO_RAY_HIT) {
         hits[pixel] = hit_of(frame, &ray, &change);
         ++num_hits;
-      } else if (first) {
-        hits[pixel] = no_hit();
       }
       if (waits) {
         const uint block_id = found[m.at * ISO_GROUP_SIZE + item];
         uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
-        if (block_id != from || first) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
+        if (block_id != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
         entry =
             pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
         ray_block_ids[pixel] = block_id;
-        if (i == 0) {
-          cache->first_block_id = block_id;
-          cache->first_touched = touched_blocks(&ray, block_coords(frame, block_id), last);
-        }
         if (i < counts->window_count) {
-          request_ahead(frame, macrocell_masks, table, slot_stamps, counts->pass, &ray, m,
-                        frame->per_ray_speculation ? min(1u << log_ahead, frame->max_spec_count) : fair_share,
-                        last, found + item, requests);
+          const uint touched = request_ahead(
+              frame, macrocell_masks, table, slot_stamps, counts->pass, &ray, m,
+              frame->per_ray_speculation ? min(1u << log_ahead, frame->max_spec_count) : fair_share, last,
+              found + item, requests);
+          if (i == 0) {
+            cache->first_block_id = block_id;
+            cache->first_touched = touched;
+          }
         }
       }
     }

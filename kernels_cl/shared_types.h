@@ -63,10 +63,16 @@ typedef struct FrameParams {
   uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
   int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
-  uint per_ray_speculation;  ///< pipeline `rays`: each ray looks as far ahead as it has missed before
+  uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
   uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 132);
+
+/// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
+#define ISO_RAY_PIXEL 0x0FFFFFFFu
+#define ISO_RAY_AHEAD_SHIFT 28u
+#define ISO_RAY_AHEAD_MAX 6u
+#define ISO_RAY_IN_DOUBT 0x80000000u
 
 #define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED 65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass

@@ -292,10 +292,10 @@ TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
   expect_refused(good + "--speculation often" + to, "speculation");
   expect_refused(good + "--group-size 48" + to, "48");
   expect_refused(good + "--pipeline tube" + to, "pipeline");
-  expect_refused(good + "--pipeline blocks --speculation per-ray" + to, "per-ray");
   expect_refused(good + "--memory-budget much" + to, "memory-budget");
   expect_refused(good + "--grouping bubble" + to, "radix, counting");
   expect_refused(good + "--stream tape" + to, "stream");
+  expect_refused(good + "--closest farthest" + to, "scan, atomic-min");
   expect_refused(good + "--orbit 0" + to, "orbit");
   expect_refused(good + "--orbit 2 --cameras x.json" + to, "orbit");
   expect_refused(good + "--rate 0" + to, "1 to 32");

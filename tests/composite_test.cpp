@@ -21,12 +21,20 @@ constexpr glm::uvec3 kDims(14, 14, 11);  // 4 x 4 x 3 blocks
 
 class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  /// In `one_in` results, one is a hit and one was not tested.
   void expect_composite(ImageSize size, uint spec_count, uint one_in, uint seed) {
-    SCOPED_TRACE(fmt::format("{} x {}, spec count {}, one in {}, seed {}", size.width, size.height,
-                             spec_count, one_in, seed));
+    for (const ClosestHit closest : {ClosestHit::kScan, ClosestHit::kAtomicMin}) {
+      for (const uint per_ray : {0u, 1u}) expect_composite(size, spec_count, one_in, seed, closest, per_ray);
+    }
+  }
+
+  /// In `one_in` results, one is a hit and one was not tested.
+  void expect_composite(ImageSize size, uint spec_count, uint one_in, uint seed, ClosestHit how,
+                        uint per_ray) {
+    SCOPED_TRACE(fmt::format("{} x {}, spec count {}, one in {}, seed {}, {}, per ray {}", size.width,
+                             size.height, spec_count, one_in, seed, to_string(how), per_ray));
     Random random(seed);
-    const FrameParams frame = case_frame(kDims, camera_cases(kDims)[0], size, 0.3f);
+    FrameParams frame = case_frame(kDims, camera_cases(kDims)[0], size, 0.3f);
+    frame.per_ray_speculation = per_ray;
     const std::vector<float> voxels = random_voxels(kDims, -1, 1, seed);
     StageWorld world(device_, frame, 4 * 4 * 3, 8);
     fill_cache(world, voxels);
@@ -58,22 +66,26 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     world.rays.hits.write(expected_hits);
     world.rays.ray_block_ids.write(states);
     world.rays.pair_hits.write(results);
-    world.set_active(active);
+    std::vector<uint> entries = active;  // some rays look ahead already
+    for (uint &entry : entries) entry |= random() % (ISO_RAY_AHEAD_MAX + 1) << ISO_RAY_AHEAD_SHIFT;
+    world.set_active(entries);
     world.begin_pass(pairs, spec_count);
+    if (how == ClosestHit::kAtomicMin) offer_results(world, pairs, results, spec_count);
     PassCounts expected_counts = world.counts();
 
-    Composite composite(device_, num_pixels);
+    Composite composite(device_, num_pixels, how);
     composite(world.cache, world.rays, world.compaction);
 
     std::vector<uint> next;
     for (std::size_t a = 0; a < active.size(); ++a) {
-      bool goes_on = states[active[a]] != ISO_INVALID_ID;
+      bool goes_on = states[active[a]] != ISO_INVALID_ID, moves = true;
       for (std::size_t pair = a * spec_count; pair < (a + 1) * spec_count; ++pair) {
         if (pairs[pair] == ISO_INVALID_ID) break;
         if (results[pair].cell == ISO_NO_HIT) continue;
         if (results[pair].cell == ISO_NOT_TESTED) {  // wait here, whatever lies behind
           states[active[a]] = pairs[pair];
           goes_on = true;
+          moves = pair != a * spec_count;
         } else {
           expected_hits[active[a]] = host_hit(frame, voxels, active[a], pairs[pair], results[pair]);
           ++expected_counts.hit_count;
@@ -81,7 +93,9 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         }
         break;
       }
-      if (goes_on) next.push_back(active[a]);
+      uint ahead = entries[a] >> ISO_RAY_AHEAD_SHIFT;
+      if (per_ray && moves) ahead = std::min(ahead + 1, ISO_RAY_AHEAD_MAX);
+      if (goes_on) next.push_back(active[a] | ahead << ISO_RAY_AHEAD_SHIFT);
     }
     expected_counts.next_active_count = static_cast<uint>(next.size());
     expect_counts(world.rays.counts, expected_counts);
@@ -94,6 +108,17 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       ASSERT_EQ(std::memcmp(&hits[pixel], &expected_hits[pixel], sizeof(HitRecord)), 0)
           << "pixel " << pixel << ": t " << hits[pixel].t << ", not " << expected_hits[pixel].t;
     }
+  }
+
+  /// What grouping and intersection leave in closest_pairs.
+  static void offer_results(StageWorld &world, const std::vector<uint> &pairs,
+                            const std::vector<PairHit> &results, uint spec_count) {
+    std::vector<uint> closest(world.rays.num_pixels, ISO_INVALID_ID);
+    for (uint pair = 0; pair < pairs.size(); ++pair) {
+      if (pairs[pair] == ISO_INVALID_ID || results[pair].cell == ISO_NO_HIT) continue;
+      closest[pair / spec_count] = std::min(closest[pair / spec_count], pair);
+    }
+    world.rays.closest_pairs.write(closest);
   }
 
   /// A pass that asks for every block.

@@ -90,9 +90,15 @@ class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
       ASSERT_EQ(end - begin, expected[slot].size());
       ASSERT_TRUE(std::all_of(slots.begin() + begin, slots.begin() + end, [&](uint s) { return s == slot; }));
     }
-    /* Every pair begins as not tested. */
+    /* The other pairs are not tested, and each ray knows its first. */
     const std::vector<PairHit> hits = world.rays.pair_hits.read();
-    for (uint pair = 0; pair < pairs.size(); ++pair) ASSERT_EQ(hits[pair].cell, ISO_NOT_TESTED) << pair;
+    std::vector<uint> closest(world.rays.num_pixels, ISO_INVALID_ID);
+    for (uint pair = 0; pair < pairs.size(); ++pair) {
+      if (pairs[pair] == ISO_INVALID_ID || granted(pair)) continue;
+      ASSERT_EQ(hits[pair].cell, ISO_NOT_TESTED) << pair;
+      closest[pair / counts.spec_count] = std::min(closest[pair / counts.spec_count], pair);
+    }
+    ASSERT_EQ(first_difference(world.rays.closest_pairs.read(), closest), kNoDifference);
     tally.granted += num_granted;
     tally.pairs += pairs.size();
     tally.blocks += expected.size();

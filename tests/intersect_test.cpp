@@ -198,9 +198,13 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const std::vector<PairHit> got = world.rays.pair_hits.read();
     const std::vector<uint> table = world.slots_by_block();
     const auto cached = [&](uint block) { return table[block] < num_slots; };
+    std::vector<uint> closest(world.rays.num_pixels, ISO_INVALID_ID);
     for (uint pair = 0; pair < pairs.size(); ++pair) {
       const uint pixel = world.active_ray_ids[pair / spec_count];
       if (pairs[pair] == ISO_INVALID_ID) continue;
+      if (got[pair].cell != ISO_NO_HIT) {
+        closest[pair / spec_count] = std::min(closest[pair / spec_count], pair);
+      }
       if (!std::ranges::all_of(dual_grid_blocks(frame, pairs[pair]), cached)) {
         ASSERT_EQ(got[pair].cell, ISO_NOT_TESTED) << "pair " << pair;
         first_hits.all_tested = false;
@@ -218,6 +222,8 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       first_hits.t[pixel] = expected.t;
       first_hits.largest[pixel] = expected.largest;
     }
+    ASSERT_EQ(first_difference(world.rays.closest_pairs.read(), closest), kNoDifference)
+        << "of closest pairs";
   }
 
   /// Residual of the field at the hit: 46 u M (derived in cell_intersect_test.cpp), u = 2^-24.

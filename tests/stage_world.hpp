@@ -71,6 +71,7 @@ struct StageWorld {
     counts.pair_slot_count = static_cast<uint>(pair_block_ids.size());
     rays.counts.write({&counts, 1});
     rays.pair_block_ids.write(pair_block_ids);
+    rays.closest_pairs.fill(ISO_INVALID_ID);
   }
 
   /// Slots for the blocks requested in this pass.

@@ -14,11 +14,13 @@ struct PipelineOnDevice {
   const char *name;
   PipelineKind pipeline;
   Grouping grouping;
+  ClosestHit closest;
   bool per_ray_speculation;
 
   RendererOptions with(RendererOptions options) const {
     options.pipeline = pipeline;
     options.grouping = grouping;
+    options.closest = closest;
     options.per_ray_speculation = per_ray_speculation;
     return options;
   }
@@ -32,11 +34,15 @@ inline void PrintTo(const PipelineOnDevice &param, std::ostream *out) {
 inline std::vector<PipelineOnDevice> pipelines_under_test() {
   std::vector<PipelineOnDevice> params;
   for (const ocl::DeviceInfo &device : devices_under_test()) {
-    params.push_back({device, "blocks", PipelineKind::kBlocks, Grouping::kRadix, false});
-    params.push_back({device, "rays_per_ray", PipelineKind::kRays, kDefaultGrouping, true});
+    params.push_back({device, "blocks", PipelineKind::kBlocks, Grouping::kRadix, ClosestHit::kScan, false});
+    params.push_back(
+        {device, "rays_per_ray", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, true});
     if (device.platform == "rusticl") continue;
-    params.push_back({device, "blocks_counting", PipelineKind::kBlocks, Grouping::kCounting, false});
-    params.push_back({device, "rays", PipelineKind::kRays, kDefaultGrouping, false});
+    params.push_back({device, "blocks_counting_atomic_min", PipelineKind::kBlocks, Grouping::kCounting,
+                      ClosestHit::kAtomicMin, false});
+    params.push_back(
+        {device, "blocks_per_ray", PipelineKind::kBlocks, Grouping::kCounting, ClosestHit::kAtomicMin, true});
+    params.push_back({device, "rays", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, false});
   }
   return params;
 }

@@ -77,7 +77,7 @@ double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
 class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   using TraverseKernel = ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
-                                     ocl::Out<uint>, ocl::Out<uint>>;
+                                     ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>;
 
   /// The kernel itself, since masks that no isovalue makes are wanted.
   struct Stages {
@@ -116,7 +116,10 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         break;
       }
       pairs.fill(0xABCDEF01u);
-      rays.active_ray_ids.write(active);
+      std::vector<uint> entries = active;  // each looks ahead by its own number, where the frame says so
+      for (uint &entry : entries) entry |= entry % 7 << ISO_RAY_AHEAD_SHIFT;
+      rays.active_ray_ids.write(entries);
+      rays.closest_pairs.fill(0);
       PassCounts counts = distinct_counts();
       counts.active_count = static_cast<uint>(active.size());
       counts.window_count = counts.active_count;
@@ -124,10 +127,13 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       counts.pair_count = 0;
       rays.counts.write({&counts, 1});
       stages.kernel(stages.range, rays.frame, masks, rays.counts, rays.active_ray_ids, rays.ray_block_ids,
-                    pairs);
+                    pairs, rays.closest_pairs);
       const std::vector<uint> got = pairs.read(), states = rays.ray_block_ids.read();
-      counts.pair_count = collect(got, active, spec_count, lists);
+      counts.pair_count = collect(got, active, spec_count, frame.per_ray_speculation, lists);
       expect_counts(rays.counts, counts);
+      std::vector<uint> closest = rays.closest_pairs.read();
+      closest.resize(active.size());
+      EXPECT_EQ(closest, std::vector<uint>(active.size(), ISO_INVALID_ID));
       std::vector<uint> still;
       for (const uint ray : active) {
         if (states[ray] != ISO_INVALID_ID) still.push_back(ray);
@@ -139,15 +145,17 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// Appends a pass's pairs to the lists; returns how many there are.
   static uint collect(const std::vector<uint> &pairs, const std::vector<uint> &active, uint spec_count,
-                      BlockLists &lists) {
+                      bool per_ray, BlockLists &lists) {
     uint num_pairs = 0;
     for (std::size_t a = 0; a < active.size(); ++a) {
       bool ended = false;
+      const uint ahead = per_ray ? std::min(1u << active[a] % 7, spec_count) : spec_count;
       for (uint k = 0; k < spec_count; ++k) {
         const uint block = pairs[a * spec_count + k];
         EXPECT_FALSE(ended && block != ISO_INVALID_ID) << "a gap in the pairs of ray " << active[a];
         ended = block == ISO_INVALID_ID;
         if (ended) continue;
+        EXPECT_LT(k, ahead) << "ray " << active[a] << " looks too far ahead";
         lists[active[a]].push_back(block);
         ++num_pairs;
       }
@@ -159,10 +167,12 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   void expect_walks(const glm::uvec3 &dims, const std::vector<CameraCase> &cameras, uint one_in,
-                    std::initializer_list<uint> spec_counts, ImageSize size, uint group_size) {
+                    std::initializer_list<uint> spec_counts, ImageSize size, uint group_size,
+                    bool per_ray = false) {
     Stages stages(device_, size.num_pixels(), group_size);
     for (const CameraCase &c : cameras) {
-      const FrameParams frame = case_frame(dims, c, size);
+      FrameParams frame = case_frame(dims, c, size);
+      frame.per_ray_speculation = per_ray;
       const Selection selected = random_selection(frame, one_in, 1);
       const BlockLists expected = walk_cells(frame, selected);
       for (const uint spec_count : spec_counts) {
@@ -215,6 +225,11 @@ TEST_P(TraverseOnDevice, RandomBlocksSelected) {
   for (const glm::uvec3 dims : {glm::uvec3(38, 41, 35), glm::uvec3(17, 33, 2)}) {
     expect_walks(dims, camera_cases(dims), 4, {1, 2, 7, 64}, {23, 17}, 64);
   }
+}
+
+TEST_P(TraverseOnDevice, EachRayLooksAheadByItsOwnNumber) {
+  const glm::uvec3 dims(38, 41, 35);
+  expect_walks(dims, camera_cases(dims), 4, {1, 2, 7, 64}, {23, 17}, 64, true);
 }
 
 /// Most coarse macrocells are empty: the walk skips them, and must come out where a cell walk does.

@@ -1,7 +1,5 @@
 #include "tools/isowave/renderer_options.hpp"
 
-#include "core/error.hpp"
-
 namespace isowave::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
@@ -11,11 +9,11 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
                  "device)")
       ->check(CLI::IsMember({"auto", "blocks", "rays"}))
       ->capture_default_str();
-  app.add_option(
-         "--speculation", flags.speculation,
-         "blocks a ray looks ahead: off (1), global (W*H / active rays), per-ray (twice as many after every "
-         "miss; not in pipeline blocks), or auto (per-ray where there is)")
-      ->check(CLI::IsMember({"auto", "off", "global", "per-ray"}))
+  app.add_option("--speculation", flags.speculation,
+                 "blocks a ray looks ahead: off (1), global (W*H / active rays), or per-ray (twice as many "
+                 "after every "
+                 "miss; in pipeline blocks no more than global)")
+      ->check(CLI::IsMember({"off", "global", "per-ray"}))
       ->capture_default_str();
   app.add_option("--max-speculation", flags.values.max_speculation, "most blocks a ray looks ahead, 1..64")
       ->capture_default_str();
@@ -36,6 +34,9 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->capture_default_str();
   app.add_option("--grouping", flags.grouping, "how pipeline blocks gathers rays by block: radix or counting")
       ->capture_default_str();
+  app.add_option("--closest", flags.closest,
+                 "how pipeline blocks finds a ray's closest result: scan or atomic-min")
+      ->capture_default_str();
   app.add_option("--group-size", flags.values.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();
 }
@@ -47,13 +48,11 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
                      : flags.pipeline == "rays" ? PipelineKind::kRays
                                                 : PipelineKind::kAuto;
   if (flags.speculation == "off") options.max_speculation = 1;
-  options.per_ray_speculation = flags.speculation == "per-ray" || flags.speculation == "auto";
-  if (flags.speculation == "per-ray" && options.pipeline == PipelineKind::kBlocks) {
-    throw Error("pipeline blocks has no per-ray speculation: use --speculation global, or --pipeline rays");
-  }
+  options.per_ray_speculation = flags.speculation == "per-ray";
   options.solver = solver_from_string(flags.solver);
   options.grouping = grouping_from_string(flags.grouping);
   options.stream = stream_place_from_string(flags.stream);
+  options.closest = closest_hit_from_string(flags.closest);
   return options;
 }
 
@@ -61,13 +60,11 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
   const char *speculation = options.max_speculation == 1  ? "off"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
-  return {{"pipeline", to_string(options.pipeline)},
-          {"speculation", speculation},
-          {"max_speculation", options.max_speculation},
-          {"cache_slots", options.cache_slots},
-          {"stream", to_string(options.stream)},
-          {"solver", to_string(options.solver)},
-          {"group_size", options.group_size}};
+  return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
+          {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
+          {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
+          {"closest", to_string(options.closest)},      {"group_size", options.group_size},
+          {"stream", to_string(options.stream)}};
 }
 
 }  // namespace isowave::tools
