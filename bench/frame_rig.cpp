@@ -19,7 +19,7 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
     : params(make_frame_params(volume.info, setup.camera, setup.size, setup.isovalue)),
       stream(device, volume),
       rays(device, setup.size.num_pixels()),
-      macrocells(device, rays.frame, params, stream.words, stream.bits_per_block),
+      macrocells(device, rays.frame, params, stream),
       cache(device, params, slots_of(volume, setup), rays.num_pixels, kGroupSize),
       compaction(device, rays.num_pixels, kGroupSize),
       initial_rays(device, rays.num_pixels),

@@ -21,7 +21,7 @@ struct MacrocellsInput {
         params(volume_params(volume, kMixingLayerIsovalue)),
         stream(device, volume),
         frame(device, "frame", 1),
-        macrocells(device, frame, params, stream.words, stream.bits_per_block) {
+        macrocells(device, frame, params, stream) {
     macrocells.select(frame, params);
     verify();
   }
@@ -67,10 +67,7 @@ void build_ranges(benchmark::State &state) {
   const double bytes = blocks * (in.stream.bits_per_block / 8.0 + sizeof(cl_ushort));
   measure(
       state, {blocks, bytes}, [] {},
-      [&] {
-        const Macrocells built(Session::current().device(), in.frame, in.params, in.stream.words,
-                               in.stream.bits_per_block);
-      });
+      [&] { const Macrocells built(Session::current().device(), in.frame, in.params, in.stream); });
 }
 
 void select_isovalue(benchmark::State &state) {

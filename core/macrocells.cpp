@@ -34,36 +34,33 @@ std::uint32_t coarse_count(const FrameParams &f) {
 }  // namespace
 
 Macrocells::Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, const FrameParams &params,
-                       const ocl::Buffer<uint> &words, std::uint32_t bits_per_block)
+                       const DeviceStream &stream)
     : num_coarse_(coarse_count(params)),
       coarse_range_(ocl::Range::strided(num_coarse_, kGroupSize, device)),
       ranges_(device, "block ranges", block_count(params)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
       masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
       box_(device, "active box", 6),
-      masks_kernel_(device, "macrocells", "macrocell_masks") {
+      masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
   const auto stage = device.timer().stage("macrocells");
   frame.write({&params, 1});
-  PartialsKernel partials_kernel(device, "macrocells", "macrocell_partials");
-  thresholds_ = sample_thresholds(device, frame, params, words, bits_per_block, partials_kernel);
+  Partials decode{device, frame, stream, {device, "macrocells", "macrocell_partials", stream.defines()}};
+  thresholds_ = sample_thresholds(device, block_count(params), decode);
 
   ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
               ocl::Out<cl_ushort>>
-      ranges_kernel(device, "macrocells", "macrocell_ranges");
+      ranges_kernel(device, "macrocells", "macrocell_ranges", stream.defines());
   ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_kernel(
-      device, "macrocells", "macrocell_coarse_ranges");
+      device, "macrocells", "macrocell_coarse_ranges", stream.defines());
   const ocl::Buffer<float> thresholds(device, "range thresholds", std::span<const float>(thresholds_));
   const std::uint32_t layer_blocks = params.blocks_x * params.blocks_y;
   ocl::Buffer<ValueRange> below(device, "range partials, layer below", 8 * std::size_t{layer_blocks});
   ocl::Buffer<ValueRange> above(device, "range partials, layer above", 8 * std::size_t{layer_blocks});
   const ocl::Range layer_range = ocl::Range::strided(layer_blocks, kGroupSize, device);
 
-  partials_kernel(layer_range, frame, words, bits_per_block, 0, 1, layer_blocks, below);
+  decode(0, 1, layer_blocks, below);
   for (std::uint32_t layer = 0; layer < params.blocks_z; ++layer) {
-    if (layer + 1 < params.blocks_z) {
-      partials_kernel(layer_range, frame, words, bits_per_block, (layer + 1) * layer_blocks, 1, layer_blocks,
-                      above);
-    }
+    if (layer + 1 < params.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
     ranges_kernel(layer_range, frame, layer, below, above, thresholds, ranges_);
     std::swap(below, above);
   }
@@ -79,17 +76,31 @@ std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
                   2 * 8 * sizeof(ValueRange) * layer_blocks + kNumThresholds * sizeof(float));
 }
 
+void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
+                                      ocl::Buffer<ValueRange> &partials) {
+  if (!stream.window) {
+    kernel(ocl::Range::strided(count, kGroupSize, device), frame, stream.part(0), stream.part(1),
+           stream.part(2), stream.part(3), stream.blocks_per_part, stream.bits_per_block, first, stride,
+           count, 0, partials);
+    return;
+  }
+  std::vector<uint> block_ids(count);
+  for (std::uint32_t i = 0; i < count; ++i) block_ids[i] = first + i * stride;
+  stream.window->bring(
+      block_ids, [&](const ocl::Buffer<uint> &words, std::uint32_t run_first, std::uint32_t run_count) {
+        kernel(ocl::Range::strided(run_count, kGroupSize, device), frame, words, words, words, words, 0,
+               stream.bits_per_block, first + run_first * stride, stride, run_count, run_first, partials);
+      });
+}
+
 /// Quantiles of the block minima and maxima of an even sample of blocks, so that one outlier does not coarsen
 /// the rest.
-std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, ocl::Buffer<FrameParams> &frame,
-                                                 const FrameParams &params, const ocl::Buffer<uint> &words,
-                                                 std::uint32_t bits_per_block,
-                                                 PartialsKernel &partials_kernel) {
-  const auto stride = static_cast<std::uint32_t>(sample_stride(block_count(params)));
-  const auto count = static_cast<std::uint32_t>(num_samples(block_count(params)));
+std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint32_t num_blocks,
+                                                 Partials &decode) {
+  const auto stride = static_cast<std::uint32_t>(sample_stride(num_blocks));
+  const auto count = static_cast<std::uint32_t>(num_samples(num_blocks));
   ocl::Buffer<ValueRange> partials(device, "range samples", 8 * std::size_t{count});
-  partials_kernel(ocl::Range::strided(count, kGroupSize, device), frame, words, bits_per_block, 0, stride,
-                  count, partials);
+  decode(0, stride, count, partials);
   const std::vector<ValueRange> samples = partials.read();
   std::vector<float> values;
   values.reserve(2 * std::size_t{count});

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/device_counts.hpp"
+#include "core/device_stream.hpp"
 #include "core/ocl/kernel.hpp"
 
 namespace isowave {
@@ -17,7 +18,7 @@ class Macrocells {
   /// Decodes every block once, beside a sample for the quantile table, and waits.
   /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z layer.
   Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, const FrameParams &params,
-             const ocl::Buffer<uint> &words, std::uint32_t bits_per_block);
+             const DeviceStream &stream);
 
   /// Bytes that the constructor needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
@@ -40,12 +41,19 @@ class Macrocells {
   struct ValueRange {
     float min, max;
   };
-  using PartialsKernel =
-      ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, uint, uint, uint, uint, ocl::Out<ValueRange>>;
+  using PartialsKernel = ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+                                     ocl::In<uint>, uint, uint, uint, uint, uint, uint, ocl::Out<ValueRange>>;
+  /// Decodes blocks first + i * stride, i in [0, count): partials [8 * count].
+  struct Partials {
+    void operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
+                    ocl::Buffer<ValueRange> &partials);
+    ocl::Device &device;
+    const ocl::Buffer<FrameParams> &frame;
+    const DeviceStream &stream;
+    PartialsKernel kernel;
+  };
 
-  std::vector<float> sample_thresholds(ocl::Device &device, ocl::Buffer<FrameParams> &frame,
-                                       const FrameParams &params, const ocl::Buffer<uint> &words,
-                                       std::uint32_t bits_per_block, PartialsKernel &partials_kernel);
+  std::vector<float> sample_thresholds(ocl::Device &device, std::uint32_t num_blocks, Partials &decode);
 
   std::uint32_t num_coarse_;
   ocl::Range coarse_range_;

@@ -1,7 +1,9 @@
 #include "core/memory_plan.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
+#include <optional>
 
 #include "core/error.hpp"
 #include "core/shade.hpp"
@@ -12,6 +14,55 @@ namespace {
 
 std::uint64_t ceil_div(std::uint64_t count, std::uint64_t size) {
   return (count + size - 1) / size;
+}
+
+/// Bytes of compressed blocks that one half of a window holds: enough for a transfer at full speed, little enough that the
+/// first is soon under way.
+constexpr std::uint64_t kWindowBytes = 2u << 20;
+/// A cache of fewer slots is too small to be paid for by keeping the compressed volume on the device: one for so many pixels.
+/// A judgement, not a measurement: a cold 720p frame touches a block for every two pixels, and most again in the next frame.
+constexpr std::uint64_t kPixelsPerUsefulSlot = 8;
+
+std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequest &request,
+                                std::uint32_t cache_slots) {
+  if (request.window_blocks != 0) return request.window_blocks;
+  const std::uint64_t block_bytes = sizeof(uint) * StreamWindow::words_per_block(volume.bits_per_block);
+  const std::uint64_t wanted =
+      std::min<std::uint64_t>({kWindowBytes / block_bytes, volume.block_count(), cache_slots / 4});
+  return static_cast<std::uint32_t>(std::max<std::uint64_t>(wanted, kMinCacheSlots));
+}
+
+void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
+  if (plan.stream == StreamPlace::kHost) {
+    plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
+    const std::uint64_t bytes =
+        sizeof(uint) * StreamWindow::half_words(volume.bits_per_block, plan.window_blocks);
+    for (const char *name : {"stream window", "stream window", "stream staging", "stream staging"}) {
+      plan.buffers.push_back({name, bytes});
+    }
+    plan.stream_bytes = 4 * bytes;
+    return;
+  }
+  const std::uint64_t largest = request.largest_stream_part != 0 ? request.largest_stream_part
+                                                                 : std::numeric_limits<std::uint64_t>::max();
+  const StreamSplit split = split_stream(volume, largest);
+  if (split.num_parts == 0) {
+    throw Error("the compressed volume of {} bytes does not fit {} buffers of {}: leave it on the host",
+                volume.word_count() * sizeof(uint), kMaxStreamParts, largest);
+  }
+  for (const std::uint64_t words : split.words) {
+    plan.buffers.push_back({"zfp stream", words * sizeof(uint)});
+    plan.stream_bytes += words * sizeof(uint);
+  }
+}
+
+bool fits_parts(const CompressedVolume &volume, const MemoryRequest &request) {
+  return request.largest_stream_part == 0 || split_stream(volume, request.largest_stream_part).num_parts != 0;
+}
+
+MemoryRequest with_stream(MemoryRequest request, StreamPlace place) {
+  request.stream = place;
+  return request;
 }
 
 /// Of what pipeline `blocks` needs beside the rays.
@@ -41,6 +92,17 @@ void add_pairs(MemoryPlan &plan, const MemoryRequest &request) {
 
 }  // namespace
 
+std::string_view to_string(StreamPlace place) {
+  return place == StreamPlace::kAuto ? "auto" : place == StreamPlace::kDevice ? "device" : "host";
+}
+
+StreamPlace stream_place_from_string(std::string_view name) {
+  for (const StreamPlace place : {StreamPlace::kAuto, StreamPlace::kDevice, StreamPlace::kHost}) {
+    if (name == to_string(place)) return place;
+  }
+  throw Error("the compressed volume cannot be on '{}': auto, device, host", name);
+}
+
 std::uint64_t MemoryPlan::total() const {
   return std::accumulate(buffers.begin(), buffers.end(), std::uint64_t{0},
                          [](std::uint64_t sum, const Buffer &buffer) { return sum + buffer.bytes; });
@@ -58,19 +120,20 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   const std::uint64_t listed = BlockCache::capacity_for(cache_slots, blocks, pixels);
   MemoryPlan plan;
   plan.cache_slots = cache_slots;
-  plan.buffers = {{"zfp stream", volume.words.size() * sizeof(uint)},
-                  {"frame", sizeof(FrameParams)},
-                  {"pass counts", sizeof(PassCounts)},
-                  {"pass counts, previous", sizeof(PassCounts)},
-                  {"pass counts, next", sizeof(PassCounts)},
-                  {"hits", sizeof(HitRecord) * pixels},
-                  {"ray states", 4 * pixels},
-                  {"active ray ids", 4 * pixels},
-                  {"active ray ids, next", 4 * pixels},
-                  {"block ranges", 2 * blocks},
-                  {"macrocell ranges", 2 * num_cells},
-                  {"macrocell masks", 8 * num_cells},
-                  {"active box", 6 * sizeof(int)}};
+  plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
+  add_stream(plan, volume, request);
+  plan.buffers.insert(plan.buffers.end(), {{"frame", sizeof(FrameParams)},
+                                           {"pass counts", sizeof(PassCounts)},
+                                           {"pass counts, previous", sizeof(PassCounts)},
+                                           {"pass counts, next", sizeof(PassCounts)},
+                                           {"hits", sizeof(HitRecord) * pixels},
+                                           {"ray states", 4 * pixels},
+                                           {"active ray ids", 4 * pixels},
+                                           {"active ray ids, next", 4 * pixels},
+                                           {"block ranges", 2 * blocks},
+                                           {"macrocell ranges", 2 * num_cells},
+                                           {"macrocell masks", 8 * num_cells},
+                                           {"active box", 6 * sizeof(int)}});
   if (request.pipeline == PipelineKind::kBlocks) {
     add_pairs(plan, request);
   } else {  // the pairs' arrays are empty: OpenCL has no buffers of 0 bytes
@@ -95,24 +158,65 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   return plan;
 }
 
+MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request, std::uint64_t budget,
+                           std::uint32_t cache_slots) {
+  if (request.stream != StreamPlace::kAuto) {
+    MemoryPlan plan = plan_memory(volume, request, cache_slots);
+    plan.reason = "as asked for";
+    return plan;
+  }
+  MemoryPlan on_host = plan_memory(volume, with_stream(request, StreamPlace::kHost), cache_slots);
+  on_host.reason = "it does not fit beside the cache slots asked for";
+  if (!fits_parts(volume, request)) return on_host;
+  MemoryPlan on_device = plan_memory(volume, with_stream(request, StreamPlace::kDevice), cache_slots);
+  on_device.reason = "it fits beside the cache slots asked for, or a window on it is no smaller";
+  return on_device.peak() <= budget || on_device.peak() <= on_host.peak() ? on_device : on_host;
+}
+
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots) {
   const std::uint64_t largest = device.capabilities().largest_allocation;
-  const auto fits = [&](std::uint32_t slots) {
-    return plan_memory(volume, request, slots).peak() <= budget &&
+  const auto fits = [&](std::uint32_t slots, StreamPlace place) {
+    return plan_memory(volume, with_stream(request, place), slots).peak() <= budget &&
            ISO_BLOCK_VOXELS * sizeof(float) * std::uint64_t{slots} <= largest;
   };
-  if (!fits(kMinCacheSlots)) {
-    const MemoryPlan least = plan_memory(volume, request, kMinCacheSlots);
-    throw Error("a memory budget of {} bytes is too small: {} would do, {} of them for the compressed volume",
-                budget, least.peak(), least.buffers.front().bytes);
+  const auto most_slots = [&](StreamPlace place) -> std::optional<MemoryPlan> {
+    if (!fits(kMinCacheSlots, place)) return {};
+    std::uint32_t fitting = kMinCacheSlots, too_many = max_slots + 1;
+    while (too_many - fitting > 1) {
+      const std::uint32_t middle = fitting + (too_many - fitting) / 2;
+      (fits(middle, place) ? fitting : too_many) = middle;
+    }
+    return plan_memory(volume, with_stream(request, place), fitting);
+  };
+  const bool may_be_on_device = request.stream == StreamPlace::kDevice ||
+                                (request.stream == StreamPlace::kAuto && fits_parts(volume, request));
+  const bool may_be_on_host = request.stream != StreamPlace::kDevice;
+  const std::uint64_t useful = std::min<std::uint64_t>(max_slots, request.num_pixels / kPixelsPerUsefulSlot);
+  std::optional<MemoryPlan> plan;
+  if (may_be_on_device) plan = most_slots(StreamPlace::kDevice);
+  if (may_be_on_host && (!plan || plan->cache_slots < useful)) {
+    std::optional<MemoryPlan> on_host = most_slots(StreamPlace::kHost);
+    if (on_host && (!plan || on_host->cache_slots > plan->cache_slots)) {
+      on_host->reason = plan ? fmt::format("beside it there would be {} cache slots, and {} are useful",
+                                           plan->cache_slots, useful)
+                             : "it does not fit";
+      plan = std::move(on_host);
+    }
   }
-  std::uint32_t fitting = kMinCacheSlots, too_many = max_slots + 1;
-  while (too_many - fitting > 1) {
-    const std::uint32_t middle = fitting + (too_many - fitting) / 2;
-    (fits(middle) ? fitting : too_many) = middle;
+  if (plan) {
+    if (request.stream != StreamPlace::kAuto) plan->reason = "as asked for";
+    if (plan->reason.empty()) plan->reason = "it fits beside a useful cache, or a window on it is no smaller";
+    return *plan;
   }
-  return plan_memory(volume, request, fitting);
+  std::optional<MemoryPlan> least;
+  for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
+    if (!(place == StreamPlace::kHost ? may_be_on_host : may_be_on_device)) continue;
+    MemoryPlan smallest = plan_memory(volume, with_stream(request, place), kMinCacheSlots);
+    if (!least || smallest.peak() < least->peak()) least = std::move(smallest);
+  }
+  throw Error("a memory budget of {} bytes is too small: {} would do, {} of them for the compressed volume",
+              budget, least->peak(), least->stream_bytes);
 }
 
 }  // namespace isowave

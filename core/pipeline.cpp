@@ -113,7 +113,12 @@ void FrameState::provide_blocks(const CountsBuffer &asked) {
     cache.assign(asked, rays);
   }
   const auto stage = device.timer().stage("decode");
-  decode(stream, rays.frame, rays.counts, cache);
+  try {
+    decode(stream, rays.frame, rays.counts, cache);
+  } catch (...) {  // blocks have slots, but no values
+    cache.clear();
+    throw;
+  }
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,

@@ -35,7 +35,8 @@ struct FrameState {
   ZfpDecode decode;
   bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
 
-  /// Cache and decode: the blocks asked for, asked.requested_count, get slots and values. Asynchronous.
+  /// Cache and decode: the blocks asked for, asked.requested_count, get slots and values. Asynchronous but where the stream
+  /// stays on the host: see ZfpDecode. Where that throws, the cache is empty.
   void provide_blocks(const CountsBuffer &asked);
 };
 

@@ -37,6 +37,13 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
                 options.group_size, device.info().name, largest);
   }
+  if (options.window_blocks != 0 && options.window_blocks < kMinCacheSlots) {
+    throw Error("a window of {} blocks cannot be used: {} (one dual grid) and more can",
+                options.window_blocks, kMinCacheSlots);
+  }
+  if (options.largest_stream_part == 0) {
+    options.largest_stream_part = device.capabilities().largest_allocation;
+  }
   return options;
 }
 
@@ -44,12 +51,13 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
 MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options) {
   const MemoryRequest request{options.size.num_pixels(), options.pipeline, options.grouping,
-                              options.group_size};
+                              options.group_size,        options.stream,   options.largest_stream_part,
+                              options.window_blocks};
   const std::uint64_t budget =
       options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
   const std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
   if (options.cache_slots != 0) {
-    MemoryPlan plan = plan_memory(volume, request, options.cache_slots);
+    MemoryPlan plan = plan_with_slots(volume, request, budget, options.cache_slots);
     if (options.memory_budget != 0 && plan.peak() > budget) {
       throw Error(
           "{} cache slots need {} bytes of device memory, more than the budget of {}: give one of the two "
@@ -77,15 +85,17 @@ FrameParams grid_params(const CompressedVolume &volume) {
 }
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
-                      std::uint32_t cache_slots) {
+                      const MemoryPlan &plan) {
   const FrameParams grid = grid_params(volume);
-  DeviceStream stream(device, volume);
+  DeviceStream stream = plan.stream == StreamPlace::kHost
+                            ? DeviceStream(device, volume, OnHost{plan.window_blocks})
+                            : DeviceStream(device, volume, options.largest_stream_part);
   Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks);
-  Macrocells macrocells(device, rays.frame, grid, stream.words, stream.bits_per_block);
-  BlockCache cache(device, grid, cache_slots, options.size.num_pixels(), options.group_size);
-  return {device,           std::move(stream),
-          std::move(rays),  std::move(macrocells),
-          std::move(cache), ZfpDecode(device, cache_slots)};
+  Macrocells macrocells(device, rays.frame, grid, stream);
+  ZfpDecode decode(device, plan.cache_slots, stream.defines());
+  BlockCache cache(device, grid, plan.cache_slots, options.size.num_pixels(), options.group_size);
+  return {device,           std::move(stream), std::move(rays), std::move(macrocells),
+          std::move(cache), std::move(decode)};
 }
 
 }  // namespace
@@ -96,11 +106,13 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       options_(checked(options, volume, device)),
       plan_(make_plan(device, volume, options_)),
       info_(volume.info),
-      state_(make_state(device, volume, options_, plan_.cache_slots)),
+      state_(make_state(device, volume, options_, plan_)),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
       shade_(device, options_.size.num_pixels()) {
   options_.cache_slots = plan_.cache_slots;
+  options_.stream = plan_.stream;
+  options_.window_blocks = plan_.window_blocks;
   device.finish();
   setup_ms_ = ms_since(setup_begin_);
 }
@@ -108,6 +120,8 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
 FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &on_pass) {
   const auto begin = std::chrono::steady_clock::now();
   const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
+  const StreamWindow *window = state_.stream.window.get();
+  const std::uint64_t uploaded_before = window ? window->uploaded_blocks() : 0;
   FrameStats stats;
   PassReadback readback;
   begin_frame(camera, isovalue);
@@ -124,6 +138,11 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   }
   if (!stats.cancelled) pipeline_->end_frame();
   device_.finish();
+  if (window) {
+    stats.uploaded_blocks = window->uploaded_blocks() - uploaded_before;
+    stats.uploaded_bytes =
+        stats.uploaded_blocks * sizeof(uint) * StreamWindow::words_per_block(state_.stream.bits_per_block);
+  }
   stats.total_ms = ms_since(begin);
   return stats;
 }

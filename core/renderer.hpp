@@ -30,6 +30,11 @@ struct RendererOptions {
   /// How a pass's pairs are gathered by block.
   Grouping grouping = kDefaultGrouping;
   ClosestHit closest = kDefaultClosestHit;  ///< how a ray's closest result is found (pipeline `blocks`)
+  StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+  /// Bytes of one of its at most four buffers; 0: what the device allows.
+  std::uint64_t largest_stream_part = 0;
+  /// Blocks uploaded at a time from a volume on the host, at least 8; 0: by the size of cache and blocks.
+  std::uint32_t window_blocks = 0;
 };
 
 /// What one pass did: the counts of the device, and what follows from them.
@@ -44,7 +49,9 @@ struct FrameStats {
   std::vector<PassStats> passes;
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
-  bool cancelled = false;  ///< on_pass said so; the hit buffer holds the picture so far
+  std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
+  std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
+  bool cancelled = false;             ///< on_pass said so; the hit buffer holds the picture so far
 };
 
 /// Called after each pass, the last included; hits() and shade() show the picture so far. Return false to
@@ -59,11 +66,11 @@ class Renderer {
  public:
   /// Uploads the volume, builds its macrocell ranges and every buffer of the frame; nothing is allocated
   /// later. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
-  /// renderer; `volume` need not.
+  /// renderer; `volume` need not, unless it stays on the host (memory_plan().stream).
   Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
 
   /// Draws one frame and waits for it. Decoded blocks stay in the cache for the next frame, whatever its
-  /// isovalue.
+  /// isovalue. Throws Error when a mapped volume's file has become shorter; the next frame is drawn as if this had not been.
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
 
   /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture depends

@@ -1,21 +1,46 @@
 #include "core/zfp_decode.hpp"
 
+#include <limits>
+#include <stdexcept>
+
 namespace isowave {
 
 namespace {
+
 constexpr std::uint32_t kGroupSize = 64;
+
+ocl::Defines all_defines(ocl::Defines stream_defines) {
+  stream_defines.merge(group_defines(kGroupSize));
+  return stream_defines;
 }
 
-ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks)
-    : range_(ocl::Range::strided(max_blocks, kGroupSize, device)),
-      kernel_(device, "zfp_decode", "zfp_decode", group_defines(kGroupSize)) {}
+}  // namespace
+
+ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines)
+    : device_(device),
+      stream_defines_(stream_defines),
+      range_(ocl::Range::strided(max_blocks, kGroupSize, device)),
+      kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines)) {}
 
 void ZfpDecode::operator()(const DeviceStream &stream, const ocl::Buffer<FrameParams> &frame,
                            const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids,
                            const ocl::Buffer<uint> &slots, const ocl::Buffer<uint> &entries,
                            ocl::Buffer<float> &values, ocl::Buffer<BlockEntry> &table) {
-  kernel_(range_, frame, stream.words, stream.bits_per_block, counts, block_ids, slots, entries, values,
-          table);
+  if (stream.defines() != stream_defines_) {
+    throw std::invalid_argument("ZfpDecode was built for a stream in another number of parts");
+  }
+  if (!stream.window) {
+    kernel_(range_, frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3),
+            stream.blocks_per_part, stream.bits_per_block, 0, std::numeric_limits<uint>::max(), counts,
+            block_ids, slots, entries, values, table);
+    return;
+  }
+  stream.window->bring(stream.window->read_granted(counts, block_ids),
+                       [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
+                         kernel_(ocl::Range::strided(count, kGroupSize, device_), frame, words, words, words,
+                                 words, 0, stream.bits_per_block, first, first + count, counts, block_ids,
+                                 slots, entries, values, table);
+                       });
 }
 
 }  // namespace isowave

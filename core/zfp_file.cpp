@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "core/error.hpp"
+#include "core/io/mapped_file.hpp"
 #include "core/libzfp.hpp"
 
 namespace isowave {
@@ -92,24 +93,12 @@ class ZfpFileReader {
 
   CompressedVolume take_info() { return std::move(volume_); }
 
-  CompressedVolume take_all() {
-    const std::uint64_t payload_bits = volume_.block_count() * volume_.bits_per_block;
-    std::vector<std::uint32_t> &words = volume_.words;
-    // From the header's first bit, so that one pass reads all and the checksum covers it.
-    const std::uint64_t header_words = header_bits_ / 32, shift = header_bits_ % 32;
-    words.resize((stream_bytes_ + 3) / 4 + 2);
-    read_at(0, std::as_writable_bytes(std::span(words)).first(stream_bytes_));
-    if (has_trailer_ && update_crc(0, std::as_bytes(std::span(words)).first(stream_bytes_)) != stream_crc_) {
+  CompressedVolume take_mapped() {
+    volume_.file = std::make_shared<MappedFile>(path_, stream_bytes_);
+    volume_.file_first_bit = header_bits_;
+    if (has_trailer_ && update_crc(0, volume_.file->bytes()) != stream_crc_) {
       throw Error("{}: damaged: the checksum of its stream does not match", path_.string());
     }
-    const std::uint64_t num_words = (payload_bits + 31) / 32;
-    for (std::uint64_t i = 0; i < num_words; ++i) {
-      const std::uint64_t pair = words[i + header_words] | std::uint64_t(words[i + header_words + 1]) << 32;
-      words[i] = std::uint32_t(pair >> shift);
-    }
-    words.resize(num_words + 2);
-    if (payload_bits % 32 != 0) words[num_words - 1] &= (1u << payload_bits % 32) - 1;
-    words[num_words] = words[num_words + 1] = 0;
     return std::move(volume_);
   }
 
@@ -236,7 +225,16 @@ void ZfpFileWriter::commit(const CompressedVolume &volume) {
 }
 
 CompressedVolume read_zfp_file(const fs::path &path) {
-  return ZfpFileReader(path).take_all();
+  CompressedVolume volume = map_zfp_file(path);
+  std::vector<std::uint32_t> words(volume.word_count());
+  volume.file->check();
+  volume.read_words(0, words);
+  volume.words = std::move(words);
+  volume.file.reset();
+  return volume;
+}
+CompressedVolume map_zfp_file(const fs::path &path) {
+  return ZfpFileReader(path).take_mapped();
 }
 CompressedVolume read_zfp_file_info(const fs::path &path) {
   return ZfpFileReader(path).take_info();

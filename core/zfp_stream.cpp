@@ -14,6 +14,7 @@
 #include <stdexcept>
 
 #include "core/error.hpp"
+#include "core/io/mapped_file.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"
 #include "core/zfp_encode.hpp"
@@ -272,6 +273,38 @@ void add_findings(CompressedVolume &volume, const CompressOptions &options, cons
 
 }  // namespace
 
+std::uint64_t CompressedVolume::word_count() const {
+  return words.empty() ? (block_count() * bits_per_block + 31) / 32 + 2 : words.size();
+}
+
+void CompressedVolume::read_words(std::uint64_t bit, std::span<std::uint32_t> out) const {
+  const std::uint64_t end = block_count() * bits_per_block;
+  const std::uint64_t asked = 32 * std::uint64_t{out.size()},
+                      bits = bit < end ? std::min(asked, end - bit) : 0;
+  const std::span<const std::byte> bytes = file ? file->bytes() : std::as_bytes(std::span(words));
+  const std::uint64_t first = (file ? file_first_bit : 0) + bit, shift = first % 8;
+  const std::byte *source = bytes.data() + first / 8;
+  const std::uint64_t num_words = bits / 32;
+  if (shift == 0) {
+    std::memcpy(out.data(), source, num_words * sizeof(std::uint32_t));
+  } else {
+    for (std::uint64_t i = 0; i < num_words; ++i) {  // of every word, the fifth byte holds bits too
+      std::uint64_t five = 0;
+      std::memcpy(&five, source + i * sizeof(std::uint32_t), 5);
+      out[i] = std::uint32_t(five >> shift);
+    }
+  }
+  if (num_words == out.size()) return;
+  std::uint64_t last = 0;
+  const std::uint64_t left = bits % 32;
+  if (left != 0) {
+    std::memcpy(&last, source + num_words * sizeof(std::uint32_t), (shift + left + 7) / 8);
+    last = last >> shift & ((1ull << left) - 1);
+  }
+  out[num_words] = std::uint32_t(last);
+  std::ranges::fill(out.subspan(num_words + 1), 0u);
+}
+
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) {
   check_options(reader, options);
   CompressedVolume volume = describe(reader, options);
@@ -297,13 +330,14 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
 }
 
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume) {
-  // libzfp reads whole 64-bit words: two more keep its last read inside.
-  std::vector<std::uint64_t> words(volume.words.size() / 2 + 2);
-  std::memcpy(words.data(), volume.words.data(), volume.words.size() * sizeof(std::uint32_t));
+  // libzfp reads whole 64-bit words: four of 32 bits more keep its last read inside.
+  std::vector<std::uint32_t> words(volume.word_count() + 4);
+  if (volume.file) volume.file->check();
+  volume.read_words(0, words);
   const glm::uvec3 dims = volume.info.dims;
   std::vector<float> voxels(volume.info.num_voxels());
   const ZfpStream stream = make_zfp_stream(volume.bits_per_block);
-  const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint64_t)), &stream_close);
+  const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)), &stream_close);
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   const ZfpField field(zfp_field_3d(voxels.data(), zfp_type_float, dims.x, dims.y, dims.z), &zfp_field_free);
   if (zfp_decompress(stream.get(), field.get()) == 0) throw std::logic_error("zfp: cannot decode");

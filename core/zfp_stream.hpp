@@ -10,7 +10,9 @@
 #include <filesystem>
 #include <functional>
 #include <glm/glm.hpp>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +20,7 @@
 
 namespace isowave {
 
+class MappedFile;
 namespace ocl {
 class Device;
 }
@@ -45,7 +48,9 @@ struct CompressedVolume {
   VolumeInfo info;                   ///< type is that of the source before compression
   std::uint32_t bits_per_block = 0;  ///< 64 * rate; 9..2048 from other writers (1 + 8 bits hold the exponent)
   std::vector<std::uint32_t>
-      words;  ///< payload from bit 0, little endian; two zero words follow the last bit
+      words;  ///< payload from bit 0, little endian; two zero words follow the last bit; empty where file is set
+  std::shared_ptr<const MappedFile> file{};  ///< holds the payload instead of words ...
+  std::uint64_t file_first_bit = 0;          ///< ... from this bit on
   std::array<float, 2> value_range{};  ///< [min, max] of the source voxels, as float32 and after map_nan;
                                        ///< {-inf, inf} when unknown
   std::optional<double> max_error{};   ///< largest |decoded - source| when it was measured
@@ -56,6 +61,11 @@ struct CompressedVolume {
     return std::uint64_t(n.x) * n.y * n.z;
   }
   double rate() const { return bits_per_block / 64.0; }  ///< bits per voxel
+  /// Size of words, or what it would be.
+  std::uint64_t word_count() const;
+  /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its end. Reads a mapped file
+  /// without a look at its size: see MappedFile::check().
+  void read_words(std::uint64_t bit, std::span<std::uint32_t> out) const;
 };
 
 /// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file).
@@ -68,6 +78,9 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
 /// Reads a `.zfp` file of ours or any fixed-rate 3D float zfp file with a full header (spacing 1 then).
 /// Throws Error in one line on a broken header, other types or modes, truncation, checksum mismatch.
 CompressedVolume read_zfp_file(const std::filesystem::path &path);
+/// As read_zfp_file(), but leaves the payload in the file, which is mapped into memory: words stays empty. The checksum is
+/// checked once, here.
+CompressedVolume map_zfp_file(const std::filesystem::path &path);
 /// As read_zfp_file(), but neither reads nor checks the payload: words stays empty.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 

@@ -12,7 +12,7 @@
 /// >= isovalue (FrameParams.isovalue_index): some value may be below the isovalue iff low < a, and some at or
 /// above iff high >= a. Both: active. Coarse macrocells of 4^3 blocks hold the union of their blocks.
 #include "block_grid.h"
-#include "zfp_codec.h"
+#include "block_stream.h"
 
 typedef struct ValueRange {
   float min, max; /* min > max: empty */
@@ -25,17 +25,21 @@ inline ValueRange join(ValueRange a, ValueRange b) {
   return r;
 }
 
-/// partials [num_blocks * 8]: entry 8 b + m is the range of the block's voxels with x = 0 if m & 1, y = 0 if
-/// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is first_block + i * stride. Grid-stride.
-kernel void macrocell_partials(constant FrameParams *frame, global const uint *words, uint bits_per_block,
-                               uint first_block, uint stride, uint num_blocks, global ValueRange *partials) {
+/// partials [(first_partial + num_blocks) * 8]: entry 8 b + m is the range of the block's voxels with x = 0 if m & 1, y = 0 if
+/// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is first_block + i * stride and b is first_partial + i.
+/// part_0 .. bits_per_block: the zfp stream, see block_stream.h. Grid-stride.
+kernel void macrocell_partials(constant FrameParams *frame, global const uint *part_0,
+                               global const uint *part_1, global const uint *part_2,
+                               global const uint *part_3, uint blocks_per_part, uint bits_per_block,
+                               uint first_block, uint stride, uint num_blocks, uint first_partial,
+                               global ValueRange *partials) {
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
     const uint block_id = first_block + i * stride;
     const BlockCoords b = block_coords(frame, block_id);
     const uint size_x = min(4u, frame->dims_x - 4 * b.x), size_y = min(4u, frame->dims_y - 4 * b.y),
                size_z = min(4u, frame->dims_z - 4 * b.z);
     float values[ISO_BLOCK_VOXELS];
-    zfp_decode_block(words, (ulong)block_id * bits_per_block, bits_per_block, values);
+    decode_block(part_0, part_1, part_2, part_3, blocks_per_part, bits_per_block, block_id, i, values);
     for (uint lattice = 0; lattice < 8; ++lattice) {
       const uint end_x = lattice & 1 ? 1 : size_x, end_y = lattice & 2 ? 1 : size_y,
                  end_z = lattice & 4 ? 1 : size_z;
@@ -51,7 +55,7 @@ kernel void macrocell_partials(constant FrameParams *frame, global const uint *w
           }
         }
       }
-      partials[8 * i + lattice] = range;
+      partials[8 * (first_partial + i) + lattice] = range;
     }
   }
 }

@@ -61,6 +61,52 @@ TEST(CliRender, MemoryBudget) {
   EXPECT_EQ(test::read_file(folder / "least.npy"), test::read_file(folder / "ample.npy"));
 }
 
+/// A stream on the host, also where the budget is smaller than it: the same picture.
+TEST(CliRender, StreamOnTheHost) {
+  const TemporaryFolder folder;
+  const std::string file = quoted(folder / "n.zfp");
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 32 -o " + file).status, 0);
+  const std::uint64_t stream_bytes = 11 * 11 * 11 * 256;
+  const std::string command = file + " --isovalue 80 --size 40x30 --device cpu";
+  const auto outputs = [&](const std::string &name) {
+    return " -o " + quoted(folder / (name + ".png")) + " --depth " + quoted(folder / (name + ".npy")) +
+           " --no-stage-times --stats " + quoted(folder / (name + ".json"));
+  };
+  const auto expect_same = [&](const std::string &name, const char *place) {
+    for (const char *extension : {".png", ".npy"}) {
+      EXPECT_EQ(test::read_file(folder / (name + extension)),
+                test::read_file(folder / (std::string("device") + extension)))
+          << name;
+    }
+    const json stats = json::parse(test::read_file(folder / (name + ".json")));
+    EXPECT_EQ(stats["options"]["stream"], place);
+    const json &frame = stats["frames"][0];
+    std::uint64_t decoded = 0;
+    for (const json &pass : frame["per_pass"]) decoded += pass["decoded_blocks"].get<std::uint64_t>();
+    EXPECT_EQ(frame["uploaded_blocks"], std::string_view(place) == "host" ? decoded : 0);
+    EXPECT_EQ(frame["uploaded_bytes"], frame["uploaded_blocks"].get<std::uint64_t>() * 256);
+    return stats;
+  };
+  render(command + outputs("device"));
+  expect_same("device", "device");
+  for (const char *pipeline : {"blocks", "rays"}) {
+    const auto run = render(command + " --verbose --stream host --pipeline " + pipeline + outputs(pipeline));
+    EXPECT_NE(run.out.find("stays on the host: as asked for"), std::string::npos) << run.out;
+    expect_same(pipeline, "host");
+  }
+  const auto run = render(command + " --verbose --memory-budget 300kB" + outputs("tight"));
+  EXPECT_NE(run.out.find("stays on the host: it does not fit"), std::string::npos) << run.out;
+  const json stats = expect_same("tight", "host");
+  EXPECT_LT(stats["memory"]["peak"], 300'000);
+  EXPECT_LT(300'000u, stream_bytes) << "else this scene tests nothing";
+  const auto cut = std::filesystem::file_size(folder / "n.zfp") / 2;
+  std::filesystem::resize_file(folder / "n.zfp", cut);
+  const auto refused = run_isowave("render " + command + " --stream host");
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+  EXPECT_NE(refused.err.find("n.zfp: truncated"), std::string::npos) << refused.err;
+}
+
 TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   const TemporaryFolder folder;
   const auto run =
@@ -248,6 +294,7 @@ TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
   expect_refused(good + "--pipeline tube" + to, "pipeline");
   expect_refused(good + "--memory-budget much" + to, "memory-budget");
   expect_refused(good + "--grouping bubble" + to, "radix, counting");
+  expect_refused(good + "--stream tape" + to, "stream");
   expect_refused(good + "--closest farthest" + to, "scan, atomic-min");
   expect_refused(good + "--orbit 0" + to, "orbit");
   expect_refused(good + "--orbit 2 --cameras x.json" + to, "orbit");

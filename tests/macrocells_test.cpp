@@ -71,7 +71,7 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     FrameParams params = grid_frame(dims);
     ocl::Buffer<FrameParams> frame(device_, "frame", 1);
     const DeviceStream stream(device_, volume);
-    Macrocells macrocells(device_, frame, params, stream.words, stream.bits_per_block);
+    Macrocells macrocells(device_, frame, params, stream);
     const std::vector<Range> expected = dual_cell_ranges(dims, decode_with_libzfp(volume));
     expect_ranges(macrocells, expected);
 
@@ -243,7 +243,7 @@ TEST_P(MacrocellsOnDevice, Outliers) {
   FrameParams params = grid_frame(dims);
   ocl::Buffer<FrameParams> frame(device_, "frame", 1);
   const DeviceStream stream(device_, volume);
-  const Macrocells macrocells(device_, frame, params, stream.words, stream.bits_per_block);
+  const Macrocells macrocells(device_, frame, params, stream);
   const auto within =
       std::ranges::count_if(macrocells.thresholds(), [](float t) { return t > -1.0f && t < 100.0f; });
   EXPECT_GT(within, 200);

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/error.hpp"
 #include "core/renderer.hpp"
 #include "tests/frame_scene.hpp"
@@ -64,27 +66,93 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
   const TestVolume volume({30, 27, 33}, test::gyroid_field(10), 8);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   const auto expected = test::twin_hits(volume, camera, kSize, kIsovalue);
-  const MemoryRequest request{kSize.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
+    const MemoryRequest request{kSize.num_pixels(), GetParam().pipeline, GetParam().grouping, 64, place};
+    const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
+    std::uint32_t last_slots = 0;
+    for (const std::uint64_t budget : {least, least + 10'000, least + 50'000, least + 1'000'000}) {
+      SCOPED_TRACE(fmt::format("stream on {}, budget {}, least {}", to_string(place), budget, least));
+      ocl::Device device(GetParam().device);
+      Renderer renderer(device, volume.compressed,
+                        GetParam().with({.size = kSize, .memory_budget = budget, .stream = place}));
+      renderer.render(camera, kIsovalue);
+      test::expect_same_hits(renderer.hits(), expected, kSize.width);
+      renderer.shade();
+      expect_booked(device, renderer.memory_plan());
+      EXPECT_LE(device.ledger().peak(), budget);
+      EXPECT_EQ(renderer.memory_plan().stream, place);
+      const std::uint32_t slots = renderer.memory_plan().cache_slots;
+      EXPECT_EQ(renderer.options().cache_slots, slots);
+      EXPECT_TRUE(slots == volume.compressed.block_count() ||
+                  plan_memory(volume.compressed, request, slots + 1).peak() > budget)
+          << "a slot more would have done";
+      EXPECT_GE(slots, last_slots);
+      last_slots = slots;
+    }
+    EXPECT_EQ(last_slots, volume.compressed.block_count());
+  }
+}
+
+/// As the budget grows, the stream moves from the host to the device, once; the smallest budget is below the stream's size.
+TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
+  const TestVolume volume({30, 27, 33}, test::gyroid_field(10), 32);
+  const std::uint64_t stream_bytes = volume.compressed.word_count() * sizeof(uint);
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  const auto expected = test::twin_hits(volume, camera, kSize, kIsovalue);
+  const MemoryRequest request{kSize.num_pixels(), GetParam().pipeline, GetParam().grouping, 64,
+                              StreamPlace::kHost};
   const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
-  std::uint32_t last_slots = 0;
-  for (const std::uint64_t budget : {least, least + 10'000, least + 50'000, least + 1'000'000}) {
-    SCOPED_TRACE(fmt::format("budget {}, least {}", budget, least));
+  EXPECT_LT(least, stream_bytes) << "else this scene tests nothing";
+  std::vector<StreamPlace> places;
+  for (const std::uint64_t budget :
+       {least, stream_bytes - 1, least + stream_bytes, least + 2 * stream_bytes, least + 10 * stream_bytes}) {
+    SCOPED_TRACE(fmt::format("budget {}, least {}, stream {}", budget, least, stream_bytes));
     ocl::Device device(GetParam().device);
     Renderer renderer(device, volume.compressed, GetParam().with({.size = kSize, .memory_budget = budget}));
-    renderer.render(camera, kIsovalue);
+    const FrameStats stats = renderer.render(camera, kIsovalue);
     test::expect_same_hits(renderer.hits(), expected, kSize.width);
     renderer.shade();
     expect_booked(device, renderer.memory_plan());
     EXPECT_LE(device.ledger().peak(), budget);
-    const std::uint32_t slots = renderer.memory_plan().cache_slots;
-    EXPECT_EQ(renderer.options().cache_slots, slots);
-    EXPECT_TRUE(slots == volume.compressed.block_count() ||
-                plan_memory(volume.compressed, request, slots + 1).peak() > budget)
-        << "a slot more would have done";
-    EXPECT_GE(slots, last_slots);
-    last_slots = slots;
+    places.push_back(renderer.memory_plan().stream);
+    EXPECT_EQ(renderer.options().stream, places.back());
+    EXPECT_EQ(stats.uploaded_blocks != 0, places.back() == StreamPlace::kHost);
+    EXPECT_FALSE(renderer.memory_plan().reason.empty());
   }
-  EXPECT_EQ(last_slots, volume.compressed.block_count());
+  EXPECT_EQ(places.front(), StreamPlace::kHost);
+  EXPECT_EQ(places.back(), StreamPlace::kDevice);
+  EXPECT_TRUE(std::is_sorted(places.rbegin(), places.rend())) << "kDevice is below kHost";
+  ocl::Device device(GetParam().device);
+  EXPECT_THAT(refusal([&] {
+                Renderer(device, volume.compressed,
+                         GetParam().with({.size = kSize, .memory_budget = least - 1}));
+              }),
+              HasSubstr(fmt::format("{} would do", least)));
+}
+
+/// Slots that were asked for leave the choice to the budget too; a place that was asked for is never left.
+TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
+  const TestVolume volume({17, 18, 19}, test::noise_field(3), 32);
+  MemoryRequest request{kSize.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  const auto plan_of = [&](std::uint64_t budget, std::uint32_t slots) {
+    return plan_with_slots(volume.compressed, request, budget, slots);
+  };
+  const std::uint64_t on_device = plan_memory(volume.compressed, request, 10).peak();
+  EXPECT_EQ(plan_of(on_device, 10).stream, StreamPlace::kDevice);
+  EXPECT_EQ(plan_of(on_device, 10).peak(), on_device);
+  const MemoryPlan on_host = plan_of(on_device - 1, 10);
+  EXPECT_EQ(on_host.stream, StreamPlace::kHost);
+  EXPECT_EQ(on_host.window_blocks, 8u);
+  EXPECT_LT(on_host.peak(), on_device);
+  request.window_blocks = 200;  // more than the volume has
+  EXPECT_EQ(plan_of(on_device - 1, 10).stream, StreamPlace::kDevice);
+  request.window_blocks = 0;
+  request.largest_stream_part = 32 * 256 + 8;  // 125 blocks of 256 bytes: four parts
+  EXPECT_EQ(plan_of(~std::uint64_t(0), 10).stream, StreamPlace::kDevice);
+  request.largest_stream_part = 31 * 256 + 8;  // five
+  EXPECT_EQ(plan_of(~std::uint64_t(0), 10).stream, StreamPlace::kHost);
+  request.stream = StreamPlace::kDevice;
+  EXPECT_THAT(refusal([&] { plan_of(on_device, 10); }), HasSubstr("leave it on the host"));
 }
 
 TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) {

@@ -257,7 +257,7 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   const DeviceStream stream(device_, volume);
   FrameParams frame = case_frame(dims, camera_cases(dims)[0], {40, 30}, 3.0f);
   Wavefront rays(device_, 40 * 30);
-  Macrocells macrocells(device_, rays.frame, frame, stream.words, stream.bits_per_block);
+  Macrocells macrocells(device_, rays.frame, frame, stream);
   macrocells.select(rays.frame, frame);
   rays.frame.write({&frame, 1});
   const std::vector<uint> masks = macrocells.masks().read();

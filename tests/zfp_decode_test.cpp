@@ -220,8 +220,8 @@ TEST_P(ZfpDecodeOnDevice, BlocksBehind32BitsOfBits) {
   nothing.words.resize(1);
   nothing.bits_per_block = kBits;
   DeviceStream stream(device_, nothing);
-  stream.words = ocl::Buffer<uint>(device_, "long stream", bytes / 4 + 2);
-  stream.words.write(volume.words, std::size_t{kFirst} * kBits / 32);
+  stream.parts[0] = ocl::Buffer<uint>(device_, "long stream", bytes / 4 + 2);
+  stream.parts[0].write(volume.words, std::size_t{kFirst} * kBits / 32);
   const std::vector<uint> block_ids = {kFirst + 7, kFirst + 2}, slots = {1, 0};
   const ocl::Buffer<uint> d_block_ids(device_, "block ids", std::span<const uint>(block_ids)),
       d_slots(device_, "slots", std::span<const uint>(slots));

@@ -20,6 +20,10 @@ Error failure(const std::string &name, const char *action, const cl::Error &erro
   return Error("cannot {} buffer '{}': {}: {}", action, name, error.what(), error_name(error.err()));
 }
 
+std::vector<cl::Event> events_of(const cl::Event &event) {
+  return event() == nullptr ? std::vector<cl::Event>() : std::vector{event};
+}
+
 template <std::size_t kBytes>
 void enqueue_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern, std::size_t bytes,
                      std::size_t offset, cl::Event *event) {
@@ -147,6 +151,29 @@ void RawBuffer::read_bytes(void *dst, std::size_t bytes, std::size_t offset, boo
     if (!blocking) queue.flush();
   } catch (const cl::Error &error) {
     throw failure(name_, "read", error);
+  }
+}
+
+void RawBuffer::upload_bytes(const void *src, std::size_t bytes, const cl::Event &after, cl::Event &done) {
+  try {
+    const std::vector<cl::Event> waits = events_of(after);
+    device_->transfer_queue().enqueueWriteBuffer(mem_, CL_FALSE, 0, bytes, src, &waits, &done);
+    if (cl::Event *timed = device_->timer().next_event()) *timed = done;
+    device_->transfer_queue().flush();
+  } catch (const cl::Error &error) {
+    throw failure(name_, "upload", error);
+  }
+}
+
+void RawBuffer::download_bytes(void *dst, std::size_t bytes, std::size_t offset, const cl::Event &after,
+                               cl::Event &done) const {
+  try {
+    const std::vector<cl::Event> waits = events_of(after);
+    device_->transfer_queue().enqueueReadBuffer(mem_, CL_FALSE, offset, bytes, dst, &waits, &done);
+    if (cl::Event *timed = device_->timer().next_event()) *timed = done;
+    device_->transfer_queue().flush();
+  } catch (const cl::Error &error) {
+    throw failure(name_, "download", error);
   }
 }
 

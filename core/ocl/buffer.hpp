@@ -34,6 +34,10 @@ class RawBuffer {
   void write_bytes(const void *src, std::size_t bytes, std::size_t offset, bool blocking);
   /// Sets *event, where given, even for 0 bytes.
   void read_bytes(void *dst, std::size_t bytes, std::size_t offset, bool blocking, cl::Event *event) const;
+  /// On the transfer queue, which is flushed. A null `after` is no event to wait for.
+  void upload_bytes(const void *src, std::size_t bytes, const cl::Event &after, cl::Event &done);
+  void download_bytes(void *dst, std::size_t bytes, std::size_t offset, const cl::Event &after,
+                      cl::Event &done) const;
   void fill_bytes(const void *pattern, std::size_t pattern_bytes, std::size_t bytes, std::size_t offset);
   void check_range(std::size_t count, std::size_t offset, std::size_t size) const;
   /// count * element_bytes; SIZE_MAX, which no device has, instead of an overflow.
@@ -85,6 +89,17 @@ class Buffer : public RawBuffer {
   void read_async(std::span<T> out, cl::Event &event, std::size_t offset = 0) const {
     check_range(out.size(), offset, size());
     read_bytes(out.data(), out.size_bytes(), offset * sizeof(T), false, &event);
+  }
+  /// Host -> elements [0, data.size()), which is not 0, on the device's transfer queue, when `after` is complete, if it is an
+  /// event. Returns at once; `data` must live until `done` completes.
+  void upload(std::span<const T> data, const cl::Event &after, cl::Event &done) {
+    check_range(data.size(), 0, size());
+    upload_bytes(data.data(), data.size_bytes(), after, done);
+  }
+  /// Elements [offset, offset + out.size()), which is not 0, -> host, as upload().
+  void download(std::span<T> out, std::size_t offset, const cl::Event &after, cl::Event &done) const {
+    check_range(out.size(), offset, size());
+    download_bytes(out.data(), out.size_bytes(), offset * sizeof(T), after, done);
   }
   /// Sets elements [offset, offset + count) to `value`, in queue order. Does not wait.
   void fill(const T &value, std::size_t offset, std::size_t count) {

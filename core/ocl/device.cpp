@@ -84,6 +84,19 @@ Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(de
   }
 }
 
+cl::CommandQueue &Device::transfer_queue() {
+  if (transfer_queue_() != nullptr) return transfer_queue_;
+  try {
+    const cl_command_queue_properties properties =
+        timer_.source() == TimerSource::kEvents ? CL_QUEUE_PROFILING_ENABLE : 0;
+    transfer_queue_ = cl::CommandQueue(context_, device_, properties);
+  } catch (const cl::Error &error) {
+    throw Error("device '{}' gives no second queue: {}: {}", info_.name, error.what(),
+                error_name(error.err()));
+  }
+  return transfer_queue_;
+}
+
 const cl::Program &Device::program(std::string_view stem, const Defines &defines) {
   auto key = std::make_pair(std::string(stem), defines);
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
@@ -117,9 +130,12 @@ std::uint32_t Device::max_resident_groups() const {
 
 void Device::finish() {
   try {
-    // Mesa rusticl 22.3 waits only for what was enqueued since the last flush.
-    if (info_.platform == "rusticl") queue_.enqueueMarkerWithWaitList();
-    queue_.finish();
+    for (cl::CommandQueue *queue : {&transfer_queue_, &queue_}) {
+      if ((*queue)() == nullptr) continue;
+      // Mesa rusticl 22.3 waits only for what was enqueued since the last flush.
+      if (info_.platform == "rusticl") queue->enqueueMarkerWithWaitList();
+      queue->finish();
+    }
   } catch (const cl::Error &error) {
     throw Error("device '{}' failed: {}: {}", info_.name, error.what(), error_name(error.err()));
   }

@@ -1,5 +1,5 @@
 #pragma once
-// A device, its one in-order queue, its programs, its memory ledger and its stage timings.
+// A device, its in-order queues (one for work, one for transfers beside it), its programs, its memory ledger and its stage timings.
 //
 // Everything that talks to OpenCL goes through this folder. Objects are RAII; a Device must outlive its
 // buffers and kernels. Not thread-safe: one thread drives one Device.
@@ -69,6 +69,9 @@ class Device {
   const Capabilities &capabilities() const { return info_.capabilities; }
   const cl::Context &context() const { return context_; }
   cl::CommandQueue &queue() { return queue_; }
+  /// A second in-order queue, made when it is first asked for: for transfers that overlap with the work of queue(). Events
+  /// order the two. Throws Error.
+  cl::CommandQueue &transfer_queue();
   MemoryLedger &ledger() { return ledger_; }
   StageTimer &timer() { return timer_; }
 
@@ -79,14 +82,14 @@ class Device {
   /// Work-groups that keep the device busy: what a grid-stride kernel should launch at most.
   std::uint32_t max_resident_groups() const;
 
-  /// Waits for everything enqueued.
+  /// Waits for everything enqueued, on both queues.
   void finish();
 
  private:
   DeviceInfo info_;
   cl::Device device_;
   cl::Context context_;
-  cl::CommandQueue queue_;
+  cl::CommandQueue queue_, transfer_queue_;
   MemoryLedger ledger_;
   StageTimer timer_;
   std::map<std::pair<std::string, Defines>, cl::Program> programs_;

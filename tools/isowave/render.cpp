@@ -170,7 +170,7 @@ nlohmann::ordered_json volume_json(const Options &options, const CompressedVolum
           {"type", to_string(info.type)},
           {"rate", volume.rate()},
           {"blocks", volume.block_count()},
-          {"stream_bytes", volume.words.size() * sizeof(std::uint32_t)}};
+          {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
 }
 
 /// Outputs go to folders that exist, but for --progress-dir, which is made. Found out before any work is
@@ -201,7 +201,12 @@ std::unique_ptr<ocl::Device> open_device(const Options &options) {
   return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
 }
 
-void print_plan(const MemoryPlan &plan) {
+void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
+  fmt::print("the compressed volume of {} bytes stays on the {}: {}\n",
+             with_commas(volume.word_count() * sizeof(std::uint32_t)), to_string(plan.stream), plan.reason);
+  if (plan.stream == StreamPlace::kHost) {
+    fmt::print("its blocks are uploaded through a window, {} at a time\n", with_commas(plan.window_blocks));
+  }
   for (const MemoryPlan::Buffer &buffer : plan.buffers) {
     fmt::print("  {:>16} bytes  {}\n", with_commas(buffer.bytes), buffer.name);
   }
@@ -231,7 +236,7 @@ void run_render(Options options) {
   } else {
     DeviceFrames frames(*device, scene, appearance, options.renderer);
     options.renderer = frames.renderer().options();
-    if (options.verbose) print_plan(frames.renderer().memory_plan());
+    if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());
     document["options"] = options_json(options, scene);
     document["setup_ms"] = frames.renderer().setup_ms();

@@ -67,6 +67,8 @@ ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera, 
                          {"passes", stats.passes.size()},
                          {"total_ms", stats.total_ms},
                          {"rays_hit", stats.rays_hit},
+                         {"uploaded_blocks", stats.uploaded_blocks},
+                         {"uploaded_bytes", stats.uploaded_bytes},
                          {"cancelled", stats.cancelled}};
   ordered_json passes = ordered_json::array();
   for (const PassStats &pass : stats.passes) passes.push_back(pass_json(pass));

@@ -24,6 +24,12 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
                  "decoded blocks kept on the device, at least 8 [as many as the budget allows; without one "
                  "2^20 or all]")
       ->check(CLI::Range(8u, 1u << 30));
+  app.add_option(
+         "--stream", flags.stream,
+         "where the compressed volume is: device, host (blocks are uploaded when they are asked for), or "
+         "auto (on the device if that leaves room for a useful cache)")
+      ->check(CLI::IsMember({"auto", "device", "host"}))
+      ->capture_default_str();
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
   app.add_option("--grouping", flags.grouping, "how pipeline blocks gathers rays by block: radix or counting")
@@ -45,6 +51,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
   options.per_ray_speculation = flags.speculation == "per-ray";
   options.solver = solver_from_string(flags.solver);
   options.grouping = grouping_from_string(flags.grouping);
+  options.stream = stream_place_from_string(flags.stream);
   options.closest = closest_hit_from_string(flags.closest);
   return options;
 }
@@ -56,7 +63,8 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
   return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
           {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
           {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
-          {"closest", to_string(options.closest)},      {"group_size", options.group_size}};
+          {"closest", to_string(options.closest)},      {"group_size", options.group_size},
+          {"stream", to_string(options.stream)}};
 }
 
 }  // namespace isowave::tools

@@ -11,7 +11,7 @@ namespace isowave::tools {
 
 struct RendererFlags {
   std::string pipeline = "auto", speculation = "per-ray", solver{to_string(kDefaultSolver)};
-  std::string grouping{to_string(kDefaultGrouping)}, closest{to_string(kDefaultClosestHit)};
+  std::string grouping{to_string(kDefaultGrouping)}, closest{to_string(kDefaultClosestHit)}, stream = "auto";
   RendererOptions values;
 };
 
@@ -20,7 +20,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags);
 /// Throws Error on a solver, grouping or way to the closest hit that there is not.
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
-/// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size.
+/// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size, stream.
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options);
 
 }  // namespace isowave::tools

@@ -98,7 +98,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
                              ocl::Device *device) {
   if (is_zfp_name(path)) {
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
-    CompressedVolume volume = read_zfp_file(path);
+    CompressedVolume volume = map_zfp_file(path);
     if (overrides.spacing) volume.info.spacing = *overrides.spacing;
     check_volume_info(volume.info, path);
     return volume;

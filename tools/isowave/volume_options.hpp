@@ -37,7 +37,7 @@ inline constexpr const char *kVolumeHelp =
 
 /// Whether the name ends in .zfp.
 bool is_zfp_name(const std::string &path);
-/// Reads a .zfp file (its spacing may be overridden), or compresses any other volume at `rate` bits per
+/// Maps a .zfp file into memory (its spacing may be overridden), or compresses any other volume at `rate` bits per
 /// voxel, on `device` where one is given. Clears that device's stage times.
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate,
                              ocl::Device *device = nullptr);

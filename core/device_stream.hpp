@@ -1,0 +1,52 @@
+#pragma once
+// The compressed volume as decoding kernels see it (kernels_cl/block_stream.h): whole on the device, in as many buffers as
+// its largest allocation demands, or on the host, behind a window.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/ocl/kernel.hpp"
+#include "core/stream_window.hpp"
+#include "core/zfp_stream.hpp"
+
+namespace isowave {
+
+/// OpenCL promises that a buffer may have a quarter of a device's memory.
+inline constexpr std::uint32_t kMaxStreamParts = 4;
+
+/// How a volume's words are cut so that no buffer is too large. No block straddles a cut, which is at a whole word.
+struct StreamSplit {
+  std::uint32_t num_parts = 0;        ///< 1..4; 0: more would be needed
+  std::uint32_t blocks_per_part = 0;  ///< the last may have fewer
+  std::vector<std::uint64_t>
+      words{};  ///< of each part: the next part's first two are at its end, for decoders that read ahead
+};
+/// largest_part: bytes.
+StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part);
+
+/// The tag of a stream that stays on the host.
+struct OnHost {
+  std::uint32_t window_blocks = 0;  ///< see StreamWindow
+};
+
+class DeviceStream {
+ public:
+  /// Uploads the whole volume and waits. largest_part: bytes of a buffer at most; 0: what the device allows. Throws Error when
+  /// four such buffers do not hold it.
+  DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part = 0);
+  /// Leaves the volume on the host, where it must outlive the stream.
+  DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host);
+
+  /// For kernels that include block_stream.h.
+  ocl::Defines defines() const;
+  /// Buffer i of 0..3 of a whole stream; where there are fewer, the first.
+  const ocl::Buffer<uint> &part(std::size_t i) const { return parts[i < parts.size() ? i : 0]; }
+
+  std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none where the volume stays on the host
+  std::unique_ptr<StreamWindow> window;  ///< where the volume stays on the host
+  std::uint32_t blocks_per_part = 0;
+  std::uint32_t bits_per_block;  ///< 9..2048
+};
+
+}  // namespace isowave

@@ -1,0 +1,33 @@
+#include "core/ocl/pinned_buffer.hpp"
+
+#include <algorithm>
+
+#include "core/error.hpp"
+
+namespace isowave::ocl {
+
+PinnedBuffer::PinnedBuffer(Device &device, std::string name, std::size_t count)
+    : device_(device), name_(std::move(name)) {
+  const std::size_t bytes = count * sizeof(std::uint32_t);
+  try {
+    mem_ = cl::Buffer(device.context(), CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, bytes);
+    void *mapped = device.queue().enqueueMapBuffer(mem_, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE, 0, bytes);
+    words_ = {static_cast<std::uint32_t *>(mapped), count};
+    device.ledger().add(name_, bytes);
+  } catch (const cl::Error &error) {
+    throw Error("device '{}' cannot allocate {} bytes for '{}': {}: {}", device.info().name, bytes, name_,
+                error.what(), error_name(error.err()));
+  }
+  std::ranges::fill(words_, 0u);  // drivers allocate lazily
+}
+
+PinnedBuffer::~PinnedBuffer() {
+  device_.ledger().remove(name_, words_.size_bytes());
+  try {
+    device_.queue().enqueueUnmapMemObject(mem_, words_.data());
+    device_.queue().finish();
+  } catch (...) {  // a lost device: its memory is gone too
+  }
+}
+
+}  // namespace isowave::ocl

@@ -1,0 +1,34 @@
+#pragma once
+// Host memory that a device can copy from without help of the processor, so that transfers overlap with work.
+
+#include <CL/opencl.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "core/ocl/device.hpp"
+
+namespace isowave::ocl {
+
+/// 32-bit words. Booked in the device's ledger all the same: a driver may keep a copy on the device, and some devices share
+/// the host's memory.
+class PinnedBuffer {
+ public:
+  /// `count` is not 0. Throws Error when there is no such memory.
+  PinnedBuffer(Device &device, std::string name, std::size_t count);
+  /// No transfer from or to the words may be under way.
+  ~PinnedBuffer();
+  PinnedBuffer(const PinnedBuffer &) = delete;
+  PinnedBuffer &operator=(const PinnedBuffer &) = delete;
+
+  std::span<std::uint32_t> words() const { return words_; }
+
+ private:
+  Device &device_;
+  std::string name_;
+  cl::Buffer mem_;
+  std::span<std::uint32_t> words_;
+};
+
+}  // namespace isowave::ocl

@@ -1,0 +1,64 @@
+#pragma once
+// The way of blocks to the device when the compressed volume stays on the host: gathered into pinned memory, uploaded on a
+// second queue into one half of a window, and decoded from there while the other half is filled.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/device_counts.hpp"
+#include "core/ocl/pinned_buffer.hpp"
+#include "core/zfp_stream.hpp"
+
+namespace isowave {
+
+class StreamWindow {
+ public:
+  /// window_blocks: what one half holds, at least 1. `volume` must outlive the window.
+  StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks);
+  /// Waits for uploads under way.
+  ~StreamWindow();
+  StreamWindow(const StreamWindow &) = delete;
+  StreamWindow &operator=(const StreamWindow &) = delete;
+
+  /// Words of one block in the window: it begins with a whole word.
+  static std::uint32_t words_per_block(std::uint32_t bits_per_block) { return (bits_per_block + 31) / 32; }
+  /// Words of one half and of its staging memory. Decoders read two words past their block.
+  static std::uint64_t half_words(std::uint32_t bits_per_block, std::uint64_t window_blocks) {
+    return window_blocks * words_per_block(bits_per_block) + 2;
+  }
+
+  /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in `words`.
+  using Use = std::function<void(const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count)>;
+  /// Brings blocks to the device, as many at a time as fit, and calls `use` for each of these runs, in order. Waits for the
+  /// uploads of all runs but the last two; the rest is asynchronous. Throws Error when the volume's file has become shorter.
+  void bring(std::span<const uint> block_ids, const Use &use);
+
+  /// The first counts.decoded_count of block_ids. Waits for all that is enqueued before. Valid until the next call.
+  std::span<const uint> read_granted(const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids);
+
+  std::uint64_t uploaded_blocks() const { return uploaded_blocks_; }  ///< since it was made
+
+ private:
+  struct Half {
+    ocl::Buffer<uint> words;
+    ocl::PinnedBuffer staging;
+    cl::Event uploaded;  ///< staging may be filled again
+    cl::Event used;      ///< words may be overwritten
+  };
+
+  void gather(std::span<const uint> block_ids, std::span<uint> words) const;
+
+  ocl::Device &device_;
+  const CompressedVolume &volume_;
+  std::uint32_t window_blocks_;
+  std::array<Half, 2> halves_;
+  std::size_t next_half_ = 0;
+  std::uint64_t uploaded_blocks_ = 0;
+  PassCounts counts_{};        ///< read_granted() reads them here,
+  std::vector<uint> granted_;  ///< and the list here
+};
+
+}  // namespace isowave
