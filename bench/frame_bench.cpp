@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
-#include <glm/gtc/quaternion.hpp>
 #include <optional>
 #include <utility>
 
@@ -29,6 +28,7 @@ struct Options {
   std::optional<float> isovalue;
   std::uint32_t rate = 4, orbit = 10, rounds = 3;
   std::vector<std::uint32_t> size = {1280, 720};
+  bool resident = true;
   tools::RendererFlags renderer;
 };
 
@@ -39,29 +39,6 @@ float isovalue_of(const Options &options, const CompressedVolume &volume) {
   if (!std::isfinite(middle))
     throw Error("{} does not say its range of values: give --isovalue", options.volume);
   return middle;
-}
-
-/// The camera one degree further around the vertical through the point it looks at.
-Camera turned(Camera camera) {
-  const glm::dquat turn = glm::angleAxis(glm::radians(1.0), glm::normalize(camera.up));
-  camera.eye = camera.at + turn * (camera.eye - camera.at);
-  return camera;
-}
-
-std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras, float isovalue,
-                                     std::uint32_t rounds) {
-  // A driver may compile a kernel when it first runs; the first frame also finds the isovalue's blocks.
-  renderer.render(cameras.front(), isovalue);
-  std::vector<ViewTimes> views(cameras.size());
-  for (std::uint32_t round = 0; round < rounds; ++round) {
-    for (std::size_t view = 0; view < cameras.size(); ++view) {
-      renderer.clear_cache();
-      views[view].cold.push_back(renderer.render(cameras[view], isovalue));
-      views[view].warm.push_back(renderer.render(cameras[view], isovalue));
-      views[view].next.push_back(renderer.render(turned(cameras[view]), isovalue));
-    }
-  }
-  return views;
 }
 
 /// On a device of its own, so that the memory reported is that of drawing.
@@ -87,22 +64,34 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, R
   return views;
 }
 
-FrameReport measure(const Options &options, std::string command) {
-  const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
-  CompressedVolume volume = load(options, device_info);
-  const std::vector<Camera> cameras = orbit_cameras(volume.info, options.orbit);
+/// What does not depend on measurements.
+FrameReport make_report(const Options &options, const CompressedVolume &volume, std::string command) {
   FrameReport report;
   report.command = std::move(command);
   report.volume = options.volume;
+  report.grid.info = volume.info;
+  report.grid.bits_per_block = volume.bits_per_block;
   report.isovalue = isovalue_of(options, volume);
   report.options = tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1)});
+  report.num_views = options.orbit;
   report.rounds = options.rounds;
+  return report;
+}
+
+FrameReport measure(const Options &options, std::string command) {
+  const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
+  const CompressedVolume volume = load(options, device_info);
+  const std::vector<Camera> cameras = orbit_cameras(volume.info, options.orbit);
+  FrameReport report = make_report(options, volume, std::move(command));
+  std::vector<HitRecord> first_hits;
   {
     ocl::Device device(device_info);
     Renderer renderer(device, volume, report.options);
     report.run_info = run_info(device);
     report.options = renderer.options();
     report.setup_ms = renderer.setup_ms();
+    renderer.render(cameras.front(), report.isovalue);
+    first_hits = renderer.hits();
     report.views = measure_views(renderer, cameras, report.isovalue, options.rounds);
     report.peak_bytes = device.ledger().peak();
     report.memory = tools::memory_json(device.ledger());
@@ -113,9 +102,17 @@ FrameReport measure(const Options &options, std::string command) {
     report.stage_clock = clock_name(device.timer().source());
     report.stage_ms = measure_stages(device, renderer, cameras, report.isovalue);
   }
-  volume.words.clear();
-  report.grid = std::move(volume);
+  if (options.resident) {
+    report.floor = measure_floor(device_info, volume, report.options, cameras, report.isovalue,
+                                 options.rounds, first_hits);
+  }
   return report;
+}
+
+void run(const Options &options, const std::string &command) {
+  const FrameReport report = measure(options, command);
+  print_report(report);
+  if (!options.json.empty()) tools::write_json(to_json(report), options.json);
 }
 
 void add_options(CLI::App &app, Options &options) {
@@ -132,6 +129,8 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("--rounds", options.rounds, "times that every view is drawn")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
+  app.add_flag("!--no-resident", options.resident,
+               "leave out the floor: the whole volume decoded, one kernel");
   app.add_option("--device", options.device,
                  "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
   tools::add_renderer_options(app, options.renderer);
@@ -148,10 +147,7 @@ int main(int argc, char **argv) {
   isowave::bench::add_options(app, options);
   try {
     app.parse(argc, argv);
-    const std::string command = fmt::format("{}", fmt::join(argv, argv + argc, " "));
-    const isowave::bench::FrameReport report = isowave::bench::measure(options, command);
-    isowave::bench::print_report(report);
-    if (!options.json.empty()) isowave::tools::write_json(isowave::bench::to_json(report), options.json);
+    isowave::bench::run(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
     return 0;
   } catch (const CLI::Success &help) {
     return app.exit(help);
