@@ -1,5 +1,5 @@
 // frame_bench: whole frames of one volume from an orbit of cameras. Total times without profiling; a second
-// run with profiling gives the milliseconds per stage.
+// run with profiling gives the milliseconds per stage. With --budgets: the total times at several memory budgets.
 
 #include <fmt/format.h>
 
@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "bench/budget_sweep.hpp"
 #include "bench/frame_report.hpp"
 #include "bench/run_info.hpp"
 #include "core/error.hpp"
@@ -23,10 +24,10 @@ namespace isowave::bench {
 namespace {
 
 struct Options {
-  std::string volume, device, json;
+  std::string volume, device, json, budgets;
   tools::VolumeOptions volume_options;
   std::optional<float> isovalue;
-  std::uint32_t rate = 4, orbit = 10, rounds = 3;
+  std::uint32_t rate = 4, orbit = 10, rounds = 3, max_passes = 2000;
   std::vector<std::uint32_t> size = {1280, 720};
   bool resident = true;
   tools::RendererFlags renderer;
@@ -109,10 +110,49 @@ FrameReport measure(const Options &options, std::string command) {
   return report;
 }
 
+/// "auto:N", or bytes separated by commas.
+std::vector<std::uint64_t> budgets_of(const Options &options, const ocl::DeviceInfo &device_info,
+                                      const CompressedVolume &volume, const RendererOptions &renderer) {
+  constexpr std::string_view kAuto = "auto:";
+  if (renderer.memory_budget != 0 || renderer.cache_slots != 0)
+    throw Error("--budgets stands for --memory-budget and --cache-slots: give it alone");
+  if (options.budgets.starts_with(kAuto)) {
+    std::uint32_t count = 0;
+    if (!CLI::detail::lexical_cast(options.budgets.substr(kAuto.size()), count) || count < 2 || count > 1000)
+      throw Error("--budgets {}: auto:N makes 2 to 1000 budgets", options.budgets);
+    return geometric_budgets(device_info, volume, renderer, count);
+  }
+  std::vector<std::uint64_t> budgets;
+  for (std::string text : CLI::detail::split(options.budgets, ',')) {
+    const std::string error = CLI::AsSizeValue(true)(text);
+    if (!error.empty() || !CLI::detail::lexical_cast(text, budgets.emplace_back()) || budgets.back() == 0)
+      throw Error("--budgets {}: '{}' is no number of bytes", options.budgets, text);
+  }
+  return budgets;
+}
+
+BudgetSweep measure_budgets(const Options &options, std::string command) {
+  const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
+  const CompressedVolume volume = load(options, device_info);
+  FrameReport common = make_report(options, volume, std::move(command));
+  std::vector<std::uint64_t> budgets = budgets_of(options, device_info, volume, common.options);
+  return sweep_budgets(device_info, volume, std::move(common), std::move(budgets), options.max_passes,
+                       options.resident);
+}
+
+/// Prints one report or the other, and writes it where asked.
 void run(const Options &options, const std::string &command) {
-  const FrameReport report = measure(options, command);
-  print_report(report);
-  if (!options.json.empty()) tools::write_json(to_json(report), options.json);
+  nlohmann::ordered_json json;
+  if (options.budgets.empty()) {
+    const FrameReport report = measure(options, command);
+    print_report(report);
+    json = to_json(report);
+  } else {
+    const BudgetSweep sweep = measure_budgets(options, command);
+    print_sweep(sweep);
+    json = to_json(sweep);
+  }
+  if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
 void add_options(CLI::App &app, Options &options) {
@@ -134,6 +174,14 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("--device", options.device,
                  "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
   tools::add_renderer_options(app, options.renderer);
+  app.add_option(
+      "--budgets", options.budgets,
+      "draw the same orbit at each of these memory budgets, e.g. 200MB,400MB,1GB, or auto:N for N from "
+      "the smallest to an ample one, in equal ratios of cache slots; the pictures must be the same");
+  app.add_option("--max-passes", options.max_passes,
+                 "of --budgets: a budget at which a frame takes more is not timed")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--json", options.json, "also write everything to this file");
 }
 
