@@ -1,5 +1,5 @@
 // frame_bench: whole frames of one volume from an orbit of cameras. Total times without profiling; a second
-// run with profiling gives the milliseconds per stage.
+// run with profiling gives the milliseconds per stage. With --budgets: the total times at several memory budgets.
 
 #include <fmt/format.h>
 
@@ -7,10 +7,10 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
-#include <glm/gtc/quaternion.hpp>
 #include <optional>
 #include <utility>
 
+#include "bench/budget_sweep.hpp"
 #include "bench/frame_report.hpp"
 #include "bench/run_info.hpp"
 #include "core/error.hpp"
@@ -24,11 +24,12 @@ namespace isowave::bench {
 namespace {
 
 struct Options {
-  std::string volume, device, json;
+  std::string volume, device, json, budgets;
   tools::VolumeOptions volume_options;
   std::optional<float> isovalue;
-  std::uint32_t rate = 4, orbit = 10, rounds = 3;
+  std::uint32_t rate = 4, orbit = 10, rounds = 3, max_passes = 2000;
   std::vector<std::uint32_t> size = {1280, 720};
+  bool resident = true;
   tools::RendererFlags renderer;
 };
 
@@ -39,29 +40,6 @@ float isovalue_of(const Options &options, const CompressedVolume &volume) {
   if (!std::isfinite(middle))
     throw Error("{} does not say its range of values: give --isovalue", options.volume);
   return middle;
-}
-
-/// The camera one degree further around the vertical through the point it looks at.
-Camera turned(Camera camera) {
-  const glm::dquat turn = glm::angleAxis(glm::radians(1.0), glm::normalize(camera.up));
-  camera.eye = camera.at + turn * (camera.eye - camera.at);
-  return camera;
-}
-
-std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras, float isovalue,
-                                     std::uint32_t rounds) {
-  // A driver may compile a kernel when it first runs; the first frame also finds the isovalue's blocks.
-  renderer.render(cameras.front(), isovalue);
-  std::vector<ViewTimes> views(cameras.size());
-  for (std::uint32_t round = 0; round < rounds; ++round) {
-    for (std::size_t view = 0; view < cameras.size(); ++view) {
-      renderer.clear_cache();
-      views[view].cold.push_back(renderer.render(cameras[view], isovalue));
-      views[view].warm.push_back(renderer.render(cameras[view], isovalue));
-      views[view].next.push_back(renderer.render(turned(cameras[view]), isovalue));
-    }
-  }
-  return views;
 }
 
 /// On a device of its own, so that the memory reported is that of drawing.
@@ -87,22 +65,34 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, R
   return views;
 }
 
-FrameReport measure(const Options &options, std::string command) {
-  const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
-  CompressedVolume volume = load(options, device_info);
-  const std::vector<Camera> cameras = orbit_cameras(volume.info, options.orbit);
+/// What does not depend on measurements.
+FrameReport make_report(const Options &options, const CompressedVolume &volume, std::string command) {
   FrameReport report;
   report.command = std::move(command);
   report.volume = options.volume;
+  report.grid.info = volume.info;
+  report.grid.bits_per_block = volume.bits_per_block;
   report.isovalue = isovalue_of(options, volume);
   report.options = tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1)});
+  report.num_views = options.orbit;
   report.rounds = options.rounds;
+  return report;
+}
+
+FrameReport measure(const Options &options, std::string command) {
+  const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
+  const CompressedVolume volume = load(options, device_info);
+  const std::vector<Camera> cameras = orbit_cameras(volume.info, options.orbit);
+  FrameReport report = make_report(options, volume, std::move(command));
+  std::vector<HitRecord> first_hits;
   {
     ocl::Device device(device_info);
     Renderer renderer(device, volume, report.options);
     report.run_info = run_info(device);
     report.options = renderer.options();
     report.setup_ms = renderer.setup_ms();
+    renderer.render(cameras.front(), report.isovalue);
+    first_hits = renderer.hits();
     report.views = measure_views(renderer, cameras, report.isovalue, options.rounds);
     report.peak_bytes = device.ledger().peak();
     report.memory = tools::memory_json(device.ledger());
@@ -113,9 +103,56 @@ FrameReport measure(const Options &options, std::string command) {
     report.stage_clock = clock_name(device.timer().source());
     report.stage_ms = measure_stages(device, renderer, cameras, report.isovalue);
   }
-  volume.words.clear();
-  report.grid = std::move(volume);
+  if (options.resident) {
+    report.floor = measure_floor(device_info, volume, report.options, cameras, report.isovalue,
+                                 options.rounds, first_hits);
+  }
   return report;
+}
+
+/// "auto:N", or bytes separated by commas.
+std::vector<std::uint64_t> budgets_of(const Options &options, const ocl::DeviceInfo &device_info,
+                                      const CompressedVolume &volume, const RendererOptions &renderer) {
+  constexpr std::string_view kAuto = "auto:";
+  if (renderer.memory_budget != 0 || renderer.cache_slots != 0)
+    throw Error("--budgets stands for --memory-budget and --cache-slots: give it alone");
+  if (options.budgets.starts_with(kAuto)) {
+    std::uint32_t count = 0;
+    if (!CLI::detail::lexical_cast(options.budgets.substr(kAuto.size()), count) || count < 2 || count > 1000)
+      throw Error("--budgets {}: auto:N makes 2 to 1000 budgets", options.budgets);
+    return geometric_budgets(device_info, volume, renderer, count);
+  }
+  std::vector<std::uint64_t> budgets;
+  for (std::string text : CLI::detail::split(options.budgets, ',')) {
+    const std::string error = CLI::AsSizeValue(true)(text);
+    if (!error.empty() || !CLI::detail::lexical_cast(text, budgets.emplace_back()) || budgets.back() == 0)
+      throw Error("--budgets {}: '{}' is no number of bytes", options.budgets, text);
+  }
+  return budgets;
+}
+
+BudgetSweep measure_budgets(const Options &options, std::string command) {
+  const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
+  const CompressedVolume volume = load(options, device_info);
+  FrameReport common = make_report(options, volume, std::move(command));
+  std::vector<std::uint64_t> budgets = budgets_of(options, device_info, volume, common.options);
+  return sweep_budgets(device_info, volume, std::move(common), std::move(budgets), options.max_passes,
+                       options.resident);
+}
+
+/// Prints one report or the other, and writes it where asked.
+void run(const Options &options, const std::string &command) {
+  nlohmann::ordered_json json;
+  if (options.budgets.empty()) {
+    const FrameReport report = measure(options, command);
+    print_report(report);
+    json = to_json(report);
+  } else {
+    const BudgetSweep sweep = measure_budgets(options, command);
+    print_sweep(sweep);
+    json = to_json(sweep);
+  }
+  if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
 void add_options(CLI::App &app, Options &options) {
@@ -132,9 +169,19 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("--rounds", options.rounds, "times that every view is drawn")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
+  app.add_flag("!--no-resident", options.resident,
+               "leave out the floor: the whole volume decoded, one kernel");
   app.add_option("--device", options.device,
                  "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
   tools::add_renderer_options(app, options.renderer);
+  app.add_option(
+      "--budgets", options.budgets,
+      "draw the same orbit at each of these memory budgets, e.g. 200MB,400MB,1GB, or auto:N for N from "
+      "the smallest to an ample one, in equal ratios of cache slots; the pictures must be the same");
+  app.add_option("--max-passes", options.max_passes,
+                 "of --budgets: a budget at which a frame takes more is not timed")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--json", options.json, "also write everything to this file");
 }
 
@@ -148,10 +195,7 @@ int main(int argc, char **argv) {
   isowave::bench::add_options(app, options);
   try {
     app.parse(argc, argv);
-    const std::string command = fmt::format("{}", fmt::join(argv, argv + argc, " "));
-    const isowave::bench::FrameReport report = isowave::bench::measure(options, command);
-    isowave::bench::print_report(report);
-    if (!options.json.empty()) isowave::tools::write_json(isowave::bench::to_json(report), options.json);
+    isowave::bench::run(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
     return 0;
   } catch (const CLI::Success &help) {
     return app.exit(help);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ctime>
 #include <set>
 
 #include "bench/run_info.hpp"
@@ -14,17 +13,6 @@ namespace isowave::bench {
 namespace {
 
 using nlohmann::ordered_json;
-
-/// Median, least and most.
-struct Spread {
-  double median = 0, min = 0, max = 0;
-};
-
-Spread spread_of(const std::vector<double> &values) {
-  if (values.empty()) return {};
-  const auto [min, max] = std::minmax_element(values.begin(), values.end());
-  return {median(values), *min, *max};
-}
 
 /// A value of every frame of the list.
 template <class Value>
@@ -94,20 +82,10 @@ double column_of(const FrameReport &report, const ViewTimes &view, const Column 
   return median(each(view.cold, [&](const FrameStats &frame) { return column.value(report, frame); }));
 }
 
-/// All frames of one kind.
-std::vector<double> all_times(const FrameReport &report, std::vector<FrameStats> ViewTimes::*kind) {
-  std::vector<double> times;
-  for (const ViewTimes &view : report.views) {
-    for (const FrameStats &frame : view.*kind) times.push_back(frame.total_ms);
-  }
-  return times;
-}
-
-constexpr std::pair<const char *, std::vector<FrameStats> ViewTimes::*> kKinds[] = {
-    {"cold", &ViewTimes::cold}, {"warm", &ViewTimes::warm}, {"next", &ViewTimes::next}};
-
-std::string spread_text(const Spread &spread) {
-  return fmt::format("{:.1f} ({:.1f}..{:.1f})", spread.median, spread.min, spread.max);
+/// How many times the floor a kind of frame takes, of the medians.
+double over_floor(const FloorTimes &floor, const std::vector<ViewTimes> &views,
+                  std::vector<FrameStats> ViewTimes::*kind) {
+  return median(all_times(views, kind)) / median(floor.all());
 }
 
 void print_row(const std::string &name, const std::vector<std::string> &cells) {
@@ -138,7 +116,7 @@ void print_views(const FrameReport &report) {
   }
   std::vector<std::string> cells;
   for (const auto &[kind, member] : kKinds)
-    cells.push_back(spread_text(spread_of(all_times(report, member))));
+    cells.push_back(spread_text(spread_of(all_times(report.views, member))));
   for (std::size_t c = 0; c < columns.size(); ++c) {
     cells.push_back(fmt::format("{:.{}f}", median(columns[c]), kColumns[c].precision));
   }
@@ -179,17 +157,44 @@ ordered_json frame_json(const FrameReport &report, const FrameStats &frame) {
   return json;
 }
 
-ordered_json spread_json(const Spread &spread) {
-  return {{"median", spread.median}, {"min", spread.min}, {"max", spread.max}};
+}  // namespace
+
+std::string spread_text(const Spread &spread) {
+  const int precision = spread.median < 100 ? 2 : 1;
+  return fmt::format("{:.{}f} ({:.{}f}..{:.{}f})", spread.median, precision, spread.min, precision,
+                     spread.max, precision);
 }
 
-std::string utc_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  gmtime_r(&now, &parts);
-  char text[32];
-  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text;
+void print_run(const FrameReport &report) {
+  const glm::uvec3 dims = report.grid.info.dims;
+  fmt::print("{}\n", report.command);
+  for (const auto &[name, value] : report.run_info) fmt::print("  {:<16}{}\n", name, value);
+  fmt::print("  {:<16}{} x {} x {} {}, {} blocks, rate {}, isovalue {}\n", "volume", dims.x, dims.y, dims.z,
+             to_string(report.grid.info.type), report.grid.block_count(), report.grid.rate(),
+             report.isovalue);
+  fmt::print("  {:<16}{} x {}, {} views, {} rounds, N_spec up to {}\n", "frames", report.options.size.width,
+             report.options.size.height, report.num_views, report.rounds, report.options.max_speculation);
+}
+
+void print_floor(const FrameReport &report, const std::vector<ViewTimes> &views) {
+  if (!report.floor) return;
+  if (report.floor->ms.empty()) {
+    fmt::print("resident floor not measured: {}\n", report.floor->why_not);
+    return;
+  }
+  fmt::print("resident floor {} ms:", spread_text(spread_of(report.floor->all())));
+  for (const auto &[kind, member] : kKinds)
+    fmt::print(" {} is {:.2f} times that{}", kind, over_floor(*report.floor, views, member),
+               member == &ViewTimes::next ? "\n" : ",");
+}
+
+ordered_json floor_json(const FrameReport &report, const std::vector<ViewTimes> &views) {
+  if (!report.floor || report.floor->ms.empty()) return nullptr;
+  ordered_json json = spread_json(spread_of(report.floor->all()));
+  for (const auto &[kind, member] : kKinds)
+    json["over_floor"][kind] = over_floor(*report.floor, views, member);
+  json["frames"] = report.floor->ms;
+  return json;
 }
 
 ordered_json options_json(const FrameReport &report) {
@@ -202,33 +207,26 @@ ordered_json options_json(const FrameReport &report) {
       {"isovalue", report.isovalue},
       {"width", report.options.size.width},
       {"height", report.options.size.height},
-      {"views", report.views.size()},
+      {"views", report.num_views},
       {"rounds", report.rounds}};
   json.update(tools::renderer_options_json(report.options));
   return json;
 }
 
-}  // namespace
-
 void print_report(const FrameReport &report) {
-  const glm::uvec3 dims = report.grid.info.dims;
-  fmt::print("{}\n", report.command);
-  for (const auto &[name, value] : report.run_info) fmt::print("  {:<16}{}\n", name, value);
-  fmt::print("  {:<16}{} x {} x {} {}, {} blocks, rate {}, isovalue {}\n", "volume", dims.x, dims.y, dims.z,
-             to_string(report.grid.info.type), report.grid.block_count(), report.grid.rate(),
-             report.isovalue);
-  fmt::print("  {:<16}{} x {}, {} views, {} rounds, {} cache slots, N_spec up to {}\n", "frames",
-             report.options.size.width, report.options.size.height, report.views.size(), report.rounds,
-             report.options.cache_slots, report.options.max_speculation);
+  print_run(report);
+  fmt::print("  {:<16}{} slots\n", "cache", report.options.cache_slots);
   fmt::print("  {:<16}{:.1f} MiB at most; setup {:.0f} ms\n\n", "device memory",
              double(report.peak_bytes) / (1 << 20), report.setup_ms);
   print_views(report);
+  print_floor(report, report.views);
   fmt::print(
       "Times are wall clock, median (min..max) over the rounds, and in the last row over views and rounds.\n"
       "cold: nothing decoded before; warm: the same view again; next: then one degree further. The other\n"
       "columns are a cold frame's. visible: blocks with rays, summed over the passes, of all blocks; "
       "decoded:\n"
-      "blocks; N_spec: median over the passes; util: intersected ray-block pairs per pass, of all pixels.\n");
+      "blocks; N_spec: median over the passes; util: intersected ray-block pairs per pass, of all pixels. "
+      "resident\nfloor: the whole volume decoded, one kernel, no cache.\n");
   print_stages(report);
 }
 
@@ -237,13 +235,14 @@ ordered_json to_json(const FrameReport &report) {
   for (const auto &[name, value] : report.run_info) json["context"][name] = value;
   json["options"] = options_json(report);
   for (const auto &[kind, member] : kKinds) {
-    json["total_ms"][kind] = spread_json(spread_of(all_times(report, member)));
+    json["total_ms"][kind] = spread_json(spread_of(all_times(report.views, member)));
   }
   for (const Column &column : kColumns) {
     std::vector<double> values;
     for (const ViewTimes &view : report.views) values.push_back(column_of(report, view, column));
     json["median"][column.json_name] = median(values);
   }
+  json["resident_floor"] = floor_json(report, report.views);
   json["stage_clock"] = report.stage_clock;
   for (const auto &[stage, ms] : times_by_stage(report)) json["stage_ms"][stage] = spread_json(spread_of(ms));
   json["setup_ms"] = report.setup_ms;

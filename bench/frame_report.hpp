@@ -3,20 +3,15 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "core/renderer.hpp"
+#include "bench/frame_measure.hpp"
+#include "bench/run_info.hpp"
 
 namespace isowave::bench {
-
-/// One view, drawn once per round. Without profiling.
-struct ViewTimes {
-  std::vector<FrameStats> cold;  ///< nothing decoded before
-  std::vector<FrameStats> warm;  ///< the same view again
-  std::vector<FrameStats> next;  ///< then one degree further around the volume
-};
 
 struct FrameReport {
   std::string command;
@@ -25,8 +20,9 @@ struct FrameReport {
   CompressedVolume grid;  ///< without its words
   float isovalue = 0;
   RendererOptions options;
-  std::uint32_t rounds = 0;
+  std::uint32_t num_views = 0, rounds = 0;
   std::vector<ViewTimes> views;
+  std::optional<FloorTimes> floor;  ///< if asked for
   std::string stage_clock;
   std::vector<std::map<std::string, double>> stage_ms;  ///< per view: a cold frame's stages, with profiling
   double setup_ms = 0;
@@ -38,5 +34,15 @@ struct FrameReport {
 void print_report(const FrameReport &report);
 
 nlohmann::ordered_json to_json(const FrameReport &report);
+
+// Parts of both, for other reports.
+/// Command, device, volume and frames.
+void print_run(const FrameReport &report);
+nlohmann::ordered_json options_json(const FrameReport &report);
+/// views: those to compare with the floor. null where there is no floor.
+void print_floor(const FrameReport &report, const std::vector<ViewTimes> &views);
+nlohmann::ordered_json floor_json(const FrameReport &report, const std::vector<ViewTimes> &views);
+/// "1.23 (1.10..1.30)".
+std::string spread_text(const Spread &spread);
 
 }  // namespace isowave::bench

@@ -1,6 +1,7 @@
 #pragma once
 // What a number was measured on and with: part of every JSON that bench/ writes.
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,5 +18,15 @@ std::string clock_name(ocl::TimerSource source);
 
 /// Middle of the sorted values, the mean of both middles for an even count; 0 of none.
 double median(std::vector<double> values);
+
+/// Median, least and most; 0 of none.
+struct Spread {
+  double median = 0, min = 0, max = 0;
+};
+Spread spread_of(const std::vector<double> &values);
+nlohmann::ordered_json spread_json(const Spread &spread);
+
+/// "2026-11-21T09:30:00Z": now.
+std::string utc_now();
 
 }  // namespace isowave::bench

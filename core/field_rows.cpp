@@ -61,6 +61,13 @@ double plane(const glm::dvec3 &p) {
   return 0.5 + (kX * p.x + kY * p.y + kZ * p.z) / (2 * (kX + kY + kZ));
 }
 
+double shell(const glm::dvec3 &p) {
+  constexpr double kRadius = 0.8, kBend = 0.02, kHalfWidth = 0.12;
+  const double bend = std::sin(5 * p.x + 1) + std::sin(6 * p.y + 2) + std::sin(7 * p.z + 3);
+  const double s = std::clamp((kRadius - length(p) + kBend * bend) / kHalfWidth, -1.0, 1.0);
+  return (128 + 127 * s * (3 - s * s) / 2) / 255;
+}
+
 }  // namespace
 
 std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims, std::uint64_t seed) {
@@ -77,6 +84,8 @@ std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims, 
       return make_analytic(dims, gyroid);
     case Field::kMixingLayer:
       return make_mixing_layer(dims, seed);
+    case Field::kShell:
+      return make_analytic(dims, shell);
   }
   throw std::invalid_argument("make_field_rows: unknown field");
 }

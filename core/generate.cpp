@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 6> kFieldNames{"sphere",         "plane",  "saddle",
-                                                      "marschner_lobb", "gyroid", "mixing_layer"};
+constexpr std::array<std::string_view, 7> kFieldNames{"sphere", "plane",        "saddle", "marschner_lobb",
+                                                      "gyroid", "mixing_layer", "shell"};
 constexpr std::uint64_t kChunkBytes = 1u << 24;
 
 VolumeInfo info_of(const GenerateOptions &options) {
@@ -145,7 +145,8 @@ std::string_view to_string(Field field) {
 Field field_from_string(std::string_view name) {
   const auto found = std::find(kFieldNames.begin(), kFieldNames.end(), name);
   if (found != kFieldNames.end()) return Field(found - kFieldNames.begin());
-  throw Error("unknown field '{}': use sphere, plane, saddle, marschner_lobb, gyroid or mixing_layer", name);
+  throw Error("unknown field '{}': use sphere, plane, saddle, marschner_lobb, gyroid, mixing_layer or shell",
+              name);
 }
 
 std::vector<std::string> field_names() {

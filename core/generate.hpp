@@ -13,9 +13,12 @@
 //   gyroid          0.5 + (sin X cos Y + sin Y cos Z + sin Z cos X) / 3, (X, Y, Z) = 4 pi p
 //   mixing_layer    a smooth step across the mid-plane of y, displaced and wrinkled by octaves of gradient
 //                   noise; the surface at 0.5 is a turbulent mixing layer. Larger volumes get finer octaves.
+//   shell           one closed, smooth surface: (128 + 127 s (3 - s^2) / 2) / 255, s = d / 0.12 clamped to [-1, 1],
+//                   d = 0.8 - |p| + 0.02 (sin(5 x + 1) + sin(6 y + 2) + sin(7 z + 3)): a bent sphere of 0.4 of the volume's
+//                   longest edge, inside where d > 0. As uint8 it is at 128. A function of p alone: the same at any size.
 //
 // The same field, dims, type and seed give the same bytes for any number of threads. mixing_layer, plane,
-// sphere and saddle use correctly rounded operations only and are the same on every machine; the other two
+// sphere and saddle use correctly rounded operations only and are the same on every machine; the other three
 // use the C library's sin and cos.
 
 #include <cstdint>
@@ -29,9 +32,9 @@
 
 namespace isowave {
 
-enum class Field { kSphere, kPlane, kSaddle, kMarschnerLobb, kGyroid, kMixingLayer };
+enum class Field { kSphere, kPlane, kSaddle, kMarschnerLobb, kGyroid, kMixingLayer, kShell };
 
-/// "sphere", "plane", "saddle", "marschner_lobb", "gyroid", "mixing_layer".
+/// "sphere", "plane", "saddle", "marschner_lobb", "gyroid", "mixing_layer", "shell".
 std::string_view to_string(Field field);
 /// Throws Error naming the fields.
 Field field_from_string(std::string_view name);

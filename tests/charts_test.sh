@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# A small run of `isowave bench solvers`, and tools/charts of it and of what is no such file.
-#   charts_test.sh PROGRAM
+# Small runs of `isowave bench solvers` and of `frame_bench --budgets`, and tools/charts of them and of what is no such file.
+#   charts_test.sh PROGRAM [FRAME_BENCH]
 set -euo pipefail
-program=$1
+program=$1 frame_bench=${2-}
 top=$(cd "$(dirname "$0")/.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -37,3 +37,44 @@ for bad in "$work/none.raw:1" "$top/tests/data/fuel_64x33x32_uint8.raw.gz" "$wor
   if "$program" bench solvers "$bad" 2>"$work/error" >/dev/null; then fail "$bad was accepted"; fi
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
+
+[ -n "$frame_bench" ] || exit 0
+# sweep ARGUMENT...: a small volume at several budgets, to sweep.json.
+volume=generate:gyroid_32x32x32_uint8
+sweep() {
+  "$frame_bench" "$volume" --size 48x32 --orbit 2 --rounds 2 --json "$work/sweep.json" "$@" >"$work/out"
+}
+sweep --budgets auto:4
+"$top/tools/charts" "$work/sweep.json" -o "$work"
+for file in sweep_budgets.png sweep_budgets.svg; do
+  [ -s "$work/$file" ] || fail "$file is missing"
+done
+/usr/bin/python3 - "$work/sweep.json" <<'EOF'
+import json, sys
+document = json.load(open(sys.argv[1]))
+budgets = document["budgets"]
+slots = [b["cache_slots"] for b in budgets]
+assert len(slots) == 4 and slots[0] == 512 and slots == sorted(slots, reverse=True), budgets
+for budget in budgets:
+    assert budget["peak_bytes"] <= budget["bytes"], budget
+    for kind in ("cold_ms", "warm_ms", "next_ms"):
+        assert 0 < budget[kind]["min"] <= budget[kind]["median"] <= budget[kind]["max"], budget
+assert budgets[0]["passes"] < budgets[-1]["passes"], "the smallest cache takes more passes"
+assert document["resident_floor"]["median"] > 0
+EOF
+sweep --budgets auto:3 --max-passes 8 --no-resident
+/usr/bin/python3 - "$work/sweep.json" <<'EOF'
+import json, sys
+document = json.load(open(sys.argv[1]))
+assert document["budgets"][-1]["cold_ms"] is None and document["budgets"][0]["cold_ms"] is not None, document
+assert document["resident_floor"] is None
+EOF
+grep -q 'more than 8 passes' "$work/out" || fail "a budget without times: $(cat "$work/out")"
+"$top/tools/charts" "$work/sweep.json" -o "$work"
+sweep --budgets 1MiB,700KB
+[ "$(grep -c '^ *[0-9]* ' "$work/out")" -ge 2 ] || fail "a list of budgets: $(cat "$work/out")"
+for bad in auto:1 auto:x auto: 1MB,x 0 1KB; do
+  if sweep --budgets "$bad" 2>"$work/error"; then fail "--budgets $bad was accepted"; fi
+  [ "$(wc -l <"$work/error")" -eq 1 ] || fail "--budgets $bad: $(cat "$work/error")"
+done
+if sweep --budgets auto:2 --cache-slots 8 2>"$work/error"; then fail "--budgets with --cache-slots was accepted"; fi

@@ -32,6 +32,7 @@ row() {
 }
 
 # Files of both kinds. google FILE NAME=MS,MS.. [NAME=MS~SPREAD%] [NAME=failed]; frames FILE MS,MS,MS (the rounds) GROUP_MS
+# [FLOOR_MS or null]
 cat >write.py <<'END'
 import json, statistics, sys
 kind, path, *rest = sys.argv[1:]
@@ -57,6 +58,9 @@ else:
                 "total_ms": {"cold": spread, "warm": spread}, "frames": frames, "setup_ms": 7.0,
                 "stage_ms": {"group": {"median": group, "min": 0.9 * group, "max": 1.1 * group}},
                 "median": {"passes": 3, "decoded_blocks": 100}, "memory": {"peak": 1 << 20}}
+    if len(rest) > 2:
+        floor = json.loads(rest[2])
+        document["resident_floor"] = floor and {"median": floor, "frames": 3 * [[0.9 * floor, floor, 1.1 * floor]]}
 json.dump(document, open(path, "w"))
 END
 write() { /usr/bin/python3 write.py "$@"; }
@@ -106,6 +110,15 @@ write frames slow.json 20,21,22 0.8
 compare 2 radix.json slow.json --fail
 row frame/warm '10.2 +21 +2.059 +\(1.923..2.200\) +slower'
 
+write frames floor.json 20,21,22 0.8 5
+write frames floorless.json 20,21,22 0.8 null
+compare 0 floor.json floor.json
+row 'resident floor' '5 +5 +1.000 +\(0.818..1.222\)'
+compare 0 slow.json floor.json # of before the floor
+grep -q 'only in floor.json: resident floor$' out || fail "the floor of NEW alone: $(cat out)"
+compare 0 floor.json floorless.json --fail
+grep -q 'only in floor.json: resident floor$' out || fail "the floor of OLD alone: $(cat out)"
+
 # ---- files that cannot be compared
 echo '{' >broken.json
 echo '[]' >list.json
@@ -135,6 +148,10 @@ if [ $# -eq 2 ]; then
   compare 0 real_frames.json real_frames.json --fail
   row frame/cold '.* 1.000 .*'
   row stage/march '.* 1.000'
+  row 'resident floor' '.* 1.000 .*'
+  "$1" generate:gyroid_16x16x16_uint8 --size 32x24 --orbit 2 --no-resident --json no_resident.json >out
+  ! grep -q '^resident floor' out || fail "--no-resident: $(cat out)"
+  compare 0 real_frames.json no_resident.json
   "$2" --benchmark_filter='scan/exclusive/entries:450' --benchmark_out=real_stages.json >/dev/null 2>&1
   compare 0 real_stages.json real_stages.json --fail
   row 'scan/exclusive/entries:450[^ ]*' '.* 1.000 .*'

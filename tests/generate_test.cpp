@@ -21,8 +21,9 @@ using test::TemporaryFolder;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-constexpr std::array<Field, 6> kFields{Field::kSphere,        Field::kPlane,  Field::kSaddle,
-                                       Field::kMarschnerLobb, Field::kGyroid, Field::kMixingLayer};
+constexpr std::array<Field, 7> kFields{Field::kSphere,        Field::kPlane,  Field::kSaddle,
+                                       Field::kMarschnerLobb, Field::kGyroid, Field::kMixingLayer,
+                                       Field::kShell};
 
 std::vector<float> generate(const GenerateOptions &options) {
   const auto reader = open_generated(options);
@@ -135,6 +136,43 @@ TEST(Generate, MixingLayerMixesOnlyInTheMiddle) {
     }
   }
   EXPECT_GT(double(crossings) / (96 * 96), 1.3) << "the surface should fold over";
+}
+
+TEST(Generate, ShellIsTheSameSmoothSurfaceAtAnySize) {
+  const auto surface = [](const glm::dvec3 &p) {  // d of generate.hpp
+    return 0.8 - glm::length(p) +
+           0.02 * (std::sin(5 * p.x + 1) + std::sin(6 * p.y + 2) + std::sin(7 * p.z + 3));
+  };
+  for (const std::uint32_t edge : {33u, 65u, 129u}) {
+    SCOPED_TRACE(edge);
+    const auto voxels = generate(make_options(Field::kShell, glm::uvec3(edge), VoxelType::kUint8));
+    const auto at = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+      return voxels[(std::size_t{z} * edge + y) * edge + x];
+    };
+    EXPECT_EQ(at(edge / 2, edge / 2, edge / 2), 255.0f);
+    const double voxel = 2.0 / (edge - 1);
+    std::size_t crossings = 0;
+    for (std::uint32_t z = 0; z < edge; ++z) {
+      for (std::uint32_t y = 0; y < edge; ++y) {
+        for (std::uint32_t x = 0; x < edge; ++x) {
+          const double d = surface(glm::dvec3(x, y, z) * voxel - 1.0);
+          // 128 is the surface: beside it the step rises by 127 * 1.5 / 0.12 per unit, which 8 bits can tell.
+          const float value = at(x, y, z);
+          if (std::abs(d) > 0.001) {
+            ASSERT_EQ(value >= 128.0f, d > 0) << x << " " << y << " " << z;
+          }
+          if (std::abs(d) > 0.121) {
+            ASSERT_EQ(value, d > 0 ? 255.0f : 1.0f);
+          }
+          const bool border = x == 0 || y == 0 || z == 0 || x + 1 == edge || y + 1 == edge || z + 1 == edge;
+          ASSERT_FALSE(border && value >= 128.0f) << "closed: no surface at the border";
+          if (x > 0) crossings += (value >= 128.0f) != (at(x - 1, y, z) >= 128.0f);
+        }
+      }
+    }
+    // Convex enough that a line along x crosses twice or never: twice the area of the silhouette, pi * (0.4 edges)^2 bent.
+    EXPECT_NEAR(double(crossings) / (edge * edge), 2 * 3.14159265 * 0.16, 0.1);
+  }
 }
 
 TEST(Generate, RefusesBadRequests) {

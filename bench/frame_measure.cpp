@@ -1,0 +1,72 @@
+#include "bench/frame_measure.hpp"
+
+#include <cstring>
+#include <glm/gtc/quaternion.hpp>
+
+#include "core/error.hpp"
+#include "core/resident.hpp"
+
+namespace isowave::bench {
+
+std::vector<double> all_times(const std::vector<ViewTimes> &views, std::vector<FrameStats> ViewTimes::*kind) {
+  std::vector<double> times;
+  for (const ViewTimes &view : views) {
+    for (const FrameStats &frame : view.*kind) times.push_back(frame.total_ms);
+  }
+  return times;
+}
+
+Camera turned(Camera camera) {
+  const glm::dquat turn = glm::angleAxis(glm::radians(1.0), glm::normalize(camera.up));
+  camera.eye = camera.at + turn * (camera.eye - camera.at);
+  return camera;
+}
+
+std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras, float isovalue,
+                                     std::uint32_t rounds) {
+  std::vector<ViewTimes> views(cameras.size());
+  for (std::uint32_t round = 0; round < rounds; ++round) {
+    for (std::size_t view = 0; view < cameras.size(); ++view) {
+      renderer.clear_cache();
+      views[view].cold.push_back(renderer.render(cameras[view], isovalue));
+      views[view].warm.push_back(renderer.render(cameras[view], isovalue));
+      views[view].next.push_back(renderer.render(turned(cameras[view]), isovalue));
+    }
+  }
+  return views;
+}
+
+std::vector<double> FloorTimes::all() const {
+  std::vector<double> times;
+  for (const std::vector<double> &view : ms) times.insert(times.end(), view.begin(), view.end());
+  return times;
+}
+
+FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVolume &volume,
+                         const RendererOptions &options, const std::vector<Camera> &cameras, float isovalue,
+                         std::uint32_t rounds, const std::vector<HitRecord> &first_hits) {
+  ocl::Device device(device_info);
+  FloorTimes times;
+  if (const auto obstacle = Resident::obstacle(device, volume, options.size)) {
+    times.why_not = *obstacle;
+    return times;
+  }
+  Resident resident(device, volume, options.size, options.solver);
+  resident.render(cameras.front(), isovalue);
+  if (!same_hits(resident.hits(), first_hits)) {
+    throw Error("the resident floor draws another picture than the renderer: its time means nothing");
+  }
+  times.ms.resize(cameras.size());
+  for (std::uint32_t round = 0; round < rounds; ++round) {
+    for (std::size_t view = 0; view < cameras.size(); ++view) {
+      times.ms[view].push_back(resident.render(cameras[view], isovalue));
+    }
+  }
+  return times;
+}
+
+bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(HitRecord)) == 0;
+}
+
+}  // namespace isowave::bench

@@ -1,0 +1,51 @@
+#pragma once
+// Whole frames of one renderer, and of the floor, against the clock. Without profiling.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/renderer.hpp"
+
+namespace isowave::bench {
+
+/// One view, drawn once per round.
+struct ViewTimes {
+  std::vector<FrameStats> cold;  ///< nothing decoded before
+  std::vector<FrameStats> warm;  ///< the same view again
+  std::vector<FrameStats> next;  ///< then one degree further around the volume
+};
+
+/// The kinds of frames by name.
+inline constexpr std::pair<const char *, std::vector<FrameStats> ViewTimes::*> kKinds[] = {
+    {"cold", &ViewTimes::cold}, {"warm", &ViewTimes::warm}, {"next", &ViewTimes::next}};
+
+/// ms of all frames of one kind.
+std::vector<double> all_times(const std::vector<ViewTimes> &views, std::vector<FrameStats> ViewTimes::*kind);
+
+/// The camera one degree further around the vertical through the point it looks at.
+Camera turned(Camera camera);
+
+/// The renderer must have drawn a frame of the isovalue before: a driver may compile a kernel when it first runs, and an
+/// isovalue's first frame finds its blocks.
+std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras, float isovalue,
+                                     std::uint32_t rounds);
+
+/// Whole volume decoded, one kernel (core/resident.hpp).
+struct FloorTimes {
+  std::vector<std::vector<double>> ms;  ///< [views][rounds]; empty if not measured
+  std::string why_not;                  ///< one line, if not measured
+
+  std::vector<double> all() const;
+};
+
+/// On a device of its own: nothing else should be on it. first_hits: the picture from cameras.front(), which the floor must
+/// draw too; throws Error if it differs.
+FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVolume &volume,
+                         const RendererOptions &options, const std::vector<Camera> &cameras, float isovalue,
+                         std::uint32_t rounds, const std::vector<HitRecord> &first_hits);
+
+/// Every bit.
+bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b);
+
+}  // namespace isowave::bench

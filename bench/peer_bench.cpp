@@ -1,0 +1,306 @@
+// peer_bench: a new isovalue, and further frames of it, by our renderer and by what one would take instead: VTK's Flying
+// Edges and Embree. Each side lives in a process of its own, warm; they draw in turns.
+//
+//   peer_bench [--dims 256 512] [--rounds 5] [--isovalues 126,128,130] --json peer.json
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "bench/peer_sides.hpp"
+#include "bench/run_info.hpp"
+#include "core/error.hpp"
+#include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::bench {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+struct Options {
+  std::vector<std::uint32_t> dims = {256, 512};
+  std::string volume, device, json;
+  std::string side;  ///< of a child process
+  std::uint32_t rate = 4, rounds = 5;
+  std::vector<float> isovalues = {126, 128, 130};
+  std::vector<std::uint32_t> size = {1280, 720};
+};
+
+constexpr std::array<const char *, 4> kSides = {"rays", "blocks", "mesh_low", "mesh_medium"};
+
+/// VmHWM of /proc/self/status [bytes]: the most memory that the process has had since reset_peak().
+std::uint64_t peak_memory() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
+  }
+  return 0;
+}
+
+/// So that loading the volume does not count.
+void reset_peak() {
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+// ---- a child: reads an isovalue a line, answers a line of JSON
+
+std::unique_ptr<PeerSide> make_side(const Options &options) {
+  CompressedVolume volume = tools::load_volume(options.volume, {}, options.rate);
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  const ImageSize size{options.size.at(0), options.size.at(1)};
+  if (options.side.starts_with("mesh"))
+    return make_mesh_side(std::move(volume), camera, size, options.side == "mesh_medium");
+  return make_renderer_side(std::move(volume), camera, size,
+                            options.side == "rays" ? PipelineKind::kRays : PipelineKind::kBlocks,
+                            options.device);
+}
+
+void serve(const Options &options) {
+  const auto side = make_side(options);
+  reset_peak();
+  std::cout << "{}" << std::endl;  // ready
+  for (float isovalue = 0; std::cin >> isovalue;) {
+    Measured measured = side->draw(isovalue);
+    measured["peak_byte_count"] = static_cast<double>(peak_memory());
+    std::cout << ordered_json(measured).dump() << std::endl;
+  }
+}
+
+// ---- the parent
+
+/// A process that runs this program as one side.
+class Child {
+ public:
+  Child(const std::string &program, std::vector<std::string> arguments) {
+    std::array<int, 2> to_child{}, from_child{};
+    if (pipe(to_child.data()) != 0 || pipe(from_child.data()) != 0)
+      throw Error("no pipe for a child process");
+    arguments.insert(arguments.begin(), program);
+    pid_ = fork();
+    if (pid_ == 0) {
+      dup2(to_child[0], STDIN_FILENO);
+      dup2(from_child[1], STDOUT_FILENO);
+      for (const int end : {to_child[0], to_child[1], from_child[0], from_child[1]}) close(end);
+      std::vector<char *> argv;
+      argv.reserve(arguments.size() + 1);
+      for (std::string &argument : arguments) argv.push_back(argument.data());
+      argv.push_back(nullptr);
+      execv("/proc/self/exe", argv.data());
+      _exit(127);
+    }
+    close(to_child[0]);
+    close(from_child[1]);
+    in_ = fdopen(from_child[0], "r");
+    out_ = fdopen(to_child[1], "w");
+    if (pid_ < 0 || in_ == nullptr || out_ == nullptr) throw Error("cannot start a child process");
+  }
+  ~Child() {
+    std::fclose(out_);  // the end of its input ends the child
+    std::fclose(in_);
+    waitpid(pid_, nullptr, 0);
+  }
+  Child(const Child &) = delete;
+  Child &operator=(const Child &) = delete;
+
+  /// Its next line. Throws Error when it has ended.
+  Measured answer() {
+    std::string line;
+    for (int c = 0; (c = std::fgetc(in_)) != '\n';) {
+      if (c == EOF) throw Error("a side ended before its answer");
+      line += static_cast<char>(c);
+    }
+    return nlohmann::json::parse(line).get<Measured>();
+  }
+
+  Measured draw(float isovalue) {
+    fmt::print(out_, "{}\n", isovalue);
+    std::fflush(out_);
+    return answer();
+  }
+
+ private:
+  pid_t pid_ = -1;
+  std::FILE *in_ = nullptr, *out_ = nullptr;
+};
+
+/// Name -> its values in every round.
+using Samples = std::map<std::string, std::vector<double>>;
+
+std::array<double, 3> load_average() {
+  std::array<double, 3> load{};
+  if (getloadavg(load.data(), 3) != 3) load.fill(-1);
+  return load;
+}
+
+/// One size: rounds x isovalues, in turns that change their order. The first turn of each isovalue is not counted.
+ordered_json measure(const Options &options, const std::string &program, const std::string &volume) {
+  std::array<std::unique_ptr<Child>, kSides.size()> children;
+  const auto load_before = load_average();
+  for (std::size_t side = 0; side < kSides.size(); ++side) {
+    children[side] = std::make_unique<Child>(
+        program, std::vector<std::string>{"--side", kSides[side], "--volume", volume, "--device",
+                                          options.device, "--rate", std::to_string(options.rate), "--size",
+                                          fmt::format("{}x{}", options.size.at(0), options.size.at(1))});
+    children[side]->answer();
+  }
+  std::array<Samples, kSides.size()> samples;
+  std::size_t turn = 0;
+  for (std::uint32_t round = 0; round <= options.rounds; ++round) {
+    for (const float isovalue : options.isovalues) {
+      std::array<double, kSides.size()> hits{};
+      for (std::size_t i = 0; i < kSides.size(); ++i) {
+        const std::size_t side = (turn + i) % kSides.size();
+        for (const auto &[name, value] : children[side]->draw(isovalue)) {
+          if (round > 0) samples[side][name].push_back(value);
+          if (name == "hit_count") hits[side] = value;
+        }
+      }
+      ++turn;
+      const auto [least, most] = std::minmax_element(hits.begin(), hits.end());
+      if (*most - *least > 0.01 * *most)
+        throw Error("isovalue {}: the sides hit {} pixels: not one picture", isovalue, fmt::join(hits, ", "));
+    }
+  }
+  ordered_json json = {
+      {"volume", volume}, {"load_average_before", load_before}, {"load_average_after", load_average()}};
+  for (std::size_t side = 0; side < kSides.size(); ++side) {
+    for (const auto &[name, values] : samples[side]) {
+      json["sides"][kSides[side]][name] = spread_json(spread_of(values));
+    }
+  }
+  return json;
+}
+
+std::string cell(const ordered_json &side, const std::string &name) {
+  if (!side.contains(name)) return "";
+  const ordered_json &spread = side.at(name);
+  return fmt::format("{:.0f} ({:.0f}..{:.0f})", spread.at("median").get<double>(),
+                     spread.at("min").get<double>(), spread.at("max").get<double>());
+}
+
+void print_rows(const ordered_json &sides, const char *title, const std::string &unit) {
+  fmt::print("{:<20}{:>22}{:>22}{:>22}{:>22}\n", title, "new isovalue", "new, cache kept", "warm", "next");
+  for (const auto &[name, side] : sides.items()) {
+    fmt::print("{:<20}{:>22}{:>22}{:>22}{:>22}\n", name, cell(side, "new" + unit),
+               cell(side, "new_kept" + unit), cell(side, "warm" + unit), cell(side, "next" + unit));
+  }
+}
+
+void print_size(const ordered_json &size) {
+  constexpr double kMiB = 1 << 20;
+  fmt::print("\n{}; load average {:.1f} before, {:.1f} after\n", size.at("volume").get<std::string>(),
+             size.at("load_average_before").at(0).get<double>(),
+             size.at("load_average_after").at(0).get<double>());
+  const ordered_json &sides = size.at("sides");
+  print_rows(sides, "ms", "_ms");
+  print_rows(sides, "ms of processors", "_cpu_ms");
+  for (const auto &[name, side] : sides.items()) {
+    fmt::print("{}: peak {:.0f} MiB", name, side.at("peak_byte_count").at("max").get<double>() / kMiB);
+    if (side.contains("device_byte_count")) {
+      fmt::print("; device memory, peak {:.0f} MiB\n",
+                 side.at("device_byte_count").at("max").get<double>() / kMiB);
+      continue;
+    }
+    fmt::print("; {:.0f} triangles, packets of {:.0f}\n",
+               side.at("triangle_count").at("median").get<double>(),
+               side.at("packet_count").at("median").get<double>());
+    for (const std::string part : {"extract", "build", "trace"}) {
+      fmt::print("  {:<8} {} ms, of processors {}\n", part, cell(side, part + "_ms"),
+                 cell(side, part + "_cpu_ms"));
+    }
+  }
+}
+
+void compare(const Options &options, const std::string &command, const std::string &program) {
+  ocl::Device device(ocl::choose_device(options.device));
+  ordered_json json = {{"program", "peer_bench"}, {"command", command}, {"date", utc_now()}};
+  for (const auto &[name, value] : run_info(device)) json["context"][name] = value;
+  json["context"]["processors"] = std::thread::hardware_concurrency();
+  json["options"] = {{"rate", options.rate},
+                     {"isovalues", options.isovalues},
+                     {"rounds", options.rounds},
+                     {"width", options.size.at(0)},
+                     {"height", options.size.at(1)}};
+  fmt::print("{}\n", command);
+  for (const auto &[name, value] : json.at("context").items()) fmt::print("  {:<16}{}\n", name, value.dump());
+  std::vector<std::string> volumes;
+  if (!options.volume.empty()) volumes.push_back(options.volume);
+  for (const std::uint32_t n : options.volume.empty() ? options.dims : std::vector<std::uint32_t>{}) {
+    volumes.push_back(fmt::format("generate:mixing_layer_{0}x{0}x{0}_uint8", n));
+  }
+  for (const std::string &volume : volumes) {
+    json["sizes"].push_back(measure(options, program, volume));
+    print_size(json["sizes"].back());
+  }
+  fmt::print(
+      "\nmesh_low, mesh_medium: Flying Edges of VTK, tree (build quality low, medium) and rays of Embree on "
+      "all\n"
+      "processors; rays, blocks: our pipelines. Median (min..max) over rounds and isovalues. new isovalue: "
+      "from there\n"
+      "to the finished hits, nothing decoded before; cache kept: with what the isovalue before left decoded; "
+      "warm:\n"
+      "the same view again; next: one degree further; of processors: their time, of all threads, which the "
+      "load of\n"
+      "others hardly changes; peak: memory of the side's process, without what loading the volume took.\n");
+  if (!options.json.empty()) tools::write_json(json, options.json);
+}
+
+void add_options(CLI::App &app, Options &options) {
+  app.add_option("--dims", options.dims, "edges of the mixing layers [256 512]");
+  app.add_option("--volume", options.volume,
+                 "this volume instead: a .zfp file, or " + std::string(tools::kVolumeHelp));
+  app.add_option("--isovalues", options.isovalues, "isovalues drawn in turn, at least two [126 128 130]")
+      ->delimiter(',')
+      ->expected(2, 1000);
+  app.add_option("--rate", options.rate, "bits per voxel")->capture_default_str();
+  app.add_option("--rounds", options.rounds,
+                 "times that every isovalue is drawn, after one that is not counted")
+      ->check(CLI::Range(1u, 100000u))
+      ->capture_default_str();
+  app.add_option("--size", options.size, "picture size WxH [1280x720]")->delimiter('x')->expected(2);
+  app.add_option("--device", options.device, "our device")->capture_default_str();
+  app.add_option("--json", options.json, "also write everything to this file");
+  app.add_option("--side", options.side)->group("");  // of a child
+}
+
+}  // namespace
+
+}  // namespace isowave::bench
+
+int main(int argc, char **argv) {
+  CLI::App app("Times a new isovalue, and further frames, beside VTK's Flying Edges and Embree.");
+  isowave::bench::Options options;
+  options.device = "cpu";
+  isowave::bench::add_options(app, options);
+  try {
+    app.parse(argc, argv);
+    if (options.side.empty()) {
+      isowave::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")), argv[0]);
+    } else {
+      isowave::bench::serve(options);
+    }
+    return 0;
+  } catch (const CLI::Success &help) {
+    return app.exit(help);
+  } catch (const std::exception &error) {
+    fmt::print(stderr, "peer_bench: {}\n", error.what());
+    return 1;
+  }
+}

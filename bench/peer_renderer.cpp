@@ -1,0 +1,55 @@
+// Our side of peer_bench.
+
+#include <optional>
+#include <utility>
+
+#include "bench/frame_measure.hpp"
+#include "bench/peer_sides.hpp"
+#include "core/renderer.hpp"
+
+namespace isowave::bench {
+
+namespace {
+
+class RendererSide : public PeerSide {
+ public:
+  RendererSide(const CompressedVolume &volume, const Camera &camera, ImageSize size, PipelineKind pipeline,
+               const std::string &device)
+      : camera_(camera),
+        device_(ocl::choose_device(device)),
+        renderer_(device_, volume, {.size = size, .pipeline = pipeline}) {}
+
+  Measured draw(float isovalue) override {
+    Measured measured;
+    Stopwatch watch;
+    renderer_.render(camera_, isovalue);
+    watch.lap(measured, "new_kept");
+    renderer_.render(camera_, previous_);
+    renderer_.clear_cache();
+    watch = {};
+    measured["hit_count"] = static_cast<double>(renderer_.render(camera_, isovalue).rays_hit);
+    watch.lap(measured, "new");
+    renderer_.render(camera_, isovalue);
+    watch.lap(measured, "warm");
+    renderer_.render(turned(camera_), isovalue);
+    watch.lap(measured, "next");
+    measured["device_byte_count"] = static_cast<double>(device_.ledger().peak());
+    previous_ = isovalue;
+    return measured;
+  }
+
+ private:
+  Camera camera_;
+  float previous_ = 0;
+  ocl::Device device_;
+  Renderer renderer_;
+};
+
+}  // namespace
+
+std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera, ImageSize size,
+                                             PipelineKind pipeline, const std::string &device) {
+  return std::make_unique<RendererSide>(volume, camera, size, pipeline, device);
+}
+
+}  // namespace isowave::bench

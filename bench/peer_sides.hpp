@@ -1,0 +1,64 @@
+#pragma once
+// What peer_bench lets draw: one process each, so that the memory of each is its own.
+
+#include <chrono>
+#include <cstdint>
+#include <ctime>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "core/camera.hpp"
+#include "core/frame.hpp"
+#include "core/pipeline.hpp"
+#include "core/zfp_stream.hpp"
+
+namespace isowave::bench {
+
+/// Name -> value: ms; ms of processor time, of all threads, by names that end in _cpu_ms; counts by names that end in _count.
+/// A machine that others use as well stretches the one and hardly the other.
+using Measured = std::map<std::string, double>;
+
+/// Takes the time of one thing after another.
+class Stopwatch {
+ public:
+  /// Notes NAME_ms and NAME_cpu_ms, and starts again.
+  void lap(Measured &measured, const std::string &name) {
+    const auto wall = std::chrono::steady_clock::now();
+    const double cpu_ms = processor_ms();
+    measured[name + "_ms"] = std::chrono::duration<double, std::milli>(wall - wall_).count();
+    measured[name + "_cpu_ms"] = cpu_ms - cpu_ms_;
+    wall_ = std::chrono::steady_clock::now();
+    cpu_ms_ = processor_ms();
+  }
+
+ private:
+  static double processor_ms() {
+    timespec time{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return 1e3 * double(time.tv_sec) + 1e-6 * double(time.tv_nsec);
+  }
+
+  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
+  double cpu_ms_ = processor_ms();
+};
+
+class PeerSide {
+ public:
+  virtual ~PeerSide() = default;
+  /// Draws the view at an isovalue that is not the last one's, and further frames of it. new_ms: from the isovalue to the
+  /// finished hits; warm_ms: the same view again; next_ms: then one degree further; hit_count; and the side's own.
+  virtual Measured draw(float isovalue) = 0;
+};
+
+/// Triangles of VTK's Flying Edges, Embree's tree over them, and its rays: threads on all processors.
+/// new_ms = extract_ms + build_ms + trace_ms. medium_quality: of Embree's tree, instead of low.
+std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &camera, ImageSize size,
+                                         bool medium_quality);
+
+/// Our renderer on the device that is chosen. new_ms: with nothing decoded; new_kept_ms: with the cache as the isovalue before
+/// left it.
+std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera, ImageSize size,
+                                             PipelineKind pipeline, const std::string &device);
+
+}  // namespace isowave::bench

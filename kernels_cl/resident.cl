@@ -1,0 +1,149 @@
+/// resident.cl -- the floor that benchmarks compare with: the whole volume is decoded, and one launch draws the frame.
+///
+/// The macrocell masks, walks and cells are those of the pipelines, and so are the bits of the picture; what is missing is all
+/// that a bounded memory costs: cache, table, requests, passes.
+///
+/// values [num_blocks * 64]: block after block in the order of their ids, x + 4y + 16z in a block. Against rows of the whole
+/// volume, a cell's corners lie in two to four cache lines instead of four to eight, and a ray's next cell mostly in the same.
+#define ISO_FOUND local
+#include "block_cells.h"
+#include "block_walk.h"
+#include "cell_intersect.h"
+#include "zfp_codec.h"
+
+/// Decodes blocks [first_block, first_block + num_blocks). Once per volume. Grid-stride.
+kernel void resident_decode(global const uint *words, uint bits_per_block, uint first_block, uint num_blocks,
+                            global float *values) {
+  for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
+    const ulong block_id = (ulong)first_block + i;
+    float block[ISO_BLOCK_VOXELS];
+    zfp_decode_block(words, block_id * bits_per_block, bits_per_block, block);
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[block_id * ISO_BLOCK_VOXELS + v] = block[v];
+  }
+}
+
+/// inside [num_blocks]: bit x + 4y + 16z of each block: is the voxel inside, value >= isovalue? Once per isovalue.
+/// Grid-stride.
+kernel void resident_inside(constant FrameParams *frame, uint num_blocks, global const float *values,
+                            global ulong *inside) {
+  for (uint block_id = get_global_id(0); block_id < num_blocks; block_id += get_global_size(0)) {
+    ulong bits = 0;
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
+      const float value = values[(ulong)block_id * ISO_BLOCK_VOXELS + v];
+      bits |= (ulong)(value - frame->isovalue >= 0.0f) << v;
+    }
+    inside[block_id] = bits;
+  }
+}
+
+/// changing [num_blocks]: bit x + 4y + 16z: has the cell of that block corners on both sides? Blocks beyond the volume matter
+/// to cells outside it alone: any block stands for them. Once per isovalue. Grid-stride.
+kernel void resident_changing(constant FrameParams *frame, uint num_blocks, global const ulong *inside,
+                              global ulong *changing) {
+  for (uint block_id = get_global_id(0); block_id < num_blocks; block_id += get_global_size(0)) {
+    const BlockCoords b = block_coords(frame, block_id);
+    ulong bits[8];
+    for (uint corner = 0; corner < 8; ++corner) {
+      bits[corner] = inside[block_id_at(frame, min(b.x + (corner & 1), frame->blocks_x - 1),
+                                        min(b.y + (corner >> 1 & 1), frame->blocks_y - 1),
+                                        min(b.z + (corner >> 2), frame->blocks_z - 1))];
+    }
+    changing[block_id] = changing_cells(bits);
+  }
+}
+
+/// The corners of dual cell (x,y,z) minus the isovalue, corner x + 2y + 4z.
+inline void resident_corners(constant FrameParams *frame, global const float *values, int x, int y, int z,
+                             float *w) {
+  for (int corner = 0; corner < 8; ++corner) {
+    const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
+               vz = (uint)(z + (corner >> 2));
+    const ulong block_id = block_id_at(frame, vx >> 2, vy >> 2, vz >> 2);
+    w[corner] =
+        values[block_id * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] - frame->isovalue;
+  }
+}
+
+/// A ray within a block.
+typedef struct CellWalk {
+  GridWalk cell;
+  RayEvent enter;  ///< by which it entered the cell
+  float w[8];      ///< of the cell where the walk stopped
+  CellChange change;
+} CellWalk;
+
+/// Walks on to the next change of inside in the block's `changing` cells, in float. Returns 1, ISO_DOUBTFUL, or 0 when the ray
+/// has left the block.
+inline int walk_to_change(constant FrameParams *frame, global const float *values, const Ray *ray,
+                          BlockCoords b, LastPlanes last, ulong changing, CellWalk *at) {
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  int found = 0;
+  while (!found && in_block(&at->cell, b, last)) {
+    const RayEvent exit = walk_exit(&at->cell);
+    if ((changing >> ((at->cell.x & 3) + 4 * (at->cell.y & 3) + 16 * (at->cell.z & 3)) & 1ul) != 0) {
+      resident_corners(frame, values, at->cell.x, at->cell.y, at->cell.z, at->w);
+      found = change_or_doubt_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter, exit,
+                                      &at->change);
+    }
+    if (!found) {
+      walk_step(&at->cell, ray, exit, 1, last);
+      at->enter = exit;
+    }
+  }
+  return found;
+}
+
+/// Is there a change of inside on the ray's way through block b, of which those cells change? If so, *at is its cell.
+inline int resident_block(constant FrameParams *frame, global const float *values, ulong changing,
+                          const Ray *ray, BlockCoords b, LastPlanes last, CellWalk *at) {
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  int found = 0;
+  if (changing != 0) {
+    at->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+    at->cell = enter_block(ray, b, at->enter, last);
+    found = walk_to_change(frame, values, ray, b, last, changing, at);
+    while (found == ISO_DOUBTFUL) { /* rare: its 48-bit arithmetic stays out of the loop over cells */
+      const RayEvent exit = walk_exit(&at->cell);
+      found = change_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter, exit,
+                             &at->change);
+      if (!found) {
+        walk_step(&at->cell, ray, exit, 1, last);
+        at->enter = exit;
+        found = walk_to_change(frame, values, ray, b, last, changing, at);
+      }
+    }
+  }
+  return found;
+}
+
+#define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them
+
+/// The frame: hits [pixel]. macrocell_masks: as traverse(). One work-item per pixel, in whole tiles of 8 x 4 pixels.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident(
+    constant FrameParams *frame, global const uint *macrocell_masks, global const float *values,
+    global const ulong *changing, global HitRecord *hits) {
+  local uint found_blocks[ISO_BLOCKS_AT_ONCE *
+                          ISO_GROUP_SIZE]; /* each work-item has its own, ISO_GROUP_SIZE apart */
+  local uint *found = found_blocks + get_local_id(0);
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  const LastPlanes last = last_planes(frame);
+  const uint pixel = tiled_pixel(frame, get_global_id(0));
+  if (pixel != ISO_INVALID_ID) {
+    const Ray ray = make_ray(frame, pixel);
+    uint next = first_block(frame, &ray);
+    int hit = 0;
+    CellWalk at;
+    while (next != ISO_INVALID_ID && !hit) {
+      const uint num_found =
+          find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
+      for (uint i = 0; i < num_found && !hit; ++i) {
+        const uint block_id = found[i * ISO_GROUP_SIZE];
+        hit =
+            resident_block(frame, values, changing[block_id], &ray, block_coords(frame, block_id), last, &at);
+      }
+    }
+    hits[pixel] = hit ? make_hit(frame, &ray, at.w, at.cell.x, at.cell.y, at.cell.z, at.enter,
+                                 walk_exit(&at.cell), refine(solver, at.change.cubic, at.change.bracket))
+                      : no_hit();
+  }
+}
