@@ -44,7 +44,7 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       size_(size),
       num_blocks_(static_cast<std::uint32_t>(volume.block_count())),
       frame_(device, "frame", 1),
-      macrocells_(device, frame_, grid_params(volume), stream.words, stream.bits_per_block),
+      macrocells_(device, frame_, grid_params(volume), stream),
       values_(device, "decoded volume", volume.block_count() * ISO_BLOCK_VOXELS),
       inside_(device, "voxels inside", volume.block_count()),
       changing_(device, "changing cells", volume.block_count()),
@@ -52,12 +52,15 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       inside_kernel_(device, "resident", "resident_inside", resident_defines(solver)),
       changing_kernel_(device, "resident", "resident_changing", resident_defines(solver)),
       kernel_(device, "resident", "resident", resident_defines(solver)) {
-  ocl::Kernel<ocl::In<uint>, uint, uint, uint, ocl::Out<float>> decode(device, "resident", "resident_decode",
-                                                                       resident_defines(solver));
+  ocl::Defines decode_defines = resident_defines(solver);
+  decode_defines.merge(stream.defines());
+  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, uint, uint, uint, uint,
+              ocl::Out<float>>
+      decode(device, "resident", "resident_decode", decode_defines);
   for (std::uint32_t first = 0; first < num_blocks_; first += kBlocksPerLaunch) {
     const std::uint32_t count = std::min(kBlocksPerLaunch, num_blocks_ - first);
-    decode(ocl::Range::strided(count, kGroupSize, device), stream.words, stream.bits_per_block, first, count,
-           values_);
+    decode(ocl::Range::strided(count, kGroupSize, device), stream.part(0), stream.part(1), stream.part(2),
+           stream.part(3), stream.blocks_per_part, stream.bits_per_block, first, count, values_);
   }
   device.finish();
 }
@@ -69,7 +72,7 @@ std::optional<std::string> Resident::obstacle(const ocl::Device &device, const C
   const glm::uvec3 cells = (volume.num_blocks() + 3u) / 4u;
   const std::uint64_t macrocells = 2 * blocks + 10 * std::uint64_t{cells.x} * cells.y * cells.z +
                                    Macrocells::setup_scratch_bytes(volume.num_blocks());
-  const std::uint64_t all = volume.words.size() * sizeof(uint) + macrocells + values +
+  const std::uint64_t all = volume.word_count() * sizeof(uint) + macrocells + values +
                             2 * blocks * sizeof(ulong) + size.num_pixels() * sizeof(HitRecord);
   const ocl::Capabilities &can = device.capabilities();
   if (values > can.largest_allocation) {

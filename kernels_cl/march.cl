@@ -4,6 +4,7 @@
 /// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort and no composite: a ray's blocks come in ray order, so its
 /// first change is its hit.
 #define ISO_FOUND local
+#include "block_cells.h"
 #include "block_requests.h"
 #include "block_walk.h"
 #include "cell_intersect.h"
@@ -24,19 +25,6 @@ inline uint cell_blocks(int x, int y, int z) {
   return (uint)(0xFF5533110F050301ul >> (8 * border)) & 0xFFu;
 }
 
-/// The cell of block b in which the ray is just after `enter`, by which it entered the block.
-inline GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, LastPlanes last) {
-  const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
-  return walk_from(ray, locate(ray->x, 0, enter, 1, x0, min(x0 + 3, last.x - 1)),
-                   locate(ray->y, 1, enter, 1, y0, min(y0 + 3, last.y - 1)),
-                   locate(ray->z, 2, enter, 1, z0, min(z0 + 3, last.z - 1)), 1, last);
-}
-
-inline int in_block(const GridWalk *cell, BlockCoords b, LastPlanes last) {
-  return cell->x >> 2 == (int)b.x && cell->y >> 2 == (int)b.y && cell->z >> 2 == (int)b.z &&
-         cell->x < last.x && cell->y < last.y && cell->z < last.z;
-}
-
 /// A change of inside, or doubt, in a cell of a block.
 typedef struct BlockChange {
   CellChange change;
@@ -44,26 +32,6 @@ typedef struct BlockChange {
   RayEvent enter;
   float w[8];
 } BlockChange;
-
-/// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which voxels of the blocks of
-/// its dual grid are inside; where one is not known, the cells that need it have any bit.
-inline ulong changing_cells(const ulong *inside) {
-  /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The same for +y, +z. */
-  const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul, not_z3 = 0x0000FFFFFFFFFFFFul;
-  ulong v[8], any = 0, all = ~0ul;
-  for (int i = 0; i < 8; ++i) v[i] = inside[i];
-  for (int i = 0; i < 8; i += 2) v[i + 1] = (v[i] >> 1 & not_x3) | (v[i + 1] << 3 & ~not_x3);
-  for (int i = 0; i < 8; i += 4) {
-    v[i + 2] = (v[i] >> 4 & not_y3) | (v[i + 2] << 12 & ~not_y3);
-    v[i + 3] = (v[i + 1] >> 4 & not_y3) | (v[i + 3] << 12 & ~not_y3);
-  }
-  for (int i = 0; i < 4; ++i) v[i + 4] = (v[i] >> 16 & not_z3) | (v[i + 4] << 48 & ~not_z3);
-  for (int i = 0; i < 8; ++i) {
-    any |= v[i];
-    all &= v[i];
-  }
-  return any & ~all;
-}
 
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, or ISO_RAY_WAITS where a block of
 /// the dual grid is not cached. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
@@ -134,14 +102,6 @@ inline void append_ray(int goes_on, uint entry, volatile local uint *counters, v
   barrier(CLK_LOCAL_MEM_FENCE);
   if (get_local_id(0) == 0) counters[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-}
-
-/// The pixel of work-item i when work-items are laid over the image in tiles of 8 x 4, so that neighbours share blocks; or
-/// ISO_INVALID_ID beyond its edge.
-inline uint tiled_pixel(constant FrameParams *frame, uint i) {
-  const uint tiles_x = (frame->width + 7) / 8, tile = i / 32;
-  const uint x = 8 * (tile % tiles_x) + (i & 7), y = 4 * (tile / tiles_x) + (i >> 3 & 3);
-  return x < frame->width && y < frame->height ? x + frame->width * y : ISO_INVALID_ID;
 }
 
 /// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.

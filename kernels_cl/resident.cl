@@ -7,18 +7,19 @@
 /// volume, a cell's corners lie in two to four cache lines instead of four to eight, and a ray's next cell mostly in the same.
 #define ISO_FOUND local
 #include "block_cells.h"
+#include "block_stream.h"
 #include "block_walk.h"
 #include "cell_intersect.h"
-#include "zfp_codec.h"
 
-/// Decodes blocks [first_block, first_block + num_blocks). Once per volume. Grid-stride.
-kernel void resident_decode(global const uint *words, uint bits_per_block, uint first_block, uint num_blocks,
-                            global float *values) {
+/// Decodes blocks [first_block, first_block + num_blocks) of the zfp stream, see block_stream.h. Once per volume. Grid-stride.
+kernel void resident_decode(global const uint *part_0, global const uint *part_1, global const uint *part_2,
+                            global const uint *part_3, uint blocks_per_part, uint bits_per_block,
+                            uint first_block, uint num_blocks, global float *values) {
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
-    const ulong block_id = (ulong)first_block + i;
+    const uint block_id = first_block + i;
     float block[ISO_BLOCK_VOXELS];
-    zfp_decode_block(words, block_id * bits_per_block, bits_per_block, block);
-    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[block_id * ISO_BLOCK_VOXELS + v] = block[v];
+    decode_block(part_0, part_1, part_2, part_3, blocks_per_part, bits_per_block, block_id, 0, block);
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[(ulong)block_id * ISO_BLOCK_VOXELS + v] = block[v];
   }
 }
 

@@ -34,18 +34,18 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
       table[entries[begin + item]].inside_high = high;
     }
     ISO_UNROLL
-    for (uint first = 0; first < ISO_BLOCK_VOXELS; first += ISO_STAGED_VALUES) {
+    for (uint part = 0; part < ISO_BLOCK_VOXELS; part += ISO_STAGED_VALUES) {
       barrier(CLK_LOCAL_MEM_FENCE);
       if (item < num_blocks) {
         ISO_UNROLL
         for (uint v = 0; v < ISO_STAGED_VALUES; ++v) {
-          staged[item * (ISO_STAGED_VALUES + 1) + v] = values[first + v];
+          staged[item * (ISO_STAGED_VALUES + 1) + v] = values[part + v];
         }
       }
       barrier(CLK_LOCAL_MEM_FENCE);
       for (uint i = item; i < num_blocks * ISO_STAGED_VALUES; i += ISO_GROUP_SIZE) {
         const uint block = i / ISO_STAGED_VALUES, v = i % ISO_STAGED_VALUES;
-        cache_values[slots[begin + block] * ISO_BLOCK_VOXELS + first + v] =
+        cache_values[slots[begin + block] * ISO_BLOCK_VOXELS + part + v] =
             staged[block * (ISO_STAGED_VALUES + 1) + v];
       }
     }
