@@ -93,8 +93,8 @@ void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
       });
 }
 
-/// Quantiles of the block minima and maxima of an even sample of blocks, so that one outlier does not coarsen
-/// the rest.
+/// From the block minima and maxima of an even sample of blocks: half of them quantiles, so that one outlier does not coarsen
+/// the rest; half at even distances, so that the noise of a plateau, which has most of the values, does not either.
 std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint32_t num_blocks,
                                                  Partials &decode) {
   const auto stride = static_cast<std::uint32_t>(sample_stride(num_blocks));
@@ -113,10 +113,21 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
 
   std::vector<float> thresholds(kNumThresholds, std::numeric_limits<float>::infinity());
   thresholds[0] = -std::numeric_limits<float>::infinity();
-  const std::size_t num_inner = std::min<std::size_t>(values.size(), kNumThresholds - 2);
-  for (std::size_t i = 0; i < num_inner; ++i) {  // the smallest and the largest are always among them
-    thresholds[1 + i] = values[num_inner == 1 ? 0 : i * (values.size() - 1) / (num_inner - 1)];
+  if (values.size() <= kNumThresholds - 2) {
+    std::ranges::copy(values, thresholds.begin() + 1);
+    return thresholds;
   }
+  constexpr std::size_t kNumQuantiles = kNumThresholds / 2, kNumEven = kNumThresholds - 2 - kNumQuantiles;
+  for (std::size_t i = 0; i < kNumQuantiles; ++i) {  // the smallest and the largest are always among them
+    thresholds[1 + i] = values[i * (values.size() - 1) / (kNumQuantiles - 1)];
+  }
+  const std::size_t outliers = values.size() / 100;
+  for (std::size_t i = 0; i < kNumEven; ++i) {
+    const float part = (static_cast<float>(i) + 0.5f) / kNumEven;
+    thresholds[1 + kNumQuantiles + i] =
+        (1 - part) * values[outliers] + part * values[values.size() - 1 - outliers];
+  }
+  std::ranges::sort(thresholds);
   return thresholds;
 }
 

@@ -62,6 +62,27 @@ static inline uint find_entry(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL 
   return key == block_id ? i : ISO_INVALID_ID;
 }
 
+/// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT where a block is not cached. All
+/// eight are read before one is looked at: a GPU waits once, not eight times.
+static inline void find_dual_grid(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
+                                  uint x, uint y, uint z, BlockEntry *entries) {
+  uint corner;
+  ISO_UNROLL
+  for (corner = 0; corner < 8u; ++corner) {
+    entries[corner] = table[table_home(frame, x + (corner & 1u), y + (corner >> 1 & 1u), z + (corner >> 2))];
+  }
+  ISO_UNROLL
+  for (corner = 0; corner < 8u; ++corner) {
+    const uint bx = x + (corner & 1u), by = y + (corner >> 1 & 1u), bz = z + (corner >> 2);
+    const uint key = entries[corner].block_id;
+    if (key != block_id_at(frame, bx, by, bz)) {
+      const uint entry = key == ISO_INVALID_ID ? ISO_INVALID_ID : find_entry(frame, table, bx, by, bz);
+      entries[corner].slot = ISO_BLOCK_ABSENT;
+      if (entry != ISO_INVALID_ID) entries[corner] = table[entry];
+    }
+  }
+}
+
 /// The slot of block (x,y,z), or ISO_BLOCK_ABSENT.
 static inline uint cached_slot(ISO_CONSTANT const FrameParams *frame, ISO_GLOBAL const BlockEntry *table,
                                uint x, uint y, uint z) {

@@ -43,14 +43,13 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
   ulong inside[8], changing;
   uint have = 0;
   int result = ISO_RAY_LEFT;
+  BlockEntry entries[8];
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    const uint entry =
-        find_entry(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
-    const uint slot = entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : table[entry].slot;
-    slots[corner * ISO_GROUP_SIZE] = slot;
-    inside[corner] =
-        slot == ISO_BLOCK_ABSENT ? 0 : (ulong)table[entry].inside_high << 32 | table[entry].inside_low;
-    have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
+    slots[corner * ISO_GROUP_SIZE] = entries[corner].slot;
+    inside[corner] = (ulong)entries[corner].inside_high << 32 | entries[corner].inside_low;
+    have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
   }
   if ((have & 1u) == 0) return ISO_RAY_WAITS; /* every cell has voxels of the block itself */
   changing = changing_cells(inside);
@@ -257,15 +256,31 @@ typedef struct Requests {
   volatile local uint *num_staged;
 } Requests;
 
-/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others.
+/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps for all
+/// corners, so that a GPU waits for memory twice, not sixteen times.
 inline void request_touched(constant FrameParams *frame, global const BlockEntry *table,
                             global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
                             Requests requests) {
+  BlockEntry entries[8];
+  uint first = 0; /* of the corners: whose mark is ours */
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-    if ((touched >> corner & 1u) != 0 &&
-        request_block(frame, table, slot_stamps, pass, requests.bits, x, y, z)) {
-      const uint place = atomic_inc(requests.num_staged), block_id = block_id_at(frame, x, y, z);
+    if ((touched >> corner & 1u) != 0) {
+      if (entries[corner].slot != ISO_BLOCK_ABSENT) {
+        slot_stamps[entries[corner].slot] = pass;
+      } else {
+        first |= (uint)mark_request(frame, requests.bits, b.x + (corner & 1), b.y + (corner >> 1 & 1),
+                                    b.z + (corner >> 2))
+                 << corner;
+      }
+    }
+  }
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((first >> corner & 1u) != 0) {
+      const uint block_id =
+          block_id_at(frame, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
+      const uint place = atomic_inc(requests.num_staged);
       if (place < ISO_REQUEST_STAGING) {
         requests.staged[place] = block_id;
       } else {
@@ -278,7 +293,8 @@ inline void request_touched(constant FrameParams *frame, global const BlockEntry
 
 /// Of the rays that wait, active_ray_ids [counts->next_active_count], the first counts->window_count ask for the blocks that
 /// they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of frame->per_ray_speculation. Out:
-/// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over the rays.
+/// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over the rays; when these are few, each has
+/// eight work-items, which share its blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
     global PassCounts *counts, global const uint *active_ray_ids, global const uint *ray_block_ids,
@@ -290,11 +306,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
                              staged,         &num_staged};
   const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = min(counts->next_active_count, counts->window_count);
+  const uint lanes = 8 * num_rays <= get_global_size(0) ? 8 : 1;
   if (item == 0) num_staged = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays * lanes;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint i = begin + item;
+    const uint i = (begin + item) / lanes, lane = (begin + item) % lanes;
     if (i < num_rays) {
       const uint entry = active_ray_ids[i], pixel = entry & ISO_RAY_PIXEL;
       const Ray ray = make_ray(frame, pixel);
@@ -307,7 +324,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
                                   found + item, ISO_GROUP_SIZE);
           at = 0;
         }
-        if (at < num_found) {
+        if (at < num_found && asked % lanes == lane) {
           const uint block_id = found[at * ISO_GROUP_SIZE + item];
           const BlockCoords b = block_coords(frame, block_id);
           const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
@@ -316,6 +333,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
             cache->first_block_id = block_id;
             cache->first_touched = touched;
           }
+        }
+        if (at < num_found) {
           ++at;
           ++asked;
         }

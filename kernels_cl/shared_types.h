@@ -10,6 +10,7 @@
 #define ISO_NAMESPACE_END
 #define ISO_GLOBAL global      ///< address space of buffers
 #define ISO_CONSTANT constant  ///< address space of FrameParams and tables
+#define ISO_UNROLL _Pragma("unroll")
 #else
 #include <bit>
 #include <cmath>
@@ -19,6 +20,7 @@
 #define ISO_NAMESPACE_END }
 #define ISO_GLOBAL
 #define ISO_CONSTANT
+#define ISO_UNROLL
 #endif
 
 ISO_NAMESPACE_BEGIN

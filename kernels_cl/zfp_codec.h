@@ -115,11 +115,6 @@ static inline float power_of_two(int e) {
 }
 
 /// All loops over the 64 values are unrolled, so that they stay in registers: a GPU has no fast indexed ones.
-#ifdef __OPENCL_C_VERSION__
-#define ISO_UNROLL _Pragma("unroll")
-#else
-#define ISO_UNROLL
-#endif
 
 /// Decodes the block that starts at `first_bit` of `words` and has max_bits bits.
 /// values [64]: x + 4 y + 16 z. Reads at most two words past the block's last bit.

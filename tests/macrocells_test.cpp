@@ -249,6 +249,25 @@ TEST_P(MacrocellsOnDevice, Outliers) {
   EXPECT_GT(within, 200);
 }
 
+/// Nearly all distinct values are noise upon two plateaus; a table of quantiles alone would take all between for one.
+TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
+  const glm::uvec3 dims(64, 40, 40);
+  std::vector<float> voxels = random_voxels(dims, 0, 1, 5);
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    const float x = static_cast<float>(i % 64);
+    voxels[i] += 100 * std::clamp((x - 28) / 8, 0.0f, 1.0f);
+  }
+  const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
+  expect_exact(volume);
+  FrameParams params = grid_frame(dims);
+  ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+  const DeviceStream stream(device_, volume);
+  const Macrocells macrocells(device_, frame, params, stream);
+  const auto between =
+      std::ranges::count_if(macrocells.thresholds(), [](float t) { return t > 2 && t < 99; });
+  EXPECT_GT(between, 100);
+}
+
 TEST_P(MacrocellsOnDevice, ConstantVolumes) {
   const glm::uvec3 dims(9, 10, 11);
   for (const float value : {0.0f, 7.0f, -1e20f}) {
