@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/frame.hpp"
+#include "kernels_cl/block_grid.h"
 
 namespace isowave {
 
@@ -24,7 +25,7 @@ std::uint64_t sample_stride(std::uint64_t num_blocks) {
   return (num_blocks + kMaxSamples - 1) / kMaxSamples;
 }
 std::uint64_t num_samples(std::uint64_t num_blocks) {
-  return (num_blocks + sample_stride(num_blocks) - 1) / sample_stride(num_blocks);
+  return num_blocks / sample_stride(num_blocks);
 }
 
 std::uint32_t coarse_count(const FrameParams &f) {
@@ -85,7 +86,7 @@ void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
     return;
   }
   std::vector<uint> block_ids(count);
-  for (std::uint32_t i = 0; i < count; ++i) block_ids[i] = first + i * stride;
+  for (std::uint32_t i = 0; i < count; ++i) block_ids[i] = sampled_block(first + i * stride, stride);
   stream.window->bring(
       block_ids, [&](const ocl::Buffer<uint> &words, std::uint32_t run_first, std::uint32_t run_count) {
         kernel(ocl::Range::strided(run_count, kGroupSize, device), frame, words, words, words, words, 0,

@@ -43,7 +43,7 @@ class Macrocells {
   };
   using PartialsKernel = ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
                                      ocl::In<uint>, uint, uint, uint, uint, uint, uint, ocl::Out<ValueRange>>;
-  /// Decodes blocks first + i * stride, i in [0, count): partials [8 * count].
+  /// Decodes blocks sampled_block(first + i * stride, stride), i in [0, count): partials [8 * count].
   struct Partials {
     void operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
                     ocl::Buffer<ValueRange> &partials);

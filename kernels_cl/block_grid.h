@@ -25,6 +25,14 @@ static inline uint block_id_at(ISO_CONSTANT const FrameParams *frame, uint x, ui
   return x + frame->blocks_x * (y + frame->blocks_y * z);
 }
 
+/// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. Always the first would be blind where the
+/// stride is a multiple of the blocks along x: all on one face of the volume.
+static inline uint sampled_block(uint begin, uint stride) {
+  uint h = begin * 0x9E3779B1u;
+  h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
+  return begin + (h ^ (h >> 13)) % stride;
+}
+
 /// The dual grid of block b needs b and its +x, +y, +z neighbours, as far as there are any: corner x + 2y +
 /// 4z of 0..7 is the block (b.x + x, b.y + y, b.z + z), or ISO_INVALID_ID outside the volume.
 static inline uint dual_grid_block(ISO_CONSTANT const FrameParams *frame, BlockCoords b, uint corner) {

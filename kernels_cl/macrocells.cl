@@ -26,7 +26,7 @@ inline ValueRange join(ValueRange a, ValueRange b) {
 }
 
 /// partials [(first_partial + num_blocks) * 8]: entry 8 b + m is the range of the block's voxels with x = 0 if m & 1, y = 0 if
-/// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is first_block + i * stride and b is first_partial + i.
+/// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is sampled_block(first_block + i * stride, stride) and b is first_partial + i.
 /// part_0 .. bits_per_block: the zfp stream, see block_stream.h. Grid-stride.
 kernel void macrocell_partials(constant FrameParams *frame, global const uint *part_0,
                                global const uint *part_1, global const uint *part_2,
@@ -34,7 +34,7 @@ kernel void macrocell_partials(constant FrameParams *frame, global const uint *p
                                uint first_block, uint stride, uint num_blocks, uint first_partial,
                                global ValueRange *partials) {
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
-    const uint block_id = first_block + i * stride;
+    const uint block_id = sampled_block(first_block + i * stride, stride);
     const BlockCoords b = block_coords(frame, block_id);
     const uint size_x = min(4u, frame->dims_x - 4 * b.x), size_y = min(4u, frame->dims_y - 4 * b.y),
                size_z = min(4u, frame->dims_z - 4 * b.z);

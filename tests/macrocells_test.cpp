@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <vector>
 
 #include "core/frame.hpp"
 #include "core/zfp_decode.hpp"
+#include "kernels_cl/block_grid.h"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
@@ -266,6 +268,18 @@ TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
   const auto between =
       std::ranges::count_if(macrocells.thresholds(), [](float t) { return t > 2 && t < 99; });
   EXPECT_GT(between, 100);
+}
+
+/// Rows of 128 blocks and one sample for 128 blocks: were it always the first, the sample would be one face of the volume.
+TEST(Macrocells, SampleOfLongRows) {
+  std::set<uint> seen;
+  for (uint begin = 0; begin < 128 * 128 * 128; begin += 128) {
+    const uint block = sampled_block(begin, 128);
+    ASSERT_GE(block, begin);
+    ASSERT_LT(block, begin + 128);
+    seen.insert(block % 128);
+  }
+  EXPECT_EQ(seen.size(), 128u);
 }
 
 TEST_P(MacrocellsOnDevice, ConstantVolumes) {
