@@ -42,7 +42,7 @@ done
 # sweep ARGUMENT...: a small volume at several budgets, to sweep.json.
 volume=generate:gyroid_32x32x32_uint8
 sweep() {
-  "$frame_bench" "$volume" --size 48x32 --orbit 2 --rounds 2 --json "$work/sweep.json" "$@" >"$work/out"
+  "$frame_bench" "$volume" --size 160x120 --orbit 2 --rounds 2 --json "$work/sweep.json" "$@" >"$work/out"
 }
 sweep --budgets auto:4
 "$top/tools/charts" "$work/sweep.json" -o "$work"
@@ -71,7 +71,7 @@ assert document["resident_floor"] is None
 EOF
 grep -q 'more than 8 passes' "$work/out" || fail "a budget without times: $(cat "$work/out")"
 "$top/tools/charts" "$work/sweep.json" -o "$work"
-sweep --budgets 1MiB,700KB
+sweep --budgets 3MiB,1200KB
 [ "$(grep -c '^ *[0-9]* ' "$work/out")" -ge 2 ] || fail "a list of budgets: $(cat "$work/out")"
 for bad in auto:1 auto:x auto: 1MB,x 0 1KB; do
   if sweep --budgets "$bad" 2>"$work/error"; then fail "--budgets $bad was accepted"; fi
