@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "bench/run_info.hpp"
 #include "core/error.hpp"
@@ -79,15 +80,20 @@ std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
   ocl::Device device(device_info);
   const Renderer ample(device, volume, options);
   const RendererOptions &chosen = ample.options();
-  const MemoryRequest request{chosen.size.num_pixels(), chosen.pipeline, chosen.grouping, chosen.group_size};
-  // More than 8 slots, where what exists only while the value ranges are built takes more memory than a frame.
-  const std::uint64_t least = plan_memory(volume, request, kMinCacheSlots).peak();
-  const std::uint32_t fewest = plan_within(device, volume, request, least, chosen.cache_slots).cache_slots;
-  const double ratio = double(chosen.cache_slots) / fewest;
+  MemoryRequest request{chosen.size.num_pixels(), chosen.pipeline, chosen.grouping, chosen.group_size};
+  std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
+  for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
+    if (chosen.stream != StreamPlace::kAuto && chosen.stream != place) continue;
+    request.stream = place;
+    least = std::min(least, plan_memory(volume, request, kMinCacheSlots).peak());
+  }
+  // In equal ratios of what lies above the least: the same at every budget, that would hide the rest.
+  constexpr double kSmallest = 0.01;
+  const auto above = static_cast<double>(ample.memory_plan().peak() - least);
   std::vector<std::uint64_t> budgets;
-  for (std::uint32_t i = count; i-- > 0;) {
-    const double slots = fewest * std::pow(ratio, double(i) / (count - 1));
-    budgets.push_back(plan_memory(volume, request, static_cast<std::uint32_t>(std::lround(slots))).peak());
+  for (std::uint32_t i = 0; i < count; ++i) {
+    budgets.push_back(least +
+                      static_cast<std::uint64_t>(above * std::pow(kSmallest, double(i) / (count - 1))));
   }
   budgets.erase(std::unique(budgets.begin(), budgets.end()), budgets.end());
   return budgets;

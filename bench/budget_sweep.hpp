@@ -23,8 +23,8 @@ struct BudgetSweep {
   std::uint32_t max_passes = 0;
 };
 
-/// `count` budgets, at least 2, from the smallest that is accepted to one whose cache is as large as without a budget, in equal
-/// ratios of cache slots: the rest of the memory is the same at each. Descending, each once.
+/// `count` budgets, at least 2, from what drawing takes without a budget down to near the smallest that is accepted, in equal
+/// ratios of what lies above that. Descending, each once.
 std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
                                              const CompressedVolume &volume, const RendererOptions &options,
                                              std::uint32_t count);
