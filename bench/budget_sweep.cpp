@@ -83,7 +83,7 @@ std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
   MemoryRequest request{chosen.size.num_pixels(), chosen.pipeline, chosen.grouping, chosen.group_size};
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-    if (chosen.stream != StreamPlace::kAuto && chosen.stream != place) continue;
+    if (options.stream != StreamPlace::kAuto && options.stream != place) continue;
     request.stream = place;
     least = std::min(least, plan_memory(volume, request, kMinCacheSlots).peak());
   }

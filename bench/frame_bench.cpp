@@ -177,7 +177,7 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option(
       "--budgets", options.budgets,
       "draw the same orbit at each of these memory budgets, e.g. 200MB,400MB,1GB, or auto:N for N from "
-      "the smallest to an ample one, in equal ratios of cache slots; the pictures must be the same");
+      "the smallest to an ample one, in equal ratios of what lies above that; the pictures must be the same");
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")
       ->check(CLI::PositiveNumber)

@@ -119,43 +119,6 @@ inline void open_next_counts(global const PassCounts *prev, global const PassCou
 
 #define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them
 
-/// How far a ray has come. found: this work-item's place for ISO_BLOCKS_AT_ONCE, ISO_GROUP_SIZE apart.
-typedef struct RayMarch {
-  int result;      ///< ISO_RAY_*
-  uint next;       ///< the first block not looked for, or ISO_INVALID_ID
-  uint num_found;  ///< active blocks looked for ...
-  uint at;         ///< ... and the one of them at which the ray stands
-} RayMarch;
-
-/// Walks a ray on from block `from`, an active one. in_doubt: about that one. num_blocks: counts the blocks intersected.
-inline RayMarch march_ray(constant FrameParams *frame, global const uint *macrocell_masks,
-                          global const BlockEntry *table, global const float *cache_values, const Ray *ray,
-                          uint from, int in_doubt, LastPlanes last, local uint *slots, local uint *found,
-                          uint *num_blocks, BlockChange *change) {
-  RayMarch m;
-  m.result = ISO_RAY_LEFT;
-  m.next = block_behind(frame, ray, block_coords(frame, from), last);
-  m.num_found = 1;
-  m.at = 0;
-  found[0] = from;
-  /* One call of each walk: what compilers inline, they compile as often as it is called. */
-  while (m.result == ISO_RAY_LEFT && (m.at < m.num_found || m.next != ISO_INVALID_ID)) {
-    if (m.at == m.num_found) {
-      m.num_found =
-          find_blocks(frame, macrocell_masks, ray, &m.next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
-      m.at = 0;
-    }
-    while (m.at < m.num_found && m.result == ISO_RAY_LEFT) {
-      const BlockCoords b = block_coords(frame, found[m.at * ISO_GROUP_SIZE]);
-      m.result = march_block(frame, table, cache_values, ray, b, last, slots, in_doubt, change);
-      in_doubt = 0;
-      *num_blocks += m.result <= ISO_RAY_HIT;
-      if (m.result == ISO_RAY_LEFT) ++m.at;
-    }
-  }
-  return m;
-}
-
 /// Begins a frame. hits [pixel] = none; next_active_ray_ids [counts->next_active_count]: the pixels whose rays meet an
 /// active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
 /// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
@@ -187,21 +150,27 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   }
 }
 
-/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel].
-/// Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait, and in ray_block_ids the block they
-/// wait at; *next, opened. macrocell_masks: as traverse(). Groups stride over the rays.
+/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel], an
+/// active block. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait, and in ray_block_ids the
+/// block they wait at; *next, opened. macrocell_masks: as traverse().
+///
+/// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so few that a device would
+/// wait for the longest of them, each has eight work-items, one for each block of a round; the first block in which anything
+/// happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
     global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
-    global PassCounts *next, global const uint *active_ray_ids, global uint *next_active_ray_ids,
+    global PassCounts *next_counts, global const uint *active_ray_ids, global uint *next_active_ray_ids,
     global uint *ray_block_ids, global HitRecord *hits, global CacheState *cache) {
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
-  local uint counters[2], group_hits, group_blocks;
+  local uint counters[2], group_hits, group_blocks, num_going;
+  volatile local uint deciding[ISO_GROUP_SIZE]; /* of each ray's blocks of the round */
   const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = prev->next_active_count;
+  const uint lanes = ISO_BLOCKS_AT_ONCE * num_rays <= get_global_size(0) ? ISO_BLOCKS_AT_ONCE : 1;
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
-    open_next_counts(prev, counts, next);
+    open_next_counts(prev, counts, next_counts);
     open_requests(cache);
     cache->first_block_id = ISO_INVALID_ID;
     counts->active_count = num_rays;
@@ -209,34 +178,70 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   }
   if (item == 0) counters[0] = group_hits = group_blocks = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays * lanes;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint i = begin + item;
-    uint entry = ISO_INVALID_ID;
-    int waits = 0;
-    if (i < num_rays) {
-      entry = active_ray_ids[i];
-      const uint pixel = entry & ISO_RAY_PIXEL, from = ray_block_ids[pixel];
-      const Ray ray = make_ray(frame, pixel);
-      BlockChange change;
-      const RayMarch m =
-          march_ray(frame, macrocell_masks, table, cache_values, &ray, from, (entry & ISO_RAY_IN_DOUBT) != 0,
-                    last, slots + item, found + item, &num_blocks, &change);
-      waits = m.result >= ISO_RAY_DOUBT;
-      if (m.result == ISO_RAY_HIT) {
-        hits[pixel] = hit_of(frame, &ray, &change);
-        ++num_hits;
+    const uint i = (begin + item) / lanes, lane = item % lanes;
+    const int is_ray = i < num_rays;
+    const uint entry = is_ray ? active_ray_ids[i] : 0, pixel = entry & ISO_RAY_PIXEL;
+    const uint from = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
+    const Ray ray = make_ray(frame, pixel);
+    uint next = from, at = lane, more = 1, waits_as = 0;
+    int result = ISO_RAY_LEFT, going = is_ray, first = 1;
+    BlockChange change;
+    while (more != 0) {
+      uint num_passed = 0;
+      if (lane == 0) deciding[item / lanes] = ISO_INVALID_ID;
+      if (item == 0) num_going = 0;
+      barrier(CLK_LOCAL_MEM_FENCE);
+      if (going) {
+        uint num_found = 1;
+        if (first && lanes == 1) { /* most rays of a cold frame wait right there */
+          found[item] = from;
+          next = block_behind(frame, &ray, block_coords(frame, from), last);
+        } else {
+          num_found = find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE, found + item,
+                                  ISO_GROUP_SIZE);
+        }
+        for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
+          const int in_doubt = first && at == 0 && (entry & ISO_RAY_IN_DOUBT) != 0;
+          result = march_block(frame, table, cache_values, &ray,
+                               block_coords(frame, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
+                               in_doubt, &change);
+          if (result == ISO_RAY_LEFT) {
+            ++num_passed;
+          } else {
+            atomic_min(&deciding[item / lanes], at);
+            waits_as = found[at * ISO_GROUP_SIZE + item];
+          }
+        }
       }
-      if (waits) {
-        const uint block_id = found[m.at * ISO_GROUP_SIZE + item];
-        uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
-        if (block_id != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
-        entry =
-            pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (m.result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u);
-        ray_block_ids[pixel] = block_id;
+      barrier(CLK_LOCAL_MEM_FENCE);
+      if (going) {
+        const uint place = deciding[item / lanes];
+        if (lane < place) num_blocks += num_passed;
+        if (lanes > 1 && lane != place) result = ISO_RAY_LEFT;
+        going = place == ISO_INVALID_ID && next != ISO_INVALID_ID;
+        if (going) atomic_inc(&num_going);
       }
+      first = 0;
+      barrier(CLK_LOCAL_MEM_FENCE);
+      more = num_going;
+      barrier(CLK_LOCAL_MEM_FENCE);
     }
-    append_ray(waits, entry, counters, &counts->next_active_count, next_active_ray_ids);
+    if (result == ISO_RAY_HIT) {
+      hits[pixel] = hit_of(frame, &ray, &change);
+      ++num_hits;
+      ++num_blocks;
+    }
+    const int waits = result >= ISO_RAY_DOUBT;
+    uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
+    if (waits) {
+      if (waits_as != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
+      ray_block_ids[pixel] = waits_as;
+    }
+    append_ray(waits,
+               pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
+               counters, &counts->next_active_count, next_active_ray_ids);
   }
   if (num_hits != 0) atomic_add(&group_hits, num_hits);
   if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);

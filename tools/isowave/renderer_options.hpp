@@ -10,7 +10,7 @@
 namespace isowave::tools {
 
 struct RendererFlags {
-  std::string pipeline = "auto", speculation = "per-ray", solver{to_string(kDefaultSolver)};
+  std::string pipeline = "auto", speculation = "auto", solver{to_string(kDefaultSolver)};
   std::string grouping{to_string(kDefaultGrouping)}, closest{to_string(kDefaultClosestHit)}, stream = "auto";
   RendererOptions values;
 };
