@@ -150,8 +150,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   if (item == 0) {
     uint granted, evicted, age, older = 0;
-    for (uint j = 0; j < num_first_missing;
-         ++j) { /* swap it to place j; where the list ended too early, put it there */
+    /* Swap each to place j; where the list ended too early, put it there. */
+    for (uint j = 0; j < num_first_missing; ++j) {
       const uint displaced = request_block_ids[j];
       if (places[j] == ISO_INVALID_ID) {
         const BlockCoords b = block_coords(frame, displaced);
@@ -227,7 +227,8 @@ kernel void cache_classify(constant FrameParams *frame, global const float *cach
   }
 }
 
-/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free slot from the end; requests past the last are dropped. decode_slots, decode_entries [requests]: the slots, and their table entries.
+/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free slot from
+/// the end; requests past the last are dropped. decode_slots, decode_entries [requests]: the slots, and their table entries.
 /// Takes the marks of all requests back. Grid-stride over requests.
 kernel void cache_assign(constant FrameParams *frame, global const PassCounts *asked,
                          global PassCounts *counts, global const uint *request_block_ids, uint capacity,

@@ -9,6 +9,8 @@
 #include "block_grid.h"
 #include "grid_dda.h"
 
+#define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them, or asks for them
+
 /// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it entered the cell.
 inline GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e, LastPlanes last) {
   const int bx = coarse->x * ISO_MACROCELL_BLOCKS, by = coarse->y * ISO_MACROCELL_BLOCKS,

@@ -117,8 +117,6 @@ inline void open_next_counts(global const PassCounts *prev, global const PassCou
   next->free_count = counts->free_count;
 }
 
-#define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them
-
 /// Begins a frame. hits [pixel] = none; next_active_ray_ids [counts->next_active_count]: the pixels whose rays meet an
 /// active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
 /// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
@@ -311,7 +309,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
                              staged,         &num_staged};
   const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = min(counts->next_active_count, counts->window_count);
-  const uint lanes = 8 * num_rays <= get_global_size(0) ? 8 : 1;
+  const uint lanes = ISO_BLOCKS_AT_ONCE * num_rays <= get_global_size(0) ? ISO_BLOCKS_AT_ONCE : 1;
   if (item == 0) num_staged = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays * lanes;

@@ -117,8 +117,6 @@ inline int resident_block(constant FrameParams *frame, global const float *value
   return found;
 }
 
-#define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them
-
 /// The frame: hits [pixel]. macrocell_masks: as traverse(). One work-item per pixel, in whole tiles of 8 x 4 pixels.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident(
     constant FrameParams *frame, global const uint *macrocell_masks, global const float *values,

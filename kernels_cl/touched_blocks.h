@@ -22,11 +22,11 @@ static inline RaySpan common_span(RaySpan a, RaySpan b) {
 
 /// Narrows a span in a region that ends at plane `end` to where the ray is between planes begin and end of this axis.
 static inline RaySpan span_between(RaySpan span, RayAxis a, int axis, int begin, int end) {
-  RaySpan slab;
-  if (a.d == 0.0f) {
-    if (begin >= end || a.o < (float)begin)
-      span.end = span.begin; /* within a plane: in the region after it, */
-    return span;             /* or in the domain's last */
+  RaySpan slab;      /* not span itself: rusticl changes the caller's struct with a parameter */
+  if (a.d == 0.0f) { /* within a plane: in the region after it, or in the domain's last */
+    slab.begin = span.begin;
+    slab.end = begin >= end || a.o < (float)begin ? span.begin : span.end;
+    return slab;
   }
   slab.begin = make_event(plane_t(a, a.d > 0.0f ? begin : end), axis);
   slab.end = make_event(plane_t(a, a.d > 0.0f ? end : begin), axis);

@@ -41,8 +41,7 @@ std::uint64_t num_decoded(const FrameStats &stats) {
 
 class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
-  /// Mesa's llvmpipe needs a millisecond of processor time a launch: there the long tests draw fewer frames.
-  bool is_slow() const { return device_.info().platform == "rusticl"; }
+  bool is_slow() const { return is_llvmpipe(device_.info()); }
 
   Renderer renderer_of(const CompressedVolume &volume, RendererOptions options) {
     options.stream = StreamPlace::kHost;

@@ -248,13 +248,15 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     }
   }
 
-  /// Every camera, each with one of the isovalues in turn.
+  bool is_slow() const { return is_llvmpipe(device_.info()); }
+
+  /// Every camera (on a slow device every fourth), each with one of the isovalues in turn.
   void run_cameras(const glm::uvec3 &dims, Field field, const std::vector<float> &isovalues, Tally &tally) {
     const uint num_blocks = uint((dims.x + 3) / 4 * ((dims.y + 3) / 4) * ((dims.z + 3) / 4));
     const ImageSize size{23, 17};
     const std::vector<CameraCase> cameras = camera_cases(dims);
     Stages stages(device_, case_frame(dims, cameras[0], size), std::max(8u, num_blocks), 64);
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
+    for (std::size_t i = 0; i < cameras.size(); i += is_slow() ? 4 : 1) {
       const float isovalue = isovalues[i % isovalues.size()];
       SCOPED_TRACE(fmt::format("{} x {} x {}, camera '{}', field {}, isovalue {}", dims.x, dims.y, dims.z,
                                cameras[i].name, static_cast<int>(field), isovalue));
@@ -278,15 +280,15 @@ TEST_P(IntersectOnDevice, SmallPlane) {
 TEST_P(IntersectOnDevice, Plane) {
   Tally tally;
   run_cameras({18, 21, 17}, Field::kPlane, {0.25f, -7.0f, 3.3f}, tally);
-  EXPECT_GT(tally.certain_hits, 1000u);
-  EXPECT_GT(tally.certain_misses, 1000u);
+  EXPECT_GT(tally.certain_hits, is_slow() ? 250u : 1000u);
+  EXPECT_GT(tally.certain_misses, is_slow() ? 250u : 1000u);
 }
 
 TEST_P(IntersectOnDevice, Saddle) {
   Tally tally;
   run_cameras({18, 21, 17}, Field::kSaddle, {-48.0f, -30.5f, 12.25f, -44.0f}, tally);
-  EXPECT_GT(tally.certain_hits, 1000u);
-  EXPECT_GT(tally.certain_misses, 500u);
+  EXPECT_GT(tally.certain_hits, is_slow() ? 250u : 1000u);
+  EXPECT_GT(tally.certain_misses, is_slow() ? 125u : 500u);
 }
 
 TEST_P(IntersectOnDevice, RandomVoxelsOfAwkwardDims) {
@@ -295,7 +297,7 @@ TEST_P(IntersectOnDevice, RandomVoxelsOfAwkwardDims) {
        {glm::uvec3(18, 21, 17), glm::uvec3(5, 6, 7), glm::uvec3(2, 9, 33), glm::uvec3(2, 2, 2)}) {
     run_cameras(dims, Field::kRandom, {0.1f}, tally);
   }
-  EXPECT_GT(tally.hits, 10000u);
+  EXPECT_GT(tally.hits, is_slow() ? 2500u : 10000u);
   EXPECT_EQ(tally.untested, 0u);
 }
 
@@ -303,6 +305,7 @@ TEST_P(IntersectOnDevice, GroupSizesDoNotMatter) {
   const glm::uvec3 dims(18, 21, 17);
   const FrameParams frame = case_frame(dims, camera_cases(dims)[1], {71, 53});
   for (const uint group_size : kGroupSizes) {
+    if (is_slow() && group_size == 64) continue;  // as the other cases
     Stages stages(device_, frame, 5 * 6 * 5, group_size);
     Tally tally;
     run(dims, Field::kRandom, frame, stages, 2, tally);

@@ -30,9 +30,7 @@ constexpr float kIsovalue = 0.8f;  // both fields: many candidate blocks that ra
 
 class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
-  /// Mesa's llvmpipe needs a millisecond of processor time a launch, a hundred times PoCL's, and half a minute (pipeline
-  /// rays: three) to compile the kernels for one more group size: there the long tests draw fewer frames.
-  bool is_slow() const { return device_.info().platform == "rusticl"; }
+  bool is_slow() const { return is_llvmpipe(device_.info()); }
 
   static bool is_blocks() { return GetParam().pipeline == PipelineKind::kBlocks; }
 

@@ -22,6 +22,11 @@ constexpr ImageSize kMedium{96, 64};
 
 class ResidentOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
+  void SetUp() override {
+    if (is_llvmpipe(device_.info()))
+      GTEST_SKIP() << "a floor for benchmarks, for which llvmpipe would compile two minutes";
+  }
+
   /// Draws all isovalues from all cameras. Returns the number of hits.
   std::uint64_t check(const TestVolume &volume, const std::vector<Camera> &cameras,
                       const std::vector<float> &isovalues, ImageSize size) {

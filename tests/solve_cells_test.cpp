@@ -97,6 +97,7 @@ TEST_P(SolveCellsOnDevice, FramesOfEverySolverEqualTheTwins) {
   const ImageSize size{64, 48};
   const Camera camera = orbit_cameras(volume.info(), 1).front();
   for (const std::string_view name : kSolverNames) {
+    if (is_llvmpipe(device_.info()) && name != "marmitt") continue;
     SCOPED_TRACE(name);
     RendererOptions options;
     options.size = size;

@@ -31,6 +31,12 @@ inline std::vector<ocl::DeviceInfo> devices_under_test() {
   return ocl::list_devices();
 }
 
+/// Mesa's llvmpipe, which prepares a kernel anew for each launch: milliseconds of processor time for a small one, a tenth of a
+/// second for `intersect`; and compiles `march` for a minute. There the long tests draw fewer frames.
+inline bool is_llvmpipe(const ocl::DeviceInfo &device) {
+  return device.platform == "rusticl";
+}
+
 /// "0_rusticl": a device as the suffix of a test's name.
 inline std::string device_test_name(const testing::TestParamInfo<ocl::DeviceInfo> &info) {
   std::string name = std::to_string(info.param.index) + "_";

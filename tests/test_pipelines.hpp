@@ -30,14 +30,14 @@ inline void PrintTo(const PipelineOnDevice &param, std::ostream *out) {
   *out << param.name << " on " << param.device.name;
 }
 
-/// Mesa's llvmpipe needs half a minute to compile the kernels of one of them: there, one of each pipeline.
+/// On llvmpipe one of each pipeline.
 inline std::vector<PipelineOnDevice> pipelines_under_test() {
   std::vector<PipelineOnDevice> params;
   for (const ocl::DeviceInfo &device : devices_under_test()) {
     params.push_back({device, "blocks", PipelineKind::kBlocks, Grouping::kRadix, ClosestHit::kScan, false});
     params.push_back(
         {device, "rays_per_ray", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, true});
-    if (device.platform == "rusticl") continue;
+    if (is_llvmpipe(device)) continue;
     params.push_back({device, "blocks_counting_atomic_min", PipelineKind::kBlocks, Grouping::kCounting,
                       ClosestHit::kAtomicMin, false});
     params.push_back(
