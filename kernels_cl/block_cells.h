@@ -13,11 +13,6 @@ inline GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, LastP
                    locate(ray->z, 2, enter, 1, z0, min(z0 + 3, last.z - 1)), 1, last);
 }
 
-inline int in_block(const GridWalk *cell, BlockCoords b, LastPlanes last) {
-  return cell->x >> 2 == (int)b.x && cell->y >> 2 == (int)b.y && cell->z >> 2 == (int)b.z &&
-         cell->x < last.x && cell->y < last.y && cell->z < last.z;
-}
-
 /// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which voxels of the blocks of
 /// its dual grid are inside; where one is not known, the cells that need it have any bit.
 inline ulong changing_cells(const ulong *inside) {

@@ -40,32 +40,32 @@ inline uint find_blocks(constant FrameParams *frame, global const uint *macrocel
   GridWalk coarse = walk_from(ray, w.x / ISO_MACROCELL_BLOCKS, w.y / ISO_MACROCELL_BLOCKS,
                               w.z / ISO_MACROCELL_BLOCKS, 4 * ISO_MACROCELL_BLOCKS, last);
   RayEvent entry = start_event();
-  int within = 1, entered = 1; /* entered: w is in this coarse cell */
+  int within = 1, follows = 1; /* follows: w is in this coarse cell */
   uint k = 0;
   while (within && k < wanted) {
     const uint cell = (uint)coarse.x + coarse_x * ((uint)coarse.y + coarse_y * (uint)coarse.z);
     const uint low = macrocell_masks[2 * cell], high = macrocell_masks[2 * cell + 1];
     if ((low | high) != 0) {
-      if (!entered) w = enter_macrocell(ray, &coarse, entry, last);
-      entered = 1;
-      while (entered && within && k < wanted) {
+      int left = 0;
+      if (!follows) w = enter_macrocell(ray, &coarse, entry, last);
+      while (!left && k < wanted) {
         const uint bit = (uint)((w.x & 3) + 4 * (w.y & 3) + 16 * (w.z & 3));
         if ((bit < 32 ? low >> bit : high >> (bit - 32)) & 1u) {
           found[stride * k++] = block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z);
         }
-        walk_step(&w, ray, walk_exit(&w), 4, last);
-        within = may_be_active(frame, w.x, w.y, w.z, 1);
-        entered = w.x >> 2 == coarse.x && w.y >> 2 == coarse.y && w.z >> 2 == coarse.z;
+        left = walk_step(&w, ray, walk_exit(&w), 4, last);
       }
     }
+    follows = (low | high) != 0;
     if (k < wanted) {
       entry = walk_exit(&coarse);
       walk_step(&coarse, ray, entry, 4 * ISO_MACROCELL_BLOCKS, last);
       within = may_be_active(frame, coarse.x, coarse.y, coarse.z, ISO_MACROCELL_BLOCKS);
-      entered = 0;
     }
   }
-  *block_id = within ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z) : ISO_INVALID_ID;
+  *block_id = within && may_be_active(frame, w.x, w.y, w.z, 1)
+                  ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
+                  : ISO_INVALID_ID;
   return k;
 }
 

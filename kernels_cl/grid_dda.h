@@ -120,13 +120,16 @@ static inline int is_above(RayAxis a, int axis, int plane, RayEvent e) {
   return crossed == (a.d > 0.0f);
 }
 
-/// The region along one axis, within [first, last], that the ray is in just after event `e`. The position is
-/// only a first guess; comparing crossings decides.
+/// The region along one axis, within [first, last], that the ray is in just after event `e`. Where the position o + t d is
+/// further from a plane than its error, 2^-24 (|t d| + |o + t d|), it decides; else crossings are compared.
 static inline int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
-  const float x =
-      (a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o)) / (float)size; /* size is a power of two: exact */
-  int c = x <= (float)first ? first : (x >= (float)last ? last : (int)floor(x));
-  int step = a.d != 0.0f;
+  const float p = a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o);
+  const float error = 0x1p-22f * (fabs(p) + fabs(a.o));
+  const int on_plane = axis == e.axis;                    /* on a whole number, then */
+  const float x = (on_plane ? rint(p) : p) / (float)size; /* size is a power of two: exact */
+  const float region = on_plane && a.d < 0.0f ? ceil(x) - 1.0f : floor(x);
+  int c = region <= (float)first ? first : (region >= (float)last ? last : (int)region);
+  int step = a.d != 0.0f && (on_plane ? error > 0.25f : fabs(p - (float)size * rint(x)) <= error);
   while (step != 0) {
     const int up = c < last && is_above(a, axis, size * (c + 1), e);
     step = up ? 1 : (c > first && !is_above(a, axis, size * c, e) ? -1 : 0);
@@ -198,9 +201,10 @@ static inline RayEvent walk_exit(const GridWalk *w) {
   return e;
 }
 
-/// Goes through the region's exit into the next region, which may lie outside the grid. One path for all axes: the
-/// work-items of a GPU take turns at branches.
-static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
+/// Goes through the region's exit into the next region, which may lie outside the grid. Returns 1 if that is outside, or in
+/// another of the groups of 4^3 regions: cells of a block, blocks of a coarse macrocell. One path for all axes: the work-items
+/// of a GPU take turns at branches.
+static inline int walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
   const int on_x = exit.axis == 0, on_y = exit.axis == 1;
   RayAxis a = r->z;
   int c = w->z, last_plane = last.z;
@@ -227,6 +231,7 @@ static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size,
     w->z = c;
     w->fz = t;
   }
+  return (c & 3) == (a.d > 0.0f ? 0 : 3) || size * c >= last_plane;
 }
 
 /// Shrinks [*enter, *exit] to one axis of a box. Returns 0 if the ray runs beside it.

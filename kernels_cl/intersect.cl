@@ -1,4 +1,5 @@
 /// intersect.cl -- a block's rays against its dual grid (Sec. 3.7, 4.3).
+#include "block_cells.h"
 #include "cached_cell.h"
 #include "cell_intersect.h"
 #include "closest_pair.h"
@@ -6,31 +7,27 @@
 /// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk came into doubt.
 /// dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
 inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, local const float *dual_grid) {
-  const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
-  const int end_x = min(x0 + 4, last.x), end_y = min(y0 + 4, last.y), end_z = min(z0 + 4, last.z);
   RayEvent enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  GridWalk cell =
-      walk_from(ray, locate(ray->x, 0, enter, 1, x0, end_x - 1), locate(ray->y, 1, enter, 1, y0, end_y - 1),
-                locate(ray->z, 2, enter, 1, z0, end_z - 1), 1, last);
+  GridWalk cell = enter_block(ray, b, enter, last);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   CellChange change;
   PairHit hit;
-  int found = 0;
+  int found = 0, left = 0;
   hit.cell = ISO_NO_HIT;
   hit.s = 0.0f;
-  while (cell.x >= x0 && cell.x < end_x && cell.y >= y0 && cell.y < end_y && cell.z >= z0 && cell.z < end_z) {
+  while (!left) {
     const RayEvent exit = walk_exit(&cell);
-    const int vertex = (cell.x - x0) + 5 * (cell.y - y0) + 25 * (cell.z - z0);
+    const int vertex = (cell.x & 3) + 5 * (cell.y & 3) + 25 * (cell.z & 3);
     float w[8];
     for (int corner = 0; corner < 8; ++corner) {
       w[corner] = dual_grid[vertex + (corner & 1) + 5 * (corner >> 1 & 1) + 25 * (corner >> 2)];
     }
     found = change_or_doubt_in_cell(solver, ray, w, cell.x, cell.y, cell.z, enter, exit, &change);
     if (found) {
-      hit.cell = (uint)((cell.x - x0) + 4 * (cell.y - y0) + 16 * (cell.z - z0));
+      hit.cell = (uint)((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3));
       break;
     }
-    walk_step(&cell, ray, exit, 1, last);
+    left = walk_step(&cell, ray, exit, 1, last);
     enter = exit;
   }
   if (found == ISO_DOUBTFUL) {
@@ -100,26 +97,25 @@ kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *
     if (start >= ISO_IN_DOUBT) {
       const Ray ray = make_ray(frame, active_ray_ids[pair / counts->spec_count] & ISO_RAY_PIXEL);
       const BlockCoords b = block_coords(frame, slot_block_ids[slots[i]]);
-      const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
-      const int end_x = min(x0 + 4, last.x), end_y = min(y0 + 4, last.y), end_z = min(z0 + 4, last.z);
-      const int x = x0 + (int)(start & 3), y = y0 + (int)(start >> 2 & 3), z = z0 + (int)(start >> 4 & 3);
+      const int x = (int)(4 * b.x + (start & 3)), y = (int)(4 * b.y + (start >> 2 & 3)),
+                z = (int)(4 * b.z + (start >> 4 & 3));
       GridWalk cell = walk_from(&ray, x, y, z, 1, last);
       RayEvent enter = region_entry(&ray, x, y, z, 1, last);
       PairHit hit;
+      int left = 0;
       hit.cell = ISO_NO_HIT;
       hit.s = 0.0f;
-      while (cell.x >= x0 && cell.x < end_x && cell.y >= y0 && cell.y < end_y && cell.z >= z0 &&
-             cell.z < end_z) {
+      while (!left) {
         const RayEvent exit = walk_exit(&cell);
         CellChange change;
         float w[8];
         load_corners(frame, table, cache_values, cell.x, cell.y, cell.z, w);
         if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
-          hit.cell = (uint)((cell.x - x0) + 4 * (cell.y - y0) + 16 * (cell.z - z0));
+          hit.cell = (uint)((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3));
           hit.s = refine(solver, change.cubic, change.bracket);
           break;
         }
-        walk_step(&cell, &ray, exit, 1, last);
+        left = walk_step(&cell, &ray, exit, 1, last);
         enter = exit;
       }
       pair_hits[pair] = hit;

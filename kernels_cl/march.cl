@@ -42,7 +42,7 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   ulong inside[8], changing;
   uint have = 0;
-  int result = ISO_RAY_LEFT;
+  int result = ISO_RAY_LEFT, left = 0;
   BlockEntry entries[8];
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
   ISO_UNROLL
@@ -56,7 +56,7 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
   if (changing == 0 && have == 0xFFu) return ISO_RAY_LEFT;
   found->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   found->cell = enter_block(ray, b, found->enter, last);
-  while (result == ISO_RAY_LEFT && in_block(&found->cell, b, last)) {
+  while (result == ISO_RAY_LEFT && !left) {
     const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
     const RayEvent exit = walk_exit(&found->cell);
     if ((cell_blocks(x, y, z) & ~have) != 0) {
@@ -75,7 +75,7 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
                                                  found->cell.z, found->enter, exit, &found->change);
     }
     if (result == ISO_RAY_LEFT) {
-      walk_step(&found->cell, ray, exit, 1, last);
+      left = walk_step(&found->cell, ray, exit, 1, last);
       found->enter = exit;
     }
   }

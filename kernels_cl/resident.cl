@@ -71,15 +71,16 @@ typedef struct CellWalk {
   RayEvent enter;  ///< by which it entered the cell
   float w[8];      ///< of the cell where the walk stopped
   CellChange change;
+  int left;  ///< has it left the block?
 } CellWalk;
 
 /// Walks on to the next change of inside in the block's `changing` cells, in float. Returns 1, ISO_DOUBTFUL, or 0 when the ray
 /// has left the block.
 inline int walk_to_change(constant FrameParams *frame, global const float *values, const Ray *ray,
-                          BlockCoords b, LastPlanes last, ulong changing, CellWalk *at) {
+                          LastPlanes last, ulong changing, CellWalk *at) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   int found = 0;
-  while (!found && in_block(&at->cell, b, last)) {
+  while (!found && !at->left) {
     const RayEvent exit = walk_exit(&at->cell);
     if ((changing >> ((at->cell.x & 3) + 4 * (at->cell.y & 3) + 16 * (at->cell.z & 3)) & 1ul) != 0) {
       resident_corners(frame, values, at->cell.x, at->cell.y, at->cell.z, at->w);
@@ -87,7 +88,7 @@ inline int walk_to_change(constant FrameParams *frame, global const float *value
                                       &at->change);
     }
     if (!found) {
-      walk_step(&at->cell, ray, exit, 1, last);
+      at->left = walk_step(&at->cell, ray, exit, 1, last);
       at->enter = exit;
     }
   }
@@ -102,15 +103,16 @@ inline int resident_block(constant FrameParams *frame, global const float *value
   if (changing != 0) {
     at->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
     at->cell = enter_block(ray, b, at->enter, last);
-    found = walk_to_change(frame, values, ray, b, last, changing, at);
+    at->left = 0;
+    found = walk_to_change(frame, values, ray, last, changing, at);
     while (found == ISO_DOUBTFUL) { /* rare: its 48-bit arithmetic stays out of the loop over cells */
       const RayEvent exit = walk_exit(&at->cell);
       found = change_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter, exit,
                              &at->change);
       if (!found) {
-        walk_step(&at->cell, ray, exit, 1, last);
+        at->left = walk_step(&at->cell, ray, exit, 1, last);
         at->enter = exit;
-        found = walk_to_change(frame, values, ray, b, last, changing, at);
+        found = walk_to_change(frame, values, ray, last, changing, at);
       }
     }
   }

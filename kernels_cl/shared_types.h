@@ -29,9 +29,11 @@ ISO_NAMESPACE_BEGIN
 using uint = std::uint32_t;
 using ulong = std::uint64_t;
 using uchar = std::uint8_t;
+using std::ceil;
 using std::fabs;
 using std::floor;
 using std::fma;
+using std::rint;
 using std::sqrt;
 inline uint popcount(uint x) {
   return static_cast<uint>(std::popcount(x));

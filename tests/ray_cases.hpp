@@ -42,6 +42,7 @@ inline std::vector<CameraCase> camera_cases(const glm::uvec3 &dims) {
       {"eye on a plane", {{middle_voxel.x, centre.y + 0.3, -11}, centre, y, 50}},
       {"3000 voxels away", {{1700, 1600, 1900}, centre, y, 1.2}},
       {"3000 voxels away, along an axis", {{3000, middle_voxel.y, middle_voxel.z}, middle_voxel, y, 0.9}},
+      {"a million voxels away", {{6.1e5, 5.3e5, 7.2e5}, centre, y, 0.002}},
       {"looking away", {{-5, -5, -5}, {-50, -60, -40}, y, 60}},
       {"beside the volume", {{-30, centre.y, -3}, {30, centre.y, -3}, y, 3}},
   };
