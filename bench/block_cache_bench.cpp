@@ -28,7 +28,7 @@ class CacheInput {
                static_cast<std::uint32_t>(num_needed()), num_pairs, kGroupSize) {
     FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
     params.table_groups = cache_.table_groups;
-    rays_.frame.write({&params, 1});
+    rays_.frame = params;
     for (int set = 0; set < 2; ++set) {
       open_pass(true);
       request();

@@ -19,7 +19,7 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
     : params(make_frame_params(volume.info, setup.camera, setup.size, setup.isovalue)),
       stream(device, volume),
       rays(device, setup.size.num_pixels()),
-      macrocells(device, rays.frame, params, stream),
+      macrocells(device, params, stream),
       cache(device, params, slots_of(volume, setup), rays.num_pixels, kGroupSize),
       compaction(device, rays.num_pixels, kGroupSize),
       initial_rays(device, rays.num_pixels),
@@ -31,8 +31,8 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
       composite(device, rays.num_pixels) {
   params.max_spec_count = setup.max_speculation;
   params.table_groups = cache.table_groups;
-  macrocells.select(rays.frame, params);
-  rays.frame.write({&params, 1});
+  macrocells.select(params);
+  rays.frame = params;
 }
 
 void FrameRig::start() {

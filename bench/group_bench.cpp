@@ -25,7 +25,7 @@ struct GroupInput {
         group(device, num_pairs, num_slots, kGroupSize, grouping) {
     FrameParams params = cube_params(kKeyBits);
     params.table_groups = cache.table_groups;
-    rays.frame.write({&params, 1});
+    rays.frame = params;
     rays.pair_block_ids.write(pairs.pair_block_ids);
     open_pass();
     cache.request(rays);

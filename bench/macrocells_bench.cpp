@@ -20,9 +20,8 @@ struct MacrocellsInput {
       : volume(mixing_layer(edge, rate)),
         params(volume_params(volume, kMixingLayerIsovalue)),
         stream(device, volume),
-        frame(device, "frame", 1),
-        macrocells(device, frame, params, stream) {
-    macrocells.select(frame, params);
+        macrocells(device, params, stream) {
+    macrocells.select(params);
     verify();
   }
 
@@ -56,7 +55,6 @@ struct MacrocellsInput {
   const CompressedVolume &volume;
   FrameParams params;
   DeviceStream stream;
-  ocl::Buffer<FrameParams> frame;
   Macrocells macrocells;
 };
 
@@ -67,7 +65,7 @@ void build_ranges(benchmark::State &state) {
   const double bytes = blocks * (in.stream.bits_per_block / 8.0 + sizeof(cl_ushort));
   measure(
       state, {blocks, bytes}, [] {},
-      [&] { const Macrocells built(Session::current().device(), in.frame, in.params, in.stream); });
+      [&] { const Macrocells built(Session::current().device(), in.params, in.stream); });
 }
 
 void select_isovalue(benchmark::State &state) {
@@ -75,7 +73,7 @@ void select_isovalue(benchmark::State &state) {
   const auto blocks = static_cast<double>(in.volume.block_count());
   measure(
       state, {blocks, blocks * (sizeof(cl_ushort) + 1.0 / 8)}, [] {},
-      [&] { in.macrocells.select(in.frame, in.params); });
+      [&] { in.macrocells.select(in.params); });
 }
 
 const bool kRegistered = [] {

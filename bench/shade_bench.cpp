@@ -19,7 +19,7 @@ struct ShadeInput : FrameRig {
     }
     check(run().pixels == shade_scalar(params, appearance, rays.hits.read()).pixels, "shaded pixels");
   }
-  Image8 run() { return shade(params, appearance, rays); }
+  Image8 run() { return shade(appearance, rays); }
 
   ShadeParams appearance;
   Shade shade;

@@ -37,7 +37,6 @@ struct DecodeInput {
         counts(device, "counts", 1),
         block_ids(device, "block ids", kNumDecoded),
         slots(device, "slots", kNumDecoded),
-        frame(device, "frame", 1),
         table(device, "table", kNumDecoded),
         values(device, "values", std::size_t{kNumDecoded} * ISO_BLOCK_VOXELS) {
     const CompressedVolume &volume = mixing_layer(kEdge, rate);
@@ -80,7 +79,7 @@ struct DecodeInput {
   ZfpDecode decode;
   CountsBuffer counts;
   ocl::Buffer<uint> block_ids, slots;
-  ocl::Buffer<FrameParams> frame;
+  FrameParams frame{};
   ocl::Buffer<BlockEntry> table;
   ocl::Buffer<float> values;
 };

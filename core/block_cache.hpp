@@ -57,23 +57,23 @@ struct BlockCache {
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
   ocl::Buffer<uint> free_slots_, age_histogram_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
+  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_;
   ocl::Kernel<ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> age_histogram_kernel_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
       select_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>,
-              ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>, ocl::Out<BlockEntry>,
+              ocl::Out<CacheState>, ocl::Out<uint>>
       evict_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<float>,
-              ocl::In<CacheState>, ocl::Out<BlockEntry>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<float>, ocl::In<CacheState>,
+              ocl::Out<BlockEntry>>
       rebuild_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<float>, ocl::Out<BlockEntry>> classify_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint,
-              ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<uint>, ocl::Out<CacheState>>
+  ocl::Kernel<FrameParams, ocl::In<float>, ocl::Out<BlockEntry>> classify_;
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint, ocl::In<uint>,
+              ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<CacheState>>
       assign_;
   ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<CacheState>>

@@ -53,10 +53,10 @@ class Group {
     ocl::Range range;
     std::uint32_t key_bits;
     RadixSort sort;
-    ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>>
+    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PairHit>,
+                ocl::Out<uint>, ocl::Out<uint>>
         select;
-    ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<BlockEntry>,
+    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<BlockEntry>,
                 ocl::Out<uint>>
         keys;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> heads;
@@ -70,12 +70,12 @@ class Group {
     ocl::Range pairs_range, pair_tiles_range, visible_range, visible_tiles_range;
     ocl::Buffer<uint> slot_counts;  ///< [slots] 0 between passes
     ocl::Buffer<uint> tile_sums;
-    ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+    ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PairHit>,
+                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
         count;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> sum_tiles;
     ocl::Kernel<ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>> offsets;
-    ocl::Kernel<ocl::In<FrameParams>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<uint>,
+    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<uint>,
                 ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>>
         scatter;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> clear;

@@ -17,7 +17,7 @@ class InitialRays {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
+  ocl::Kernel<FrameParams, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<PassCounts>>
       kernel_;
 };

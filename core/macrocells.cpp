@@ -34,34 +34,32 @@ std::uint32_t coarse_count(const FrameParams &f) {
 
 }  // namespace
 
-Macrocells::Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, const FrameParams &params,
-                       const DeviceStream &stream)
-    : num_coarse_(coarse_count(params)),
+Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream)
+    : num_coarse_(coarse_count(frame)),
       coarse_range_(ocl::Range::strided(num_coarse_, kGroupSize, device)),
-      ranges_(device, "block ranges", block_count(params)),
+      ranges_(device, "block ranges", block_count(frame)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
       masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
       box_(device, "active box", 6),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
   const auto stage = device.timer().stage("macrocells");
-  frame.write({&params, 1});
   Partials decode{device, frame, stream, {device, "macrocells", "macrocell_partials", stream.defines()}};
-  thresholds_ = sample_thresholds(device, block_count(params), decode);
+  thresholds_ = sample_thresholds(device, block_count(frame), decode);
 
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
+  ocl::Kernel<FrameParams, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
               ocl::Out<cl_ushort>>
       ranges_kernel(device, "macrocells", "macrocell_ranges", stream.defines());
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_kernel(
+  ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_kernel(
       device, "macrocells", "macrocell_coarse_ranges", stream.defines());
   const ocl::Buffer<float> thresholds(device, "range thresholds", std::span<const float>(thresholds_));
-  const std::uint32_t layer_blocks = params.blocks_x * params.blocks_y;
+  const std::uint32_t layer_blocks = frame.blocks_x * frame.blocks_y;
   ocl::Buffer<ValueRange> below(device, "range partials, layer below", 8 * std::size_t{layer_blocks});
   ocl::Buffer<ValueRange> above(device, "range partials, layer above", 8 * std::size_t{layer_blocks});
   const ocl::Range layer_range = ocl::Range::strided(layer_blocks, kGroupSize, device);
 
   decode(0, 1, layer_blocks, below);
-  for (std::uint32_t layer = 0; layer < params.blocks_z; ++layer) {
-    if (layer + 1 < params.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
+  for (std::uint32_t layer = 0; layer < frame.blocks_z; ++layer) {
+    if (layer + 1 < frame.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
     ranges_kernel(layer_range, frame, layer, below, above, thresholds, ranges_);
     std::swap(below, above);
   }
@@ -132,30 +130,29 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
   return thresholds;
 }
 
-void Macrocells::select(ocl::Buffer<FrameParams> &frame, FrameParams &params) {
-  params.isovalue_index = static_cast<std::uint32_t>(
-      std::lower_bound(thresholds_.begin(), thresholds_.end(), params.isovalue) - thresholds_.begin());
-  frame.write({&params, 1});
+void Macrocells::select(FrameParams &frame) {
+  frame.isovalue_index = static_cast<std::uint32_t>(
+      std::lower_bound(thresholds_.begin(), thresholds_.end(), frame.isovalue) - thresholds_.begin());
   constexpr int kNone = std::numeric_limits<int>::max();
   box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
   masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_, box_);
   box_.read(active_box_);
-  const std::array<std::uint32_t, 3> dims = {params.dims_x, params.dims_y, params.dims_z};
+  const std::array<std::uint32_t, 3> dims = {frame.dims_x, frame.dims_y, frame.dims_z};
   for (std::size_t i = 0; i < 3; ++i) {
     const int num_blocks = static_cast<int>(num_owning_blocks(dims[i]));
     active_box_[i] = std::min(active_box_[i], num_blocks) * ISO_MACROCELL_BLOCKS;
     active_box_[3 + i] = std::min(active_box_[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
   }
-  set_active_box(params);
+  set_active_box(frame);
 }
 
-void Macrocells::set_active_box(FrameParams &params) const {
-  params.active_begin_x = active_box_[0];
-  params.active_begin_y = active_box_[1];
-  params.active_begin_z = active_box_[2];
-  params.active_end_x = active_box_[3];
-  params.active_end_y = active_box_[4];
-  params.active_end_z = active_box_[5];
+void Macrocells::set_active_box(FrameParams &frame) const {
+  frame.active_begin_x = active_box_[0];
+  frame.active_begin_y = active_box_[1];
+  frame.active_begin_z = active_box_[2];
+  frame.active_end_x = active_box_[3];
+  frame.active_end_y = active_box_[4];
+  frame.active_end_z = active_box_[5];
 }
 
 }  // namespace isowave

@@ -17,17 +17,16 @@ class Macrocells {
  public:
   /// Decodes every block once, beside a sample for the quantile table, and waits.
   /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z layer.
-  Macrocells(ocl::Device &device, ocl::Buffer<FrameParams> &frame, const FrameParams &params,
-             const DeviceStream &stream);
+  Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
 
   /// Bytes that the constructor needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
-  /// Rebuilds masks() for params.isovalue and sets what the frames of this isovalue need: params.isovalue_index and the
+  /// Rebuilds masks() for frame.isovalue and sets what the frames of this isovalue need: frame.isovalue_index and the
   /// active box. Waits.
-  void select(ocl::Buffer<FrameParams> &frame, FrameParams &params);
+  void select(FrameParams &frame);
   /// Sets the active box of the isovalue selected last.
-  void set_active_box(FrameParams &params) const;
+  void set_active_box(FrameParams &frame) const;
 
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
   const ocl::Buffer<uint> &masks() const { return masks_; }
@@ -41,14 +40,14 @@ class Macrocells {
   struct ValueRange {
     float min, max;
   };
-  using PartialsKernel = ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-                                     ocl::In<uint>, uint, uint, uint, uint, uint, uint, ocl::Out<ValueRange>>;
+  using PartialsKernel = ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+                                     uint, uint, uint, uint, uint, uint, ocl::Out<ValueRange>>;
   /// Decodes blocks sampled_block(first + i * stride, stride), i in [0, count): partials [8 * count].
   struct Partials {
     void operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
                     ocl::Buffer<ValueRange> &partials);
     ocl::Device &device;
-    const ocl::Buffer<FrameParams> &frame;
+    const FrameParams &frame;
     const DeviceStream &stream;
     PartialsKernel kernel;
   };
@@ -62,8 +61,7 @@ class Macrocells {
   ocl::Buffer<int> box_;
   std::array<int, 6> active_box_{};  ///< begin x, y, z, end x, y, z [blocks]
   std::vector<float> thresholds_;
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::Out<uint>,
-              ocl::Out<int>>
+  ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::Out<uint>, ocl::Out<int>>
       masks_kernel_;
 };
 

@@ -28,14 +28,14 @@ class March {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<HitRecord>>
       start_rays_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<PassCounts>,
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<PassCounts>,
               ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<HitRecord>, ocl::Out<CacheState>>
       march_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>,
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>,
               ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_ahead_;
 };

@@ -122,8 +122,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   plan.cache_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
   add_stream(plan, volume, request);
-  plan.buffers.insert(plan.buffers.end(), {{"frame", sizeof(FrameParams)},
-                                           {"pass counts", sizeof(PassCounts)},
+  plan.buffers.insert(plan.buffers.end(), {{"pass counts", sizeof(PassCounts)},
                                            {"pass counts, previous", sizeof(PassCounts)},
                                            {"pass counts, next", sizeof(PassCounts)},
                                            {"hits", sizeof(HitRecord) * pixels},

@@ -92,7 +92,7 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
                             ? DeviceStream(device, volume, OnHost{plan.window_blocks})
                             : DeviceStream(device, volume, options.largest_stream_part);
   Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks);
-  Macrocells macrocells(device, rays.frame, grid, stream);
+  Macrocells macrocells(device, grid, stream);
   ZfpDecode decode(device, plan.cache_slots, stream.defines());
   BlockCache cache(device, grid, plan.cache_slots, options.size.num_pixels(), options.group_size);
   return {device,           std::move(stream), std::move(rays), std::move(macrocells),
@@ -151,17 +151,17 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
 }
 
 void Renderer::begin_frame(const Camera &camera, float isovalue) {
-  frame_ = make_frame_params(info_, camera, options_.size, isovalue);
-  frame_.max_spec_count = options_.max_speculation;
-  frame_.per_ray_speculation = options_.per_ray_speculation;
-  frame_.table_groups = state_.cache.table_groups;
+  FrameParams &frame = state_.rays.frame;
+  frame = make_frame_params(info_, camera, options_.size, isovalue);
+  frame.max_spec_count = options_.max_speculation;
+  frame.per_ray_speculation = options_.per_ray_speculation;
+  frame.table_groups = state_.cache.table_groups;
   if (selected_isovalue_ != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
-    state_.macrocells.select(state_.rays.frame, frame_);
+    state_.macrocells.select(frame);
     state_.cache.classify(state_.rays);
   }
-  state_.macrocells.set_active_box(frame_);
-  state_.rays.frame.write({&frame_, 1});
+  state_.macrocells.set_active_box(frame);
   selected_isovalue_ = isovalue;
   pipeline_->begin_frame();
 }
@@ -186,7 +186,7 @@ void Renderer::clear_cache() {
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {
-  return shade_(frame_, make_shade_params(info_, appearance), state_.rays);
+  return shade_(make_shade_params(info_, appearance), state_.rays);
 }
 
 }  // namespace isowave

@@ -96,7 +96,6 @@ class Renderer {
   RendererOptions options_;
   MemoryPlan plan_;
   VolumeInfo info_;
-  FrameParams frame_{};
   std::optional<float> selected_isovalue_;  ///< what the macrocell masks stand for
   FrameState state_;
   std::unique_ptr<Pipeline> pipeline_;

@@ -43,8 +43,7 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       info_(volume.info),
       size_(size),
       num_blocks_(static_cast<std::uint32_t>(volume.block_count())),
-      frame_(device, "frame", 1),
-      macrocells_(device, frame_, grid_params(volume), stream),
+      macrocells_(device, grid_params(volume), stream),
       values_(device, "decoded volume", volume.block_count() * ISO_BLOCK_VOXELS),
       inside_(device, "voxels inside", volume.block_count()),
       changing_(device, "changing cells", volume.block_count()),
@@ -90,17 +89,16 @@ double Resident::render(const Camera &camera, float isovalue) {
   const auto begin = std::chrono::steady_clock::now();
   FrameParams frame = make_frame_params(info_, camera, size_, isovalue);
   if (selected_isovalue_ != isovalue) {
-    macrocells_.select(frame_, frame);
+    macrocells_.select(frame);
     const ocl::Range blocks = ocl::Range::strided(num_blocks_, kGroupSize, device_);
-    inside_kernel_(blocks, frame_, num_blocks_, values_, inside_);
-    changing_kernel_(blocks, frame_, num_blocks_, inside_, changing_);
+    inside_kernel_(blocks, frame, num_blocks_, values_, inside_);
+    changing_kernel_(blocks, frame, num_blocks_, inside_, changing_);
   }
   macrocells_.set_active_box(frame);
-  frame_.write({&frame, 1});
   selected_isovalue_ = isovalue;
   const std::size_t tiles = std::size_t{(size_.width + 7) / 8} * ((size_.height + 3) / 4);
   // One work-item per pixel: rays differ too much in length for strides over them to keep a device busy.
-  kernel_(ocl::Range::covering(tiles * kTilePixels, kGroupSize), frame_, macrocells_.masks(), values_,
+  kernel_(ocl::Range::covering(tiles * kTilePixels, kGroupSize), frame, macrocells_.masks(), values_,
           changing_, hits_);
   device_.finish();
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();

@@ -42,16 +42,14 @@ class Resident {
   ImageSize size_;
   std::uint32_t num_blocks_;
   std::optional<float> selected_isovalue_;  ///< what masks and changing_ stand for
-  ocl::Buffer<FrameParams> frame_;          ///< [1]
   Macrocells macrocells_;
   ocl::Buffer<float> values_;    ///< [num_blocks * 64]
   ocl::Buffer<ulong> inside_;    ///< [num_blocks]
   ocl::Buffer<ulong> changing_;  ///< [num_blocks]
   ocl::Buffer<HitRecord> hits_;  ///< [pixels]
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<float>, ocl::Out<ulong>> inside_kernel_;
-  ocl::Kernel<ocl::In<FrameParams>, uint, ocl::In<ulong>, ocl::Out<ulong>> changing_kernel_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<float>, ocl::In<ulong>, ocl::Out<HitRecord>>
-      kernel_;
+  ocl::Kernel<FrameParams, uint, ocl::In<float>, ocl::Out<ulong>> inside_kernel_;
+  ocl::Kernel<FrameParams, uint, ocl::In<ulong>, ocl::Out<ulong>> changing_kernel_;
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<float>, ocl::In<ulong>, ocl::Out<HitRecord>> kernel_;
 };
 
 }  // namespace isowave

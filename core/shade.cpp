@@ -65,10 +65,10 @@ Shade::Shade(ocl::Device &device, std::uint64_t num_pixels)
       image_(device, "framebuffer", num_pixels),
       kernel_(device, "shade", "shade") {}
 
-Image8 Shade::operator()(const FrameParams &frame, const ShadeParams &params, Wavefront &rays) {
+Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays) {
   params_.write({&params, 1});
   kernel_(range_, rays.frame, params_, rays.hits, image_);
-  return rgb_image(frame, image_.read());
+  return rgb_image(rays.frame, image_.read());
 }
 
 }  // namespace isowave

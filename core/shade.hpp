@@ -28,13 +28,13 @@ class Shade {
   Shade(ocl::Device &device, std::uint64_t num_pixels);
 
   /// Shades rays.hits and waits. RGB.
-  Image8 operator()(const FrameParams &frame, const ShadeParams &params, Wavefront &rays);
+  Image8 operator()(const ShadeParams &params, Wavefront &rays);
 
  private:
   ocl::Range range_;
   ocl::Buffer<ShadeParams> params_;
   ocl::Buffer<uint> image_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<ShadeParams>, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
+  ocl::Kernel<FrameParams, ocl::In<ShadeParams>, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
 };
 
 }  // namespace isowave

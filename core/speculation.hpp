@@ -19,7 +19,7 @@ class Speculation {
   }
 
  private:
-  ocl::Kernel<ocl::In<FrameParams>, ocl::Out<PassCounts>> begin_pass_;
+  ocl::Kernel<FrameParams, ocl::Out<PassCounts>> begin_pass_;
 };
 
 }  // namespace isowave

@@ -17,8 +17,8 @@ class Traverse {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<uint>>
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<uint>>
       kernel_;
 };
 

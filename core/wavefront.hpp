@@ -31,7 +31,6 @@ struct Wavefront {
   /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not.
   explicit Wavefront(ocl::Device &device, std::uint64_t pixels, bool with_pairs = true)
       : num_pixels(pixels),
-        frame(device, "frame", 1),
         counts(device, "pass counts", 1),
         previous_counts(device, "pass counts, previous", 1),
         next_counts(device, "pass counts, next", 1),
@@ -67,7 +66,7 @@ struct Wavefront {
   }
 
   std::uint64_t num_pixels;               ///< R
-  ocl::Buffer<FrameParams> frame;         ///< [1]
+  FrameParams frame{};                    ///< of the frame at work
   CountsBuffer counts;                    ///< [1] of the pass at work
   CountsBuffer previous_counts;           ///< [1] of the pass before (pipeline `rays`)
   CountsBuffer next_counts;               ///< [1] of the next pass, opened by this one (pipeline `rays`)

@@ -22,10 +22,10 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::D
       range_(ocl::Range::strided(max_blocks, kGroupSize, device)),
       kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines)) {}
 
-void ZfpDecode::operator()(const DeviceStream &stream, const ocl::Buffer<FrameParams> &frame,
-                           const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids,
-                           const ocl::Buffer<uint> &slots, const ocl::Buffer<uint> &entries,
-                           ocl::Buffer<float> &values, ocl::Buffer<BlockEntry> &table) {
+void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
+                           const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
+                           const ocl::Buffer<uint> &entries, ocl::Buffer<float> &values,
+                           ocl::Buffer<BlockEntry> &table) {
   if (stream.defines() != stream_defines_) {
     throw std::invalid_argument("ZfpDecode was built for a stream in another number of parts");
   }

@@ -16,13 +16,13 @@ class ZfpDecode {
   /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes in entries[0..n) of the
   /// table which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the stream stays on the host, waits for all that is
   /// enqueued, and throws Error when the volume's file has become shorter.
-  void operator()(const DeviceStream &stream, const ocl::Buffer<FrameParams> &frame,
-                  const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids,
-                  const ocl::Buffer<uint> &slots, const ocl::Buffer<uint> &entries,
-                  ocl::Buffer<float> &values, ocl::Buffer<BlockEntry> &table);
+  void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
+                  const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
+                  const ocl::Buffer<uint> &entries, ocl::Buffer<float> &values,
+                  ocl::Buffer<BlockEntry> &table);
   /// The same for what the cache has granted.
-  void operator()(const DeviceStream &stream, const ocl::Buffer<FrameParams> &frame,
-                  const CountsBuffer &counts, BlockCache &cache) {
+  void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
+                  BlockCache &cache) {
     (*this)(stream, frame, counts, cache.request_block_ids, cache.decode_slots, cache.decode_entries,
             cache.values, cache.table);
   }
@@ -31,8 +31,8 @@ class ZfpDecode {
   ocl::Device &device_;
   ocl::Defines stream_defines_;
   ocl::Range range_;
-  ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, uint, uint,
-              uint, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>,
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, uint, uint, uint, uint,
+              ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>,
               ocl::Out<BlockEntry>>
       kernel_;
 };

@@ -23,7 +23,7 @@ inline uint listed_count(global const PassCounts *counts, uint capacity) {
 }
 
 /// Adds a key to the table, or finds the one it has. Returns its entry.
-inline uint table_insert(constant FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
+inline uint table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
   const BlockCoords b = block_coords(frame, block_id);
   uint i = table_home(frame, b.x, b.y, b.z);
   for (;;) {
@@ -36,7 +36,7 @@ inline uint table_insert(constant FrameParams *frame, global BlockEntry *table, 
 }
 
 /// Which of the slot's voxels are inside, into its table entry.
-inline void store_inside(constant FrameParams *frame, global const float *cache_values, uint slot,
+inline void store_inside(const FrameParams *frame, global const float *cache_values, uint slot,
                          global BlockEntry *entry) {
   ulong inside = 0;
   for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
@@ -47,7 +47,7 @@ inline void store_inside(constant FrameParams *frame, global const float *cache_
 }
 
 /// Marks the block as not cached; its key stays.
-inline void table_evict(constant FrameParams *frame, global BlockEntry *table, uint block_id) {
+inline void table_evict(const FrameParams *frame, global BlockEntry *table, uint block_id) {
   const BlockCoords b = block_coords(frame, block_id);
   uint i = table_home(frame, b.x, b.y, b.z);
   while (table[i].block_id != block_id) i = table_next(frame, i);
@@ -56,10 +56,11 @@ inline void table_evict(constant FrameParams *frame, global BlockEntry *table, u
 
 /// Per pair: stamps the cached blocks of its dual grid and appends the missing ones, once each, to the
 /// request list [capacity]. Grid-stride over pair slots.
-kernel void cache_request(constant FrameParams *frame, global PassCounts *counts,
+kernel void cache_request(const FrameParams frame_params, global PassCounts *counts,
                           global const uint *pair_block_ids, global const BlockEntry *table,
                           global uint *slot_stamps, global uint *requested_bits,
                           global uint *request_block_ids, uint capacity, global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
   const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count, pass = counts->pass;
   if (get_global_id(0) == 0) {
     open_requests(cache);
@@ -113,9 +114,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ag
 /// Decides how many slots are freed and which ages pay for it. One work-group. age_histogram is zeroed
 /// again.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
-    constant FrameParams *frame, global const PassCounts *counts, uint num_slots,
+    const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
     global const BlockEntry *table, global uint *slot_stamps, global uint *requested_bits,
     global uint *request_block_ids, uint capacity, global uint *age_histogram, global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
   local uint first_missing[8]; /* blocks served first that are not cached */
   local uint places[8];        /* where they stand on the request list */
   local uint num_first_missing;
@@ -183,9 +185,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
 }
 
 /// Frees the slots selected; empties the table where it is to be rebuilt. Grid-stride over slots.
-kernel void cache_evict(constant FrameParams *frame, global const PassCounts *counts, uint num_slots,
+kernel void cache_evict(const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
                         global uint *slot_block_ids, global const uint *slot_stamps, global BlockEntry *table,
                         global CacheState *cache, global uint *free_slots) {
+  const FrameParams *frame = &frame_params;
   const uint pass = counts->pass, cutoff_age = cache->cutoff_age, rebuild = cache->rebuild;
   if (counts->requested_count == 0) return;
   for (uint i = get_global_id(0); rebuild && i < 8 * frame->table_groups; i += get_global_size(0)) {
@@ -207,9 +210,10 @@ kernel void cache_evict(constant FrameParams *frame, global const PassCounts *co
 }
 
 /// Enters the blocks that are still cached into the emptied table. Grid-stride over slots.
-kernel void cache_rebuild(constant FrameParams *frame, global const PassCounts *counts, uint num_slots,
+kernel void cache_rebuild(const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
                           global const uint *slot_block_ids, global const float *cache_values,
                           global const CacheState *cache, global BlockEntry *table) {
+  const FrameParams *frame = &frame_params;
   if (counts->requested_count == 0 || !cache->rebuild) return;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
     if (slot_block_ids[slot] != ISO_INVALID_ID) {
@@ -220,8 +224,9 @@ kernel void cache_rebuild(constant FrameParams *frame, global const PassCounts *
 }
 
 /// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over the table.
-kernel void cache_classify(constant FrameParams *frame, global const float *cache_values,
+kernel void cache_classify(const FrameParams frame_params, global const float *cache_values,
                            global BlockEntry *table) {
+  const FrameParams *frame = &frame_params;
   for (uint i = get_global_id(0); i < 8 * frame->table_groups; i += get_global_size(0)) {
     if (table[i].slot != ISO_BLOCK_ABSENT) store_inside(frame, cache_values, table[i].slot, &table[i]);
   }
@@ -230,11 +235,12 @@ kernel void cache_classify(constant FrameParams *frame, global const float *cach
 /// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free slot from
 /// the end; requests past the last are dropped. decode_slots, decode_entries [requests]: the slots, and their table entries.
 /// Takes the marks of all requests back. Grid-stride over requests.
-kernel void cache_assign(constant FrameParams *frame, global const PassCounts *asked,
+kernel void cache_assign(const FrameParams frame_params, global const PassCounts *asked,
                          global PassCounts *counts, global const uint *request_block_ids, uint capacity,
                          global const uint *free_slots, global BlockEntry *table, global uint *slot_block_ids,
                          global uint *slot_stamps, global uint *requested_bits, global uint *decode_slots,
                          global uint *decode_entries, global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
   const uint listed = listed_count(asked, capacity), num_free = cache->free_count;
   const uint granted = min(listed, num_free);
   if (get_global_id(0) == 0) {

@@ -35,7 +35,7 @@ inline ulong changing_cells(const ulong *inside) {
 
 /// The pixel of work-item i when work-items are laid over the image in tiles of 8 x 4, so that neighbours share blocks; or
 /// ISO_INVALID_ID beyond its edge.
-inline uint tiled_pixel(constant FrameParams *frame, uint i) {
+inline uint tiled_pixel(const FrameParams *frame, uint i) {
   const uint tiles_x = (frame->width + 7) / 8, tile = i / 32;
   const uint x = 8 * (tile % tiles_x) + (i & 7), y = 4 * (tile / tiles_x) + (i >> 3 & 3);
   return x < frame->width && y < frame->height ? x + frame->width * y : ISO_INVALID_ID;

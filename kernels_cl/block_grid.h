@@ -13,7 +13,7 @@ typedef struct BlockCoords {
   uint x, y, z;
 } BlockCoords;
 
-static inline BlockCoords block_coords(ISO_CONSTANT const FrameParams *frame, uint block_id) {
+static inline BlockCoords block_coords(const FrameParams *frame, uint block_id) {
   BlockCoords b;
   b.x = block_id % frame->blocks_x;
   b.y = block_id / frame->blocks_x % frame->blocks_y;
@@ -21,7 +21,7 @@ static inline BlockCoords block_coords(ISO_CONSTANT const FrameParams *frame, ui
   return b;
 }
 
-static inline uint block_id_at(ISO_CONSTANT const FrameParams *frame, uint x, uint y, uint z) {
+static inline uint block_id_at(const FrameParams *frame, uint x, uint y, uint z) {
   return x + frame->blocks_x * (y + frame->blocks_y * z);
 }
 
@@ -35,7 +35,7 @@ static inline uint sampled_block(uint begin, uint stride) {
 
 /// The dual grid of block b needs b and its +x, +y, +z neighbours, as far as there are any: corner x + 2y +
 /// 4z of 0..7 is the block (b.x + x, b.y + y, b.z + z), or ISO_INVALID_ID outside the volume.
-static inline uint dual_grid_block(ISO_CONSTANT const FrameParams *frame, BlockCoords b, uint corner) {
+static inline uint dual_grid_block(const FrameParams *frame, BlockCoords b, uint corner) {
   const uint x = b.x + (corner & 1u), y = b.y + (corner >> 1 & 1u), z = b.z + (corner >> 2);
   return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z ? block_id_at(frame, x, y, z)
                                                                            : ISO_INVALID_ID;

@@ -21,56 +21,56 @@ inline GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent
   return walk_from(ray, x, y, z, 4, last);
 }
 
-/// May region (x,y,z) hold an active block? edge: of the region [blocks].
-inline int may_be_active(constant FrameParams *frame, int x, int y, int z, int edge) {
-  return edge * x >= frame->active_begin_x && edge * x < frame->active_end_x &&
-         edge * y >= frame->active_begin_y && edge * y < frame->active_end_y &&
-         edge * z >= frame->active_begin_z && edge * z < frame->active_end_z;
-}
-
-/// Walks on from block *block_id to the next `wanted` active blocks, into found [wanted], `stride` apart. Returns how many
-/// there are before the ray has left all active blocks behind; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
-inline uint find_blocks(constant FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
+/// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active blocks, into found [wanted],
+/// `stride` apart. Returns how many there are before the ray has left the box; *block_id becomes the first block not looked at,
+/// or ISO_INVALID_ID.
+inline uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
                         uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
   const LastPlanes last = last_planes(frame);
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  /* The coarse cells behind the box, in the ray's direction. */
+  const int behind_x = ray->x.d > 0.0f ? (frame->active_end_x + 3) / 4 : frame->active_begin_x / 4 - 1,
+            behind_y = ray->y.d > 0.0f ? (frame->active_end_y + 3) / 4 : frame->active_begin_y / 4 - 1,
+            behind_z = ray->z.d > 0.0f ? (frame->active_end_z + 3) / 4 : frame->active_begin_z / 4 - 1;
   const BlockCoords from = block_coords(frame, *block_id);
   /* The outer walk steps from coarse cell to coarse cell; only in those with a bit is there an inner one. */
   GridWalk w = walk_from(ray, (int)from.x, (int)from.y, (int)from.z, 4, last);
   GridWalk coarse = walk_from(ray, w.x / ISO_MACROCELL_BLOCKS, w.y / ISO_MACROCELL_BLOCKS,
                               w.z / ISO_MACROCELL_BLOCKS, 4 * ISO_MACROCELL_BLOCKS, last);
-  RayEvent entry = start_event();
-  int within = 1, follows = 1; /* follows: w is in this coarse cell */
+  RayEvent exit = start_event(); /* of the block or cell that the ray was in last */
+  int within = 1, follows = 1;   /* follows: w is in this coarse cell */
   uint k = 0;
   while (within && k < wanted) {
     const uint cell = (uint)coarse.x + coarse_x * ((uint)coarse.y + coarse_y * (uint)coarse.z);
     const uint low = macrocell_masks[2 * cell], high = macrocell_masks[2 * cell + 1];
+    int left = 0;
     if ((low | high) != 0) {
-      int left = 0;
-      if (!follows) w = enter_macrocell(ray, &coarse, entry, last);
+      if (!follows) w = enter_macrocell(ray, &coarse, exit, last);
       while (!left && k < wanted) {
         const uint bit = (uint)((w.x & 3) + 4 * (w.y & 3) + 16 * (w.z & 3));
         if ((bit < 32 ? low >> bit : high >> (bit - 32)) & 1u) {
           found[stride * k++] = block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z);
         }
-        left = walk_step(&w, ray, walk_exit(&w), 4, last);
+        exit = walk_exit(&w, ray);
+        left = leaves(&w, &coarse, exit);
+        walk_step(&w, ray, exit, 4, last);
       }
+    } else {
+      exit = walk_exit(&coarse, ray);
+      left = 1;
     }
     follows = (low | high) != 0;
-    if (k < wanted) {
-      entry = walk_exit(&coarse);
-      walk_step(&coarse, ray, entry, 4 * ISO_MACROCELL_BLOCKS, last);
-      within = may_be_active(frame, coarse.x, coarse.y, coarse.z, ISO_MACROCELL_BLOCKS);
+    if (left) {
+      walk_step(&coarse, ray, exit, 4 * ISO_MACROCELL_BLOCKS, last);
+      within = coarse.x != behind_x && coarse.y != behind_y && coarse.z != behind_z;
     }
   }
-  *block_id = within && may_be_active(frame, w.x, w.y, w.z, 1)
-                  ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
-                  : ISO_INVALID_ID;
+  *block_id = within ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z) : ISO_INVALID_ID;
   return k;
 }
 
 /// The block in which a ray enters the box of active blocks, or starts in it; ISO_INVALID_ID if it does not meet the box.
-inline uint first_block(constant FrameParams *frame, const Ray *ray) {
+inline uint first_block(const FrameParams *frame, const Ray *ray) {
   const LastPlanes last = last_planes(frame);
   LastPlanes begin, end;
   RayEvent enter;
@@ -87,11 +87,13 @@ inline uint first_block(constant FrameParams *frame, const Ray *ray) {
 }
 
 /// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones.
-inline uint block_behind(constant FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
+inline uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  walk_step(&w, ray, walk_exit(&w), 4, last);
-  return may_be_active(frame, w.x, w.y, w.z, 1) ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
-                                                : ISO_INVALID_ID;
+  walk_step(&w, ray, walk_exit(&w, ray), 4, last);
+  return w.x >= frame->active_begin_x && w.x < frame->active_end_x && w.y >= frame->active_begin_y &&
+                 w.y < frame->active_end_y && w.z >= frame->active_begin_z && w.z < frame->active_end_z
+             ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
+             : ISO_INVALID_ID;
 }
 
 #endif

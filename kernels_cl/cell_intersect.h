@@ -123,8 +123,8 @@ static inline float without_zero_sign(float x) {
 }
 
 /// The hit at parameter s of cell (x,y,z): t, position in the cell, gradient. w [8] as in segment_cubic.
-static inline HitRecord make_hit(ISO_CONSTANT const FrameParams *frame, const Ray *r, const float *w, int x,
-                                 int y, int z, RayEvent enter, RayEvent exit, float s) {
+static inline HitRecord make_hit(const FrameParams *frame, const Ray *r, const float *w, int x, int y, int z,
+                                 RayEvent enter, RayEvent exit, float s) {
   const CellPoint a = event_position(r, enter, x, y, z, 0), b = event_position(r, exit, x, y, z, 1);
   HitRecord hit;
   /* Two-float differences first: t_exit - t_enter may be far below an ulp of t. */

@@ -6,11 +6,12 @@
 /// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block without slots;
 /// ray_active_mask [active_count] = 1 where it goes on. active_ray_ids: a ray that moved on looks twice as far ahead.
 /// Grid-stride.
-kernel void composite(constant FrameParams *frame, global PassCounts *counts, global uint *active_ray_ids,
+kernel void composite(const FrameParams frame_params, global PassCounts *counts, global uint *active_ray_ids,
                       global const uint *pair_block_ids, global const PairHit *pair_hits,
                       global const uint *closest_pairs, global const BlockEntry *table,
                       global const float *cache_values, global uint *ray_block_ids, global HitRecord *hits,
                       global uint *ray_active_mask) {
+  const FrameParams *frame = &frame_params;
   const LastPlanes last = last_planes(frame);
   const uint active_count = counts->active_count, spec_count = counts->spec_count,
              window = counts->window_count;
@@ -38,7 +39,7 @@ kernel void composite(constant FrameParams *frame, global PassCounts *counts, gl
           float w[8];
           load_corners(frame, table, cache_values, x, y, z, w);
           hits[ray_id] = make_hit(frame, &ray, w, x, y, z, region_entry(&ray, x, y, z, 1, last),
-                                  walk_exit(&cell), pair_hit.s);
+                                  walk_exit(&cell, &ray), pair_hit.s);
           atomic_inc(&counts->hit_count);
         }
       }

@@ -66,7 +66,7 @@ static inline RayAxis make_ray_axis(float o, float d) {
 
 /// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) / sqrt(1 + u^2 +
 /// v^2), mapped to index space; t * frame->t_scale is the distance from the eye in world units.
-static inline Ray make_ray(ISO_CONSTANT const FrameParams *frame, uint pixel) {
+static inline Ray make_ray(const FrameParams *frame, uint pixel) {
   const int column = (int)(pixel % frame->width);
   const int row = (int)(pixel / frame->width);
   const float u = (float)(2 * column + 1 - (int)frame->width) * frame->pixel_scale;
@@ -79,13 +79,12 @@ static inline Ray make_ray(ISO_CONSTANT const FrameParams *frame, uint pixel) {
   return r;
 }
 
-/// t at which the ray crosses the plane (a pure function; the order of crossings rests on it). Needs d != 0.
+/// t at which the ray crosses the plane, a whole number (a pure function; the order of crossings rests on it). Needs d != 0.
 /// plane - o is exact as a pair (Knuth's two-sum); it is multiplied by the two-float 1 / d.
-static inline TwoFloat plane_t(RayAxis a, int plane) {
-  const float p = (float)plane; /* exact: dims are far below 2^24 */
-  const float s = p - a.o;
-  const float back = s - p;
-  const float e = (p - (s - back)) - (a.o + back);
+static inline TwoFloat plane_t(RayAxis a, float plane) {
+  const float s = plane - a.o;
+  const float back = s - plane;
+  const float e = (plane - (s - back)) - (a.o + back);
   const float h = s * a.inv_d.hi;
   const float l = fma(s, a.inv_d.hi, -h) + fma(s, a.inv_d.lo, e * a.inv_d.hi);
   TwoFloat t;
@@ -95,14 +94,17 @@ static inline TwoFloat plane_t(RayAxis a, int plane) {
 }
 
 /// Regions are slabs [size c, size (c+1)] of planes along one axis, cut at the domain's last plane.
-/// Where the ray leaves region c: never, if it runs within the slab.
-static inline TwoFloat far_t(RayAxis a, int c, int size, int last_plane) {
-  TwoFloat never;
-  int plane = a.d > 0.0f ? size * (c + 1) : size * c;
-  never.hi = INFINITY;
-  never.lo = 0.0f;
-  if (a.d == 0.0f) return never;
-  return plane_t(a, plane > last_plane ? last_plane : plane);
+/// The plane by which the ray leaves region c. Exact: dims are far below 2^24.
+static inline float far_plane(RayAxis a, int c, int size, int last_plane) {
+  const int plane = a.d > 0.0f ? size * (c + 1) : size * c;
+  return (float)(plane > last_plane ? last_plane : plane);
+}
+
+/// When it does: never, if it runs within the slab.
+static inline TwoFloat far_t(RayAxis a, float plane) {
+  TwoFloat t = plane_t(a, plane);
+  t.hi = a.d == 0.0f ? INFINITY : t.hi;
+  return t;
 }
 
 /// The later of `e` and the crossing by which the ray enters region c of this axis.
@@ -110,13 +112,14 @@ static inline RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int s
   int plane = a.d > 0.0f ? size * c : size * (c + 1);
   RayEvent near;
   if (a.d == 0.0f) return e;
-  near = make_event(plane_t(a, plane > last_plane ? last_plane : plane), axis);
+  near = make_event(plane_t(a, (float)(plane > last_plane ? last_plane : plane)), axis);
   return event_before(e, near) ? near : e;
 }
 
 /// Is the ray, just after event `e`, on the far side of the plane as seen from -infinity? Needs d != 0.
 static inline int is_above(RayAxis a, int axis, int plane, RayEvent e) {
-  const int crossed = !event_before(e, make_event(plane_t(a, plane), axis)); /* the event itself counts */
+  const int crossed =
+      !event_before(e, make_event(plane_t(a, (float)plane), axis)); /* the event itself counts */
   return crossed == (a.d > 0.0f);
 }
 
@@ -154,10 +157,11 @@ static inline float local_position(RayAxis a, TwoFloat t, int c) {
   return x <= 0.0f ? 0.0f : (x >= 1.0f ? 1.0f : x);
 }
 
-/// A walk through regions of one size. `first` and `last` bound the regions that belong to the walk.
+/// A walk through regions of one size: where it is, and by which plane of each axis it would leave. No times: computed for
+/// all three axes at once whenever they are asked for, they take a processor less time than choosing one of them to renew.
 typedef struct GridWalk {
-  int x, y, z;          ///< the region the ray is in
-  TwoFloat fx, fy, fz;  ///< where it would leave it through each axis
+  int x, y, z;                ///< the region
+  float far_x, far_y, far_z;  ///< planes
 } GridWalk;
 
 /// Number of the domain's last plane along each axis: dims - 1.
@@ -165,7 +169,7 @@ typedef struct LastPlanes {
   int x, y, z;
 } LastPlanes;
 
-static inline LastPlanes last_planes(ISO_CONSTANT const FrameParams *frame) {
+static inline LastPlanes last_planes(const FrameParams *frame) {
   LastPlanes last;
   last.x = (int)frame->dims_x - 1;
   last.y = (int)frame->dims_y - 1;
@@ -179,9 +183,9 @@ static inline GridWalk walk_from(const Ray *r, int x, int y, int z, int size, La
   w.x = x;
   w.y = y;
   w.z = z;
-  w.fx = far_t(r->x, x, size, last.x);
-  w.fy = far_t(r->y, y, size, last.y);
-  w.fz = far_t(r->z, z, size, last.z);
+  w.far_x = far_plane(r->x, x, size, last.x);
+  w.far_y = far_plane(r->y, y, size, last.y);
+  w.far_z = far_plane(r->z, z, size, last.z);
   return w;
 }
 
@@ -193,53 +197,56 @@ static inline RayEvent region_entry(const Ray *r, int x, int y, int z, int size,
   return later_entry(e, r->z, 2, z, size, last.z);
 }
 
-/// The event by which the ray leaves the walk's region: the first of the three; ties in the order x, y, z.
-static inline RayEvent walk_exit(const GridWalk *w) {
-  RayEvent e = make_event(w->fx, 0);
-  if (t_less(w->fy, e.t)) e = make_event(w->fy, 1);
-  if (t_less(w->fz, e.t)) e = make_event(w->fz, 2);
+/// The event by which the ray leaves the walk's region: the first of the three; ties in the order x, y, z. Numbers are chosen,
+/// not structs, which compilers would choose by address and so keep in memory.
+static inline RayEvent walk_exit(const GridWalk *w, const Ray *r) {
+  const TwoFloat x = far_t(r->x, w->far_x), y = far_t(r->y, w->far_y), z = far_t(r->z, w->far_z);
+  const int y_first = t_less(y, x);
+  TwoFloat xy;
+  RayEvent e;
+  int z_first;
+  xy.hi = y_first ? y.hi : x.hi;
+  xy.lo = y_first ? y.lo : x.lo;
+  z_first = t_less(z, xy);
+  e.t.hi = z_first ? z.hi : xy.hi;
+  e.t.lo = z_first ? z.lo : xy.lo;
+  e.axis = z_first ? 2 : y_first;
   return e;
 }
 
-/// Goes through the region's exit into the next region, which may lie outside the grid. Returns 1 if that is outside, or in
-/// another of the groups of 4^3 regions: cells of a block, blocks of a coarse macrocell. One path for all axes: the work-items
-/// of a GPU take turns at branches.
-static inline int walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
-  const int on_x = exit.axis == 0, on_y = exit.axis == 1;
-  RayAxis a = r->z;
-  int c = w->z, last_plane = last.z;
-  TwoFloat t;
-  if (on_y) {
-    a = r->y;
-    c = w->y;
-    last_plane = last.y;
-  }
-  if (on_x) {
-    a = r->x;
-    c = w->x;
-    last_plane = last.x;
-  }
-  c += a.d > 0.0f ? 1 : -1;
-  t = far_t(a, c, size, last_plane);
-  if (on_x) {
-    w->x = c;
-    w->fx = t;
-  } else if (on_y) {
-    w->y = c;
-    w->fy = t;
-  } else {
-    w->z = c;
-    w->fz = t;
-  }
-  return (c & 3) == (a.d > 0.0f ? 0 : 3) || size * c >= last_plane;
+/// One axis of walk_step().
+static inline float next_far_plane(RayAxis a, float plane, int size, int last_plane) {
+  const float next = plane + (float)(a.d > 0.0f ? size : -size), end = (float)last_plane;
+  return next > end ? end : next;
+}
+
+/// Goes through the region's exit into the next region, which may lie outside the grid. No branches: the work-items of a GPU
+/// take turns at them.
+static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
+  const int on_x = exit.axis == 0, on_y = exit.axis == 1, on_z = exit.axis == 2;
+  const float far_x = next_far_plane(r->x, w->far_x, size, last.x),
+              far_y = next_far_plane(r->y, w->far_y, size, last.y),
+              far_z = next_far_plane(r->z, w->far_z, size, last.z);
+  w->x += on_x ? (r->x.d > 0.0f ? 1 : -1) : 0;
+  w->y += on_y ? (r->y.d > 0.0f ? 1 : -1) : 0;
+  w->z += on_z ? (r->z.d > 0.0f ? 1 : -1) : 0;
+  w->far_x = on_x ? far_x : w->far_x;
+  w->far_y = on_y ? far_y : w->far_y;
+  w->far_z = on_z ? far_z : w->far_z;
+}
+
+/// Does the walk leave the larger region that it is in, too, by its exit?
+static inline int leaves(const GridWalk *w, const GridWalk *larger, RayEvent exit) {
+  return (exit.axis == 0 && w->far_x == larger->far_x) || (exit.axis == 1 && w->far_y == larger->far_y) ||
+         (exit.axis == 2 && w->far_z == larger->far_z);
 }
 
 /// Shrinks [*enter, *exit] to one axis of a box. Returns 0 if the ray runs beside it.
 static inline int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *enter, RayEvent *exit) {
   RayEvent near, far;
   if (a.d == 0.0f) return a.o >= (float)begin && a.o <= (float)end;
-  near = make_event(plane_t(a, a.d > 0.0f ? begin : end), axis);
-  far = make_event(plane_t(a, a.d > 0.0f ? end : begin), axis);
+  near = make_event(plane_t(a, (float)(a.d > 0.0f ? begin : end)), axis);
+  far = make_event(plane_t(a, (float)(a.d > 0.0f ? end : begin)), axis);
   if (event_before(*enter, near)) *enter = near;
   if (event_before(far, *exit)) *exit = far;
   return 1;

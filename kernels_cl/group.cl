@@ -15,7 +15,7 @@
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
 
 /// Whether every block of the dual grid is cached: all or nothing. block_id may be ISO_INVALID_ID: no.
-inline int dual_grid_is_cached(constant FrameParams *frame, uint block_id, global const BlockEntry *table) {
+inline int dual_grid_is_cached(const FrameParams *frame, uint block_id, global const BlockEntry *table) {
   int cached = block_id != ISO_INVALID_ID;
   if (cached) {
     const BlockCoords b = block_coords(frame, block_id);
@@ -31,16 +31,17 @@ inline int dual_grid_is_cached(constant FrameParams *frame, uint block_id, globa
 }
 
 /// The slot of a cached block.
-inline uint slot_of(constant FrameParams *frame, global const BlockEntry *table, uint block_id) {
+inline uint slot_of(const FrameParams *frame, global const BlockEntry *table, uint block_id) {
   const BlockCoords b = block_coords(frame, block_id);
   return cached_slot(frame, table, b.x, b.y, b.z);
 }
 
 /// pair_active_mask [pair slots] = 1 where the pair can be intersected. Marks the others as not tested. Grid-stride.
-kernel void group_select(constant FrameParams *frame, global const PassCounts *counts,
+kernel void group_select(const FrameParams frame_params, global const PassCounts *counts,
                          global const uint *pair_block_ids, global const BlockEntry *table,
                          global PairHit *pair_hits, global uint *closest_pairs,
                          global uint *pair_active_mask) {
+  const FrameParams *frame = &frame_params;
   const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count;
   for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
     const uint block_id = pair_block_ids[pair];
@@ -52,9 +53,10 @@ kernel void group_select(constant FrameParams *frame, global const PassCounts *c
 
 /// keys [granted_count]: the cache slot of each pair's block, which sorts by block with the fewest bits.
 /// Grid-stride.
-kernel void group_keys(constant FrameParams *frame, global const PassCounts *counts,
+kernel void group_keys(const FrameParams frame_params, global const PassCounts *counts,
                        global const uint *pair_ids, global const uint *pair_block_ids,
                        global const BlockEntry *table, global uint *keys) {
+  const FrameParams *frame = &frame_params;
   const uint count = counts->granted_count;
   for (uint i = get_global_id(0); i < count; i += get_global_size(0))
     keys[i] = slot_of(frame, table, pair_block_ids[pair_ids[i]]);
@@ -71,9 +73,10 @@ kernel void group_heads(global const PassCounts *counts, global const uint *keys
 /// intersected. Lists the slots of visible blocks, in any order. Marks those as not tested. Groups stride over
 /// tiles of pairs; each appends with one global atomic a tile. counts->visible_count: 0 before.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_count(
-    constant FrameParams *frame, global PassCounts *counts, global const uint *pair_block_ids,
+    const FrameParams frame_params, global PassCounts *counts, global const uint *pair_block_ids,
     global const BlockEntry *table, global PairHit *pair_hits, global uint *closest_pairs,
     global uint *pair_ranks, global uint *slot_counts, global uint *visible_slots) {
+  const FrameParams *frame = &frame_params;
   local uint new_slots[TILE];
   local uint num_new, first_place;
   const uint pair_slots = counts->pair_slot_count, item = get_local_id(0);
@@ -157,10 +160,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_of
 
 /// pair_ids, slots [granted_count]: the pairs in their groups. slot_offsets: slot_counts after group_offsets.
 /// Grid-stride over pair slots.
-kernel void group_scatter(constant FrameParams *frame, global const PassCounts *counts,
+kernel void group_scatter(const FrameParams frame_params, global const PassCounts *counts,
                           global const uint *pair_block_ids, global const BlockEntry *table,
                           global const uint *pair_ranks, global const uint *slot_offsets,
                           global uint *pair_ids, global uint *slots) {
+  const FrameParams *frame = &frame_params;
   const uint pair_slots = counts->pair_slot_count;
   for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
     const uint rank = pair_ranks[pair];

@@ -8,6 +8,7 @@
 /// dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
 inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, local const float *dual_grid) {
   RayEvent enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   GridWalk cell = enter_block(ray, b, enter, last);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   CellChange change;
@@ -16,7 +17,7 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
   hit.cell = ISO_NO_HIT;
   hit.s = 0.0f;
   while (!left) {
-    const RayEvent exit = walk_exit(&cell);
+    const RayEvent exit = walk_exit(&cell, ray);
     const int vertex = (cell.x & 3) + 5 * (cell.y & 3) + 25 * (cell.z & 3);
     float w[8];
     for (int corner = 0; corner < 8; ++corner) {
@@ -27,7 +28,8 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
       hit.cell = (uint)((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3));
       break;
     }
-    left = walk_step(&cell, ray, exit, 1, last);
+    left = leaves(&cell, &block, exit);
+    walk_step(&cell, ray, exit, 1, last);
     enter = exit;
   }
   if (found == ISO_DOUBTFUL) {
@@ -42,10 +44,11 @@ inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, l
 /// slot of their block; block_ray_offsets [visible_count]: where each block's pairs begin. pair_hits [pair
 /// slots]: written for every pair. closest_pairs [active rays]: see closest_pair.h.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
-    constant FrameParams *frame, global const PassCounts *counts, global const uint *pair_ids,
+    const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_ids,
     global const uint *slots, global const uint *block_ray_offsets, global const uint *slot_block_ids,
     global const BlockEntry *table, global const float *cache_values, global const uint *active_ray_ids,
     global PairHit *pair_hits, global uint *closest_pairs) {
+  const FrameParams *frame = &frame_params;
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
   local uint corner_slots[8];
   const LastPlanes last = last_planes(frame);
@@ -85,11 +88,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
 
 /// The pairs whose walk came into doubt, walked on from there with 48-bit arithmetic. They are few, but in intersect() the
 /// registers for them would cost a fifth of its speed (H100). Same arguments; grid-stride over the pairs.
-kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *counts,
+kernel void settle_doubts(const FrameParams frame_params, global const PassCounts *counts,
                           global const uint *pair_ids, global const uint *slots,
                           global const uint *slot_block_ids, global const BlockEntry *table,
                           global const float *cache_values, global const uint *active_ray_ids,
                           global PairHit *pair_hits, global uint *closest_pairs) {
+  const FrameParams *frame = &frame_params;
   const LastPlanes last = last_planes(frame);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   for (uint i = get_global_id(0); i < counts->granted_count; i += get_global_size(0)) {
@@ -99,6 +103,7 @@ kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *
       const BlockCoords b = block_coords(frame, slot_block_ids[slots[i]]);
       const int x = (int)(4 * b.x + (start & 3)), y = (int)(4 * b.y + (start >> 2 & 3)),
                 z = (int)(4 * b.z + (start >> 4 & 3));
+      const GridWalk block = walk_from(&ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
       GridWalk cell = walk_from(&ray, x, y, z, 1, last);
       RayEvent enter = region_entry(&ray, x, y, z, 1, last);
       PairHit hit;
@@ -106,7 +111,7 @@ kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *
       hit.cell = ISO_NO_HIT;
       hit.s = 0.0f;
       while (!left) {
-        const RayEvent exit = walk_exit(&cell);
+        const RayEvent exit = walk_exit(&cell, &ray);
         CellChange change;
         float w[8];
         load_corners(frame, table, cache_values, cell.x, cell.y, cell.z, w);
@@ -115,7 +120,8 @@ kernel void settle_doubts(constant FrameParams *frame, global const PassCounts *
           hit.s = refine(solver, change.cubic, change.bracket);
           break;
         }
-        left = walk_step(&cell, &ray, exit, 1, last);
+        left = leaves(&cell, &block, exit);
+        walk_step(&cell, &ray, exit, 1, last);
         enter = exit;
       }
       pair_hits[pair] = hit;

@@ -28,11 +28,12 @@ inline ValueRange join(ValueRange a, ValueRange b) {
 /// partials [(first_partial + num_blocks) * 8]: entry 8 b + m is the range of the block's voxels with x = 0 if m & 1, y = 0 if
 /// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is sampled_block(first_block + i * stride, stride) and b is first_partial + i.
 /// part_0 .. bits_per_block: the zfp stream, see block_stream.h. Grid-stride.
-kernel void macrocell_partials(constant FrameParams *frame, global const uint *part_0,
+kernel void macrocell_partials(const FrameParams frame_params, global const uint *part_0,
                                global const uint *part_1, global const uint *part_2,
                                global const uint *part_3, uint blocks_per_part, uint bits_per_block,
                                uint first_block, uint stride, uint num_blocks, uint first_partial,
                                global ValueRange *partials) {
+  const FrameParams *frame = &frame_params;
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
     const uint block_id = sampled_block(first_block + i * stride, stride);
     const BlockCoords b = block_coords(frame, block_id);
@@ -63,9 +64,10 @@ kernel void macrocell_partials(constant FrameParams *frame, global const uint *p
 /// The 8-bit range of every block of layer `layer` (in z): ranges [blocks], low in bits 0..7, high in
 /// bits 8..15; low > high in blocks that own no dual cell. below, above: the partials of this layer and the
 /// next, [blocks_x * blocks_y * 8]; above is not read in the last layer. Grid-stride.
-kernel void macrocell_ranges(constant FrameParams *frame, uint layer, global const ValueRange *below,
+kernel void macrocell_ranges(const FrameParams frame_params, uint layer, global const ValueRange *below,
                              global const ValueRange *above, global const float *thresholds,
                              global ushort *ranges) {
+  const FrameParams *frame = &frame_params;
   const uint layer_blocks = frame->blocks_x * frame->blocks_y;
   for (uint i = get_global_id(0); i < layer_blocks; i += get_global_size(0)) {
     const uint x = i % frame->blocks_x, y = i / frame->blocks_x;
@@ -107,7 +109,7 @@ kernel void macrocell_ranges(constant FrameParams *frame, uint layer, global con
 }
 
 /// The block of bit 0..63 of a coarse macrocell, or ISO_INVALID_ID outside the volume.
-inline uint macrocell_block(constant FrameParams *frame, uint coarse, uint bit) {
+inline uint macrocell_block(const FrameParams *frame, uint coarse, uint bit) {
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
   const uint x = 4 * (coarse % coarse_x) + (bit & 3), y = 4 * (coarse / coarse_x % coarse_y) + (bit >> 2 & 3),
              z = 4 * (coarse / coarse_x / coarse_y) + (bit >> 4);
@@ -117,8 +119,9 @@ inline uint macrocell_block(constant FrameParams *frame, uint coarse, uint bit) 
 
 /// coarse_ranges [num_coarse]: the union of each coarse macrocell's block ranges. Once per volume.
 /// Grid-stride.
-kernel void macrocell_coarse_ranges(constant FrameParams *frame, uint num_coarse, global const ushort *ranges,
-                                    global ushort *coarse_ranges) {
+kernel void macrocell_coarse_ranges(const FrameParams frame_params, uint num_coarse,
+                                    global const ushort *ranges, global ushort *coarse_ranges) {
+  const FrameParams *frame = &frame_params;
   for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {
     uint low = 255, high = 0;
     for (uint bit = 0; bit < 64; ++bit) {
@@ -133,8 +136,9 @@ kernel void macrocell_coarse_ranges(constant FrameParams *frame, uint num_coarse
 
 /// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. box [6]: in, INT_MAX three
 /// times and 0 three times; out, first and behind the last macrocell with a bit, x, y, z. Once per isovalue. Grid-stride.
-kernel void macrocell_masks(constant FrameParams *frame, uint num_coarse, global const ushort *ranges,
+kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse, global const ushort *ranges,
                             global const ushort *coarse_ranges, global uint *masks, global int *box) {
+  const FrameParams *frame = &frame_params;
   const uint a = frame->isovalue_index;
   for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {
     uint words[2] = {0, 0};

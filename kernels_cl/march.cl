@@ -36,7 +36,7 @@ typedef struct BlockChange {
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, or ISO_RAY_WAITS where a block of
 /// the dual grid is not cached. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
 /// precise: settle doubts on the spot.
-inline int march_block(constant FrameParams *frame, global const BlockEntry *table,
+inline int march_block(const FrameParams *frame, global const BlockEntry *table,
                        global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
                        local uint *slots, int precise, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
@@ -55,10 +55,11 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
   changing = changing_cells(inside);
   if (changing == 0 && have == 0xFFu) return ISO_RAY_LEFT;
   found->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   found->cell = enter_block(ray, b, found->enter, last);
   while (result == ISO_RAY_LEFT && !left) {
     const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
-    const RayEvent exit = walk_exit(&found->cell);
+    const RayEvent exit = walk_exit(&found->cell, ray);
     if ((cell_blocks(x, y, z) & ~have) != 0) {
       result = ISO_RAY_WAITS;
     } else if ((changing >> (x + 4 * y + 16 * z) & 1ul) != 0) {
@@ -75,17 +76,18 @@ inline int march_block(constant FrameParams *frame, global const BlockEntry *tab
                                                  found->cell.z, found->enter, exit, &found->change);
     }
     if (result == ISO_RAY_LEFT) {
-      left = walk_step(&found->cell, ray, exit, 1, last);
+      left = leaves(&found->cell, &block, exit);
+      walk_step(&found->cell, ray, exit, 1, last);
       found->enter = exit;
     }
   }
   return result;
 }
 
-inline HitRecord hit_of(constant FrameParams *frame, const Ray *ray, const BlockChange *found) {
+inline HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   return make_hit(frame, ray, found->w, found->cell.x, found->cell.y, found->cell.z, found->enter,
-                  walk_exit(&found->cell), refine(solver, found->change.cubic, found->change.bracket));
+                  walk_exit(&found->cell, ray), refine(solver, found->change.cubic, found->change.bracket));
 }
 
 /// Appends the rays that go on to next_active_ray_ids. Called by whole work-groups.
@@ -122,9 +124,10 @@ inline void open_next_counts(global const PassCounts *prev, global const PassCou
 /// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
 /// that far more of its work-items fit a device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
-    constant FrameParams *frame, global const uint *macrocell_masks, global PassCounts *counts,
+    const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
     global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
     global HitRecord *hits) {
+  const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
   const uint item = get_local_id(0);
   const uint num_tiled = (frame->width + 7) / 8 * ((frame->height + 3) / 4) * 32;
@@ -156,10 +159,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
 /// wait for the longest of them, each has eight work-items, one for each block of a round; the first block in which anything
 /// happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
+    const FrameParams frame_params, global const uint *macrocell_masks, global const BlockEntry *table,
     global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
     global PassCounts *next_counts, global const uint *active_ray_ids, global uint *next_active_ray_ids,
     global uint *ray_block_ids, global HitRecord *hits, global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
   local uint counters[2], group_hits, group_blocks, num_going;
   volatile local uint deciding[ISO_GROUP_SIZE]; /* of each ray's blocks of the round */
@@ -261,7 +265,7 @@ typedef struct Requests {
 
 /// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps for all
 /// corners, so that a GPU waits for memory twice, not sixteen times.
-inline void request_touched(constant FrameParams *frame, global const BlockEntry *table,
+inline void request_touched(const FrameParams *frame, global const BlockEntry *table,
                             global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
                             Requests requests) {
   BlockEntry entries[8];
@@ -299,10 +303,11 @@ inline void request_touched(constant FrameParams *frame, global const BlockEntry
 /// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over the rays; when these are few, each has
 /// eight work-items, which share its blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
-    constant FrameParams *frame, global const uint *macrocell_masks, global const BlockEntry *table,
+    const FrameParams frame_params, global const uint *macrocell_masks, global const BlockEntry *table,
     global PassCounts *counts, global const uint *active_ray_ids, global const uint *ray_block_ids,
     global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids, uint capacity,
     global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
   local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,

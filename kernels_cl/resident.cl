@@ -25,8 +25,9 @@ kernel void resident_decode(global const uint *part_0, global const uint *part_1
 
 /// inside [num_blocks]: bit x + 4y + 16z of each block: is the voxel inside, value >= isovalue? Once per isovalue.
 /// Grid-stride.
-kernel void resident_inside(constant FrameParams *frame, uint num_blocks, global const float *values,
+kernel void resident_inside(const FrameParams frame_params, uint num_blocks, global const float *values,
                             global ulong *inside) {
+  const FrameParams *frame = &frame_params;
   for (uint block_id = get_global_id(0); block_id < num_blocks; block_id += get_global_size(0)) {
     ulong bits = 0;
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
@@ -39,8 +40,9 @@ kernel void resident_inside(constant FrameParams *frame, uint num_blocks, global
 
 /// changing [num_blocks]: bit x + 4y + 16z: has the cell of that block corners on both sides? Blocks beyond the volume matter
 /// to cells outside it alone: any block stands for them. Once per isovalue. Grid-stride.
-kernel void resident_changing(constant FrameParams *frame, uint num_blocks, global const ulong *inside,
+kernel void resident_changing(const FrameParams frame_params, uint num_blocks, global const ulong *inside,
                               global ulong *changing) {
+  const FrameParams *frame = &frame_params;
   for (uint block_id = get_global_id(0); block_id < num_blocks; block_id += get_global_size(0)) {
     const BlockCoords b = block_coords(frame, block_id);
     ulong bits[8];
@@ -54,7 +56,7 @@ kernel void resident_changing(constant FrameParams *frame, uint num_blocks, glob
 }
 
 /// The corners of dual cell (x,y,z) minus the isovalue, corner x + 2y + 4z.
-inline void resident_corners(constant FrameParams *frame, global const float *values, int x, int y, int z,
+inline void resident_corners(const FrameParams *frame, global const float *values, int x, int y, int z,
                              float *w) {
   for (int corner = 0; corner < 8; ++corner) {
     const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
@@ -67,7 +69,7 @@ inline void resident_corners(constant FrameParams *frame, global const float *va
 
 /// A ray within a block.
 typedef struct CellWalk {
-  GridWalk cell;
+  GridWalk block, cell;
   RayEvent enter;  ///< by which it entered the cell
   float w[8];      ///< of the cell where the walk stopped
   CellChange change;
@@ -76,19 +78,20 @@ typedef struct CellWalk {
 
 /// Walks on to the next change of inside in the block's `changing` cells, in float. Returns 1, ISO_DOUBTFUL, or 0 when the ray
 /// has left the block.
-inline int walk_to_change(constant FrameParams *frame, global const float *values, const Ray *ray,
+inline int walk_to_change(const FrameParams *frame, global const float *values, const Ray *ray,
                           LastPlanes last, ulong changing, CellWalk *at) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   int found = 0;
   while (!found && !at->left) {
-    const RayEvent exit = walk_exit(&at->cell);
+    const RayEvent exit = walk_exit(&at->cell, ray);
     if ((changing >> ((at->cell.x & 3) + 4 * (at->cell.y & 3) + 16 * (at->cell.z & 3)) & 1ul) != 0) {
       resident_corners(frame, values, at->cell.x, at->cell.y, at->cell.z, at->w);
       found = change_or_doubt_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter, exit,
                                       &at->change);
     }
     if (!found) {
-      at->left = walk_step(&at->cell, ray, exit, 1, last);
+      at->left = leaves(&at->cell, &at->block, exit);
+      walk_step(&at->cell, ray, exit, 1, last);
       at->enter = exit;
     }
   }
@@ -96,21 +99,23 @@ inline int walk_to_change(constant FrameParams *frame, global const float *value
 }
 
 /// Is there a change of inside on the ray's way through block b, of which those cells change? If so, *at is its cell.
-inline int resident_block(constant FrameParams *frame, global const float *values, ulong changing,
+inline int resident_block(const FrameParams *frame, global const float *values, ulong changing,
                           const Ray *ray, BlockCoords b, LastPlanes last, CellWalk *at) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   int found = 0;
   if (changing != 0) {
     at->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+    at->block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
     at->cell = enter_block(ray, b, at->enter, last);
     at->left = 0;
     found = walk_to_change(frame, values, ray, last, changing, at);
     while (found == ISO_DOUBTFUL) { /* rare: its 48-bit arithmetic stays out of the loop over cells */
-      const RayEvent exit = walk_exit(&at->cell);
+      const RayEvent exit = walk_exit(&at->cell, ray);
       found = change_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter, exit,
                              &at->change);
       if (!found) {
-        at->left = walk_step(&at->cell, ray, exit, 1, last);
+        at->left = leaves(&at->cell, &at->block, exit);
+        walk_step(&at->cell, ray, exit, 1, last);
         at->enter = exit;
         found = walk_to_change(frame, values, ray, last, changing, at);
       }
@@ -121,8 +126,9 @@ inline int resident_block(constant FrameParams *frame, global const float *value
 
 /// The frame: hits [pixel]. macrocell_masks: as traverse(). One work-item per pixel, in whole tiles of 8 x 4 pixels.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident(
-    constant FrameParams *frame, global const uint *macrocell_masks, global const float *values,
+    const FrameParams frame_params, global const uint *macrocell_masks, global const float *values,
     global const ulong *changing, global HitRecord *hits) {
+  const FrameParams *frame = &frame_params;
   local uint found_blocks[ISO_BLOCKS_AT_ONCE *
                           ISO_GROUP_SIZE]; /* each work-item has its own, ISO_GROUP_SIZE apart */
   local uint *found = found_blocks + get_local_id(0);
@@ -143,8 +149,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident
             resident_block(frame, values, changing[block_id], &ray, block_coords(frame, block_id), last, &at);
       }
     }
-    hits[pixel] = hit ? make_hit(frame, &ray, at.w, at.cell.x, at.cell.y, at.cell.z, at.enter,
-                                 walk_exit(&at.cell), refine(solver, at.change.cubic, at.change.bracket))
-                      : no_hit();
+    hits[pixel] =
+        hit ? make_hit(frame, &ray, at.w, at.cell.x, at.cell.y, at.cell.z, at.enter,
+                       walk_exit(&at.cell, &ray), refine(solver, at.change.cubic, at.change.bracket))
+            : no_hit();
   }
 }

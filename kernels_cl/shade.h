@@ -27,8 +27,8 @@ static inline uint pack_rgb(float r, float g, float b) {
 }
 
 /// RGBA, 8 bits each, red in bits 0..7.
-static inline uint shade_pixel(ISO_CONSTANT const FrameParams *frame, ISO_CONSTANT const ShadeParams *p,
-                               uint pixel, float t, float gx, float gy, float gz) {
+static inline uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint pixel,
+                               float t, float gx, float gy, float gz) {
   const Ray ray = make_ray(frame, pixel);
   float nx, ny, nz, vx, vy, vz, lengths, cosine, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);

@@ -9,7 +9,7 @@
 #define ISO_NAMESPACE_BEGIN
 #define ISO_NAMESPACE_END
 #define ISO_GLOBAL global      ///< address space of buffers
-#define ISO_CONSTANT constant  ///< address space of FrameParams and tables
+#define ISO_CONSTANT constant  ///< address space of tables
 #define ISO_UNROLL _Pragma("unroll")
 #else
 #include <bit>
@@ -51,7 +51,8 @@ inline uint popcount(uint x) {
 #define ISO_RADIX_ITEMS 16u  ///< pairs per work-item and tile in radix_sort.cl
 #define ISO_AGE_BUCKETS 64u  ///< ages the LRU tells apart [passes]; older ones count as the oldest
 
-/// All that a frame's kernels need of grid, camera and isovalue. Written once per frame.
+/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: a GPU then reads it as fast as its
+/// own registers, and through a pointer, even to constant memory, as slowly as the cache.
 typedef struct FrameParams {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
   uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted

@@ -6,7 +6,8 @@
 /// Not in the paper: when a pass asked for more blocks than the cache could free, half as many rays take part in the next
 /// one; when it did not, a quarter more. Otherwise all rays would hold on to parts of their dual grids, none would
 /// get the rest, and only the ray that is served first would move.
-kernel void begin_pass(constant FrameParams *frame, global PassCounts *counts) {
+kernel void begin_pass(const FrameParams frame_params, global PassCounts *counts) {
+  const FrameParams *frame = &frame_params;
   const uint active = counts->next_active_count;
   uint spec = 0, window = counts->window_count;
   if (active != 0) {

@@ -28,8 +28,8 @@ static inline RaySpan span_between(RaySpan span, RayAxis a, int axis, int begin,
     slab.end = begin >= end || a.o < (float)begin ? span.begin : span.end;
     return slab;
   }
-  slab.begin = make_event(plane_t(a, a.d > 0.0f ? begin : end), axis);
-  slab.end = make_event(plane_t(a, a.d > 0.0f ? end : begin), axis);
+  slab.begin = make_event(plane_t(a, (float)(a.d > 0.0f ? begin : end)), axis);
+  slab.end = make_event(plane_t(a, (float)(a.d > 0.0f ? end : begin)), axis);
   return common_span(span, slab);
 }
 
@@ -42,7 +42,7 @@ static inline uint touched_blocks(const Ray *r, int x, int y, int z, LastPlanes 
   in_block.begin = region_entry(r, x, y, z, 4, last);
   {
     const GridWalk block = walk_from(r, x, y, z, 4, last);
-    in_block.end = walk_exit(&block);
+    in_block.end = walk_exit(&block, r);
   }
   in_x = span_between(in_block, r->x, 0, 4 * x + 3, 4 * x + 4 > last.x ? last.x : 4 * x + 4);
   in_y = span_between(in_block, r->y, 1, 4 * y + 3, 4 * y + 4 > last.y ? last.y : 4 * y + 4);

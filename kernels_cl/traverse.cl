@@ -8,9 +8,10 @@
 /// ISO_INVALID_ID when the ray has left the volume. macrocell_masks [2 * coarse cells]: bit x + 4y + 16z of a block in its
 /// coarse cell. Grid-stride over the window.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse(
-    constant FrameParams *frame, global const uint *macrocell_masks, global PassCounts *counts,
+    const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
     global const uint *active_ray_ids, global uint *ray_block_ids, global uint *pair_block_ids,
     global uint *closest_pairs) {
+  const FrameParams *frame = &frame_params;
   local uint group_pairs;
   const uint window = counts->window_count, spec_count = counts->spec_count;
   uint pairs = 0;

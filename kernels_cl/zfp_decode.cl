@@ -10,11 +10,12 @@
 /// block's voxels are inside goes to entry entries[i] of the table. Groups stride over requests [first, end), but not beyond
 /// decoded_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_decode(
-    constant FrameParams *frame, global const uint *part_0, global const uint *part_1,
+    const FrameParams frame_params, global const uint *part_0, global const uint *part_1,
     global const uint *part_2, global const uint *part_3, uint blocks_per_part, uint bits_per_block,
     uint first, uint end, global const PassCounts *counts, global const uint *block_ids,
     global const uint *slots, global const uint *entries, global float *cache_values,
     global BlockEntry *table) {
+  const FrameParams *frame = &frame_params;
   local float staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
   const uint count = min(counts->decoded_count, end), item = get_local_id(0);
   for (uint begin = first + get_group_id(0) * ISO_GROUP_SIZE; begin < count;

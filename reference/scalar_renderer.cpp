@@ -45,7 +45,7 @@ void walk_cells(const FrameParams &frame, const Ray &ray, RayEvent enter, const 
   const LastPlanes last = last_planes(&frame);
   GridWalk cell = enter_box(ray, enter, 1, box, last);
   while (contains(box, cell)) {
-    const RayEvent exit = walk_exit(&cell);
+    const RayEvent exit = walk_exit(&cell, &ray);
     if (visit(cell, enter, exit)) return;
     walk_step(&cell, &ray, exit, 1, last);
     enter = exit;
@@ -126,7 +126,7 @@ HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float
                   {begin, glm::min(begin + 4, end_cell)});
     if (std::isfinite(hit.t)) return hit;
     block = walk_from(&ray, block.x, block.y, block.z, 4, last);  // all that is kept between passes
-    walk_step(&block, &ray, walk_exit(&block), 4, last);
+    walk_step(&block, &ray, walk_exit(&block, &ray), 4, last);
   }
   return no_hit();
 }

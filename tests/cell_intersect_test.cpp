@@ -80,7 +80,7 @@ TEST(CellIntersect, SharedFacesHaveEqualBits) {
     const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]), make_ray_axis(o[2], d[2])};
     const RayAxis axes[3] = {ray.x, ray.y, ray.z};
     const int plane = step > 0 ? to[axis] : from[axis];
-    const RayEvent face = make_event(plane_t(axes[axis], plane), axis);
+    const RayEvent face = make_event(plane_t(axes[axis], static_cast<float>(plane)), axis);
     /* Corners: the face's four are shared. */
     float near[8], far[8];
     for (int corner = 0; corner < 8; ++corner) near[corner] = unit(random);
@@ -321,7 +321,8 @@ TEST(CellIntersect, CellsFarFromTheEye) {
     const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]), make_ray_axis(o[2], d[2])};
     const LastPlanes last = {4000, 4000, 4000};
     const GridWalk region = walk_from(&ray, cell[0], cell[1], cell[2], 1, last);
-    const RayEvent enter = region_entry(&ray, cell[0], cell[1], cell[2], 1, last), exit = walk_exit(&region);
+    const RayEvent enter = region_entry(&ray, cell[0], cell[1], cell[2], 1, last),
+                   exit = walk_exit(&region, &ray);
     if (!event_before(enter, exit)) continue;  // the ray passes by
     bool beside = false;
     const RayAxis axes[3] = {ray.x, ray.y, ray.z};

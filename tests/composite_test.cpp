@@ -151,7 +151,7 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
               z = int(4 * (block / frame.blocks_x / frame.blocks_y) + result.cell / 16);
     const GridWalk cell = walk_from(&ray, x, y, z, 1, last);
     return make_hit(&frame, &ray, cell_corners(frame, voxels, x, y, z).data(), x, y, z,
-                    region_entry(&ray, x, y, z, 1, last), walk_exit(&cell), result.s);
+                    region_entry(&ray, x, y, z, 1, last), walk_exit(&cell, &ray), result.s);
   }
 
   ocl::Device device_{GetParam()};

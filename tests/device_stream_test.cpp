@@ -154,7 +154,7 @@ class DeviceStreamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
     const ocl::Buffer<uint> d_block_ids(device_, "block ids", std::span<const uint>(listed)),
         d_slots(device_, "slots", std::span<const uint>(listed));
-    const ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+    const FrameParams frame{};
     ocl::Buffer<BlockEntry> table(device_, "table", num_blocks);
     ocl::Buffer<float> values(device_, "values", 64 * std::size_t{num_blocks});
     ZfpDecode zfp_decode(device_, num_blocks, stream.defines());
@@ -171,10 +171,9 @@ class DeviceStreamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// The ranges do not depend on where the stream is.
   void expect_same_ranges(const CompressedVolume &volume, const DeviceStream &stream) {
     const FrameParams params = grid_frame(volume.info.dims);
-    ocl::Buffer<FrameParams> frame(device_, "frame", 1);
-    const Macrocells got(device_, frame, params, stream);
+    const Macrocells got(device_, params, stream);
     const DeviceStream whole(device_, volume);
-    const Macrocells expected(device_, frame, params, whole);
+    const Macrocells expected(device_, params, whole);
     EXPECT_EQ(first_difference(got.ranges().read(), expected.ranges().read()), kNoDifference);
     EXPECT_EQ(got.thresholds(), expected.thresholds());
   }
@@ -266,7 +265,7 @@ TEST_P(DeviceStreamOnDevice, DecodersOfAnotherKindOfStreamAreRefused) {
   const DeviceStream stream(device_, volume, OnHost{8});
   const CountsBuffer counts(device_, "counts", 1);
   const ocl::Buffer<uint> ids(device_, "block ids", 1);
-  const ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+  const FrameParams frame{};
   ocl::Buffer<float> values(device_, "values", 64);
   ocl::Buffer<BlockEntry> table(device_, "table", 1);
   EXPECT_THROW(decode(stream, frame, counts, ids, ids, ids, values, table), std::invalid_argument);

@@ -57,7 +57,7 @@ TEST(GridDda, PlaneCrossingsHave45Bits) {
     const RayAxis a = random.next();
     const int plane = random.plane();
     const Real exact = (static_cast<Real>(plane) - a.o) / a.d;
-    const TwoFloat t = plane_t(a, plane);
+    const TwoFloat t = plane_t(a, static_cast<float>(plane));
     ASSERT_LE(std::abs(value_of(t) - exact), 0x1p-45L * std::abs(exact))
         << "o " << a.o << ", d " << a.d << ", plane " << plane << ", seed 1";
     ASSERT_EQ(t.hi + t.lo, t.hi) << "not normalised: o " << a.o << ", d " << a.d << ", plane " << plane;
@@ -72,7 +72,8 @@ TEST(GridDda, PlaneCrossingsAscend) {
   for (int i = 0; i < 200000; ++i) {
     const RayAxis a = random.next();
     const int plane = random.plane();
-    const TwoFloat here = plane_t(a, plane), next = plane_t(a, plane + 1);
+    const TwoFloat here = plane_t(a, static_cast<float>(plane)),
+                   next = plane_t(a, static_cast<float>(plane + 1));
     ASSERT_TRUE(a.d > 0 ? t_less(here, next) : t_less(next, here))
         << "o " << a.o << ", d " << a.d << ", plane " << plane << ", seed 2";
   }
@@ -149,7 +150,7 @@ std::vector<Visit> walk(const Ray &ray, LastPlanes last, int size) {
   GridWalk w = walk_from(&ray, start[0], start[1], start[2], size, last);
   while (w.x >= 0 && w.x <= end[0] && w.y >= 0 && w.y <= end[1] && w.z >= 0 && w.z <= end[2]) {
     visits.push_back({{w.x, w.y, w.z}, enter});
-    enter = walk_exit(&w);
+    enter = walk_exit(&w, &ray);
     walk_step(&w, &ray, enter, size, last);
   }
   return visits;

@@ -46,7 +46,7 @@ BlockHit trace_block(const FrameParams &frame, const std::vector<float> &voxels,
   BlockHit hit;
   while (cell.x >= 4 * bx && cell.x < end_x && cell.y >= 4 * by && cell.y < end_y && cell.z >= 4 * bz &&
          cell.z < end_z) {
-    const RayEvent exit = walk_exit(&cell);
+    const RayEvent exit = walk_exit(&cell, &ray);
     const std::array<float, 8> w = cell_corners(frame, voxels, cell.x, cell.y, cell.z);
     const uint number = uint(cell.x % 4 + 4 * (cell.y % 4) + 16 * (cell.z % 4));
     CellChange change;

@@ -71,9 +71,8 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     SCOPED_TRACE(
         fmt::format("{} x {} x {}, {} bits per block", dims.x, dims.y, dims.z, volume.bits_per_block));
     FrameParams params = grid_frame(dims);
-    ocl::Buffer<FrameParams> frame(device_, "frame", 1);
     const DeviceStream stream(device_, volume);
-    Macrocells macrocells(device_, frame, params, stream);
+    Macrocells macrocells(device_, params, stream);
     const std::vector<Range> expected = dual_cell_ranges(dims, decode_with_libzfp(volume));
     expect_ranges(macrocells, expected);
 
@@ -81,7 +80,7 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (const float isovalue : awkward_isovalues(expected, max_ranges)) {
       SCOPED_TRACE(fmt::format("isovalue {:a}", isovalue));
       params.isovalue = isovalue;
-      macrocells.select(frame, params);
+      macrocells.select(params);
       expect_box(params, macrocells.masks().read());
       expect_mask(macrocells, params, expected, isovalue, num_selected, num_in_range);
       if (HasFatalFailure()) return;
@@ -243,9 +242,8 @@ TEST_P(MacrocellsOnDevice, Outliers) {
   const CompressedVolume volume = compress_with_libzfp(voxels, dims, 2048);
   expect_exact(volume);
   FrameParams params = grid_frame(dims);
-  ocl::Buffer<FrameParams> frame(device_, "frame", 1);
   const DeviceStream stream(device_, volume);
-  const Macrocells macrocells(device_, frame, params, stream);
+  const Macrocells macrocells(device_, params, stream);
   const auto within =
       std::ranges::count_if(macrocells.thresholds(), [](float t) { return t > -1.0f && t < 100.0f; });
   EXPECT_GT(within, 200);
@@ -262,9 +260,8 @@ TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
   const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
   expect_exact(volume);
   FrameParams params = grid_frame(dims);
-  ocl::Buffer<FrameParams> frame(device_, "frame", 1);
   const DeviceStream stream(device_, volume);
-  const Macrocells macrocells(device_, frame, params, stream);
+  const Macrocells macrocells(device_, params, stream);
   const auto between =
       std::ranges::count_if(macrocells.thresholds(), [](float t) { return t > 2 && t < 99; });
   EXPECT_GT(between, 100);

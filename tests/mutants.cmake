@@ -28,15 +28,14 @@ add_mutant(none_at_all cubic.h "/// cubic.h" "/// cubic.h")  # what the others s
 set_tests_properties(mutant.none_at_all PROPERTIES WILL_FAIL TRUE)
 
 # Traversal.
-add_mutant(accumulated_t grid_dda.h
-  "    w->fx = t;" "    w->fx.hi += fabs(a.inv_d.hi) * (float)size;")
+add_mutant(step_beyond_domain grid_dda.h "return next > end ? end : next;" "return next;")
 add_mutant(missing_carry two_float.h
   "return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);" "return a.hi < b.hi;")
 add_mutant(float_plane_t grid_dda.h
   "fma(s, a.inv_d.hi, -h) + fma(s, a.inv_d.lo, e * a.inv_d.hi);" "0.0f;")
 add_mutant(float_position grid_dda.h "const float x = r + (re + (pe + se));" "const float x = r;")
 add_mutant(domain_end grid_dda.h
-  "return plane_t(a, plane > last_plane ? last_plane : plane);" "return plane_t(a, plane);")
+  "return (float)(plane > last_plane ? last_plane : plane);" "return (float)plane;")
 
 # Intersection.
 add_mutant(open_interval solve_bernstein.h

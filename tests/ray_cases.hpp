@@ -70,7 +70,7 @@ inline std::vector<uint> blocks_of_ray(const FrameParams &frame, uint pixel) {
     const uint block =
         uint(cell.x / 4) + frame.blocks_x * (uint(cell.y / 4) + frame.blocks_y * uint(cell.z / 4));
     if (blocks.empty() || blocks.back() != block) blocks.push_back(block);
-    walk_step(&cell, &ray, walk_exit(&cell), 1, last);
+    walk_step(&cell, &ray, walk_exit(&cell, &ray), 1, last);
   }
   return blocks;
 }

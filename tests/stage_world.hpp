@@ -48,7 +48,7 @@ struct StageWorld {
   void set_frame(const FrameParams &frame_params) {
     frame = frame_params;
     frame.table_groups = cache.table_groups;
-    rays.frame.write({&frame, 1});
+    rays.frame = frame;
   }
 
   PassCounts counts() const { return rays.counts.read().front(); }

@@ -76,7 +76,7 @@ double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
 
 class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  using TraverseKernel = ocl::Kernel<ocl::In<FrameParams>, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
+  using TraverseKernel = ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
                                      ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>;
 
   /// The kernel itself, since masks that no isovalue makes are wanted.
@@ -102,7 +102,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const ocl::Buffer<uint> masks(device_, "masks", std::span<const uint>(masks_of(frame, selected)));
     const uint num_pixels = frame.width * frame.height;
     ocl::Buffer<uint> pairs(device_, "pairs", std::size_t{num_pixels} * spec_count);
-    rays.frame.write({&frame, 1});
+    rays.frame = frame;
     PassCounts start{};
     start.pixel_count = num_pixels;
     rays.counts.write({&start, 1});
@@ -257,9 +257,9 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   const DeviceStream stream(device_, volume);
   FrameParams frame = case_frame(dims, camera_cases(dims)[0], {40, 30}, 3.0f);
   Wavefront rays(device_, 40 * 30);
-  Macrocells macrocells(device_, rays.frame, frame, stream);
-  macrocells.select(rays.frame, frame);
-  rays.frame.write({&frame, 1});
+  Macrocells macrocells(device_, frame, stream);
+  macrocells.select(frame);
+  rays.frame = frame;
   const std::vector<uint> masks = macrocells.masks().read();
   Selection selected(9 * 9 * 9);
   for (uint b = 0; b < selected.size(); ++b) {
@@ -299,7 +299,7 @@ class InitialRaysOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (const CameraCase &c : camera_cases(dims)) {
       SCOPED_TRACE(fmt::format("{} x {} x {}, camera '{}'", dims.x, dims.y, dims.z, c.name));
       const FrameParams frame = case_frame(dims, c, size);
-      rays.frame.write({&frame, 1});
+      rays.frame = frame;
       initial_rays(rays, compaction);
       const BlockLists all = walk_cells(frame, random_selection(frame, 1, 0));
       const std::vector<uint> blocks = rays.ray_block_ids.read();

@@ -130,7 +130,7 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
     FrameParams frame_params{};
     frame_params.isovalue = 0.25f;
-    const ocl::Buffer<FrameParams> frame(device_, "frame", std::span<const FrameParams>(&frame_params, 1));
+    const FrameParams &frame = frame_params;
     ocl::Buffer<BlockEntry> table(device_, "table", num_slots);
 
     ZfpDecode decode(device_, num_blocks);
@@ -202,7 +202,7 @@ TEST_P(ZfpDecodeOnDevice, NothingToDecodeTouchesNothing) {
   const ocl::Buffer<uint> ids(device_, "block ids", 1), slots(device_, "slots", 1);
   ocl::Buffer<float> values(device_, "values", 64);
   values.fill(kSentinel);
-  const ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+  const FrameParams frame{};
   ocl::Buffer<BlockEntry> table(device_, "table", 1);
   ZfpDecode decode(device_, 1);
   decode(stream, frame, counts, ids, slots, slots, values, table);
@@ -229,7 +229,7 @@ TEST_P(ZfpDecodeOnDevice, BlocksBehind32BitsOfBits) {
   start.decoded_count = 2;
   const CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
   ocl::Buffer<float> values(device_, "values", 128);
-  const ocl::Buffer<FrameParams> frame(device_, "frame", 1);
+  const FrameParams frame{};
   ocl::Buffer<BlockEntry> table(device_, "table", 2);
   ZfpDecode decode(device_, 2);
   decode(stream, frame, counts, d_block_ids, d_slots, d_slots, values, table);
