@@ -37,7 +37,7 @@ struct DecodeInput {
         counts(device, "counts", 1),
         block_ids(device, "block ids", kNumDecoded),
         slots(device, "slots", kNumDecoded),
-        table(device, "table", kNumDecoded),
+        inside(device, "voxels inside", kNumDecoded),
         values(device, "values", std::size_t{kNumDecoded} * ISO_BLOCK_VOXELS) {
     const CompressedVolume &volume = mixing_layer(kEdge, rate);
     const auto num_blocks = static_cast<uint>(kCopies * volume.block_count());
@@ -57,7 +57,7 @@ struct DecodeInput {
     run();
     verify(volume, ids, slot_ids);
   }
-  void run() { decode(stream, frame, counts, block_ids, slots, slots, values, table); }
+  void run() { decode(stream, frame, counts, block_ids, slots, values, inside); }
 
   /// Every block, bit for bit, against libzfp.
   void verify(const CompressedVolume &volume, const std::vector<uint> &ids,
@@ -80,7 +80,7 @@ struct DecodeInput {
   CountsBuffer counts;
   ocl::Buffer<uint> block_ids, slots;
   FrameParams frame{};
-  ocl::Buffer<BlockEntry> table;
+  ocl::Buffer<ulong> inside;
   ocl::Buffer<float> values;
 };
 

@@ -48,12 +48,12 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       capacity(capacity_for(slots, block_count(grid), num_pixels)),
       table(device, "block table", 8 * std::size_t{table_groups}),
       values(device, "block cache", std::size_t{slots} * ISO_BLOCK_VOXELS),
+      inside(device, "voxels inside", slots),
       slot_block_ids(device, "cache slot blocks", slots),
       slot_stamps(device, "cache slot stamps", slots),
       requested_bits(device, "requested blocks", request_words(grid)),
       request_block_ids(device, "block requests", capacity),
       decode_slots(device, "decode slots", capacity),
-      decode_entries(device, "decode entries", capacity),
       state(device, "cache state", 1),
       group_size_(group_size),
       pairs_range_(ocl::Range::strided(num_pixels, group_size, device)),
@@ -77,7 +77,7 @@ void BlockCache::clear() {
 }
 
 void BlockCache::classify(Wavefront &rays) {
-  classify_(slots_range_, rays.frame, values, table);
+  classify_(slots_range_, rays.frame, num_slots, slot_block_ids, values, inside, table);
 }
 
 void BlockCache::request(Wavefront &rays) {
@@ -90,12 +90,12 @@ void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, age_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, table, state, free_slots_);
-  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, values, state, table);
+  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, state, table);
 }
 
 void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {
   assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots_, table,
-          slot_block_ids, slot_stamps, requested_bits, decode_slots, decode_entries, state);
+          slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
 }
 
 }  // namespace isowave

@@ -19,7 +19,7 @@ struct BlockCache {
              std::uint32_t group_size);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones. Out:
-  /// counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request.)
+  /// counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request_ahead.)
   void request(Wavefront &rays);
   /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the free ones, but none that the
   /// pass uses; the block served first gets what it takes. asked: the counts that hold requested_count. Asynchronous.
@@ -28,7 +28,7 @@ struct BlockCache {
   /// Asynchronous.
   void assign(const CountsBuffer &asked, Wavefront &rays);
 
-  /// Brings the table up to date with another isovalue of rays.frame. Asynchronous.
+  /// Brings inside and the table up to date with another isovalue of rays.frame. Asynchronous.
   void classify(Wavefront &rays);
 
   /// Forgets every block: the next pass finds the cache as it was made. Asynchronous.
@@ -45,12 +45,12 @@ struct BlockCache {
   std::uint32_t capacity;               ///< of the request list: requests beyond it are dropped
   ocl::Buffer<BlockEntry> table;        ///< [8 * table_groups] see kernels_cl/block_table.h
   ocl::Buffer<float> values;            ///< [num_slots * 64] decoded values, x + 4y + 16z within a slot
+  ocl::Buffer<ulong> inside;            ///< [num_slots] bit x + 4y + 16z: is value >= isovalue?
   ocl::Buffer<uint> slot_block_ids;     ///< [num_slots] block in each slot or ISO_INVALID_ID
   ocl::Buffer<uint> slot_stamps;        ///< [num_slots] pass that used it last
   ocl::Buffer<uint> requested_bits;     ///< [2 * coarse macrocells] one bit per block; 0 between passes
   ocl::Buffer<uint> request_block_ids;  ///< [capacity]
   ocl::Buffer<uint> decode_slots;       ///< [capacity] slot of each request granted
-  ocl::Buffer<uint> decode_entries;     ///< [capacity] and its table entry
   ocl::Buffer<CacheState> state;        ///< [1]
 
  private:
@@ -67,13 +67,14 @@ struct BlockCache {
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>, ocl::Out<BlockEntry>,
               ocl::Out<CacheState>, ocl::Out<uint>>
       evict_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<float>, ocl::In<CacheState>,
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<CacheState>,
               ocl::Out<BlockEntry>>
       rebuild_;
-  ocl::Kernel<FrameParams, ocl::In<float>, ocl::Out<BlockEntry>> classify_;
+  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<float>, ocl::Out<ulong>, ocl::Out<BlockEntry>>
+      classify_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint, ocl::In<uint>,
               ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<CacheState>>
+              ocl::Out<CacheState>>
       assign_;
   ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<CacheState>>

@@ -24,9 +24,9 @@ void March::start_rays(const Macrocells &macrocells, Wavefront &rays) {
 }
 
 void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  march_(range_, rays.frame, macrocells.masks(), cache.table, cache.values, rays.previous_counts, rays.counts,
-         rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids, rays.ray_block_ids, rays.hits,
-         cache.state);
+  march_(range_, rays.frame, macrocells.masks(), cache.table, cache.inside, cache.values,
+         rays.previous_counts, rays.counts, rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids,
+         rays.ray_block_ids, rays.hits, cache.state);
 }
 
 void March::request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {

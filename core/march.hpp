@@ -31,9 +31,9 @@ class March {
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<HitRecord>>
       start_rays_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<PassCounts>,
-              ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<HitRecord>, ocl::Out<CacheState>>
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
+              ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<CacheState>>
       march_;
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>,
               ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>

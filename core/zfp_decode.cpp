@@ -24,22 +24,21 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::D
 
 void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                            const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
-                           const ocl::Buffer<uint> &entries, ocl::Buffer<float> &values,
-                           ocl::Buffer<BlockEntry> &table) {
+                           ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
   if (stream.defines() != stream_defines_) {
     throw std::invalid_argument("ZfpDecode was built for a stream in another number of parts");
   }
   if (!stream.window) {
     kernel_(range_, frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3),
             stream.blocks_per_part, stream.bits_per_block, 0, std::numeric_limits<uint>::max(), counts,
-            block_ids, slots, entries, values, table);
+            block_ids, slots, values, inside);
     return;
   }
   stream.window->bring(stream.window->read_granted(counts, block_ids),
                        [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
                          kernel_(ocl::Range::strided(count, kGroupSize, device_), frame, words, words, words,
                                  words, 0, stream.bits_per_block, first, first + count, counts, block_ids,
-                                 slots, entries, values, table);
+                                 slots, values, inside);
                        });
 }
 

@@ -13,18 +13,16 @@ class ZfpDecode {
   /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams to come.
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {});
 
-  /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes in entries[0..n) of the
-  /// table which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the stream stays on the host, waits for all that is
+  /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes in inside
+  /// [slots] which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the stream stays on the host, waits for all that is
   /// enqueued, and throws Error when the volume's file has become shorter.
   void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                   const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
-                  const ocl::Buffer<uint> &entries, ocl::Buffer<float> &values,
-                  ocl::Buffer<BlockEntry> &table);
+                  ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside);
   /// The same for what the cache has granted.
   void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                   BlockCache &cache) {
-    (*this)(stream, frame, counts, cache.request_block_ids, cache.decode_slots, cache.decode_entries,
-            cache.values, cache.table);
+    (*this)(stream, frame, counts, cache.request_block_ids, cache.decode_slots, cache.values, cache.inside);
   }
 
  private:
@@ -32,8 +30,7 @@ class ZfpDecode {
   ocl::Defines stream_defines_;
   ocl::Range range_;
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, uint, uint, uint, uint,
-              ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>,
-              ocl::Out<BlockEntry>>
+              ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>, ocl::Out<ulong>>
       kernel_;
 };
 

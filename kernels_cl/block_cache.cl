@@ -22,8 +22,8 @@ inline uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
 }
 
-/// Adds a key to the table, or finds the one it has. Returns its entry.
-inline uint table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
+/// Adds a key to the table, or finds the one it has.
+inline void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
   const BlockCoords b = block_coords(frame, block_id);
   uint i = table_home(frame, b.x, b.y, b.z);
   for (;;) {
@@ -32,18 +32,7 @@ inline uint table_insert(const FrameParams *frame, global BlockEntry *table, uin
     i = table_next(frame, i);
   }
   table[i].slot = slot;
-  return i;
-}
-
-/// Which of the slot's voxels are inside, into its table entry.
-inline void store_inside(const FrameParams *frame, global const float *cache_values, uint slot,
-                         global BlockEntry *entry) {
-  ulong inside = 0;
-  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
-    inside |= (ulong)(cache_values[slot * ISO_BLOCK_VOXELS + v] - frame->isovalue >= 0.0f) << v;
-  }
-  entry->inside_low = (uint)inside;
-  entry->inside_high = (uint)(inside >> 32);
+  table[i].changing_low = table[i].changing_high = (uint)ISO_CHANGING_UNKNOWN;
 }
 
 /// Marks the block as not cached; its key stays.
@@ -211,35 +200,43 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
 
 /// Enters the blocks that are still cached into the emptied table. Grid-stride over slots.
 kernel void cache_rebuild(const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
-                          global const uint *slot_block_ids, global const float *cache_values,
-                          global const CacheState *cache, global BlockEntry *table) {
+                          global const uint *slot_block_ids, global const CacheState *cache,
+                          global BlockEntry *table) {
   const FrameParams *frame = &frame_params;
   if (counts->requested_count == 0 || !cache->rebuild) return;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
     if (slot_block_ids[slot] != ISO_INVALID_ID) {
-      const uint entry = table_insert(frame, table, slot_block_ids[slot], slot);
-      store_inside(frame, cache_values, slot, &table[entry]);
+      table_insert(frame, table, slot_block_ids[slot], slot);
     }
   }
 }
 
-/// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over the table.
-kernel void cache_classify(const FrameParams frame_params, global const float *cache_values,
-                           global BlockEntry *table) {
+/// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over slots and table.
+kernel void cache_classify(const FrameParams frame_params, uint num_slots, global const uint *slot_block_ids,
+                           global const float *cache_values, global ulong *inside, global BlockEntry *table) {
   const FrameParams *frame = &frame_params;
+  for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
+    if (slot_block_ids[slot] != ISO_INVALID_ID) {
+      ulong bits = 0;
+      for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
+        bits |= (ulong)(cache_values[slot * ISO_BLOCK_VOXELS + v] - frame->isovalue >= 0.0f) << v;
+      }
+      inside[slot] = bits;
+    }
+  }
   for (uint i = get_global_id(0); i < 8 * frame->table_groups; i += get_global_size(0)) {
-    if (table[i].slot != ISO_BLOCK_ABSENT) store_inside(frame, cache_values, table[i].slot, &table[i]);
+    table[i].changing_low = table[i].changing_high = (uint)ISO_CHANGING_UNKNOWN;
   }
 }
 
 /// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free slot from
-/// the end; requests past the last are dropped. decode_slots, decode_entries [requests]: the slots, and their table entries.
+/// the end; requests past the last are dropped. decode_slots [requests]: the slots.
 /// Takes the marks of all requests back. Grid-stride over requests.
 kernel void cache_assign(const FrameParams frame_params, global const PassCounts *asked,
                          global PassCounts *counts, global const uint *request_block_ids, uint capacity,
                          global const uint *free_slots, global BlockEntry *table, global uint *slot_block_ids,
                          global uint *slot_stamps, global uint *requested_bits, global uint *decode_slots,
-                         global uint *decode_entries, global CacheState *cache) {
+                         global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   const uint listed = listed_count(asked, capacity), num_free = cache->free_count;
   const uint granted = min(listed, num_free);
@@ -254,7 +251,7 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
     requested_bits[request_word(frame, b.x, b.y, b.z)] = 0; /* every mark in it is of this pass */
     if (i < granted) {
       const uint slot = free_slots[num_free - 1 - i];
-      decode_entries[i] = table_insert(frame, table, block_id, slot);
+      table_insert(frame, table, block_id, slot);
       slot_block_ids[slot] = block_id;
       slot_stamps[slot] = asked->pass;
       decode_slots[i] = slot;

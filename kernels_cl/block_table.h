@@ -11,12 +11,16 @@
 ISO_NAMESPACE_BEGIN
 
 typedef struct BlockEntry {
-  uint block_id;     ///< ISO_INVALID_ID: never used
-  uint slot;         ///< ISO_BLOCK_ABSENT: evicted
-  uint inside_low;   ///< bit x + 4y + 16z: is the voxel inside, value >= isovalue? z = 0, 1
-  uint inside_high;  ///< z = 2, 3
+  uint block_id;       ///< ISO_INVALID_ID: never used
+  uint slot;           ///< ISO_BLOCK_ABSENT: evicted
+  uint changing_low;   ///< bit x + 4y + 16z: does inside change in the cell? z = 0, 1
+  uint changing_high;  ///< z = 2, 3
 } BlockEntry;
 ISO_CHECK_SIZE(BlockEntry, 16);
+
+/// Both halves of the changing cells of a block while nobody has looked. A work-item that reads while another writes may get one
+/// half of each: cells too many, which does no harm.
+#define ISO_CHANGING_UNKNOWN 0xFFFFFFFFFFFFFFFFul
 
 /// What the cache's kernels leave for each other, and for the next pass.
 typedef struct CacheState {

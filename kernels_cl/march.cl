@@ -33,47 +33,85 @@ typedef struct BlockChange {
   float w[8];
 } BlockChange;
 
-/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, or ISO_RAY_WAITS where a block of
-/// the dual grid is not cached. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
-/// precise: settle doubts on the spot.
-inline int march_block(const FrameParams *frame, global const BlockEntry *table,
-                       global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
-                       local uint *slots, int precise, BlockChange *found) {
-  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  ulong inside[8], changing;
-  uint have = 0;
-  int result = ISO_RAY_LEFT, left = 0;
+/// The cells of a block that have voxels of any of those corners.
+inline ulong cells_of_corners(uint corners) {
+  const ulong x3 = 0x8888888888888888ul, y3 = 0xF000F000F000F000ul, z3 = 0xFFFF000000000000ul;
+  ulong cells = 0;
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((corners >> corner & 1u) != 0)
+      cells |=
+          ((corner & 1) != 0 ? x3 : ~0ul) & ((corner & 2) != 0 ? y3 : ~0ul) & ((corner & 4) != 0 ? z3 : ~0ul);
+  }
+  return cells;
+}
+
+/// Which cells of block b a ray must look into: those in which inside changes, and those that need a block that is not cached.
+/// What is found out stays in the block's table entry for the next who asks. Out: slots [8] of the dual grid, ISO_GROUP_SIZE apart;
+/// *have: which of its corners are cached, or beyond the volume, where no cell of the domain reaches.
+inline ulong open_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
+                        BlockCoords b, local uint *slots, uint *have) {
   BlockEntry entries[8];
+  ulong cells;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  *have = (b.x + 1 == frame->blocks_x ? 0xAAu : 0u) | (b.y + 1 == frame->blocks_y ? 0xCCu : 0u) |
+          (b.z + 1 == frame->blocks_z ? 0xF0u : 0u);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
     slots[corner * ISO_GROUP_SIZE] = entries[corner].slot;
-    inside[corner] = (ulong)entries[corner].inside_high << 32 | entries[corner].inside_low;
-    have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
+    *have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
   }
-  if ((have & 1u) == 0) return ISO_RAY_WAITS; /* every cell has voxels of the block itself */
-  changing = changing_cells(inside);
-  if (changing == 0 && have == 0xFFu) return ISO_RAY_LEFT;
-  found->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  cells = (ulong)entries[0].changing_high << 32 | entries[0].changing_low;
+  if ((*have & 1u) != 0 && cells == ISO_CHANGING_UNKNOWN) {
+    ulong voxels[8];
+    ISO_UNROLL
+    for (uint corner = 0; corner < 8; ++corner) {
+      voxels[corner] = entries[corner].slot == ISO_BLOCK_ABSENT ? 0 : inside[entries[corner].slot];
+    }
+    cells = changing_cells(voxels) | cells_of_corners(~*have & 0xFFu);
+    if (*have == 0xFFu) {
+      global BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
+      entry->changing_low = (uint)cells;
+      entry->changing_high = (uint)(cells >> 32);
+    }
+  }
+  return cells;
+}
+
+/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, or ISO_RAY_WAITS where a block of
+/// the dual grid is not cached. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
+/// precise: settle doubts on the spot.
+inline int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
+                       global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
+                       local uint *slots, int precise, BlockChange *found) {
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  uint have;
+  int result = ISO_RAY_LEFT, left = 0;
+  const ulong cells = open_block(frame, table, inside, b, slots, &have);
+  if ((have & 1u) == 0) return ISO_RAY_WAITS;
+  if (cells == 0) return ISO_RAY_LEFT;
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  found->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   found->cell = enter_block(ray, b, found->enter, last);
   while (result == ISO_RAY_LEFT && !left) {
     const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
     const RayEvent exit = walk_exit(&found->cell, ray);
-    if ((cell_blocks(x, y, z) & ~have) != 0) {
-      result = ISO_RAY_WAITS;
-    } else if ((changing >> (x + 4 * y + 16 * z) & 1ul) != 0) {
-      for (int corner = 0; corner < 8; ++corner) {
-        const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
-        const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
-        found->w[corner] =
-            cache_values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
-            frame->isovalue;
+    if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0) {
+      const uint needed = cell_blocks(x, y, z);
+      if ((needed & ~have) != 0) {
+        result = ISO_RAY_WAITS;
+      } else {
+        for (int corner = 0; corner < 8; ++corner) {
+          const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
+          const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+          found->w[corner] =
+              cache_values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
+              frame->isovalue;
+        }
+        result = precise ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y, found->cell.z,
+                                          found->enter, exit, &found->change)
+                         : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                                   found->cell.z, found->enter, exit, &found->change);
       }
-      result = precise ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y, found->cell.z,
-                                        found->enter, exit, &found->change)
-                       : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
-                                                 found->cell.z, found->enter, exit, &found->change);
     }
     if (result == ISO_RAY_LEFT) {
       left = leaves(&found->cell, &block, exit);
@@ -146,8 +184,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
       if (num_found != 0) ray_block_ids[pixel] = found[item];
       hits[pixel] = no_hit();
     }
-    append_ray(num_found != 0, pixel | 1u << ISO_RAY_AHEAD_SHIFT, counters, &counts->next_active_count,
-               next_active_ray_ids);
+    append_ray(num_found != 0, pixel | ISO_FIRST_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
+               &counts->next_active_count, next_active_ray_ids);
   }
 }
 
@@ -159,10 +197,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
 /// wait for the longest of them, each has eight work-items, one for each block of a round; the first block in which anything
 /// happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    const FrameParams frame_params, global const uint *macrocell_masks, global const BlockEntry *table,
-    global const float *cache_values, global const PassCounts *prev, global PassCounts *counts,
-    global PassCounts *next_counts, global const uint *active_ray_ids, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global HitRecord *hits, global CacheState *cache) {
+    const FrameParams frame_params, global const uint *macrocell_masks, global BlockEntry *table,
+    global const ulong *inside, global const float *cache_values, global const PassCounts *prev,
+    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
+    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
+    global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
   local uint counters[2], group_hits, group_blocks, num_going;
@@ -206,7 +245,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         }
         for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
           const int in_doubt = first && at == 0 && (entry & ISO_RAY_IN_DOUBT) != 0;
-          result = march_block(frame, table, cache_values, &ray,
+          result = march_block(frame, table, inside, cache_values, &ray,
                                block_coords(frame, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
                                in_doubt, &change);
           if (result == ISO_RAY_LEFT) {

@@ -77,6 +77,7 @@ ISO_CHECK_SIZE(FrameParams, 132);
 #define ISO_RAY_PIXEL 0x0FFFFFFFu
 #define ISO_RAY_AHEAD_SHIFT 28u
 #define ISO_RAY_AHEAD_MAX 6u
+#define ISO_FIRST_LOG_AHEAD 2u  ///< of a new ray
 #define ISO_RAY_IN_DOUBT 0x80000000u
 
 #define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses

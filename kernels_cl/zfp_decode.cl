@@ -1,20 +1,19 @@
 /// zfp_decode.cl -- decodes the pass's new blocks into their cache slots (Sec. 3.5).
 #include "block_stream.h"
-#include "block_table.h"
+#include "shared_types.h"
 
 #define ISO_STAGED_VALUES 16u  ///< of each block that go to the cache together: 64 bytes
 
 /// One work-item decodes one block; the work-group stores them together, so that neighbouring work-items write neighbouring
 /// values. The block of request i goes to slot slots[i]: cache_values [slots * 64], x + 4y + 16z within a slot.
 /// part_0 .. bits_per_block: the zfp stream, see block_stream.h; a window holds the blocks from request `first` on. Which of a
-/// block's voxels are inside goes to entry entries[i] of the table. Groups stride over requests [first, end), but not beyond
+/// block's voxels are inside goes to inside [slots]. Groups stride over requests [first, end), but not beyond
 /// decoded_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_decode(
     const FrameParams frame_params, global const uint *part_0, global const uint *part_1,
     global const uint *part_2, global const uint *part_3, uint blocks_per_part, uint bits_per_block,
     uint first, uint end, global const PassCounts *counts, global const uint *block_ids,
-    global const uint *slots, global const uint *entries, global float *cache_values,
-    global BlockEntry *table) {
+    global const uint *slots, global float *cache_values, global ulong *inside) {
   const FrameParams *frame = &frame_params;
   local float staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
   const uint count = min(counts->decoded_count, end), item = get_local_id(0);
@@ -23,16 +22,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     const uint num_blocks = min(count - begin, (uint)ISO_GROUP_SIZE);
     float values[ISO_BLOCK_VOXELS];
     if (item < num_blocks) {
-      uint low = 0, high = 0;
+      ulong bits = 0;
       decode_block(part_0, part_1, part_2, part_3, blocks_per_part, bits_per_block, block_ids[begin + item],
                    begin + item - first, values);
       ISO_UNROLL
-      for (uint v = 0; v < 32; ++v) {
-        low |= (uint)(values[v] - frame->isovalue >= 0.0f) << v;
-        high |= (uint)(values[v + 32] - frame->isovalue >= 0.0f) << v;
-      }
-      table[entries[begin + item]].inside_low = low;
-      table[entries[begin + item]].inside_high = high;
+      for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) bits |= (ulong)(values[v] - frame->isovalue >= 0.0f) << v;
+      inside[slots[begin + item]] = bits;
     }
     ISO_UNROLL
     for (uint part = 0; part < ISO_BLOCK_VOXELS; part += ISO_STAGED_VALUES) {

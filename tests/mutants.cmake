@@ -28,7 +28,7 @@ add_mutant(none_at_all cubic.h "/// cubic.h" "/// cubic.h")  # what the others s
 set_tests_properties(mutant.none_at_all PROPERTIES WILL_FAIL TRUE)
 
 # Traversal.
-add_mutant(step_beyond_domain grid_dda.h "return next > end ? end : next;" "return next;")
+add_mutant(other_planes_move grid_dda.h "w->far_x = on_x ? far_x : w->far_x;" "w->far_x = far_x;")
 add_mutant(missing_carry two_float.h
   "return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);" "return a.hi < b.hi;")
 add_mutant(float_plane_t grid_dda.h
