@@ -303,30 +303,33 @@ typedef struct Requests {
 } Requests;
 
 /// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps for all
-/// corners, so that a GPU waits for memory twice, not sixteen times.
+/// corners, so that a GPU waits for memory three times, not twenty-four; and a block that is seen to be asked for already, as most
+/// are by a neighbouring ray, is left alone: atomics that return something are slow.
 inline void request_touched(const FrameParams *frame, global const BlockEntry *table,
                             global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
                             Requests requests) {
   BlockEntry entries[8];
-  uint first = 0; /* of the corners: whose mark is ours */
+  uint seen[8];
+  uint missing = 0; /* of the corners */
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    if ((touched >> corner & 1u) != 0) {
-      if (entries[corner].slot != ISO_BLOCK_ABSENT) {
-        slot_stamps[entries[corner].slot] = pass;
-      } else {
-        first |= (uint)mark_request(frame, requests.bits, b.x + (corner & 1), b.y + (corner >> 1 & 1),
-                                    b.z + (corner >> 2))
-                 << corner;
-      }
-    }
+    const uint asked = touched >> corner & 1u, absent = entries[corner].slot == ISO_BLOCK_ABSENT;
+    missing |= (asked & absent) << corner;
+    if (asked && !absent) slot_stamps[entries[corner].slot] = pass;
   }
+  ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    if ((first >> corner & 1u) != 0) {
-      const uint block_id =
-          block_id_at(frame, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
-      const uint place = atomic_inc(requests.num_staged);
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    const uint word = (missing >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
+    seen[corner] = requests.bits[word] & request_bit(x, y, z);
+  }
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) missing &= ~((uint)(seen[corner] != 0) << corner);
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    if ((missing >> corner & 1u) != 0 && mark_request(frame, requests.bits, x, y, z)) {
+      const uint block_id = block_id_at(frame, x, y, z), place = atomic_inc(requests.num_staged);
       if (place < ISO_REQUEST_STAGING) {
         requests.staged[place] = block_id;
       } else {
@@ -364,27 +367,22 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       const Ray ray = make_ray(frame, pixel);
       const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
       const uint ahead = frame->per_ray_speculation ? own : counts->spec_count;
-      uint next = ray_block_ids[pixel], num_found = 0, at = 0; /* it stands at an active block */
-      for (uint asked = 0; asked < ahead && (at < num_found || next != ISO_INVALID_ID);) {
-        if (at == num_found) {
-          num_found = find_blocks(frame, macrocell_masks, &ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
-                                  found + item, ISO_GROUP_SIZE);
-          at = 0;
-        }
-        if (at < num_found && asked % lanes == lane) {
+      uint next = ray_block_ids[pixel]; /* it stands at an active block */
+      for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
+        const uint num_found =
+            find_blocks(frame, macrocell_masks, &ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
+                        found + item, ISO_GROUP_SIZE);
+        for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
           const uint block_id = found[at * ISO_GROUP_SIZE + item];
           const BlockCoords b = block_coords(frame, block_id);
           const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
           request_touched(frame, table, slot_stamps, counts->pass, b, touched, requests);
-          if (i == 0 && asked == 0) {
+          if (i == 0 && asked + at == 0) {
             cache->first_block_id = block_id;
             cache->first_touched = touched;
           }
         }
-        if (at < num_found) {
-          ++at;
-          ++asked;
-        }
+        asked += num_found;
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);
