@@ -67,32 +67,22 @@ static inline uint find_entry(const FrameParams *frame, ISO_GLOBAL const BlockEn
 }
 
 /// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT where a block is not cached. All
-/// eight are read before one is looked at, and those that must search on do so together: a GPU waits for memory once or twice,
-/// not eight times.
+/// eight are read before one is looked at: a GPU waits once, not eight times.
 static inline void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
                                   uint y, uint z, BlockEntry *entries) {
-  const uint first_id = block_id_at(frame, x, y, z), layer = frame->blocks_x * frame->blocks_y;
-  uint at[8], searching = 0xFFu, corner;
+  uint corner;
   ISO_UNROLL
   for (corner = 0; corner < 8u; ++corner) {
-    at[corner] = table_home(frame, x + (corner & 1u), y + (corner >> 1 & 1u), z + (corner >> 2));
-    entries[corner] = table[at[corner]];
+    entries[corner] = table[table_home(frame, x + (corner & 1u), y + (corner >> 1 & 1u), z + (corner >> 2))];
   }
-  while (searching != 0) {
-    ISO_UNROLL
-    for (corner = 0; corner < 8u; ++corner) {
-      const uint block_id =
-          first_id + (corner & 1u) + frame->blocks_x * (corner >> 1 & 1u) + layer * (corner >> 2);
-      const uint key = entries[corner].block_id;
-      if (key == block_id || key == ISO_INVALID_ID) searching &= ~(1u << corner);
-      if (key == ISO_INVALID_ID) entries[corner].slot = ISO_BLOCK_ABSENT;
-    }
-    ISO_UNROLL
-    for (corner = 0; corner < 8u; ++corner) {
-      if ((searching >> corner & 1u) != 0) {
-        at[corner] = table_next(frame, at[corner]);
-        entries[corner] = table[at[corner]];
-      }
+  ISO_UNROLL
+  for (corner = 0; corner < 8u; ++corner) {
+    const uint bx = x + (corner & 1u), by = y + (corner >> 1 & 1u), bz = z + (corner >> 2);
+    const uint key = entries[corner].block_id;
+    if (key != block_id_at(frame, bx, by, bz)) {
+      const uint entry = key == ISO_INVALID_ID ? ISO_INVALID_ID : find_entry(frame, table, bx, by, bz);
+      entries[corner].slot = ISO_BLOCK_ABSENT;
+      if (entry != ISO_INVALID_ID) entries[corner] = table[entry];
     }
   }
 }
