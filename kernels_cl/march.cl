@@ -303,8 +303,8 @@ typedef struct Requests {
 } Requests;
 
 /// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps for all
-/// corners, so that a GPU waits for memory three times, not twenty-four; and a block that is seen to be asked for already, as most
-/// are by a neighbouring ray, is left alone: atomics that return something are slow.
+/// corners, so that a GPU waits for memory twice, not sixteen times; a block that is seen to be asked for already costs no
+/// atomic, for whose result it would wait.
 inline void request_touched(const FrameParams *frame, global const BlockEntry *table,
                             global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
                             Requests requests) {

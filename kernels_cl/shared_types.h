@@ -51,8 +51,8 @@ inline uint popcount(uint x) {
 #define ISO_RADIX_ITEMS 16u  ///< pairs per work-item and tile in radix_sort.cl
 #define ISO_AGE_BUCKETS 64u  ///< ages the LRU tells apart [passes]; older ones count as the oldest
 
-/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: a GPU then reads it as fast as its
-/// own registers, and through a pointer, even to constant memory, as slowly as the cache.
+/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's compiler reads a pointer to
+/// constant memory through the cache, again in every turn of a loop.
 typedef struct FrameParams {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
   uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted

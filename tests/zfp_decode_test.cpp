@@ -128,9 +128,8 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const ocl::Buffer<uint> d_block_ids(device_, "block ids", std::span<const uint>(block_ids)),
         d_slots(device_, "slots", std::span<const uint>(slots));
 
-    FrameParams frame_params{};
-    frame_params.isovalue = 0.25f;
-    const FrameParams &frame = frame_params;
+    FrameParams frame{};
+    frame.isovalue = 0.25f;
     ocl::Buffer<ulong> inside(device_, "inside", num_slots);
 
     ZfpDecode decode(device_, num_blocks);
@@ -148,8 +147,7 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (uint i = 0; i < start.decoded_count; ++i) {
       std::uint64_t expected_inside = 0;
       for (uint v = 0; v < 64; ++v)
-        expected_inside |= std::uint64_t{expected[64 * std::size_t{slots[i]} + v] >= frame_params.isovalue}
-                           << v;
+        expected_inside |= std::uint64_t{expected[64 * std::size_t{slots[i]} + v] >= frame.isovalue} << v;
       ASSERT_EQ(got_inside[slots[i]], expected_inside) << "request " << i;
     }
   }
