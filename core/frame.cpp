@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.hpp"
+#include "kernels_cl/grid_dda.h"
 
 namespace isowave {
 
@@ -84,7 +86,57 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   frame.t_scale = static_cast<float>(t_scale);
   frame.isovalue = isovalue;
   frame.max_spec_count = 1;
+  set_screen_box(frame);
   return frame;
+}
+
+void set_screen_box(FrameParams &frame) {
+  frame.screen_begin_x = frame.screen_begin_y = frame.screen_end_x = frame.screen_end_y = 0;
+  if (frame.active_end_x == 0) return;
+  const glm::dvec2 size(frame.width, frame.height);
+  const glm::dmat3 basis(glm::dvec3(frame.fwd_x, frame.fwd_y, frame.fwd_z),
+                         glm::dvec3(frame.right_x, frame.right_y, frame.right_z),
+                         glm::dvec3(frame.up_x, frame.up_y, frame.up_z));
+  const glm::dmat3 to_view = glm::inverse(basis);
+  const glm::dvec3 eye(frame.eye_x, frame.eye_y, frame.eye_z);
+  const double pixel = 2.0 * frame.pixel_scale;  // step of u and v
+  const glm::dvec2 border = 0.5 * pixel * size;  // largest |u|, |v|
+
+  // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of that basis: by how much?
+  const glm::dmat3 sizes(glm::abs(basis[0]), glm::abs(basis[1]), glm::abs(basis[2]));
+  const glm::dmat3 to_sizes(glm::abs(to_view[0]), glm::abs(to_view[1]), glm::abs(to_view[2]));
+  const double length = glm::length(glm::dvec3(1, border.x, border.y));
+  const glm::dvec3 off = to_sizes * (0x1p-21 * (sizes * glm::dvec3(1, border.x, border.y)) +
+                                     double{ISO_SMALLEST_DIRECTION} * length);
+  const glm::dvec2 margin = 1.0 + (glm::dvec2(off.y, off.z) + border * off.x) / pixel;
+
+  glm::dvec2 begin(std::numeric_limits<double>::infinity()), end = -begin;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto plane = [corner](int axis, int first, int behind, uint dim) {
+      return (corner >> axis & 1) == 0 ? 4.0 * first : std::min(4.0 * behind, dim - 1.0);
+    };
+    const glm::dvec3 at(plane(0, frame.active_begin_x, frame.active_end_x, frame.dims_x),
+                        plane(1, frame.active_begin_y, frame.active_end_y, frame.dims_y),
+                        plane(2, frame.active_begin_z, frame.active_end_z, frame.dims_z));
+    const glm::dvec3 view = to_view * (at - eye);
+    if (!(view.x > 1e-3 && margin.x < size.x &&
+          margin.y < size.y)) {  // beside or behind the eye, or all rounded
+      begin = glm::dvec2(0);
+      end = size;
+      break;
+    }
+    // See make_ray(): u = (2 column + 1 - width) pixel_scale, v = (height - 1 - 2 row) pixel_scale.
+    const glm::dvec2 projected = 0.5 * (size - 1.0) + glm::dvec2(view.y, -view.z) / (view.x * pixel);
+    begin = glm::min(begin, projected - margin);
+    end = glm::max(end, projected + margin + 1.0);
+  }
+  begin = glm::clamp(glm::floor(begin), glm::dvec2(0), size);
+  end = glm::clamp(glm::ceil(end), glm::dvec2(0), size);
+  if (begin.x >= end.x || begin.y >= end.y) return;
+  frame.screen_begin_x = static_cast<uint>(begin.x) / 8 * 8;
+  frame.screen_begin_y = static_cast<uint>(begin.y) / 4 * 4;
+  frame.screen_end_x = static_cast<uint>(end.x);
+  frame.screen_end_y = static_cast<uint>(end.y);
 }
 
 std::vector<float> depth_of(const std::vector<HitRecord> &hits) {

@@ -23,6 +23,9 @@ inline std::uint32_t num_owning_blocks(std::uint32_t dim) {
   return (dim + 2) / 4;
 }
 
+/// Sets the frame's screen box: a rectangle of the pixels whose rays, as make_ray() rounds them, may meet its active box.
+void set_screen_box(FrameParams &frame);
+
 /// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume; isovalue_index,
 /// speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, an image of 0 or more than 2^28 pixels, a
 /// NaN isovalue.

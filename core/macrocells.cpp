@@ -153,6 +153,7 @@ void Macrocells::set_active_box(FrameParams &frame) const {
   frame.active_end_x = active_box_[3];
   frame.active_end_y = active_box_[4];
   frame.active_end_z = active_box_[5];
+  set_screen_box(frame);
 }
 
 }  // namespace isowave

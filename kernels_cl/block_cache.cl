@@ -14,16 +14,16 @@
 #include "block_requests.h"
 
 /// A slot that holds blocks of the ray served first is stamped with the next pass: younger than all.
-inline uint slot_age(uint stamp, uint pass) {
+ISO_INLINE uint slot_age(uint stamp, uint pass) {
   return min(pass - stamp, ISO_AGE_BUCKETS - 1);
 }
 
-inline uint listed_count(global const PassCounts *counts, uint capacity) {
+ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
 }
 
 /// Adds a key to the table, or finds the one it has.
-inline void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
+ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
   const BlockCoords b = block_coords(frame, block_id);
   uint i = table_home(frame, b.x, b.y, b.z);
   for (;;) {
@@ -36,7 +36,7 @@ inline void table_insert(const FrameParams *frame, global BlockEntry *table, uin
 }
 
 /// Marks the block as not cached; its key stays.
-inline void table_evict(const FrameParams *frame, global BlockEntry *table, uint block_id) {
+ISO_INLINE void table_evict(const FrameParams *frame, global BlockEntry *table, uint block_id) {
   const BlockCoords b = block_coords(frame, block_id);
   uint i = table_home(frame, b.x, b.y, b.z);
   while (table[i].block_id != block_id) i = table_next(frame, i);

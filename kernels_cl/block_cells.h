@@ -6,7 +6,7 @@
 #include "grid_dda.h"
 
 /// The cell of block b in which the ray is just after `enter`, by which it entered the block.
-inline GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, LastPlanes last) {
+ISO_INLINE GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, LastPlanes last) {
   const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
   return walk_from(ray, locate(ray->x, 0, enter, 1, x0, min(x0 + 3, last.x - 1)),
                    locate(ray->y, 1, enter, 1, y0, min(y0 + 3, last.y - 1)),
@@ -15,7 +15,7 @@ inline GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, LastP
 
 /// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which voxels of the blocks of
 /// its dual grid are inside; where one is not known, the cells that need it have any bit.
-inline ulong changing_cells(const ulong *inside) {
+ISO_INLINE ulong changing_cells(const ulong *inside) {
   /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The same for +y, +z. */
   const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul, not_z3 = 0x0000FFFFFFFFFFFFul;
   ulong v[8], any = 0, all = ~0ul;
@@ -33,12 +33,22 @@ inline ulong changing_cells(const ulong *inside) {
   return any & ~all;
 }
 
-/// The pixel of work-item i when work-items are laid over the image in tiles of 8 x 4, so that neighbours share blocks; or
-/// ISO_INVALID_ID beyond its edge.
-inline uint tiled_pixel(const FrameParams *frame, uint i) {
-  const uint tiles_x = (frame->width + 7) / 8, tile = i / 32;
-  const uint x = 8 * (tile % tiles_x) + (i & 7), y = 4 * (tile / tiles_x) + (i >> 3 & 3);
-  return x < frame->width && y < frame->height ? x + frame->width * y : ISO_INVALID_ID;
+/// Part of the image, in whole tiles of 8 x 4 pixels but for its end.
+typedef struct PixelBox {
+  uint begin_x, begin_y, end_x, end_y;
+} PixelBox;
+
+/// Number of work-items laid over a box, tile by tile, so that neighbours share blocks.
+ISO_INLINE uint num_tiled_pixels(PixelBox box) {
+  return 32 * ((box.end_x - box.begin_x + 7) / 8) * ((box.end_y - box.begin_y + 3) / 4);
+}
+
+/// The pixel of such a work-item i, or ISO_INVALID_ID beyond the box.
+ISO_INLINE uint tiled_pixel(const FrameParams *frame, PixelBox box, uint i) {
+  const uint tiles_x = (box.end_x - box.begin_x + 7) / 8, tile = i / 32;
+  const uint x = box.begin_x + 8 * (tile % tiles_x) + (i & 7);
+  const uint y = box.begin_y + 4 * (tile / tiles_x) + (i >> 3 & 3);
+  return x < box.end_x && y < box.end_y ? x + frame->width * y : ISO_INVALID_ID;
 }
 
 #endif

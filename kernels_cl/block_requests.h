@@ -5,31 +5,32 @@
 #include "block_table.h"
 
 /// Begins a pass. One work-item, in a kernel that reads none of this.
-inline void open_requests(global CacheState *cache) {
+ISO_INLINE void open_requests(global CacheState *cache) {
   cache->free_count -= cache->granted;
   cache->table_count += cache->granted;
   cache->granted = 0;
 }
 
 /// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks.
-inline uint request_word(const FrameParams *frame, uint x, uint y, uint z) {
+ISO_INLINE uint request_word(const FrameParams *frame, uint x, uint y, uint z) {
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
   return 2 * ((x >> 2) + coarse_x * ((y >> 2) + coarse_y * (z >> 2))) + (z >> 1 & 1);
 }
-inline uint request_bit(uint x, uint y, uint z) {
+ISO_INLINE uint request_bit(uint x, uint y, uint z) {
   return 1u << ((x & 3) + 4 * (y & 3) + 16 * (z & 1));
 }
 
 /// Marks block (x,y,z). Returns 1 to the one who is first.
-inline int mark_request(const FrameParams *frame, volatile global uint *requested_bits, uint x, uint y,
-                        uint z) {
+ISO_INLINE int mark_request(const FrameParams *frame, volatile global uint *requested_bits, uint x, uint y,
+                            uint z) {
   const uint bit = request_bit(x, y, z);
   return (atomic_or(&requested_bits[request_word(frame, x, y, z)], bit) & bit) == 0;
 }
 
 /// Stamps block (x,y,z) with the pass if it is cached. Returns 1 if it is not, and this is the first to ask for it.
-inline int request_block(const FrameParams *frame, global const BlockEntry *table, global uint *slot_stamps,
-                         uint pass, volatile global uint *requested_bits, uint x, uint y, uint z) {
+ISO_INLINE int request_block(const FrameParams *frame, global const BlockEntry *table,
+                             global uint *slot_stamps, uint pass, volatile global uint *requested_bits,
+                             uint x, uint y, uint z) {
   const uint slot = cached_slot(frame, table, x, y, z);
   if (slot == ISO_BLOCK_ABSENT) return mark_request(frame, requested_bits, x, y, z);
   slot_stamps[slot] = pass;
@@ -37,8 +38,8 @@ inline int request_block(const FrameParams *frame, global const BlockEntry *tabl
 }
 
 /// Puts a marked block at `place` of the list [capacity]; where the list has ended, takes the mark back.
-inline void list_request(const FrameParams *frame, global uint *request_block_ids, uint capacity,
-                         volatile global uint *requested_bits, uint place, uint block_id) {
+ISO_INLINE void list_request(const FrameParams *frame, global uint *request_block_ids, uint capacity,
+                             volatile global uint *requested_bits, uint place, uint block_id) {
   if (place < capacity) {
     request_block_ids[place] = block_id;
   } else {

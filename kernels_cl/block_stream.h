@@ -13,9 +13,9 @@
 #endif
 
 /// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z.
-inline void decode_block(global const uint *part_0, global const uint *part_1, global const uint *part_2,
-                         global const uint *part_3, uint blocks_per_part, uint bits_per_block, uint block_id,
-                         uint place, float *values) {
+ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_1, global const uint *part_2,
+                             global const uint *part_3, uint blocks_per_part, uint bits_per_block,
+                             uint block_id, uint place, float *values) {
   const uint part = ISO_STREAM_PARTS > 1 ? block_id / blocks_per_part : 0;
   global const uint *words = part == 0 ? part_0 : part == 1 ? part_1 : part == 2 ? part_2 : part_3;
   const ulong first_bit = ISO_STREAM_PARTS == 0 ? (ulong)place * ((bits_per_block + 31u) & ~31u)

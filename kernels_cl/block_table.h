@@ -42,21 +42,21 @@ typedef struct CacheState {
 #define ISO_TABLE_STEP 9u  ///< from entry to entry of a search; odd, and no factor of the table's size
 
 /// Where the search for block (x,y,z) begins. frame->table_groups: entries / 8.
-static inline uint table_home(const FrameParams *frame, uint x, uint y, uint z) {
+ISO_INLINE uint table_home(const FrameParams *frame, uint x, uint y, uint z) {
   uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((z >> 1) * 0xC2B2AE3Du);
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   h ^= h >> 13;
   return 8u * (uint)(((ulong)h * frame->table_groups) >> 32) + (x & 1u) + 2u * (y & 1u) + 4u * (z & 1u);
 }
 
-static inline uint table_next(const FrameParams *frame, uint entry) {
+ISO_INLINE uint table_next(const FrameParams *frame, uint entry) {
   const uint next = entry + ISO_TABLE_STEP, size = 8u * frame->table_groups;
   return next >= size ? next - size : next;
 }
 
 /// The table entry of block (x,y,z), or ISO_INVALID_ID if it has none.
-static inline uint find_entry(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x, uint y,
-                              uint z) {
+ISO_INLINE uint find_entry(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x, uint y,
+                           uint z) {
   const uint block_id = block_id_at(frame, x, y, z);
   uint i = table_home(frame, x, y, z), key = table[i].block_id;
   while (key != block_id && key != ISO_INVALID_ID) {
@@ -68,8 +68,8 @@ static inline uint find_entry(const FrameParams *frame, ISO_GLOBAL const BlockEn
 
 /// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT where a block is not cached. All
 /// eight are read before one is looked at: a GPU waits once, not eight times.
-static inline void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
-                                  uint y, uint z, BlockEntry *entries) {
+ISO_INLINE void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x, uint y,
+                               uint z, BlockEntry *entries) {
   uint corner;
   ISO_UNROLL
   for (corner = 0; corner < 8u; ++corner) {
@@ -88,8 +88,8 @@ static inline void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const Blo
 }
 
 /// The slot of block (x,y,z), or ISO_BLOCK_ABSENT.
-static inline uint cached_slot(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x, uint y,
-                               uint z) {
+ISO_INLINE uint cached_slot(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x, uint y,
+                            uint z) {
   const uint entry = find_entry(frame, table, x, y, z);
   return entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : table[entry].slot;
 }

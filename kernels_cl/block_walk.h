@@ -12,7 +12,7 @@
 #define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them, or asks for them
 
 /// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it entered the cell.
-inline GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e, LastPlanes last) {
+ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e, LastPlanes last) {
   const int bx = coarse->x * ISO_MACROCELL_BLOCKS, by = coarse->y * ISO_MACROCELL_BLOCKS,
             bz = coarse->z * ISO_MACROCELL_BLOCKS;
   const int x = locate(ray->x, 0, e, 4, bx, min(bx + ISO_MACROCELL_BLOCKS - 1, (last.x - 1) / 4));
@@ -24,8 +24,8 @@ inline GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent
 /// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active blocks, into found [wanted],
 /// `stride` apart. Returns how many there are before the ray has left the box; *block_id becomes the first block not looked at,
 /// or ISO_INVALID_ID.
-inline uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
-                        uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
+ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
+                            uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
   const LastPlanes last = last_planes(frame);
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
   /* The coarse cells behind the box, in the ray's direction. */
@@ -70,7 +70,7 @@ inline uint find_blocks(const FrameParams *frame, global const uint *macrocell_m
 }
 
 /// The block in which a ray enters the box of active blocks, or starts in it; ISO_INVALID_ID if it does not meet the box.
-inline uint first_block(const FrameParams *frame, const Ray *ray) {
+ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
   const LastPlanes last = last_planes(frame);
   LastPlanes begin, end;
   RayEvent enter;
@@ -87,7 +87,7 @@ inline uint first_block(const FrameParams *frame, const Ray *ray) {
 }
 
 /// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones.
-inline uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
+ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   walk_step(&w, ray, walk_exit(&w, ray), 4, last);
   return w.x >= frame->active_begin_x && w.x < frame->active_end_x && w.y >= frame->active_begin_y &&

@@ -27,7 +27,7 @@ typedef struct CellPoint {
 
 /// Position of the ray at `e` in cell (x,y,z). On the axis of the event it is exactly the face's 0 or 1.
 /// leaving: 0 when `e` enters the cell, 1 when it leaves it.
-static inline CellPoint event_position(const Ray *r, RayEvent e, int x, int y, int z, int leaving) {
+ISO_INLINE CellPoint event_position(const Ray *r, RayEvent e, int x, int y, int z, int leaving) {
   CellPoint p;
   p.x = e.axis == 0 ? ((r->x.d > 0.0f) == leaving ? 1.0f : 0.0f) : local_position(r->x, e.t, x);
   p.y = e.axis == 1 ? ((r->y.d > 0.0f) == leaving ? 1.0f : 0.0f) : local_position(r->y, e.t, y);
@@ -36,7 +36,7 @@ static inline CellPoint event_position(const Ray *r, RayEvent e, int x, int y, i
 }
 
 /// w [8]: corner x + 2y + 4z minus the isovalue.
-static inline Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
+ISO_INLINE Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
   /* Names: axis values already fixed, in the order x, y, z; digit: corner along y, z. */
   const float a00 = lerp(a.x, w[0], w[1]), a10 = lerp(a.x, w[2], w[3]);
   const float a01 = lerp(a.x, w[4], w[5]), a11 = lerp(a.x, w[6], w[7]);
@@ -56,7 +56,7 @@ static inline Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
 }
 
 /// The field at (x,y,z) of the cell. w [8] as in segment_cubic.
-static inline TwoFloat precise_trilinear(const float *w, float x, float y, float z) {
+ISO_INLINE TwoFloat precise_trilinear(const float *w, float x, float y, float z) {
   TwoFloat v[8];
   int i, n;
   for (i = 0; i < 8; ++i) v[i] = two_float(w[i]);
@@ -68,7 +68,7 @@ static inline TwoFloat precise_trilinear(const float *w, float x, float y, float
 
 /// segment_cubic() in 48 bits. A loop, for one copy of the arithmetic: compilers that inline and unroll everything take
 /// half a minute over eight.
-static inline PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellPoint b) {
+ISO_INLINE PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellPoint b) {
   PreciseCubic c;
   TwoFloat third;
   int i;
@@ -86,7 +86,7 @@ static inline PreciseCubic precise_segment_cubic(const float *w, CellPoint a, Ce
 }
 
 /// 1 if the corners [8] are not all on one side: only then can `inside` change in the cell.
-static inline int corners_differ(const float *w) {
+ISO_INLINE int corners_differ(const float *w) {
   const int in = w[0] >= 0.0f;
   return (w[1] >= 0.0f) != in || (w[2] >= 0.0f) != in || (w[3] >= 0.0f) != in || (w[4] >= 0.0f) != in ||
          (w[5] >= 0.0f) != in || (w[6] >= 0.0f) != in || (w[7] >= 0.0f) != in;
@@ -100,16 +100,16 @@ typedef struct CellChange {
 
 /// Finds the first change of inside between the events `enter` and `exit` of cell (x,y,z), in float. Returns 1, 0 or
 /// ISO_DOUBTFUL. w [8] as in segment_cubic.
-static inline int change_or_doubt_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
-                                          RayEvent enter, RayEvent exit, CellChange *change) {
+ISO_INLINE int change_or_doubt_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
+                                       RayEvent enter, RayEvent exit, CellChange *change) {
   if (!corners_differ(w)) return 0;
   change->cubic = segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1));
   return isolate(solver, change->cubic, &change->bracket);
 }
 
 /// The same without doubt: returns 1 or 0.
-static inline int change_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
-                                 RayEvent enter, RayEvent exit, CellChange *change) {
+ISO_INLINE int change_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
+                              RayEvent enter, RayEvent exit, CellChange *change) {
   const int found = change_or_doubt_in_cell(solver, r, w, x, y, z, enter, exit, change);
   if (found != ISO_DOUBTFUL) return found;
   return isolate_precisely(
@@ -118,13 +118,13 @@ static inline int change_in_cell(Solver solver, const Ray *r, const float *w, in
 }
 
 /// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).
-static inline float without_zero_sign(float x) {
+ISO_INLINE float without_zero_sign(float x) {
   return x == 0.0f ? 0.0f : x;
 }
 
 /// The hit at parameter s of cell (x,y,z): t, position in the cell, gradient. w [8] as in segment_cubic.
-static inline HitRecord make_hit(const FrameParams *frame, const Ray *r, const float *w, int x, int y, int z,
-                                 RayEvent enter, RayEvent exit, float s) {
+ISO_INLINE HitRecord make_hit(const FrameParams *frame, const Ray *r, const float *w, int x, int y, int z,
+                              RayEvent enter, RayEvent exit, float s) {
   const CellPoint a = event_position(r, enter, x, y, z, 0), b = event_position(r, exit, x, y, z, 1);
   HitRecord hit;
   /* Two-float differences first: t_exit - t_enter may be far below an ulp of t. */
@@ -145,7 +145,7 @@ static inline HitRecord make_hit(const FrameParams *frame, const Ray *r, const f
 }
 
 /// "Nothing hit."
-static inline HitRecord no_hit(void) {
+ISO_INLINE HitRecord no_hit(void) {
   HitRecord hit;
   hit.t = INFINITY;
   hit.block_id = ISO_INVALID_ID;

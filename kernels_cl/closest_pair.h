@@ -14,20 +14,20 @@
 #endif
 
 /// Says that a pair hits, or was not tested.
-inline void offer_closest(volatile global uint *closest_pairs, uint pair, uint spec_count) {
+ISO_INLINE void offer_closest(volatile global uint *closest_pairs, uint pair, uint spec_count) {
   if (ISO_CLOSEST_BY_ATOMICS) atomic_min(&closest_pairs[pair / spec_count], pair);
 }
 
 /// Marks a pair that cannot be intersected in this pass, or lies behind the last of its ray.
-inline void mark_not_tested(global PairHit *pair_hits, volatile global uint *closest_pairs, uint pair,
-                            uint block_id, uint spec_count) {
+ISO_INLINE void mark_not_tested(global PairHit *pair_hits, volatile global uint *closest_pairs, uint pair,
+                                uint block_id, uint spec_count) {
   if (!ISO_CLOSEST_BY_ATOMICS || block_id != ISO_INVALID_ID) pair_hits[pair].cell = ISO_NOT_TESTED;
   if (block_id != ISO_INVALID_ID) offer_closest(closest_pairs, pair, spec_count);
 }
 
 /// The pair of active ray `a` that decides, or ISO_INVALID_ID.
-inline uint closest_pair(global const uint *closest_pairs, global const uint *pair_block_ids,
-                         global const PairHit *pair_hits, uint a, uint spec_count) {
+ISO_INLINE uint closest_pair(global const uint *closest_pairs, global const uint *pair_block_ids,
+                             global const PairHit *pair_hits, uint a, uint spec_count) {
   uint pair = a * spec_count;
   if (ISO_CLOSEST_BY_ATOMICS) return closest_pairs[a];
   while (pair < (a + 1) * spec_count && pair_block_ids[pair] != ISO_INVALID_ID &&

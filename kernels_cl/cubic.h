@@ -8,7 +8,7 @@
 ISO_NAMESPACE_BEGIN
 
 /// a at u = 0 and b at u = 1, exactly; between them in sign and, but for rounding, in value.
-static inline float lerp(float u, float a, float b) {
+ISO_INLINE float lerp(float u, float a, float b) {
   return fma(u, b, fma(-u, a, a));
 }
 
@@ -23,14 +23,14 @@ typedef struct Bracket {
 } Bracket;
 
 /// De Casteljau's value and derivative of the cubic at s.
-static inline float cubic_value(Cubic c, float s, float *derivative) {
+ISO_INLINE float cubic_value(Cubic c, float s, float *derivative) {
   const float c0 = lerp(s, c.b0, c.b1), c1 = lerp(s, c.b1, c.b2), c2 = lerp(s, c.b2, c.b3);
   const float d0 = lerp(s, c0, c1), d1 = lerp(s, c1, c2);
   *derivative = 3.0f * (d1 - d0);
   return lerp(s, d0, d1);
 }
 
-static inline int cubic_inside(Cubic c, float s) {
+ISO_INLINE int cubic_inside(Cubic c, float s) {
   float derivative;
   return cubic_value(c, s, &derivative) >= 0.0f;
 }
@@ -40,7 +40,7 @@ typedef struct PreciseCubic {
   TwoFloat b[4];
 } PreciseCubic;
 
-static inline PreciseCubic widened(Cubic c) {
+ISO_INLINE PreciseCubic widened(Cubic c) {
   PreciseCubic p;
   p.b[0] = two_float(c.b0);
   p.b[1] = two_float(c.b1);
@@ -49,7 +49,7 @@ static inline PreciseCubic widened(Cubic c) {
   return p;
 }
 
-static inline int precise_cubic_inside(PreciseCubic cubic, float s) {
+ISO_INLINE int precise_cubic_inside(PreciseCubic cubic, float s) {
   PreciseCubic c = cubic; /* see tf_sub() */
   int i, n;
   for (n = 3; n > 0; --n) {
@@ -64,7 +64,7 @@ typedef struct PowerCubic {
   float p3, p2, p1, p0;
 } PowerCubic;
 
-static inline PowerCubic power_form(Cubic c) {
+ISO_INLINE PowerCubic power_form(Cubic c) {
   PowerCubic p;
   p.p0 = c.b0;
   p.p1 = 3.0f * (c.b1 - c.b0);
@@ -73,7 +73,7 @@ static inline PowerCubic power_form(Cubic c) {
   return p;
 }
 
-static inline float power_value(PowerCubic p, float s) {
+ISO_INLINE float power_value(PowerCubic p, float s) {
   return fma(fma(fma(p.p3, s, p.p2), s, p.p1), s, p.p0);
 }
 

@@ -37,25 +37,25 @@ typedef struct RayEvent {
   int axis;
 } RayEvent;
 
-static inline int event_before(RayEvent a, RayEvent b) {
+ISO_INLINE int event_before(RayEvent a, RayEvent b) {
   return t_less(a.t, b.t) || (!t_less(b.t, a.t) && a.axis < b.axis);
 }
 
-static inline RayEvent make_event(TwoFloat t, int axis) {
+ISO_INLINE RayEvent make_event(TwoFloat t, int axis) {
   RayEvent e;
   e.t = t;
   e.axis = axis;
   return e;
 }
 
-static inline RayEvent start_event(void) {
+ISO_INLINE RayEvent start_event(void) {
   TwoFloat zero;
   zero.hi = 0.0f;
   zero.lo = 0.0f;
   return make_event(zero, ISO_AXIS_START);
 }
 
-static inline RayAxis make_ray_axis(float o, float d) {
+ISO_INLINE RayAxis make_ray_axis(float o, float d) {
   RayAxis a;
   a.o = o;
   a.d = fabs(d) < ISO_SMALLEST_DIRECTION ? 0.0f : d;
@@ -66,7 +66,7 @@ static inline RayAxis make_ray_axis(float o, float d) {
 
 /// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) / sqrt(1 + u^2 +
 /// v^2), mapped to index space; t * frame->t_scale is the distance from the eye in world units.
-static inline Ray make_ray(const FrameParams *frame, uint pixel) {
+ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   const int column = (int)(pixel % frame->width);
   const int row = (int)(pixel / frame->width);
   const float u = (float)(2 * column + 1 - (int)frame->width) * frame->pixel_scale;
@@ -81,7 +81,7 @@ static inline Ray make_ray(const FrameParams *frame, uint pixel) {
 
 /// t at which the ray crosses the plane, a whole number (a pure function; the order of crossings rests on it). Needs d != 0.
 /// plane - o is exact as a pair (Knuth's two-sum); it is multiplied by the two-float 1 / d.
-static inline TwoFloat plane_t(RayAxis a, float plane) {
+ISO_INLINE TwoFloat plane_t(RayAxis a, float plane) {
   const float s = plane - a.o;
   const float back = s - plane;
   const float e = (plane - (s - back)) - (a.o + back);
@@ -95,20 +95,20 @@ static inline TwoFloat plane_t(RayAxis a, float plane) {
 
 /// Regions are slabs [size c, size (c+1)] of planes along one axis, cut at the domain's last plane.
 /// The plane by which the ray leaves region c. Exact: dims are far below 2^24.
-static inline float far_plane(RayAxis a, int c, int size, int last_plane) {
+ISO_INLINE float far_plane(RayAxis a, int c, int size, int last_plane) {
   const int plane = a.d > 0.0f ? size * (c + 1) : size * c;
   return (float)(plane > last_plane ? last_plane : plane);
 }
 
 /// When it does: never, if it runs within the slab.
-static inline TwoFloat far_t(RayAxis a, float plane) {
+ISO_INLINE TwoFloat far_t(RayAxis a, float plane) {
   TwoFloat t = plane_t(a, plane);
   t.hi = a.d == 0.0f ? INFINITY : t.hi;
   return t;
 }
 
 /// The later of `e` and the crossing by which the ray enters region c of this axis.
-static inline RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int size, int last_plane) {
+ISO_INLINE RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int size, int last_plane) {
   int plane = a.d > 0.0f ? size * c : size * (c + 1);
   RayEvent near;
   if (a.d == 0.0f) return e;
@@ -117,7 +117,7 @@ static inline RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int s
 }
 
 /// Is the ray, just after event `e`, on the far side of the plane as seen from -infinity? Needs d != 0.
-static inline int is_above(RayAxis a, int axis, int plane, RayEvent e) {
+ISO_INLINE int is_above(RayAxis a, int axis, int plane, RayEvent e) {
   const int crossed =
       !event_before(e, make_event(plane_t(a, (float)plane), axis)); /* the event itself counts */
   return crossed == (a.d > 0.0f);
@@ -125,7 +125,7 @@ static inline int is_above(RayAxis a, int axis, int plane, RayEvent e) {
 
 /// The region along one axis, within [first, last], that the ray is in just after event `e`. Where the position o + t d is
 /// further from a plane than its error, 2^-24 (|t d| + |o + t d|), it decides; else crossings are compared.
-static inline int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
+ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
   const float p = a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o);
   const float error = 0x1p-22f * (fabs(p) + fabs(a.o));
   const int on_plane = axis == e.axis;                    /* on a whole number, then */
@@ -143,7 +143,7 @@ static inline int locate(RayAxis a, int axis, RayEvent e, int size, int first, i
 
 /// Position along one axis at t, relative to the integer plane c: (o - c) + t d with the cancellation done
 /// exactly, clamped to the cell [0,1].
-static inline float local_position(RayAxis a, TwoFloat t, int c) {
+ISO_INLINE float local_position(RayAxis a, TwoFloat t, int c) {
   const float cf = (float)c;
   const float s = a.o - cf;
   const float sb = a.o - s;
@@ -157,11 +157,15 @@ static inline float local_position(RayAxis a, TwoFloat t, int c) {
   return x <= 0.0f ? 0.0f : (x >= 1.0f ? 1.0f : x);
 }
 
-/// A walk through regions of one size: where it is, and by which plane of each axis it would leave. No times: a GPU computes
-/// all three at once, without a branch, faster than it chooses one of them to renew; a CPU slower (README "Results").
+/// A walk through regions of one size: where it is, and by which plane of each axis it would leave. A GPU computes the three
+/// times when it needs them, without a branch, faster than it chooses one of them to renew; a CPU keeps them
+/// (ISO_WALK_KEEPS_TIMES). The same bits either way.
 typedef struct GridWalk {
   int x, y, z;                ///< the region
   float far_x, far_y, far_z;  ///< planes
+#ifdef ISO_WALK_KEEPS_TIMES
+  TwoFloat t_x, t_y, t_z;  ///< far_t() of each
+#endif
 } GridWalk;
 
 /// Number of the domain's last plane along each axis: dims - 1.
@@ -169,7 +173,7 @@ typedef struct LastPlanes {
   int x, y, z;
 } LastPlanes;
 
-static inline LastPlanes last_planes(const FrameParams *frame) {
+ISO_INLINE LastPlanes last_planes(const FrameParams *frame) {
   LastPlanes last;
   last.x = (int)frame->dims_x - 1;
   last.y = (int)frame->dims_y - 1;
@@ -178,7 +182,7 @@ static inline LastPlanes last_planes(const FrameParams *frame) {
 }
 
 /// Starts (or restarts) a walk in region (x,y,z).
-static inline GridWalk walk_from(const Ray *r, int x, int y, int z, int size, LastPlanes last) {
+ISO_INLINE GridWalk walk_from(const Ray *r, int x, int y, int z, int size, LastPlanes last) {
   GridWalk w;
   w.x = x;
   w.y = y;
@@ -186,11 +190,16 @@ static inline GridWalk walk_from(const Ray *r, int x, int y, int z, int size, La
   w.far_x = far_plane(r->x, x, size, last.x);
   w.far_y = far_plane(r->y, y, size, last.y);
   w.far_z = far_plane(r->z, z, size, last.z);
+#ifdef ISO_WALK_KEEPS_TIMES
+  w.t_x = far_t(r->x, w.far_x);
+  w.t_y = far_t(r->y, w.far_y);
+  w.t_z = far_t(r->z, w.far_z);
+#endif
   return w;
 }
 
 /// The event by which the ray entered region (x,y,z): the last of its three near planes, or the start.
-static inline RayEvent region_entry(const Ray *r, int x, int y, int z, int size, LastPlanes last) {
+ISO_INLINE RayEvent region_entry(const Ray *r, int x, int y, int z, int size, LastPlanes last) {
   RayEvent e = start_event();
   e = later_entry(e, r->x, 0, x, size, last.x);
   e = later_entry(e, r->y, 1, y, size, last.y);
@@ -199,8 +208,12 @@ static inline RayEvent region_entry(const Ray *r, int x, int y, int z, int size,
 
 /// The event by which the ray leaves the walk's region: the first of the three; ties in the order x, y, z. Numbers are chosen,
 /// not structs, which compilers would choose by address and so keep in memory.
-static inline RayEvent walk_exit(const GridWalk *w, const Ray *r) {
+ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
+#ifdef ISO_WALK_KEEPS_TIMES
+  const TwoFloat x = w->t_x, y = w->t_y, z = w->t_z;
+#else
   const TwoFloat x = far_t(r->x, w->far_x), y = far_t(r->y, w->far_y), z = far_t(r->z, w->far_z);
+#endif
   const int y_first = t_less(y, x);
   TwoFloat xy;
   RayEvent e;
@@ -215,14 +228,28 @@ static inline RayEvent walk_exit(const GridWalk *w, const Ray *r) {
 }
 
 /// One axis of walk_step().
-static inline float next_far_plane(RayAxis a, float plane, int size, int last_plane) {
+ISO_INLINE float next_far_plane(RayAxis a, float plane, int size, int last_plane) {
   const float next = plane + (float)(a.d > 0.0f ? size : -size), end = (float)last_plane;
   return next > end ? end : next;
 }
 
-/// Goes through the region's exit into the next region, which may lie outside the grid. No branches: the work-items of a GPU
-/// take turns at them.
-static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
+/// Goes through the region's exit into the next region, which may lie outside the grid.
+ISO_INLINE void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
+#ifdef ISO_WALK_KEEPS_TIMES
+  if (exit.axis == 0) {
+    w->x += r->x.d > 0.0f ? 1 : -1;
+    w->far_x = next_far_plane(r->x, w->far_x, size, last.x);
+    w->t_x = far_t(r->x, w->far_x);
+  } else if (exit.axis == 1) {
+    w->y += r->y.d > 0.0f ? 1 : -1;
+    w->far_y = next_far_plane(r->y, w->far_y, size, last.y);
+    w->t_y = far_t(r->y, w->far_y);
+  } else {
+    w->z += r->z.d > 0.0f ? 1 : -1;
+    w->far_z = next_far_plane(r->z, w->far_z, size, last.z);
+    w->t_z = far_t(r->z, w->far_z);
+  }
+#else /* no branches: the work-items of a GPU take turns at them */
   const int on_x = exit.axis == 0, on_y = exit.axis == 1, on_z = exit.axis == 2;
   const float far_x = next_far_plane(r->x, w->far_x, size, last.x),
               far_y = next_far_plane(r->y, w->far_y, size, last.y),
@@ -233,16 +260,17 @@ static inline void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size,
   w->far_x = on_x ? far_x : w->far_x;
   w->far_y = on_y ? far_y : w->far_y;
   w->far_z = on_z ? far_z : w->far_z;
+#endif
 }
 
 /// Does the walk leave the larger region that it is in, too, by its exit?
-static inline int leaves(const GridWalk *w, const GridWalk *larger, RayEvent exit) {
+ISO_INLINE int leaves(const GridWalk *w, const GridWalk *larger, RayEvent exit) {
   return (exit.axis == 0 && w->far_x == larger->far_x) || (exit.axis == 1 && w->far_y == larger->far_y) ||
          (exit.axis == 2 && w->far_z == larger->far_z);
 }
 
 /// Shrinks [*enter, *exit] to one axis of a box. Returns 0 if the ray runs beside it.
-static inline int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *enter, RayEvent *exit) {
+ISO_INLINE int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *enter, RayEvent *exit) {
   RayEvent near, far;
   if (a.d == 0.0f) return a.o >= (float)begin && a.o <= (float)end;
   near = make_event(plane_t(a, (float)(a.d > 0.0f ? begin : end)), axis);
@@ -253,7 +281,7 @@ static inline int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent
 }
 
 /// Where the ray enters the box from planes `begin` to planes `end`, or starts in it. Returns 0 if it never does.
-static inline int box_entry(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter) {
+ISO_INLINE int box_entry(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter) {
   RayEvent exit;
   exit.t.hi = INFINITY;
   exit.t.lo = 0.0f;
@@ -265,7 +293,7 @@ static inline int box_entry(const Ray *r, LastPlanes begin, LastPlanes end, RayE
 }
 
 /// Where the ray enters the domain [0, dims-1], or starts in it. Returns 0 if it never does.
-static inline int domain_entry(const Ray *r, LastPlanes last, RayEvent *enter) {
+ISO_INLINE int domain_entry(const Ray *r, LastPlanes last, RayEvent *enter) {
   LastPlanes zero;
   zero.x = zero.y = zero.z = 0;
   return box_entry(r, zero, last, enter);

@@ -15,7 +15,7 @@
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
 
 /// Whether every block of the dual grid is cached: all or nothing. block_id may be ISO_INVALID_ID: no.
-inline int dual_grid_is_cached(const FrameParams *frame, uint block_id, global const BlockEntry *table) {
+ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, uint block_id, global const BlockEntry *table) {
   int cached = block_id != ISO_INVALID_ID;
   if (cached) {
     const BlockCoords b = block_coords(frame, block_id);
@@ -31,7 +31,7 @@ inline int dual_grid_is_cached(const FrameParams *frame, uint block_id, global c
 }
 
 /// The slot of a cached block.
-inline uint slot_of(const FrameParams *frame, global const BlockEntry *table, uint block_id) {
+ISO_INLINE uint slot_of(const FrameParams *frame, global const BlockEntry *table, uint block_id) {
   const BlockCoords b = block_coords(frame, block_id);
   return cached_slot(frame, table, b.x, b.y, b.z);
 }

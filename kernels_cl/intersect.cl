@@ -6,7 +6,8 @@
 
 /// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk came into doubt.
 /// dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
-inline PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last, local const float *dual_grid) {
+ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last,
+                                   local const float *dual_grid) {
   RayEvent enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   GridWalk cell = enter_block(ray, b, enter, last);

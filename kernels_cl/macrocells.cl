@@ -18,7 +18,7 @@ typedef struct ValueRange {
   float min, max; /* min > max: empty */
 } ValueRange;
 
-inline ValueRange join(ValueRange a, ValueRange b) {
+ISO_INLINE ValueRange join(ValueRange a, ValueRange b) {
   ValueRange r;
   r.min = a.min < b.min ? a.min : b.min;
   r.max = a.max > b.max ? a.max : b.max;
@@ -109,7 +109,7 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer, global 
 }
 
 /// The block of bit 0..63 of a coarse macrocell, or ISO_INVALID_ID outside the volume.
-inline uint macrocell_block(const FrameParams *frame, uint coarse, uint bit) {
+ISO_INLINE uint macrocell_block(const FrameParams *frame, uint coarse, uint bit) {
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
   const uint x = 4 * (coarse % coarse_x) + (bit & 3), y = 4 * (coarse / coarse_x % coarse_y) + (bit >> 2 & 3),
              z = 4 * (coarse / coarse_x / coarse_y) + (bit >> 4);

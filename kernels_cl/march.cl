@@ -20,7 +20,7 @@
 #endif
 
 /// The corners of the dual grid (bits 0..7, corner x + 2y + 4z) whose blocks the voxels of local cell (x,y,z) lie in.
-inline uint cell_blocks(int x, int y, int z) {
+ISO_INLINE uint cell_blocks(int x, int y, int z) {
   const int border = (x == 3 ? 1 : 0) + (y == 3 ? 2 : 0) + (z == 3 ? 4 : 0);
   return (uint)(0xFF5533110F050301ul >> (8 * border)) & 0xFFu;
 }
@@ -34,7 +34,7 @@ typedef struct BlockChange {
 } BlockChange;
 
 /// The cells of a block that have voxels of any of those corners.
-inline ulong cells_of_corners(uint corners) {
+ISO_INLINE ulong cells_of_corners(uint corners) {
   const ulong x3 = 0x8888888888888888ul, y3 = 0xF000F000F000F000ul, z3 = 0xFFFF000000000000ul;
   ulong cells = 0;
   for (uint corner = 0; corner < 8; ++corner) {
@@ -48,8 +48,8 @@ inline ulong cells_of_corners(uint corners) {
 /// Which cells of block b a ray must look into: those in which inside changes, and those that need a block that is not cached.
 /// What is found out stays in the block's table entry for the next who asks. Out: slots [8] of the dual grid, ISO_GROUP_SIZE apart;
 /// *have: which of its corners are cached, or beyond the volume, where no cell of the domain reaches.
-inline ulong open_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
-                        BlockCoords b, local uint *slots, uint *have) {
+ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
+                            BlockCoords b, local uint *slots, uint *have) {
   BlockEntry entries[8];
   ulong cells;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
@@ -80,9 +80,9 @@ inline ulong open_block(const FrameParams *frame, global BlockEntry *table, glob
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, or ISO_RAY_WAITS where a block of
 /// the dual grid is not cached. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
 /// precise: settle doubts on the spot.
-inline int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
-                       global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
-                       local uint *slots, int precise, BlockChange *found) {
+ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
+                           global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
+                           local uint *slots, int precise, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   uint have;
   int result = ISO_RAY_LEFT, left = 0;
@@ -122,7 +122,7 @@ inline int march_block(const FrameParams *frame, global BlockEntry *table, globa
   return result;
 }
 
-inline HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
+ISO_INLINE HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   return make_hit(frame, ray, found->w, found->cell.x, found->cell.y, found->cell.z, found->enter,
                   walk_exit(&found->cell, ray), refine(solver, found->change.cubic, found->change.bracket));
@@ -130,8 +130,8 @@ inline HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockCha
 
 /// Appends the rays that go on to next_active_ray_ids. Called by whole work-groups.
 /// goes_on: this work-item has one. counters [2] of the work-group: 0 on entry and on return.
-inline void append_ray(int goes_on, uint entry, volatile local uint *counters, volatile global uint *count,
-                       global uint *list) {
+ISO_INLINE void append_ray(int goes_on, uint entry, volatile local uint *counters,
+                           volatile global uint *count, global uint *list) {
   uint place = 0;
   if (goes_on) place = atomic_inc(&counters[0]);
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -144,8 +144,8 @@ inline void append_ray(int goes_on, uint entry, volatile local uint *counters, v
 }
 
 /// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
-inline void open_next_counts(global const PassCounts *prev, global const PassCounts *counts,
-                             global PassCounts *next) {
+ISO_INLINE void open_next_counts(global const PassCounts *prev, global const PassCounts *counts,
+                                 global PassCounts *next) {
   uint window = counts->window_count; /* see begin_pass() in speculation.cl */
   window = prev->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
   next->pixel_count = counts->pixel_count;
@@ -157,24 +157,52 @@ inline void open_next_counts(global const PassCounts *prev, global const PassCou
   next->free_count = counts->free_count;
 }
 
-/// Begins a frame. hits [pixel] = none; next_active_ray_ids [counts->next_active_count]: the pixels whose rays meet an
+#define ISO_HIT_WORDS ((uint)(sizeof(HitRecord) / sizeof(uint)))
+
+/// hits [count] = no_hit(), by a work-group. Seen as words, in fours, of which neighbours write neighbours: records are 36 bytes
+/// long, so that the nine stores of each would be scattered.
+ISO_INLINE void clear_hits(global uint *words, uint count) {
+  const uint num_words = ISO_HIT_WORDS * count;
+  for (uint i = 4 * get_local_id(0); i < num_words; i += 4 * ISO_GROUP_SIZE) {
+    const uint4 at = i % ISO_HIT_WORDS + (uint4)(0, 1, 2, 3);
+    const uint4 field = select(at, at - ISO_HIT_WORDS, at >= ISO_HIT_WORDS); /* t; block_id and cell; zeros */
+    const uint4 ids = select((uint4)(0), (uint4)(ISO_INVALID_ID), field < 3);
+    const uint4 words_of_none = select(ids, as_uint4((float4)(INFINITY)), field == 0);
+    if (i + 4 <= num_words) {
+      vstore4(words_of_none, 0, words + i);
+    } else { /* the image's last few */
+      words[i] = words_of_none.x;
+      if (i + 1 < num_words) words[i + 1] = words_of_none.y;
+      if (i + 2 < num_words) words[i + 2] = words_of_none.z;
+    }
+  }
+}
+
+/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: the pixels whose rays meet an
 /// active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
 /// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
 /// that far more of its work-items fit a device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
     global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
-    global HitRecord *hits) {
+    global uint *hit_words) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
-  const uint item = get_local_id(0);
-  const uint num_tiled = (frame->width + 7) / 8 * ((frame->height + 3) / 4) * 32;
+  const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
+                        frame->screen_end_y};
+  const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
   if (get_global_id(0) == 0) next->window_count = counts->pixel_count;
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < counts->pixel_count;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    clear_hits(hit_words + begin * ISO_HIT_WORDS, min(ISO_GROUP_SIZE, counts->pixel_count - begin));
+    barrier(
+        CLK_LOCAL_MEM_FENCE); /* for a CPU, which takes a group's work-items one by one from barrier to barrier */
+  }
   if (item == 0) counters[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint pixel = begin + item < num_tiled ? tiled_pixel(frame, begin + item) : ISO_INVALID_ID;
+    const uint pixel = begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
     uint num_found = 0;
     if (pixel != ISO_INVALID_ID) {
       const Ray ray = make_ray(frame, pixel);
@@ -182,7 +210,6 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
       if (block_id != ISO_INVALID_ID)
         num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
       if (num_found != 0) ray_block_ids[pixel] = found[item];
-      hits[pixel] = no_hit();
     }
     append_ray(num_found != 0, pixel | ISO_FIRST_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
                &counts->next_active_count, next_active_ray_ids);
@@ -303,29 +330,28 @@ typedef struct Requests {
 } Requests;
 
 /// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps for all
-/// corners, so that a GPU waits for memory twice, not sixteen times; a block that is seen to be asked for already costs no
-/// atomic, for whose result it would wait.
-inline void request_touched(const FrameParams *frame, global const BlockEntry *table,
-                            global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
-                            Requests requests) {
+/// corners, so that a GPU waits for memory twice, not sixteen times. Most have been asked for by another ray: their bits tell,
+/// and cost neither a search in the table nor an atomic, for whose result one would wait.
+ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
+                                global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
+                                Requests requests) {
   BlockEntry entries[8];
-  uint seen[8];
-  uint missing = 0; /* of the corners */
-  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
-  ISO_UNROLL
-  for (uint corner = 0; corner < 8; ++corner) {
-    const uint asked = touched >> corner & 1u, absent = entries[corner].slot == ISO_BLOCK_ABSENT;
-    missing |= (asked & absent) << corner;
-    if (asked && !absent) slot_stamps[entries[corner].slot] = pass;
-  }
+  uint missing = touched; /* of the corners: nobody is known to have asked for them */
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
     const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-    const uint word = (missing >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
-    seen[corner] = requests.bits[word] & request_bit(x, y, z);
+    const uint word = (touched >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
+    missing &= ~((uint)((requests.bits[word] & request_bit(x, y, z)) != 0) << corner);
   }
+  if (missing == 0) return;
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
   ISO_UNROLL
-  for (uint corner = 0; corner < 8; ++corner) missing &= ~((uint)(seen[corner] != 0) << corner);
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
+      slot_stamps[entries[corner].slot] = pass;
+      missing &= ~(1u << corner);
+    }
+  }
   for (uint corner = 0; corner < 8; ++corner) {
     const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
     if ((missing >> corner & 1u) != 0 && mark_request(frame, requests.bits, x, y, z)) {

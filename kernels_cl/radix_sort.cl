@@ -7,7 +7,7 @@
 
 #define TILE (ISO_GROUP_SIZE * ISO_RADIX_ITEMS)
 
-inline uint digit_of(uint key, uint shift) {
+ISO_INLINE uint digit_of(uint key, uint shift) {
   return (key >> shift) & (ISO_RADIX_DIGITS - 1);
 }
 

@@ -56,8 +56,8 @@ kernel void resident_changing(const FrameParams frame_params, uint num_blocks, g
 }
 
 /// The corners of dual cell (x,y,z) minus the isovalue, corner x + 2y + 4z.
-inline void resident_corners(const FrameParams *frame, global const float *values, int x, int y, int z,
-                             float *w) {
+ISO_INLINE void resident_corners(const FrameParams *frame, global const float *values, int x, int y, int z,
+                                 float *w) {
   for (int corner = 0; corner < 8; ++corner) {
     const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
                vz = (uint)(z + (corner >> 2));
@@ -78,8 +78,8 @@ typedef struct CellWalk {
 
 /// Walks on to the next change of inside in the block's `changing` cells, in float. Returns 1, ISO_DOUBTFUL, or 0 when the ray
 /// has left the block.
-inline int walk_to_change(const FrameParams *frame, global const float *values, const Ray *ray,
-                          LastPlanes last, ulong changing, CellWalk *at) {
+ISO_INLINE int walk_to_change(const FrameParams *frame, global const float *values, const Ray *ray,
+                              LastPlanes last, ulong changing, CellWalk *at) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   int found = 0;
   while (!found && !at->left) {
@@ -99,8 +99,8 @@ inline int walk_to_change(const FrameParams *frame, global const float *values, 
 }
 
 /// Is there a change of inside on the ray's way through block b, of which those cells change? If so, *at is its cell.
-inline int resident_block(const FrameParams *frame, global const float *values, ulong changing,
-                          const Ray *ray, BlockCoords b, LastPlanes last, CellWalk *at) {
+ISO_INLINE int resident_block(const FrameParams *frame, global const float *values, ulong changing,
+                              const Ray *ray, BlockCoords b, LastPlanes last, CellWalk *at) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   int found = 0;
   if (changing != 0) {
@@ -134,10 +134,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident
   local uint *found = found_blocks + get_local_id(0);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   const LastPlanes last = last_planes(frame);
-  const uint pixel = tiled_pixel(frame, get_global_id(0));
+  const PixelBox image = {0, 0, frame->width, frame->height};
+  const uint pixel = tiled_pixel(frame, image, get_global_id(0));
   if (pixel != ISO_INVALID_ID) {
+    const uint column = pixel % frame->width, row = pixel / frame->width;
+    const int in_box = column >= frame->screen_begin_x && column < frame->screen_end_x &&
+                       row >= frame->screen_begin_y && row < frame->screen_end_y;
     const Ray ray = make_ray(frame, pixel);
-    uint next = first_block(frame, &ray);
+    uint next = in_box ? first_block(frame, &ray) : ISO_INVALID_ID;
     int hit = 0;
     CellWalk at;
     while (next != ISO_INVALID_ID && !hit) {

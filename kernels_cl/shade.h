@@ -18,17 +18,17 @@ typedef struct ShadeParams {
 } ShadeParams;
 ISO_CHECK_SIZE(ShadeParams, 108);
 
-static inline uint to_byte(float c) {
+ISO_INLINE uint to_byte(float c) {
   return c <= 0.0f ? 0u : (c >= 1.0f ? 255u : (uint)fma(c, 255.0f, 0.5f));
 }
 
-static inline uint pack_rgb(float r, float g, float b) {
+ISO_INLINE uint pack_rgb(float r, float g, float b) {
   return to_byte(r) | to_byte(g) << 8 | to_byte(b) << 16 | 0xFF000000u;
 }
 
 /// RGBA, 8 bits each, red in bits 0..7.
-static inline uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint pixel,
-                               float t, float gx, float gy, float gz) {
+ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint pixel, float t,
+                            float gx, float gy, float gz) {
   const Ray ray = make_ray(frame, pixel);
   float nx, ny, nz, vx, vy, vz, lengths, cosine, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);

@@ -11,6 +11,8 @@
 #define ISO_GLOBAL global      ///< address space of buffers
 #define ISO_CONSTANT constant  ///< address space of tables
 #define ISO_UNROLL _Pragma("unroll")
+#define ISO_INLINE \
+  static inline __attribute__((always_inline))  ///< PoCL calls long functions: a fifth slower
 #else
 #include <bit>
 #include <cmath>
@@ -21,6 +23,7 @@
 #define ISO_GLOBAL
 #define ISO_CONSTANT
 #define ISO_UNROLL
+#define ISO_INLINE static inline
 #endif
 
 ISO_NAMESPACE_BEGIN
@@ -68,10 +71,13 @@ typedef struct FrameParams {
   uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
   int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
-  uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
-  uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
+  uint screen_begin_x,
+      screen_begin_y;               ///< the pixels whose rays may meet that box, from whole tiles of 8 x 4:
+  uint screen_end_x, screen_end_y;  ///< from begin to below end
+  uint per_ray_speculation;         ///< each ray looks ahead by what it has missed, not all alike
+  uint table_groups;                ///< entries / 8 of the block cache's table (block_table.h)
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 132);
+ISO_CHECK_SIZE(FrameParams, 148);
 
 /// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu

@@ -17,7 +17,7 @@ ISO_NAMESPACE_BEGIN
 #define ISO_ANALYTIC_DEGENERATE 1e-5f
 
 /// Cube root: halves the exponent's third by a power of two, then Newton. Relative error about 1e-7.
-static inline float portable_cbrt(float x) {
+ISO_INLINE float portable_cbrt(float x) {
   union {
     float f;
     uint u;
@@ -32,7 +32,7 @@ static inline float portable_cbrt(float x) {
 }
 
 /// Arc cosine on [-1,1] [Abramowitz and Stegun 4.4.46]: absolute error about 2e-8 before rounding.
-static inline float portable_acos(float x) {
+ISO_INLINE float portable_acos(float x) {
   const float a = fabs(x) > 1.0f ? 1.0f : fabs(x);
   float p = -0.0012624911f;
   float angle;
@@ -48,7 +48,7 @@ static inline float portable_acos(float x) {
 }
 
 /// Cosine on [-pi/3, pi] by Taylor series about 0 of a half angle: absolute error about 1e-7.
-static inline float portable_cos(float x) {
+ISO_INLINE float portable_cos(float x) {
   const float h = 0.25f * x, h2 = h * h;
   const float c =
       fma(h2, fma(h2, fma(h2, fma(h2, 1.0f / 40320.0f, -1.0f / 720.0f), 1.0f / 24.0f), -0.5f), 1.0f);
@@ -57,7 +57,7 @@ static inline float portable_cos(float x) {
 }
 
 /// The bracket is the root itself: the closed form has nothing to refine.
-static inline int isolate_analytic(Cubic c, Bracket *bracket) {
+ISO_INLINE int isolate_analytic(Cubic c, Bracket *bracket) {
   const PowerCubic p = power_form(c);
   const float largest_low = fabs(p.p1) > fabs(p.p0) ? fabs(p.p1) : fabs(p.p0);
   const float largest = fabs(p.p2) > largest_low ? fabs(p.p2) : largest_low;

@@ -22,7 +22,7 @@ ISO_NAMESPACE_BEGIN
 #define ISO_DOUBTFUL 2
 
 /// s = n / (n + m) where n and m have one sign, so nothing cancels; -1 where they do not.
-static inline float same_sign_fraction(float n, float m) {
+ISO_INLINE float same_sign_fraction(float n, float m) {
   return (n > 0.0f && m > 0.0f) || (n < 0.0f && m < 0.0f) ? n / (n + m) : -1.0f;
 }
 
@@ -35,7 +35,7 @@ typedef struct Extrema {
 /// The derivative is d0 (1-s)^2 + 2 d1 s (1-s) + d2 s^2, up to a factor. With r = s / (1-s) > 0 that is d2 r^2 +
 /// 2 d1 r + d0 = 0, whose roots q / d2 and d0 / q (q = -(d1 +- sqrt(d1^2 - d0 d2)), larger magnitude) give s
 /// without cancellation and without dividing by a leading coefficient.
-static inline Extrema cubic_extrema(float e0, float e1, float e2) {
+ISO_INLINE Extrema cubic_extrema(float e0, float e1, float e2) {
   const float e01 = fabs(e0) > fabs(e1) ? fabs(e0) : fabs(e1), largest = fabs(e2) > e01 ? fabs(e2) : e01;
   /* Squares of huge or tiny values would not survive; only the ratios of the three count. */
   const float d0 = e0 / largest, d1 = e1 / largest, d2 = e2 / largest;
@@ -53,7 +53,7 @@ static inline Extrema cubic_extrema(float e0, float e1, float e2) {
   return at;
 }
 
-static inline float largest_coefficient(Cubic c) {
+ISO_INLINE float largest_coefficient(Cubic c) {
   const float b01 = fabs(c.b0) > fabs(c.b1) ? fabs(c.b0) : fabs(c.b1);
   const float b23 = fabs(c.b2) > fabs(c.b3) ? fabs(c.b2) : fabs(c.b3);
   return b01 > b23 ? b01 : b23;
@@ -65,7 +65,7 @@ static inline float largest_coefficient(Cubic c) {
 /// bracketed by [0,1]. More: [0,1] is split at the extrema. An extremum's value depends on its place only to second
 /// order, so its sign is certain unless the value is noise; nor is it certain that there is an extremum where the
 /// derivative's discriminant is noise.
-static inline int isolate_bernstein(Cubic c, Bracket *bracket) {
+ISO_INLINE int isolate_bernstein(Cubic c, Bracket *bracket) {
   const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
   bracket->lo = 0.0f;
   bracket->hi = 1.0f;
@@ -95,7 +95,7 @@ static inline int isolate_bernstein(Cubic c, Bracket *bracket) {
 /// The same in 48 bits, for the few segments on which isolate_bernstein() is in doubt, and the root itself (lo == hi) by
 /// bisection. rounded: the float coefficients, whose end signs neighbouring cells share and which therefore say what
 /// is inside at entry and exit.
-static inline int isolate_precisely(PreciseCubic c, Cubic rounded, Bracket *bracket) {
+ISO_INLINE int isolate_precisely(PreciseCubic c, Cubic rounded, Bracket *bracket) {
   const int in0 = rounded.b0 >= 0.0f, in3 = rounded.b3 >= 0.0f;
   const Extrema at =
       cubic_extrema(tf_sub(c.b[1], c.b[0]).hi, tf_sub(c.b[2], c.b[1]).hi, tf_sub(c.b[3], c.b[2]).hi);
@@ -117,7 +117,7 @@ static inline int isolate_precisely(PreciseCubic c, Cubic rounded, Bracket *brac
 }
 
 /// Newton, kept in the bracket by bisection.
-static inline float refine_by_newton(Cubic c, Bracket bracket, int max_steps) {
+ISO_INLINE float refine_by_newton(Cubic c, Bracket bracket, int max_steps) {
   const int in_lo = cubic_inside(c, bracket.lo);
   float lo = bracket.lo, hi = bracket.hi;
   float s = 0.5f * (lo + hi);

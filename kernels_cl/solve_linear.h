@@ -11,14 +11,14 @@
 
 ISO_NAMESPACE_BEGIN
 
-static inline int isolate_linear(Cubic c, Bracket *bracket) {
+ISO_INLINE int isolate_linear(Cubic c, Bracket *bracket) {
   bracket->lo = 0.0f;
   bracket->hi = 1.0f;
   return (c.b0 >= 0.0f) != (c.b3 >= 0.0f);
 }
 
 /// False position: the chord's root again and again, kept on the side where inside changes.
-static inline float refine_by_chords(Cubic c, Bracket bracket, int max_steps) {
+ISO_INLINE float refine_by_chords(Cubic c, Bracket bracket, int max_steps) {
   float lo = bracket.lo, hi = bracket.hi, s, derivative;
   float value_lo = cubic_value(c, lo, &derivative), value_hi = cubic_value(c, hi, &derivative);
   const int in_lo = value_lo >= 0.0f;

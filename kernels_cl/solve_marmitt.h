@@ -11,7 +11,7 @@
 
 ISO_NAMESPACE_BEGIN
 
-static inline int isolate_marmitt(Cubic c, Bracket *bracket) {
+ISO_INLINE int isolate_marmitt(Cubic c, Bracket *bracket) {
   const PowerCubic p = power_form(c);
   const float qa = 3.0f * p.p3, qb = 2.0f * p.p2, qc = p.p1; /* the derivative */
   const float discriminant = qb * qb - 4.0f * qa * qc;

@@ -36,7 +36,7 @@ typedef struct Solver {
 } Solver;
 
 /// See the contract above; or ISO_DOUBTFUL (`bernstein` alone): isolate_precisely() then decides.
-static inline int isolate(Solver solver, Cubic c, Bracket *bracket) {
+ISO_INLINE int isolate(Solver solver, Cubic c, Bracket *bracket) {
   switch (solver.kind) {
     case ISO_SOLVER_LINEAR:
       return isolate_linear(c, bracket);
@@ -49,7 +49,7 @@ static inline int isolate(Solver solver, Cubic c, Bracket *bracket) {
   }
 }
 
-static inline float refine(Solver solver, Cubic c, Bracket bracket) {
+ISO_INLINE float refine(Solver solver, Cubic c, Bracket bracket) {
   float s = bracket.lo;
   if (bracket.lo != bracket.hi) {
     s = solver.kind == ISO_SOLVER_BERNSTEIN ? refine_by_newton(c, bracket, solver.max_steps)
@@ -60,7 +60,7 @@ static inline float refine(Solver solver, Cubic c, Bracket bracket) {
 
 /// Both, for a cubic of which no more than its float coefficients is known: the first s at which inside differs from
 /// inside at s = 0. Returns 0 if it never does.
-static inline int first_change(Solver solver, Cubic c, float *s) {
+ISO_INLINE int first_change(Solver solver, Cubic c, float *s) {
   Bracket bracket;
   int found = isolate(solver, c, &bracket);
   if (found == ISO_DOUBTFUL) found = isolate_precisely(widened(c), c, &bracket);

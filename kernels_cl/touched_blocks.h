@@ -13,7 +13,7 @@ typedef struct RaySpan {
   RayEvent begin, end;
 } RaySpan;
 
-static inline RaySpan common_span(RaySpan a, RaySpan b) {
+ISO_INLINE RaySpan common_span(RaySpan a, RaySpan b) {
   RaySpan both;
   both.begin = event_before(a.begin, b.begin) ? b.begin : a.begin;
   both.end = event_before(a.end, b.end) ? a.end : b.end;
@@ -21,7 +21,7 @@ static inline RaySpan common_span(RaySpan a, RaySpan b) {
 }
 
 /// Narrows a span in a region that ends at plane `end` to where the ray is between planes begin and end of this axis.
-static inline RaySpan span_between(RaySpan span, RayAxis a, int axis, int begin, int end) {
+ISO_INLINE RaySpan span_between(RaySpan span, RayAxis a, int axis, int begin, int end) {
   RaySpan slab;      /* not span itself: rusticl changes the caller's struct with a parameter */
   if (a.d == 0.0f) { /* within a plane: in the region after it, or in the domain's last */
     slab.begin = span.begin;
@@ -36,7 +36,7 @@ static inline RaySpan span_between(RaySpan span, RayAxis a, int axis, int begin,
 /// The corners (bits 0..7, corner x + 2y + 4z) of the dual grid of block (x,y,z) whose voxels the cells that the ray crosses
 /// in the block have. A cell has voxels of the neighbour at +x where it is the block's fourth along x. A ray is in that layer
 /// from one event to another; so it is in several layers at once where those spans overlap, and no cell need be walked.
-static inline uint touched_blocks(const Ray *r, int x, int y, int z, LastPlanes last) {
+ISO_INLINE uint touched_blocks(const Ray *r, int x, int y, int z, LastPlanes last) {
   RaySpan in_block, in_x, in_y, in_z, in_xy;
   uint touched = 1u;
   in_block.begin = region_entry(r, x, y, z, 4, last);

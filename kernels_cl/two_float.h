@@ -12,11 +12,11 @@ typedef struct TwoFloat {
   float hi, lo;
 } TwoFloat;
 
-static inline int t_less(TwoFloat a, TwoFloat b) {
+ISO_INLINE int t_less(TwoFloat a, TwoFloat b) {
   return a.hi < b.hi || (a.hi == b.hi && a.lo < b.lo);
 }
 
-static inline TwoFloat two_float(float x) {
+ISO_INLINE TwoFloat two_float(float x) {
   TwoFloat r;
   r.hi = x;
   r.lo = 0.0f;
@@ -24,7 +24,7 @@ static inline TwoFloat two_float(float x) {
 }
 
 /// a + b exactly, for |a| >= |b|.
-static inline TwoFloat fast_two_sum(float a, float b) {
+ISO_INLINE TwoFloat fast_two_sum(float a, float b) {
   TwoFloat r;
   r.hi = a + b;
   r.lo = b - (r.hi - a);
@@ -32,7 +32,7 @@ static inline TwoFloat fast_two_sum(float a, float b) {
 }
 
 /// a + b exactly.
-static inline TwoFloat two_sum(float a, float b) {
+ISO_INLINE TwoFloat two_sum(float a, float b) {
   TwoFloat r;
   float b_part;
   r.hi = a + b;
@@ -42,26 +42,26 @@ static inline TwoFloat two_sum(float a, float b) {
 }
 
 /// Relative error 2^-45 or so where the sum does not cancel; below that of the larger operand where it does.
-static inline TwoFloat tf_add(TwoFloat a, TwoFloat b) {
+ISO_INLINE TwoFloat tf_add(TwoFloat a, TwoFloat b) {
   const TwoFloat high = two_sum(a.hi, b.hi), low = two_sum(a.lo, b.lo);
   const TwoFloat sum = fast_two_sum(high.hi, high.lo + low.hi);
   return fast_two_sum(sum.hi, sum.lo + low.lo);
 }
 
-static inline TwoFloat tf_sub(TwoFloat a, TwoFloat b) {
+ISO_INLINE TwoFloat tf_sub(TwoFloat a, TwoFloat b) {
   TwoFloat minus_b; /* not b itself: rusticl changes the caller's struct with a parameter */
   minus_b.hi = -b.hi;
   minus_b.lo = -b.lo;
   return tf_add(a, minus_b);
 }
 
-static inline TwoFloat tf_mul(TwoFloat a, TwoFloat b) {
+ISO_INLINE TwoFloat tf_mul(TwoFloat a, TwoFloat b) {
   const float high = a.hi * b.hi;
   return fast_two_sum(high, fma(a.hi, b.hi, -high) + fma(a.hi, b.lo, a.lo * b.hi));
 }
 
 /// a at u = 0, b at u = 1 but for rounding.
-static inline TwoFloat tf_lerp(float u, TwoFloat a, TwoFloat b) {
+ISO_INLINE TwoFloat tf_lerp(float u, TwoFloat a, TwoFloat b) {
   return tf_add(a, tf_mul(two_float(u), tf_sub(b, a)));
 }
 

@@ -25,20 +25,20 @@ typedef struct BitReader {
 } BitReader;
 
 /// Makes at least 32 bits of the buffer valid.
-static inline void fill_bits(BitReader *r) {
+ISO_INLINE void fill_bits(BitReader *r) {
   if (r->buffered < 32u) {
     r->buffer |= (ulong)*r->words++ << r->buffered;
     r->buffered += 32u;
   }
 }
 
-static inline void skip_bits(BitReader *r, uint count) {
+ISO_INLINE void skip_bits(BitReader *r, uint count) {
   r->buffer >>= count;
   r->buffered -= count;
 }
 
 /// The next `count` bits, 0..32.
-static inline uint read_bits(BitReader *r, uint count) {
+ISO_INLINE uint read_bits(BitReader *r, uint count) {
   uint value;
   fill_bits(r);
   value = (uint)(r->buffer & (((ulong)1 << count) - 1u));
@@ -46,7 +46,7 @@ static inline uint read_bits(BitReader *r, uint count) {
   return value;
 }
 
-static inline BitReader open_bits(ISO_GLOBAL const uint *words, ulong first_bit) {
+ISO_INLINE BitReader open_bits(ISO_GLOBAL const uint *words, ulong first_bit) {
   BitReader r;
   r.words = words + (first_bit >> 5);
   r.buffer = 0;
@@ -56,7 +56,7 @@ static inline BitReader open_bits(ISO_GLOBAL const uint *words, ulong first_bit)
 }
 
 /// Skips zeros up to and with the next one, but reads no more than `limit` bits. Returns the number of zeros.
-static inline uint read_zeros(BitReader *r, uint limit) {
+ISO_INLINE uint read_zeros(BitReader *r, uint limit) {
   uint zeros = 0;
   for (;;) {
     uint window, run;
@@ -82,7 +82,7 @@ static inline uint read_zeros(BitReader *r, uint limit) {
 ///          ( 4  2  4  5)
 ///          ( 4 -2  4 -5)
 ///          ( 4 -6 -4  1)
-static inline void inverse_lift(uint *v, int stride) {
+ISO_INLINE void inverse_lift(uint *v, int stride) {
   uint x = v[0], y = v[stride], z = v[2 * stride], w = v[3 * stride];
   y += (uint)((int)w >> 1);
   w -= (uint)((int)y >> 1);
@@ -105,7 +105,7 @@ static inline void inverse_lift(uint *v, int stride) {
 }
 
 /// 2^e for e in [-149, 127]; 0 below.
-static inline float power_of_two(int e) {
+ISO_INLINE float power_of_two(int e) {
   union {
     uint u;
     float f;
@@ -118,8 +118,8 @@ static inline float power_of_two(int e) {
 
 /// Decodes the block that starts at `first_bit` of `words` and has max_bits bits.
 /// values [64]: x + 4 y + 16 z. Reads at most two words past the block's last bit.
-static inline void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
-                                    float *values) {
+ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
+                                 float *values) {
   BitReader r = open_bits(words, first_bit);
   uint coefficients[64];
   float scale;

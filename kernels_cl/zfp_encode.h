@@ -25,7 +25,7 @@ typedef struct BitWriter {
 } BitWriter;
 
 /// `count`, 0..32, bits; value < 2^count.
-static inline void write_up_to_32_bits(BitWriter *w, uint value, uint count) {
+ISO_INLINE void write_up_to_32_bits(BitWriter *w, uint value, uint count) {
   w->buffer |= (ulong)value << w->buffered;
   w->buffered += count;
   if (w->buffered >= 32u) {
@@ -36,20 +36,20 @@ static inline void write_up_to_32_bits(BitWriter *w, uint value, uint count) {
 }
 
 /// The lowest `count` bits of `value`, 0..64.
-static inline void write_bits(BitWriter *w, ulong value, uint count) {
+ISO_INLINE void write_bits(BitWriter *w, ulong value, uint count) {
   if (count < 64u) value &= ((ulong)1 << count) - 1u;
   write_up_to_32_bits(w, (uint)value, count < 32u ? count : 32u);
   if (count > 32u) write_up_to_32_bits(w, (uint)(value >> 32), count - 32u);
 }
 
 /// Zeros below the lowest one of x; x != 0.
-static inline uint trailing_zeros(ulong x) {
+ISO_INLINE uint trailing_zeros(ulong x) {
   return (uint)popcount((x & ((ulong)0 - x)) - 1u);
 }
 
 /// Forward lifting, in place on v[0], v[stride], ...: inverse_lift() of zfp_codec.h backwards, but for the
 /// bits that its shifts drop.
-static inline void forward_lift(uint *v, int stride) {
+ISO_INLINE void forward_lift(uint *v, int stride) {
   uint x = v[0], y = v[stride], z = v[2 * stride], w = v[3 * stride];
   x += w;
   x = (uint)((int)x >> 1);
@@ -72,12 +72,12 @@ static inline void forward_lift(uint *v, int stride) {
 }
 
 /// Where coordinate i, 0..3, of a partial block with `count` voxels along an axis, 1..4, takes its value from.
-static inline uint padded_coordinate(uint i, uint count) {
+ISO_INLINE uint padded_coordinate(uint i, uint count) {
   if (i < count) return i;
   return i == 3u ? 0u : count - 1u;
 }
 
-static inline uint float_bits(float value) {
+ISO_INLINE uint float_bits(float value) {
   union {
     float f;
     uint u;
@@ -88,7 +88,7 @@ static inline uint float_bits(float value) {
 
 /// Writes the bit planes of `coefficients`, in stream order and negabinary, until `bits` bits are used or no
 /// plane is left.
-static inline void write_bit_planes(BitWriter *w, const uint *coefficients, uint bits) {
+ISO_INLINE void write_bit_planes(BitWriter *w, const uint *coefficients, uint bits) {
   uint n = 0; /* coefficients known to be significant: their bits go verbatim */
   uint plane, i;
   for (plane = 32; bits > 0u && plane-- > 0u;) {
@@ -118,7 +118,7 @@ static inline void write_bit_planes(BitWriter *w, const uint *coefficients, uint
 
 /// Encodes values [64], x + 4 y + 16 z, to words [max_bits / 32]; max_bits: 32..2048, a multiple of 32. Every
 /// magnitude is 0 or in [2^-97, 2^126).
-static inline void zfp_encode_block(const float *values, uint max_bits, ISO_GLOBAL uint *words) {
+ISO_INLINE void zfp_encode_block(const float *values, uint max_bits, ISO_GLOBAL uint *words) {
   ISO_GLOBAL uint *const end = words + max_bits / 32u;
   BitWriter w;
   uint coefficients[64], ordered[64];

@@ -43,9 +43,10 @@ std::string_view kernel_text(std::string_view stem) {
 }
 
 /// Bits agree between devices only under these options (README "Arithmetic").
-std::string build_options(const Capabilities &capabilities, const Defines &defines) {
+std::string build_options(const DeviceInfo &device, Defines defines) {
   std::string options = "-cl-std=CL1.2";
-  if (capabilities.correctly_rounded_divide) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+  if (device.capabilities.correctly_rounded_divide) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+  if (device.type == DeviceType::kCpu) defines.emplace("ISO_WALK_KEEPS_TIMES", "1");  // grid_dda.h
   const auto has_space = [](const std::string &text) {
     return std::ranges::any_of(text, [](unsigned char c) { return std::isspace(c) != 0; });
   };
@@ -101,7 +102,7 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
   auto key = std::make_pair(std::string(stem), defines);
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
 
-  const std::string options = build_options(info_.capabilities, defines);
+  const std::string options = build_options(info_, defines);
   try {
     cl::Program program(context_, std::string(kernel_text(stem)));
     program.build(device_, options.c_str());
