@@ -14,13 +14,14 @@ ocl::Defines march_defines(std::uint32_t group_size, Solver solver) {
 
 March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver)
     : range_(ocl::Range::strided(num_pixels, group_size, device)),
+      start_range_(ocl::Range::strided(num_pixels, group_size, device, 4)),
       start_rays_(device, "march", "start_rays", march_defines(group_size, solver)),
       march_(device, "march", "march", march_defines(group_size, solver)),
       request_ahead_(device, "march", "request_ahead", march_defines(group_size, solver)) {}
 
 void March::start_rays(const Macrocells &macrocells, Wavefront &rays) {
-  start_rays_(range_, rays.frame, macrocells.masks(), rays.counts, rays.next_counts, rays.next_active_ray_ids,
-              rays.ray_block_ids, rays.hits);
+  start_rays_(start_range_, rays.frame, macrocells.masks(), rays.counts, rays.next_counts,
+              rays.next_active_ray_ids, rays.ray_block_ids, rays.hits);
 }
 
 void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {

@@ -27,7 +27,7 @@ class March {
   void request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:
-  ocl::Range range_;
+  ocl::Range range_, start_range_;
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<HitRecord>>
       start_rays_;

@@ -143,6 +143,13 @@ ISO_INLINE void append_ray(int goes_on, uint entry, volatile local uint *counter
   barrier(CLK_LOCAL_MEM_FENCE);
 }
 
+/// Work-items for each ray: as many as there are, up to one for each block of a round.
+ISO_INLINE uint lanes_per_ray(uint num_rays) {
+  uint lanes = ISO_BLOCKS_AT_ONCE;
+  while (lanes > 1 && lanes * num_rays > get_global_size(0)) lanes /= 2;
+  return lanes;
+}
+
 /// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
 ISO_INLINE void open_next_counts(global const PassCounts *prev, global const PassCounts *counts,
                                  global PassCounts *next) {
@@ -235,7 +242,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   volatile local uint deciding[ISO_GROUP_SIZE]; /* of each ray's blocks of the round */
   const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = prev->next_active_count;
-  const uint lanes = ISO_BLOCKS_AT_ONCE * num_rays <= get_global_size(0) ? ISO_BLOCKS_AT_ONCE : 1;
+  const uint lanes = lanes_per_ray(num_rays);
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
     open_next_counts(prev, counts, next_counts);
@@ -253,7 +260,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const uint entry = is_ray ? active_ray_ids[i] : 0, pixel = entry & ISO_RAY_PIXEL;
     const uint from = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
     const Ray ray = make_ray(frame, pixel);
-    uint next = from, at = lane, more = 1, waits_as = 0;
+    uint next = from, at = lane, more = 1, waits_as = 0, decides_at = 0;
     int result = ISO_RAY_LEFT, going = is_ray, first = 1;
     BlockChange change;
     while (more != 0) {
@@ -279,6 +286,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
             ++num_passed;
           } else {
             atomic_min(&deciding[item / lanes], at);
+            decides_at = at;
             waits_as = found[at * ISO_GROUP_SIZE + item];
           }
         }
@@ -286,8 +294,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       barrier(CLK_LOCAL_MEM_FENCE);
       if (going) {
         const uint place = deciding[item / lanes];
-        if (lane < place) num_blocks += num_passed;
-        if (lanes > 1 && lane != place) result = ISO_RAY_LEFT;
+        if (lane < place) num_blocks += min(num_passed, (place - lane - 1) / lanes + 1);
+        if (decides_at != place) result = ISO_RAY_LEFT;
         going = place == ISO_INVALID_ID && next != ISO_INVALID_ID;
         if (going) atomic_inc(&num_going);
       }
@@ -382,7 +390,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
                              staged,         &num_staged};
   const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = min(counts->next_active_count, counts->window_count);
-  const uint lanes = ISO_BLOCKS_AT_ONCE * num_rays <= get_global_size(0) ? ISO_BLOCKS_AT_ONCE : 1;
+  const uint lanes = lanes_per_ray(num_rays);
   if (item == 0) num_staged = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays * lanes;

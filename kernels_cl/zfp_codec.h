@@ -55,25 +55,9 @@ ISO_INLINE BitReader open_bits(ISO_GLOBAL const uint *words, ulong first_bit) {
   return r;
 }
 
-/// Skips zeros up to and with the next one, but reads no more than `limit` bits. Returns the number of zeros.
-ISO_INLINE uint read_zeros(BitReader *r, uint limit) {
-  uint zeros = 0;
-  for (;;) {
-    uint window, run;
-    fill_bits(r);
-    window = (uint)r->buffer;
-    run = window == 0u ? 32u : popcount((window & (0u - window)) - 1u);
-    if (zeros + run >= limit) { /* there is none among them */
-      skip_bits(r, limit - zeros);
-      return limit;
-    }
-    zeros += run;
-    if (window != 0u) {
-      skip_bits(r, run + 1u);
-      return zeros;
-    }
-    skip_bits(r, 32u);
-  }
+/// Zeros below the lowest one; 32 if there is none.
+ISO_INLINE uint trailing_zeros_32(uint bits) {
+  return popcount(~bits & (bits - 1u));
 }
 
 /// Inverse of zfp's lifted 4-point transform, in place on v[0], v[stride], ... Sums wrap, shifts right keep
@@ -114,6 +98,42 @@ ISO_INLINE float power_of_two(int e) {
   return bits.f;
 }
 
+/// Transposes the 8 x 8 bits of bytes 7..4 in *low and 3..0 in *high, lowest byte first: bit j of byte k to bit 7 - k of byte j.
+ISO_INLINE void transpose_bits(uint *low, uint *high) {
+  uint t = (*low ^ *low >> 7) & 0x00AA00AAu;
+  *low ^= t ^ t << 7;
+  t = (*high ^ *high >> 7) & 0x00AA00AAu;
+  *high ^= t ^ t << 7;
+  t = (*low ^ *low >> 14) & 0x0000CCCCu;
+  *low ^= t ^ t << 14;
+  t = (*high ^ *high >> 14) & 0x0000CCCCu;
+  *high ^= t ^ t << 14;
+  t = (*low ^ *high << 4) & 0xF0F0F0F0u;
+  *low ^= t;
+  *high ^= t >> 4;
+}
+
+/// Appends eight bit planes, the highest first, to 32 coefficients: bit i of each to coefficients[i].
+ISO_INLINE void append_planes(const uint *planes, uint *coefficients) {
+  uint byte, i;
+  ISO_UNROLL
+  for (byte = 0; byte < 4u; ++byte) {
+    uint low = 0, high = 0;
+    ISO_UNROLL
+    for (i = 0; i < 4u; ++i) {
+      low |= (planes[7u - i] >> (8u * byte) & 0xFFu) << (8u * i);
+      high |= (planes[3u - i] >> (8u * byte) & 0xFFu) << (8u * i);
+    }
+    transpose_bits(&low, &high);
+    ISO_UNROLL
+    for (i = 0; i < 4u; ++i) {
+      uint *c = coefficients + 8u * byte + i;
+      c[0] = c[0] << 8 | (low >> (8u * i) & 0xFFu);
+      c[4] = c[4] << 8 | (high >> (8u * i) & 0xFFu);
+    }
+  }
+}
+
 /// All loops over the 64 values are unrolled, so that they stay in registers: a GPU has no fast indexed ones.
 
 /// Decodes the block that starts at `first_bit` of `words` and has max_bits bits.
@@ -121,11 +141,10 @@ ISO_INLINE float power_of_two(int e) {
 ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
                                  float *values) {
   BitReader r = open_bits(words, first_bit);
-  uint coefficients[64];
+  uint low[32], high[32]; /* halves of the bit planes, the highest first */
+  uint sequence[64], coefficients[64];
   float scale;
-  uint bits, plane, n, i;
-  ISO_UNROLL
-  for (i = 0; i < 64u; ++i) coefficients[i] = 0u;
+  uint bits, n, i, num_planes = 0, any_high = 0;
   if (!read_bits(&r, 1)) {
     ISO_UNROLL
     for (i = 0; i < 64u; ++i) values[i] = 0.0f;
@@ -134,33 +153,47 @@ ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, 
   scale = power_of_two((int)read_bits(&r, 8) - 127 - 30);
   bits = max_bits - 9u;
   n = 0; /* coefficients known to be significant: their bits come verbatim */
-  for (plane = 32; bits > 0u && plane-- > 0u;) {
+  while (bits > 0u && num_planes < 32u) {
     const uint verbatim = n < bits ? n : bits;
-    uint low = read_bits(&r, verbatim < 32u ? verbatim : 32u);
-    uint high = read_bits(&r, verbatim < 32u ? 0u : verbatim - 32u);
+    ulong ones = read_bits(&r, verbatim < 32u ? verbatim : 32u);
+    if (verbatim > 32u) ones |= (ulong)read_bits(&r, verbatim - 32u) << 32;
     bits -= verbatim;
-    while (n < 64u && bits > 0u) {
-      uint limit, zeros;
+    while (n < 64u &&
+           bits > 0u) { /* group tests: 0, no more ones in this plane; or 1, and zeros up to the next */
+      uint limit, zeros, read = 0;
+      fill_bits(&r);
       --bits;
-      if (!read_bits(&r, 1)) break; /* group test: no more ones in this plane */
-      limit = 63u - n < bits ? 63u - n : bits;
-      zeros = read_zeros(&r, limit);
-      bits -= zeros < limit ? zeros + 1u : limit;
-      n += zeros;
-      if (n < 32u) {
-        low |= 1u << n;
-      } else {
-        high |= 1u << (n - 32u);
+      if (((uint)r.buffer & 1u) == 0u) {
+        skip_bits(&r, 1);
+        break;
       }
+      limit = 63u - n < bits ? 63u - n : bits; /* a one that must come is not written */
+      zeros = trailing_zeros_32((uint)r.buffer >> 1);
+      if (zeros > 31u && limit > 31u) { /* seldom */
+        read = 32u;
+        skip_bits(&r, read);
+        fill_bits(&r);
+        zeros = 31u + trailing_zeros_32((uint)r.buffer);
+      }
+      skip_bits(&r, 1u + (zeros < limit ? zeros + 1u : limit) - read);
+      bits -= zeros < limit ? zeros + 1u : limit;
+      n += zeros < limit ? zeros : limit;
+      ones |= (ulong)1 << n;
       ++n;
     }
-    ISO_UNROLL
-    for (i = 0; i < 32u; ++i) coefficients[iso_zfp_order[i]] |= (low >> i & 1u) << plane;
-    if (high != 0u) { /* at low rates, seldom */
-      ISO_UNROLL
-      for (i = 0; i < 32u; ++i) coefficients[iso_zfp_order[i + 32u]] |= (high >> i & 1u) << plane;
-    }
+    low[num_planes] = (uint)ones;
+    high[num_planes] = (uint)(ones >> 32);
+    any_high |= high[num_planes];
+    ++num_planes;
   }
+  for (i = num_planes; (i & 7u) != 0u; ++i) low[i] = high[i] = 0u;
+  ISO_UNROLL
+  for (i = 0; i < 64u; ++i) sequence[i] = 0u;
+  for (i = 0; i < num_planes; i += 8u) append_planes(low + i, sequence);
+  for (i = 0; any_high != 0u && i < num_planes; i += 8u) append_planes(high + i, sequence + 32);
+  bits = (32u - num_planes) & ~7u; /* of the planes that are missing, those of whole bytes */
+  ISO_UNROLL
+  for (i = 0; i < 64u; ++i) coefficients[iso_zfp_order[i]] = sequence[i] << bits;
   ISO_UNROLL
   for (i = 0; i < 64u; ++i) coefficients[i] = (coefficients[i] ^ 0xAAAAAAAAu) - 0xAAAAAAAAu; /* negabinary */
   ISO_UNROLL

@@ -43,7 +43,7 @@ ISO_INLINE void write_bits(BitWriter *w, ulong value, uint count) {
 }
 
 /// Zeros below the lowest one of x; x != 0.
-ISO_INLINE uint trailing_zeros(ulong x) {
+ISO_INLINE uint trailing_zeros_64(ulong x) {
   return (uint)popcount((x & ((ulong)0 - x)) - 1u);
 }
 
@@ -102,7 +102,7 @@ ISO_INLINE void write_bit_planes(BitWriter *w, const uint *coefficients, uint bi
       ulong run = 0; /* group test: no more ones in this plane */
       uint length = 1, zeros = 0;
       if (x != 0u) { /* the test's one, zeros, and a one that goes without saying for the last coefficient */
-        zeros = trailing_zeros(x);
+        zeros = trailing_zeros_64(x);
         run = (ulong)2 << zeros | 1u;
         length = n + zeros < 63u ? zeros + 2u : zeros + 1u;
       }

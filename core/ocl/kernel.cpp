@@ -7,9 +7,10 @@
 
 namespace isowave::ocl {
 
-Range Range::strided(std::size_t max_count, std::size_t group_size, const Device &device) {
+Range Range::strided(std::size_t max_count, std::size_t group_size, const Device &device,
+                     std::size_t oversubscribe) {
   Range range = covering(max_count, group_size);
-  range.num_groups = std::min<std::size_t>(range.num_groups, device.max_resident_groups());
+  range.num_groups = std::min<std::size_t>(range.num_groups, oversubscribe * device.max_resident_groups());
   return range;
 }
 

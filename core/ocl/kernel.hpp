@@ -44,7 +44,9 @@ struct Range {
     return {(count + group_size - 1) / group_size, group_size};
   }
   /// For grid-stride kernels: as covering(), but never more groups than keep the device busy.
-  static Range strided(std::size_t max_count, std::size_t group_size, const Device &device);
+  /// oversubscribe: this many times as many, for kernels so lean that a device holds more groups than of others.
+  static Range strided(std::size_t max_count, std::size_t group_size, const Device &device,
+                       std::size_t oversubscribe = 1);
 };
 
 class RawKernel {
