@@ -14,20 +14,23 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     global const uint *part_2, global const uint *part_3, uint blocks_per_part, uint bits_per_block,
     uint first, uint end, global const PassCounts *counts, global const uint *block_ids,
     global const uint *slots, global float *cache_values, global ulong *inside) {
-  const FrameParams *frame = &frame_params;
   local float staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
+  const float isovalue = frame_params.isovalue == 0.0f ? -0.0f : frame_params.isovalue;
   const uint count = min(counts->decoded_count, end), item = get_local_id(0);
   for (uint begin = first + get_group_id(0) * ISO_GROUP_SIZE; begin < count;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint num_blocks = min(count - begin, (uint)ISO_GROUP_SIZE);
     float values[ISO_BLOCK_VOXELS];
     if (item < num_blocks) {
-      ulong bits = 0;
+      uint outside_low = 0, outside_high = 0;
       decode_block(part_0, part_1, part_2, part_3, blocks_per_part, bits_per_block, block_ids[begin + item],
                    begin + item - first, values);
       ISO_UNROLL
-      for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) bits |= (ulong)(values[v] - frame->isovalue >= 0.0f) << v;
-      inside[slots[begin + item]] = bits;
+      for (uint v = 32; v-- > 0;) { /* the signs; nothing minus this isovalue is -0 */
+        outside_low = outside_low << 1 | as_uint(values[v] - isovalue) >> 31;
+        outside_high = outside_high << 1 | as_uint(values[v + 32] - isovalue) >> 31;
+      }
+      inside[slots[begin + item]] = ~((ulong)outside_high << 32 | outside_low);
     }
     ISO_UNROLL
     for (uint part = 0; part < ISO_BLOCK_VOXELS; part += ISO_STAGED_VALUES) {
