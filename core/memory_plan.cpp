@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/error.hpp"
+#include "core/pass_readback.hpp"
 #include "core/shade.hpp"
 
 namespace isowave {
@@ -122,17 +123,19 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   plan.cache_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
   add_stream(plan, volume, request);
-  plan.buffers.insert(plan.buffers.end(), {{"pass counts", sizeof(PassCounts)},
-                                           {"pass counts, previous", sizeof(PassCounts)},
-                                           {"pass counts, next", sizeof(PassCounts)},
-                                           {"hits", sizeof(HitRecord) * pixels},
-                                           {"ray states", 4 * pixels},
-                                           {"active ray ids", 4 * pixels},
-                                           {"active ray ids, next", 4 * pixels},
-                                           {"block ranges", 2 * blocks},
-                                           {"macrocell ranges", 2 * num_cells},
-                                           {"macrocell masks", 8 * num_cells},
-                                           {"active box", 6 * sizeof(int)}});
+  plan.buffers.insert(plan.buffers.end(),
+                      {{"pass counts", sizeof(PassCounts)},
+                       {"pass counts, previous", sizeof(PassCounts)},
+                       {"pass counts, next", sizeof(PassCounts)},
+                       {"pass counts, read back", PassReadback::kMaxInFlight * sizeof(PassCounts)},
+                       {"hits", sizeof(HitRecord) * pixels},
+                       {"ray states", 4 * pixels},
+                       {"active ray ids", 4 * pixels},
+                       {"active ray ids, next", 4 * pixels},
+                       {"block ranges", 2 * blocks},
+                       {"macrocell ranges", 2 * num_cells},
+                       {"macrocell masks", 8 * num_cells},
+                       {"active box", 6 * sizeof(int)}});
   if (request.pipeline == PipelineKind::kBlocks) {
     add_pairs(plan, request);
   } else {  // the pairs' arrays are empty: OpenCL has no buffers of 0 bytes

@@ -5,7 +5,6 @@
 #include <chrono>
 
 #include "core/error.hpp"
-#include "core/pass_readback.hpp"
 #include "core/stall_guard.hpp"
 #include "kernels_cl/block_grid.h"
 
@@ -110,7 +109,8 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       state_(make_state(device, volume, options_, plan_)),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
-      shade_(device, options_.size.num_pixels()) {
+      shade_(device, options_.size.num_pixels()),
+      readback_(device) {
   options_.cache_slots = plan_.cache_slots;
   options_.stream = plan_.stream;
   options_.window_blocks = plan_.window_blocks;
@@ -124,23 +124,23 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   const StreamWindow *window = state_.stream.window.get();
   const std::uint64_t uploaded_before = window ? window->uploaded_blocks() : 0;
   FrameStats stats;
-  PassReadback readback;
   StallGuard guard(info_.dims);
+  readback_.drain();  // of what the frame before had enqueued beyond its last pass
   begin_frame(camera, isovalue);
   for (bool finished = false; !finished && !stats.cancelled;) {
     pipeline_->enqueue_pass();
-    readback.push(state_.rays.counts);
-    if (!in_step && readback.in_flight() < 2)
+    readback_.push(state_.rays.counts);
+    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
       continue;  // read one pass behind: the device never waits for us
-    const PassStats pass = stats_of(readback.pop());
+    const PassStats pass = stats_of(readback_.pop());
     stats.passes.push_back(pass);
     stats.rays_hit += pass.counts.hit_count;
     stats.cancelled = on_pass && !on_pass(pass);
     finished = pass.counts.next_active_count == 0;
     guard.check(pass.counts);
   }
+  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
   if (!stats.cancelled) pipeline_->end_frame();
-  device_.finish();
   if (window) {
     stats.uploaded_blocks = window->uploaded_blocks() - uploaded_before;
     stats.uploaded_bytes =

@@ -11,6 +11,7 @@
 
 #include "core/frame.hpp"
 #include "core/memory_plan.hpp"
+#include "core/pass_readback.hpp"
 #include "core/pipeline.hpp"
 #include "core/shade.hpp"
 #include "core/zfp_stream.hpp"
@@ -100,6 +101,7 @@ class Renderer {
   FrameState state_;
   std::unique_ptr<Pipeline> pipeline_;
   Shade shade_;
+  PassReadback readback_;
   double setup_ms_ = 0;
 };
 

@@ -201,7 +201,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   if (get_global_id(0) == 0) next->window_count = counts->pixel_count;
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < counts->pixel_count;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    clear_hits(hit_words + begin * ISO_HIT_WORDS, min(ISO_GROUP_SIZE, counts->pixel_count - begin));
+    clear_hits(hit_words + begin * ISO_HIT_WORDS, min((uint)ISO_GROUP_SIZE, counts->pixel_count - begin));
     barrier(
         CLK_LOCAL_MEM_FENCE); /* for a CPU, which takes a group's work-items one by one from barrier to barrier */
   }
