@@ -103,6 +103,7 @@ const bool kRegistered = [] {
                           [=](benchmark::State &state) { group_pairs(state, grouping, distribution); });
       benchmark->ArgNames({"width", "slot_bits", "visible_bits"});
       for (const std::int64_t width : kWidths) benchmark->Args({width, 14, 10})->Args({width, 18, 14});
+      benchmark->Args({kSortWidth, 18, 14});
       if (distribution == Distribution::kHot) continue;
       benchmark->Args({kWidths.front(), 18, 16});  // few rays a block: most keys are distinct
       benchmark->Args({kLargeWidth, 18, 14});

@@ -80,6 +80,8 @@ std::string to_string(Distribution distribution);
 
 /// The image sizes that stages are swept over: 640x360 and 1280x720.
 inline constexpr std::array<std::int64_t, 2> kWidths = {640, 1280};
+/// Between them, for what sorts pairs: 896x504, 451,584 of them.
+inline constexpr std::int64_t kSortWidth = 896;
 /// Beyond them, for stages whose cost at that size is memory's: 3840x2160.
 inline constexpr std::int64_t kLargeWidth = 3840;
 inline ImageSize image_of_width(std::int64_t width) {

@@ -68,6 +68,7 @@ const bool kRegistered = [] {
                     [=](benchmark::State &state) { sort_rays_by_block(state, distribution); })
         ->ArgNames({"width", "key_bits"})
         ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {18, 27}})
+        ->Args({kSortWidth, 18})
         ->Args({kLargeWidth, 18});
   }
   return true;

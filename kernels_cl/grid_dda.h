@@ -159,11 +159,11 @@ ISO_INLINE float local_position(RayAxis a, TwoFloat t, int c) {
 
 /// A walk through regions of one size: where it is, and by which plane of each axis it would leave. A GPU computes the three
 /// times when it needs them, without a branch, faster than it chooses one of them to renew; a CPU keeps them
-/// (ISO_WALK_KEEPS_TIMES). The same bits either way.
+/// (ISO_CPU). The same bits either way.
 typedef struct GridWalk {
   int x, y, z;                ///< the region
   float far_x, far_y, far_z;  ///< planes
-#ifdef ISO_WALK_KEEPS_TIMES
+#ifdef ISO_CPU
   TwoFloat t_x, t_y, t_z;  ///< far_t() of each
 #endif
 } GridWalk;
@@ -190,7 +190,7 @@ ISO_INLINE GridWalk walk_from(const Ray *r, int x, int y, int z, int size, LastP
   w.far_x = far_plane(r->x, x, size, last.x);
   w.far_y = far_plane(r->y, y, size, last.y);
   w.far_z = far_plane(r->z, z, size, last.z);
-#ifdef ISO_WALK_KEEPS_TIMES
+#ifdef ISO_CPU
   w.t_x = far_t(r->x, w.far_x);
   w.t_y = far_t(r->y, w.far_y);
   w.t_z = far_t(r->z, w.far_z);
@@ -209,7 +209,7 @@ ISO_INLINE RayEvent region_entry(const Ray *r, int x, int y, int z, int size, La
 /// The event by which the ray leaves the walk's region: the first of the three; ties in the order x, y, z. Numbers are chosen,
 /// not structs, which compilers would choose by address and so keep in memory.
 ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
-#ifdef ISO_WALK_KEEPS_TIMES
+#ifdef ISO_CPU
   const TwoFloat x = w->t_x, y = w->t_y, z = w->t_z;
 #else
   const TwoFloat x = far_t(r->x, w->far_x), y = far_t(r->y, w->far_y), z = far_t(r->z, w->far_z);
@@ -235,7 +235,7 @@ ISO_INLINE float next_far_plane(RayAxis a, float plane, int size, int last_plane
 
 /// Goes through the region's exit into the next region, which may lie outside the grid.
 ISO_INLINE void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
-#ifdef ISO_WALK_KEEPS_TIMES
+#ifdef ISO_CPU
   if (exit.axis == 0) {
     w->x += r->x.d > 0.0f ? 1 : -1;
     w->far_x = next_far_plane(r->x, w->far_x, size, last.x);
