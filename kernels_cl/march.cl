@@ -185,8 +185,8 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
-/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: the pixels whose rays meet an
-/// active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
+/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the frame's screen box,
+/// the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
 /// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
 /// that far more of its work-items fit a device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
@@ -202,8 +202,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < counts->pixel_count;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     clear_hits(hit_words + begin * ISO_HIT_WORDS, min((uint)ISO_GROUP_SIZE, counts->pixel_count - begin));
-    barrier(
-        CLK_LOCAL_MEM_FENCE); /* for a CPU, which takes a group's work-items one by one from barrier to barrier */
+    barrier(CLK_LOCAL_MEM_FENCE); /* or each of a CPU's work-items, one by one, would go through all memory */
   }
   if (item == 0) counters[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
