@@ -191,7 +191,7 @@ ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, 
   for (i = 0; i < 64u; ++i) sequence[i] = 0u;
   for (i = 0; i < num_planes; i += 8u) append_planes(low + i, sequence);
   for (i = 0; any_high != 0u && i < num_planes; i += 8u) append_planes(high + i, sequence + 32);
-  bits = (32u - num_planes) & ~7u; /* of the planes that are missing, those of whole bytes */
+  bits = (32u - num_planes) & 24u; /* of the planes that are missing, those of whole bytes, but no 32 */
   ISO_UNROLL
   for (i = 0; i < 64u; ++i) coefficients[iso_zfp_order[i]] = sequence[i] << bits;
   ISO_UNROLL
