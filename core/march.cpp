@@ -14,6 +14,7 @@ ocl::Defines march_defines(std::uint32_t group_size, Solver solver) {
 
 March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver)
     : range_(ocl::Range::strided(num_pixels, group_size, device)),
+      // H100, 512^3: 0.07 ms instead of 0.09.
       start_range_(ocl::Range::strided(num_pixels, group_size, device, 4)),
       start_rays_(device, "march", "start_rays", march_defines(group_size, solver)),
       march_(device, "march", "march", march_defines(group_size, solver)),

@@ -12,7 +12,7 @@
 namespace isowave {
 
 /// A queue of at most two read-backs in flight. Their memory is pinned: to any other, NVIDIA's driver copies by a detour that
-/// costs a 512^3 frame a fifth of its time.
+/// costs a cold 512^3 frame a fifth of its time (H100, README "Results").
 class PassReadback {
  public:
   static constexpr std::size_t kMaxInFlight = 2;

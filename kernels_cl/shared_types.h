@@ -74,11 +74,10 @@ typedef struct FrameParams {
   uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
   int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
-  uint screen_begin_x,
-      screen_begin_y;               ///< the pixels whose rays may meet that box, from whole tiles of 8 x 4:
-  uint screen_end_x, screen_end_y;  ///< from begin to below end
-  uint per_ray_speculation;         ///< each ray looks ahead by what it has missed, not all alike
-  uint table_groups;                ///< entries / 8 of the block cache's table (block_table.h)
+  /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
+  uint screen_begin_x, screen_begin_y, screen_end_x, screen_end_y;
+  uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
+  uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 148);
 

@@ -158,8 +158,8 @@ ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, 
     ulong ones = read_bits(&r, verbatim < 32u ? verbatim : 32u);
     if (verbatim > 32u) ones |= (ulong)read_bits(&r, verbatim - 32u) << 32;
     bits -= verbatim;
-    while (n < 64u &&
-           bits > 0u) { /* group tests: 0, no more ones in this plane; or 1, and zeros up to the next */
+    /* Group tests: 0, no more ones in this plane; or 1, and zeros up to the next. */
+    while (n < 64u && bits > 0u) {
       uint limit, zeros, read = 0;
       fill_bits(&r);
       --bits;

@@ -101,7 +101,7 @@ TEST(Frame, ScreenBoxAllowsForRoundedDirections) {
   }
 }
 
-/// Two pixels about the box's corners, and whole tiles.
+/// Two pixels about the box's corners (one, and up to a whole one), a tenth of one for rounded directions, and whole tiles.
 TEST(Frame, ScreenBoxIsTight) {
   VolumeInfo info;  // of spacing 1: the camera's basis is orthonormal in index space, too
   info.dims = glm::uvec3(64);

@@ -46,7 +46,7 @@ std::string_view kernel_text(std::string_view stem) {
 std::string build_options(const DeviceInfo &device, Defines defines) {
   std::string options = "-cl-std=CL1.2";
   if (device.capabilities.correctly_rounded_divide) options += " -cl-fp32-correctly-rounded-divide-sqrt";
-  if (device.type == DeviceType::kCpu) defines.emplace("ISO_CPU", "1");  // grid_dda.h
+  if (device.type == DeviceType::kCpu) defines.emplace("ISO_CPU", "1");  // grid_dda.h, shared_types.h
   const auto has_space = [](const std::string &text) {
     return std::ranges::any_of(text, [](unsigned char c) { return std::isspace(c) != 0; });
   };
