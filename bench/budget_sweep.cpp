@@ -49,10 +49,6 @@ double median_of_frames(const BudgetTimes &budget, double (*value)(const FrameSt
   return median(std::move(values));
 }
 
-double num_passes(const FrameStats &frame) {
-  return static_cast<double>(frame.passes.size());
-}
-
 double num_decoded(const FrameStats &frame) {
   double sum = 0;
   for (const PassStats &pass : frame.passes) sum += pass.counts.decoded_count;

@@ -36,6 +36,10 @@ std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camer
   return views;
 }
 
+double num_passes(const FrameStats &frame) {
+  return static_cast<double>(frame.passes.size());
+}
+
 std::vector<double> FloorTimes::all() const {
   std::vector<double> times;
   for (const std::vector<double> &view : ms) times.insert(times.end(), view.begin(), view.end());

@@ -31,6 +31,8 @@ Camera turned(Camera camera);
 std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras, float isovalue,
                                      std::uint32_t rounds);
 
+double num_passes(const FrameStats &frame);
+
 /// Whole volume decoded, one kernel (core/resident.hpp).
 struct FloorTimes {
   std::vector<std::vector<double>> ms;  ///< [views][rounds]; empty if not measured

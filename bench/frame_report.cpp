@@ -33,10 +33,6 @@ double sum_of(const FrameStats &frame, uint PassCounts::*count) {
   return sum;
 }
 
-double num_passes(const FrameStats &frame) {
-  return static_cast<double>(frame.passes.size());
-}
-
 double median_spec_count(const FrameStats &frame) {
   std::vector<double> counts;
   for (const PassStats &pass : frame.passes) counts.push_back(pass.counts.spec_count);

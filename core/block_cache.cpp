@@ -86,7 +86,8 @@ void BlockCache::request(Wavefront &rays) {
 }
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
-  age_histogram_kernel_(slots_range_, asked, num_slots, slot_block_ids, slot_stamps, age_histogram_);
+  age_histogram_kernel_(slots_range_, asked, num_slots, capacity, state, slot_block_ids, slot_stamps,
+                        age_histogram_);
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, age_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, table, state, free_slots_);

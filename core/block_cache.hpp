@@ -60,7 +60,9 @@ struct BlockCache {
   ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_;
-  ocl::Kernel<ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> age_histogram_kernel_;
+  ocl::Kernel<ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>, ocl::In<uint>, ocl::In<uint>,
+              ocl::Out<uint>>
+      age_histogram_kernel_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
       select_;

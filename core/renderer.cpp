@@ -173,7 +173,7 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   stats.counts.window_count = std::min(counts.window_count, counts.active_count);
   // A launch that is not needed costs more than a pass that finds slots missing now and then.
   state_.slots_are_scarce =
-      state_.cache.num_slots < kSmallCache || counts.free_count < state_.cache.num_slots / 2;
+      state_.cache.num_slots < kSmallCache || counts.free_count < state_.cache.num_slots / 4;
   stats.utilization_percent = 100.0 * counts.granted_count / pixels;
   stats.completed_percent = 100.0 * (pixels - counts.next_active_count) / pixels;
   stats.stage_ms = device_.timer().collect();

@@ -13,6 +13,8 @@
 /// cache grows instead.)
 #include "block_requests.h"
 
+#define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
+
 /// A slot that holds blocks of the ray served first is stamped with the next pass: younger than all.
 ISO_INLINE uint slot_age(uint stamp, uint pass) {
   return min(pass - stamp, ISO_AGE_BUCKETS - 1);
@@ -81,14 +83,15 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
   }
 }
 
-/// Counts the slots in use by age. age_histogram [ISO_AGE_BUCKETS]: zero before. Grid-stride over slots.
+/// Counts the slots in use by age, unless free ones suffice. age_histogram [ISO_AGE_BUCKETS]: zero before. Grid-stride over
+/// slots.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_age_histogram(
-    global const PassCounts *counts, uint num_slots, global const uint *slot_block_ids,
-    global const uint *slot_stamps, global uint *age_histogram) {
+    global const PassCounts *counts, uint num_slots, uint capacity, global const CacheState *cache,
+    global const uint *slot_block_ids, global const uint *slot_stamps, global uint *age_histogram) {
   local uint histogram[ISO_AGE_BUCKETS];
   const uint pass = counts->pass;
   /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
-  const uint counted_slots = counts->requested_count == 0 ? 0 : num_slots;
+  const uint counted_slots = listed_count(counts, capacity) <= cache->free_count ? 0 : num_slots;
   for (uint age = get_local_id(0); age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) histogram[age] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
@@ -157,6 +160,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     }
     granted = min(requested, max(num_slots - in_use, num_first_missing));
     evicted = granted > num_free ? granted - num_free : 0;
+    if (evicted != 0) { /* some more that are out of use, so that the next passes need not count again */
+      const uint unused = age_histogram[ISO_AGE_BUCKETS - 1];
+      evicted += min(num_slots / ISO_SPARE_PART, unused - min(unused, evicted));
+    }
     for (age = ISO_AGE_BUCKETS - 1; age > 0 && older + age_histogram[age] < evicted; --age) {
       older += age_histogram[age];
     }

@@ -9,7 +9,13 @@
 #include "block_grid.h"
 #include "grid_dda.h"
 
-#define ISO_BLOCKS_AT_ONCE 8u  ///< that a ray looks for before it intersects them, or asks for them
+/// That a ray looks for before it intersects them, or asks for them. Where many work-items take turns, a longer list is walked
+/// by more of them, and a last ray has up to as many; a CPU looks for more than it needs.
+#ifdef ISO_CPU
+#define ISO_BLOCKS_AT_ONCE 8u
+#else
+#define ISO_BLOCKS_AT_ONCE 16u
+#endif
 
 /// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it entered the cell.
 ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e, LastPlanes last) {

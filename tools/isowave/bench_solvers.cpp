@@ -36,7 +36,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kSchema = 1;  ///< of the JSON; tools/charts refuses others
 constexpr std::size_t kMaxSegments = 1 << 20;
 
-struct Options {
+struct BenchSolversArgs {
   std::vector<std::string> volumes;  ///< FILE:ISOVALUE
   VolumeOptions volume;
   std::uint32_t rate = 8, rounds = 7;
@@ -68,7 +68,7 @@ struct Subject {
 };
 
 /// FILE:ISOVALUE
-Subject load_subject(const std::string &argument, const Options &options) {
+Subject load_subject(const std::string &argument, const BenchSolversArgs &options) {
   const std::size_t colon = argument.rfind(':');
   Subject subject;
   try {
@@ -264,7 +264,7 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
   return picture;
 }
 
-void write_failure_picture(const Options &options, const Subject &subject, const HitOracle &oracle,
+void write_failure_picture(const BenchSolversArgs &options, const Subject &subject, const HitOracle &oracle,
                            Solver solver, Renderer &renderer) {
   const std::vector<HitRecord> hits = renderer.hits();
   std::vector<Verdict> verdicts(hits.size());
@@ -279,7 +279,7 @@ void write_failure_picture(const Options &options, const Subject &subject, const
             std::filesystem::path(options.pictures) / fmt::format("{}_{}.png", stem, to_string(solver)));
 }
 
-ordered_json bench_frames(ocl::Device &device, const Subject &subject, const Options &options) {
+ordered_json bench_frames(ocl::Device &device, const Subject &subject, const BenchSolversArgs &options) {
   const FrameOracle oracle(subject);
   struct Run {
     Solver solver;
@@ -340,7 +340,7 @@ void print_results(const ordered_json &document) {
   }
 }
 
-void run_bench_solvers(const Options &options) {
+void run_bench_solvers(const BenchSolversArgs &options) {
   const std::filesystem::path folder = std::filesystem::path(options.json).parent_path();
   if (!folder.empty() && !std::filesystem::is_directory(folder))
     throw Error("cannot write {}: {} is no folder", options.json, folder.string());
@@ -372,7 +372,7 @@ void add_bench_solvers(CLI::App &bench) {
   CLI::App *command = bench.add_subcommand(
       "solvers",
       "Root finders: ns per ray-cell test and ms per frame beside their errors, by the exact oracle");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchSolversArgs>();
   command->add_option("VOLUME:ISOVALUE", options->volumes, "volumes and the isovalue of each")->required();
   add_volume_options(*command, options->volume);
   command->add_option("--rate", options->rate, "bits per voxel of volumes that are not compressed")

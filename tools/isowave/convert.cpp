@@ -17,7 +17,7 @@ namespace isowave::tools {
 
 namespace {
 
-struct Options {
+struct ConvertArgs {
   std::string input, output;
   std::optional<std::string> device;
   VolumeOptions volume;
@@ -25,7 +25,7 @@ struct Options {
   bool no_verify = false;
 };
 
-void run(const Options &options) {
+void run(const ConvertArgs &options) {
   if (!is_zfp_name(options.output)) throw Error("{}: end the output's name in .zfp", options.output);
   if (is_zfp_name(options.input)) throw Error("{}: is compressed already", options.input);
   const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, to_overrides(options.volume));
@@ -47,7 +47,7 @@ void run(const Options &options) {
 }  // namespace
 
 void add_convert(CLI::App &app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ConvertArgs>();
   CLI::App *command = app.add_subcommand("convert", "Compress a volume to a fixed-rate zfp file");
   command->add_option("IN", options->input, kVolumeHelp)->required();
   command->add_option("-o,--output", options->output, "the .zfp file to write")->required();

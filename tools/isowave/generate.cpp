@@ -14,13 +14,13 @@ namespace isowave::tools {
 
 namespace {
 
-struct Options {
+struct GenerateArgs {
   std::string field, type = "uint8", output = ".";
   std::vector<std::uint32_t> dims;
   GenerateOptions generate;
 };
 
-void run(const Options &options) {
+void run(const GenerateArgs &options) {
   GenerateOptions generate = options.generate;
   generate.field = field_from_string(options.field);
   generate.type = voxel_type_from_string(options.type);
@@ -34,7 +34,7 @@ void run(const Options &options) {
 }  // namespace
 
 void add_generate(CLI::App &app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<GenerateArgs>();
   CLI::App *command = app.add_subcommand("generate", "Write a synthetic volume as raw voxels");
   command->add_option("FIELD", options->field, fmt::format("one of {}", fmt::join(field_names(), ", ")))
       ->required();

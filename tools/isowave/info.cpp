@@ -19,7 +19,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-struct Options {
+struct InfoArgs {
   std::string input;
   VolumeOptions volume;
   bool json = false, no_scan = false;
@@ -94,7 +94,7 @@ std::string to_text(const ordered_json &value) {
   return text;
 }
 
-void run(const Options &options) {
+void run(const InfoArgs &options) {
   const RawOverrides overrides = to_overrides(options.volume);
   ordered_json result;
   result["file"] = options.input;
@@ -120,7 +120,7 @@ void run(const Options &options) {
 }  // namespace
 
 void add_info(CLI::App &app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<InfoArgs>();
   CLI::App *command = app.add_subcommand("info", "Print everything known of a volume file");
   command->add_option("FILE", options->input, std::string(kVolumeHelp) + ", or .zfp")->required();
   command->add_flag("--json", options->json, "print JSON");

@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct RenderArgs {
   std::string input;
   VolumeOptions volume;
   FrameOptions frame;
@@ -53,7 +53,7 @@ glm::vec3 parse_color(const char *option, const std::string &text) {
 }
 
 /// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT.
-fs::path frame_path(const fs::path &path, const Scene &scene, const Options &options, float isovalue,
+fs::path frame_path(const fs::path &path, const Scene &scene, const RenderArgs &options, float isovalue,
                     std::size_t view) {
   if (scene.cameras.size() * options.frame.isovalues.size() == 1) return path;
   fs::path result = path;
@@ -115,7 +115,7 @@ class TwinFrames : public FrameSource {
   std::vector<HitRecord> hits_;
 };
 
-void write_outputs(const Options &options, const Scene &scene, FrameSource &frames, float isovalue,
+void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &frames, float isovalue,
                    std::size_t view) {
   if (!options.image.empty()) {
     write_png(frames.shade(), frame_path(options.image, scene, options, isovalue, view));
@@ -127,7 +127,7 @@ void write_outputs(const Options &options, const Scene &scene, FrameSource &fram
 }
 
 /// Writes the picture after every pass to --progress-dir, if that was asked for.
-OnPass progress_writer(const Options &options, const Scene &scene, FrameSource &frames, float isovalue,
+OnPass progress_writer(const RenderArgs &options, const Scene &scene, FrameSource &frames, float isovalue,
                        std::size_t view) {
   if (options.progress_dir.empty()) return {};
   return [&options, &scene, &frames, isovalue, view, pass = 0](const PassStats &) mutable {
@@ -137,7 +137,7 @@ OnPass progress_writer(const Options &options, const Scene &scene, FrameSource &
   };
 }
 
-nlohmann::ordered_json draw_frames(const Options &options, const Scene &scene, FrameSource &frames) {
+nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene, FrameSource &frames) {
   nlohmann::ordered_json result = nlohmann::ordered_json::array();
   for (const float isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
@@ -153,7 +153,7 @@ nlohmann::ordered_json draw_frames(const Options &options, const Scene &scene, F
   return result;
 }
 
-nlohmann::ordered_json options_json(const Options &options, const Scene &scene) {
+nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scene) {
   nlohmann::ordered_json json = {{"size", {scene.size.width, scene.size.height}},
                                  {"views", scene.cameras.size()},
                                  {"isovalues", options.frame.isovalues},
@@ -162,7 +162,7 @@ nlohmann::ordered_json options_json(const Options &options, const Scene &scene) 
   return json;
 }
 
-nlohmann::ordered_json volume_json(const Options &options, const CompressedVolume &volume) {
+nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVolume &volume) {
   const VolumeInfo &info = volume.info;
   return {{"file", options.input},
           {"dims", {info.dims.x, info.dims.y, info.dims.z}},
@@ -175,7 +175,7 @@ nlohmann::ordered_json volume_json(const Options &options, const CompressedVolum
 
 /// Outputs go to folders that exist, but for --progress-dir, which is made. Found out before any work is
 /// done.
-void check_outputs(const Options &options) {
+void check_outputs(const RenderArgs &options) {
   for (const std::string &output : {options.image, options.depth, options.stats}) {
     const fs::path folder = fs::path(output).parent_path();
     if (!folder.empty() && !fs::is_directory(folder))
@@ -188,7 +188,7 @@ void check_outputs(const Options &options) {
   if (failure) throw Error("cannot make the folder {}: {}", options.progress_dir, failure.message());
 }
 
-std::unique_ptr<ocl::Device> open_device(const Options &options) {
+std::unique_ptr<ocl::Device> open_device(const RenderArgs &options) {
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index, info.name,
              info.platform);
@@ -214,7 +214,7 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
              with_commas(plan.total()), with_commas(plan.cache_slots), with_commas(plan.setup_bytes));
 }
 
-void run_render(Options options) {
+void run_render(RenderArgs options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
   for (const float isovalue : options.frame.isovalues) {
@@ -252,7 +252,7 @@ void run_render(Options options) {
 
 void add_render(CLI::App &app) {
   CLI::App *command = app.add_subcommand("render", "Draw isosurfaces: PNG pictures, depth and statistics");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RenderArgs>();
   command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))->required();
   add_volume_options(*command, options->volume);
   add_frame_options(*command, options->frame)->required();

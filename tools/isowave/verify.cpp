@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-struct Options {
+struct VerifyArgs {
   VerifyFramesOptions frames;
   std::vector<std::string> solvers;
   std::uint32_t rays = 20000, seed = 1;
@@ -29,7 +29,7 @@ struct Options {
 };
 
 /// Returns the failures of the solver: rays missed, false, wrong or leaked.
-std::uint64_t verify_solver(const Options &options, std::string_view name, ordered_json &document) {
+std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, ordered_json &document) {
   const Solver solver = solver_from_string(name);
   fmt::print("solver {}\n", name);
   std::uint64_t failures = 0;
@@ -59,7 +59,7 @@ std::uint64_t verify_solver(const Options &options, std::string_view name, order
   return failures;
 }
 
-void run_verify(Options options) {
+void run_verify(VerifyArgs options) {
   const bool all = options.solvers.empty();
   if (all) options.solvers.assign(kSolverNames.begin(), kSolverNames.end());
   ordered_json document = {{"program", "isowave 0.1.0"}, {"seed", options.seed}};
@@ -87,7 +87,7 @@ void run_verify(Options options) {
 void add_verify(CLI::App &app) {
   CLI::App *command = app.add_subcommand(
       "verify", "Judge the intersection by independent oracles: the stability suite, or frames of a volume");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<VerifyArgs>();
   add_verify_frames_options(*command, options->frames);
   command->add_option(
       "--solver", options->solvers,
