@@ -58,7 +58,7 @@ void FrameRig::find_blocks() {
   cache.evict(rays.counts, rays);
   cache.assign(rays.counts, rays);
   zfp_decode(stream, rays.frame, rays.counts, cache);
-  group(cache, rays, compaction);
+  group(cache, rays);
 }
 
 PassCounts FrameRig::run_pass() {

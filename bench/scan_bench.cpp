@@ -10,7 +10,7 @@
 namespace isowave::bench {
 namespace {
 
-/// A table such as the stages scan: one entry per tile of a compaction, 16 per tile of a sort.
+/// A table such as the stages scan: one entry per tile of a compaction.
 struct ScanInput {
   ScanInput(ocl::Device &device, std::int64_t entries)
       : scan(device, kGroupSize), counts(device, "counts", 1), values(device, "values", entries) {
@@ -27,7 +27,7 @@ struct ScanInput {
     check(counts.read()[0].hit_count == expected.back() + host.back(), "total of the scan");
   }
   void reset() { values.write(host); }
-  void run() { scan(values, counts, ISO_COUNT_FIELD(pixel_count), 1, 1, ISO_COUNT_FIELD(hit_count)); }
+  void run() { scan(values, counts, ISO_COUNT_FIELD(pixel_count), 1, ISO_COUNT_FIELD(hit_count)); }
 
   std::vector<uint> host;
   ExclusiveScan scan;
@@ -64,28 +64,18 @@ struct CompactionInput {
     start.pixel_count = static_cast<uint>(entries);
     counts.write({&start, 1});
 
-    std::vector<uint> expected_indices, expected_values;
+    std::vector<uint> expected;
     for (std::size_t i = 0; i < kept.size(); ++i) {
-      if (!kept[i]) continue;
-      expected_indices.push_back(static_cast<uint>(i));
-      expected_values.push_back(numbers[i]);
+      if (kept[i]) expected.push_back(numbers[i]);
     }
-    num_kept = expected_indices.size();
-    keep_indices();
-    check(result() == expected_indices, "kept indices");
-    keep_values();
-    check(result() == expected_values, "kept values");
+    num_kept = expected.size();
+    run();
+    std::vector<uint> got(counts.read()[0].hit_count);
+    out.read(got);
+    check(got == expected, "kept values");
   }
-  std::vector<uint> result() {
-    std::vector<uint> kept(counts.read()[0].hit_count);
-    out.read(kept);
-    return kept;
-  }
-  void keep_indices() {
-    compaction.indices(mask, counts, ISO_COUNT_FIELD(pixel_count), out, ISO_COUNT_FIELD(hit_count));
-  }
-  void keep_values() {
-    compaction.values(mask, values, counts, ISO_COUNT_FIELD(pixel_count), out, ISO_COUNT_FIELD(hit_count));
+  void run() {
+    compaction(mask, values, counts, ISO_COUNT_FIELD(pixel_count), out, ISO_COUNT_FIELD(hit_count));
   }
 
   std::size_t num_kept = 0;
@@ -94,29 +84,25 @@ struct CompactionInput {
   ocl::Buffer<uint> mask, values, out;
 };
 
-void compact(benchmark::State &state, Distribution distribution, bool indices) {
+void compact(benchmark::State &state, Distribution distribution) {
   const std::int64_t entries = pixels_of_width(state.range(0));
   auto &in = input<CompactionInput>(entries, distribution);
-  const double bytes = 4.0 * static_cast<double>(entries) + (indices ? 4.0 : 8.0) * double(in.num_kept);
+  const double bytes = 4.0 * static_cast<double>(entries) + 8.0 * double(in.num_kept);
   measure(
-      state, {static_cast<double>(entries), bytes}, [] {},
-      [&] { indices ? in.keep_indices() : in.keep_values(); });
+      state, {static_cast<double>(entries), bytes}, [] {}, [&] { in.run(); });
 }
 
 const bool kRegistered = [] {
   stage_benchmark("scan/exclusive", exclusive_scan)
       ->ArgName("entries")
-      ->ArgsProduct({{640 * 360 / 512, 1280 * 720 / 512, 1280 * 720 / 1024 * 16, 3840 * 2160 / 1024 * 16}})
+      ->ArgsProduct({{640 * 360 / 512, 1280 * 720 / 512, 3840 * 2160 / 512}})
       ->Iterations(1000);  // microseconds each: --benchmark_min_time would ask for far more
   for (const Distribution distribution : kDistributions) {
-    for (const bool indices : {true, false}) {
-      stage_benchmark(
-          fmt::format("scan/compact_{}/{}", indices ? "indices" : "values", to_string(distribution)),
-          [=](benchmark::State &state) { compact(state, distribution, indices); })
-          ->ArgName("width")
-          ->ArgsProduct({{kWidths.begin(), kWidths.end()}})
-          ->Arg(kLargeWidth);
-    }
+    stage_benchmark(fmt::format("scan/compact_values/{}", to_string(distribution)),
+                    [=](benchmark::State &state) { compact(state, distribution); })
+        ->ArgName("width")
+        ->ArgsProduct({{kWidths.begin(), kWidths.end()}})
+        ->Arg(kLargeWidth);
   }
   return true;
 }();

@@ -24,12 +24,11 @@ Intersect::Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_
 }
 
 void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays) {
-  kernel_(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, groups.block_ray_offsets,
-          cache.slot_block_ids, cache.table, cache.values, rays.active_ray_ids, rays.pair_hits,
-          rays.closest_pairs);
+  kernel_(range_, rays.frame, rays.counts, groups.pair_ids, groups.block_rays, rays.pair_block_ids,
+          cache.table, cache.values, rays.active_ray_ids, rays.pair_hits, rays.closest_pairs);
   if (settle_doubts_) {
-    (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, groups.slots, cache.slot_block_ids,
-                      cache.table, cache.values, rays.active_ray_ids, rays.pair_hits, rays.closest_pairs);
+    (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, rays.pair_block_ids, cache.table,
+                      cache.values, rays.active_ray_ids, rays.pair_hits, rays.closest_pairs);
   }
 }
 

@@ -77,17 +77,18 @@ void add_pairs(MemoryPlan &plan, const MemoryRequest &request) {
                                            {"closest pairs", 4 * pixels},
                                            {"scan tile sums", 4 * ceil_div(pixels, scan_tile)},
                                            {"grouped pair ids", 4 * pixels},
-                                           {"grouped slots", 4 * pixels},
-                                           {"block ray offsets", 4 * visible}});
+                                           {"cache slots of pairs", 4 * pixels},
+                                           {"block rays", sizeof(BlockRays) * visible}});
   if (request.grouping == Grouping::kRadix) {
-    const std::uint64_t sort_tile = std::uint64_t{request.group_size} * ISO_RADIX_ITEMS;
     plan.buffers.insert(plan.buffers.end(),
                         {{"sort keys, other half", 4 * pixels},
                          {"sort values, other half", 4 * pixels},
-                         {"sort digit table", 4 * ISO_RADIX_DIGITS * ceil_div(pixels, sort_tile)}});
+                         {"sort digit table", 4 * RadixSort::table_size(pixels, request.group_size)},
+                         {"group tile sums", 4 * ceil_div(pixels, scan_tile)}});
   } else {
     plan.buffers.insert(plan.buffers.end(), {{"pairs by slot", 4 * std::uint64_t{plan.cache_slots}},
-                                             {"group tile sums", 4 * ceil_div(visible, scan_tile)}});
+                                             {"pair offsets by slot", 4 * std::uint64_t{plan.cache_slots}},
+                                             {"group candidates", 4}});
   }
 }
 

@@ -45,7 +45,7 @@ class BlocksPipeline : public Pipeline {
     state_.provide_blocks(state_.rays.counts);
     {
       const auto stage = timer.stage("group");
-      group_(state_.cache, state_.rays, compaction_);
+      group_(state_.cache, state_.rays);
     }
     {
       const auto stage = timer.stage("intersect");

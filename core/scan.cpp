@@ -19,8 +19,8 @@ ExclusiveScan::ExclusiveScan(ocl::Device &device, std::uint32_t group_size)
       scan_(device, "scan", "scan_exclusive", group_defines(group_size_)) {}
 
 void ExclusiveScan::operator()(ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field,
-                               uint divisor, uint multiplier, uint total_field) {
-  scan_({1, group_size_}, values, counts, count_field, divisor, multiplier, total_field);
+                               uint divisor, uint total_field) {
+  scan_({1, group_size_}, values, counts, count_field, divisor, total_field);
 }
 
 Compaction::Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t group_size)
@@ -28,26 +28,15 @@ Compaction::Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t
       tile_offsets_(device, "scan tile sums", (max_count + tile_ - 1) / tile_),
       scan_(device, group_size),
       count_(device, "scan", "compact_count", group_defines(group_size)),
-      values_(device, "scan", "compact_values", group_defines(group_size)),
-      indices_(device, "scan", "compact_indices", group_defines(group_size)) {
+      values_(device, "scan", "compact_values", group_defines(group_size)) {
   range_ = ocl::Range::strided((max_count + ISO_SCAN_ITEMS - 1) / ISO_SCAN_ITEMS, group_size, device);
 }
 
-void Compaction::count_tiles(const ocl::Buffer<uint> &mask, CountsBuffer &counts, uint count_field,
-                             uint total_field) {
+void Compaction::operator()(const ocl::Buffer<uint> &mask, const ocl::Buffer<uint> &values,
+                            CountsBuffer &counts, uint count_field, ocl::Buffer<uint> &out,
+                            uint total_field) {
   count_(range_, mask, counts, count_field, tile_offsets_);
-  scan_(tile_offsets_, counts, count_field, tile_, 1, total_field);
-}
-
-void Compaction::indices(const ocl::Buffer<uint> &mask, CountsBuffer &counts, uint count_field,
-                         ocl::Buffer<uint> &out, uint total_field) {
-  count_tiles(mask, counts, count_field, total_field);
-  indices_(range_, mask, counts, count_field, tile_offsets_, out);
-}
-
-void Compaction::values(const ocl::Buffer<uint> &mask, const ocl::Buffer<uint> &values, CountsBuffer &counts,
-                        uint count_field, ocl::Buffer<uint> &out, uint total_field) {
-  count_tiles(mask, counts, count_field, total_field);
+  scan_(tile_offsets_, counts, count_field, tile_, total_field);
   values_(range_, mask, values, counts, count_field, tile_offsets_, out);
 }
 

@@ -1,186 +1,246 @@
 /// group.cl -- the pass's ray-block pairs that can be intersected now, gathered by block (Sec. 3.6, 4.2).
 ///
 /// Two ways to the same groups; they differ in the order of the groups and of the pairs in one, on which no hit depends.
-///   radix      group_select -> compact_indices -> group_keys -> radix_sort -> group_heads -> compact_indices
-///   counting   group_count -> group_tile_sums -> group_offsets -> group_scatter -> group_clear
+///   radix      group_select -> radix_sort -> group_head_sums -> group_heads
+///   counting   group_count -> group_blocks -> group_scatter
 ///
-/// Counting: slot_counts [slots] is 0 between passes. A pair takes its rank in its block's group from the count of the
-/// block's slot, and whoever gets rank 0 appends the slot to the list of visible ones. That list is scanned, so nothing
-/// here costs more than O(pairs), whatever the number of slots or blocks. One array holds the list, then the offsets:
-/// block_ray_offsets.
+/// Counting: slot_counts [slots] and candidate_count are 0 between passes. A pair whose own block is cached
+/// takes its rank among the pairs of that block from the count of the block's slot, and whoever gets rank 0
+/// lists the slot as a candidate. Only then is each candidate's dual grid looked up: eight blocks a block,
+/// not eight a pair. The visible ones draw places for their pairs, in whatever order they come. Nothing here
+/// costs more than O(pairs), whatever the number of slots or blocks.
 #include "block_table.h"
 #include "closest_pair.h"
 #include "work_group.h"
 
-#define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
-
-/// Whether every block of the dual grid is cached: all or nothing. block_id may be ISO_INVALID_ID: no.
-ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, uint block_id, global const BlockEntry *table) {
-  int cached = block_id != ISO_INVALID_ID;
-  if (cached) {
-    const BlockCoords b = block_coords(frame, block_id);
-    for (uint corner = 0; corner < 8; ++corner) {
-      if (dual_grid_block(frame, b, corner) != ISO_INVALID_ID &&
-          cached_slot(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2)) ==
-              ISO_BLOCK_ABSENT) {
-        cached = 0;
-      }
-    }
-  }
-  return cached;
+/// Whether every block of the dual grid of block b is cached: all or nothing. slot: its own.
+ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b, global const BlockEntry *table,
+                                   uint *slot) {
+  const uint outside = (b.x + 1 == frame->blocks_x ? 0xAAu : 0u) | (b.y + 1 == frame->blocks_y ? 0xCCu : 0u) |
+                       (b.z + 1 == frame->blocks_z ? 0xF0u : 0u);
+  BlockEntry entries[8];
+  uint absent = 0;
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner)
+    absent |= (uint)(entries[corner].slot == ISO_BLOCK_ABSENT) << corner;
+  *slot = entries[0].slot;
+  return (absent & ~outside) == 0;
 }
 
-/// The slot of a cached block.
-ISO_INLINE uint slot_of(const FrameParams *frame, global const BlockEntry *table, uint block_id) {
-  const BlockCoords b = block_coords(frame, block_id);
-  return cached_slot(frame, table, b.x, b.y, b.z);
-}
+#define PAIR_TILE (ISO_GROUP_SIZE * ISO_GROUP_ITEMS)
 
-/// pair_active_mask [pair slots] = 1 where the pair can be intersected. Marks the others as not tested. Grid-stride.
-kernel void group_select(const FrameParams frame_params, global const PassCounts *counts,
-                         global const uint *pair_block_ids, global const BlockEntry *table,
-                         global PairHit *pair_hits, global uint *closest_pairs,
-                         global uint *pair_active_mask) {
-  const FrameParams *frame = &frame_params;
-  const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count;
-  for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
-    const uint block_id = pair_block_ids[pair];
-    const int can_be_tested = dual_grid_is_cached(frame, block_id, table);
-    if (!can_be_tested) mark_not_tested(pair_hits, closest_pairs, pair, block_id, spec_count);
-    pair_active_mask[pair] = (uint)can_be_tested;
-  }
-}
-
-/// keys [granted_count]: the cache slot of each pair's block, which sorts by block with the fewest bits.
-/// Grid-stride.
-kernel void group_keys(const FrameParams frame_params, global const PassCounts *counts,
-                       global const uint *pair_ids, global const uint *pair_block_ids,
-                       global const BlockEntry *table, global uint *keys) {
-  const FrameParams *frame = &frame_params;
-  const uint count = counts->granted_count;
-  for (uint i = get_global_id(0); i < count; i += get_global_size(0))
-    keys[i] = slot_of(frame, table, pair_block_ids[pair_ids[i]]);
-}
-
-/// mask [granted_count] = 1 at the first pair of each block. Grid-stride.
-kernel void group_heads(global const PassCounts *counts, global const uint *keys, global uint *mask) {
-  const uint count = counts->granted_count;
-  for (uint i = get_global_id(0); i < count; i += get_global_size(0))
-    mask[i] = i == 0 || keys[i] != keys[i - 1];
-}
-
-/// pair_ranks [pair slots]: place in the group of the pair's block, or ISO_INVALID_ID of a pair that cannot be
-/// intersected. Lists the slots of visible blocks, in any order. Marks those as not tested. Groups stride over
-/// tiles of pairs; each appends with one global atomic a tile. counts->visible_count: 0 before.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_count(
+/// pair_ids, keys [granted_count]: the pairs that can be intersected, and the cache slots of their blocks,
+/// which sort by block with the fewest bits. Marks the others as not tested. Groups stride over tiles of
+/// pairs; each appends with one global atomic a tile. counts->granted_count: 0 before.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_select(
     const FrameParams frame_params, global PassCounts *counts, global const uint *pair_block_ids,
     global const BlockEntry *table, global PairHit *pair_hits, global uint *closest_pairs,
-    global uint *pair_ranks, global uint *slot_counts, global uint *visible_slots) {
+    global uint *pair_ids, global uint *keys) {
   const FrameParams *frame = &frame_params;
-  local uint new_slots[TILE];
-  local uint num_new, first_place;
-  const uint pair_slots = counts->pair_slot_count, item = get_local_id(0);
-  for (uint tile = get_group_id(0); tile * TILE < pair_slots; tile += get_num_groups(0)) {
-    if (item == 0) num_new = 0;
+  local uint num_granted, first_place;
+  const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count, item = get_local_id(0);
+  for (uint tile = get_group_id(0); tile * PAIR_TILE < pair_slots; tile += get_num_groups(0)) {
+    uint slots[ISO_GROUP_ITEMS], places[ISO_GROUP_ITEMS];
+    if (item == 0) num_granted = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      const uint pair = tile * TILE + i * ISO_GROUP_SIZE + item;
+    for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
+      const uint pair = tile * PAIR_TILE + i * ISO_GROUP_SIZE + item;
+      places[i] = ISO_INVALID_ID;
       if (pair < pair_slots) {
         const uint block_id = pair_block_ids[pair];
-        uint rank = ISO_INVALID_ID;
-        if (dual_grid_is_cached(frame, block_id, table)) {
-          const uint slot = slot_of(frame, table, block_id);
-          rank = atomic_inc(&slot_counts[slot]);
-          if (rank == 0) new_slots[atomic_inc(&num_new)] = slot;
+        if (block_id != ISO_INVALID_ID &&
+            dual_grid_is_cached(frame, block_coords(frame, block_id), table, &slots[i])) {
+          places[i] = atomic_inc(&num_granted);
         } else {
-          mark_not_tested(pair_hits, closest_pairs, pair, block_id, counts->spec_count);
+          mark_not_tested(pair_hits, closest_pairs, pair, block_id, spec_count);
         }
-        pair_ranks[pair] = rank;
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (item == 0 && num_new != 0) first_place = atomic_add(&counts->visible_count, num_new);
+    if (item == 0 && num_granted != 0) first_place = atomic_add(&counts->granted_count, num_granted);
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = item; i < num_new; i += ISO_GROUP_SIZE) visible_slots[first_place + i] = new_slots[i];
-    barrier(CLK_LOCAL_MEM_FENCE);
-  }
-}
-
-/// tile_sums [tiles of visible blocks] = number of their pairs. Groups stride over tiles.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_tile_sums(
-    global const PassCounts *counts, global const uint *visible_slots, global const uint *slot_counts,
-    global uint *tile_sums) {
-  local uint sums[ISO_GROUP_SIZE];
-  const uint visible_count = counts->visible_count;
-  for (uint tile = get_group_id(0); tile * TILE < visible_count; tile += get_num_groups(0)) {
-    uint sum = 0, total;
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      const uint visible = tile * TILE + i * ISO_GROUP_SIZE + get_local_id(0);
-      if (visible < visible_count) sum += slot_counts[visible_slots[visible]];
+    for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
+      if (places[i] != ISO_INVALID_ID) {
+        pair_ids[first_place + places[i]] = tile * PAIR_TILE + i * ISO_GROUP_SIZE + item;
+        keys[first_place + places[i]] = slots[i];
+      }
     }
-    group_scan(sums, sum, &total);
-    if (get_local_id(0) == 0) tile_sums[tile] = total;
   }
 }
 
-/// block_ray_offsets [visible_count]: the list of visible slots before, where each one's pairs begin after;
-/// slot_counts: pairs before, the same offset after. Groups stride over tiles; each sums up the tiles before its own,
-/// which are too few for a launch between.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_offsets(
-    global PassCounts *counts, global const uint *tile_sums, global uint *slot_counts,
-    global uint *block_ray_offsets) {
+#define KEY_TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
+
+ISO_INLINE int starts_block(global const uint *keys, uint i) {
+  return i == 0 || keys[i] != keys[i - 1];
+}
+
+/// tile_sums [tiles of sorted keys] = number of blocks that start there. Groups stride over tiles.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_head_sums(
+    global const PassCounts *counts, global const uint *keys, global uint *tile_sums) {
+  local uint num_heads;
+  const uint count = counts->granted_count, item = get_local_id(0);
+  for (uint tile = get_group_id(0); tile * KEY_TILE < count; tile += get_num_groups(0)) {
+    uint heads = 0;
+    if (item == 0) num_heads = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
+      const uint entry = tile * KEY_TILE + i * ISO_GROUP_SIZE + item;
+      heads += entry < count && starts_block(keys, entry);
+    }
+    if (heads != 0) atomic_add(&num_heads, heads);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (item == 0) tile_sums[tile] = num_heads;
+  }
+}
+
+/// block_rays [visible_count], in the order of the keys. Groups stride over tiles; each sums up the tiles
+/// before its own, which are too few for a launch between. counts->visible_count: 0 before.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_heads(
+    global PassCounts *counts, global const uint *keys, global const uint *tile_sums,
+    global BlockRays *block_rays) {
   local uint sums[ISO_GROUP_SIZE];
-  const uint visible_count = counts->visible_count;
-  uint before = 0, next_tile = 0; /* pairs of the tiles before next_tile */
-  for (uint tile = get_group_id(0); tile * TILE < visible_count; tile += get_num_groups(0)) {
-    const uint begin = tile * TILE + get_local_id(0) * ISO_SCAN_ITEMS;
-    uint own_slots[ISO_SCAN_ITEMS], own_counts[ISO_SCAN_ITEMS];
-    uint skipped = 0, sum = 0, total, offset;
+  const uint count = counts->granted_count;
+  uint before = 0, next_tile = 0; /* blocks that start in the tiles before next_tile */
+  for (uint tile = get_group_id(0); tile * KEY_TILE < count; tile += get_num_groups(0)) {
+    const uint begin = tile * KEY_TILE + get_local_id(0) * ISO_SCAN_ITEMS;
+    const uint end = min(begin + ISO_SCAN_ITEMS, count);
+    uint skipped = 0, heads = 0, total, visible;
     for (uint i = next_tile + get_local_id(0); i < tile; i += ISO_GROUP_SIZE) skipped += tile_sums[i];
     group_scan(sums, skipped, &total);
     before += total;
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      own_slots[i] = begin + i < visible_count ? block_ray_offsets[begin + i] : ISO_INVALID_ID;
-      own_counts[i] = begin + i < visible_count ? slot_counts[own_slots[i]] : 0;
-      sum += own_counts[i];
-    }
-    offset = before + group_scan(sums, sum, &total);
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      if (begin + i < visible_count) {
-        block_ray_offsets[begin + i] = offset;
-        slot_counts[own_slots[i]] = offset;
-      }
-      offset += own_counts[i];
+    for (uint i = begin; i < end; ++i) heads += starts_block(keys, i);
+    visible = before + group_scan(sums, heads, &total);
+    for (uint i = begin; i < end; ++i) {
+      if (starts_block(keys, i)) block_rays[visible++].begin = i;
+      if (i + 1 == count || keys[i + 1] != keys[i]) block_rays[visible - 1].end = i + 1;
     }
     before += total;
     next_tile = tile + 1;
-    if (get_local_id(0) == 0 && next_tile * TILE >= visible_count) counts->granted_count = before;
+    if (get_local_id(0) == 0 && next_tile * KEY_TILE >= count) counts->visible_count = before;
   }
 }
 
-/// pair_ids, slots [granted_count]: the pairs in their groups. slot_offsets: slot_counts after group_offsets.
-/// Grid-stride over pair slots.
-kernel void group_scatter(const FrameParams frame_params, global const PassCounts *counts,
-                          global const uint *pair_block_ids, global const BlockEntry *table,
-                          global const uint *pair_ranks, global const uint *slot_offsets,
-                          global uint *pair_ids, global uint *slots) {
-  const FrameParams *frame = &frame_params;
-  const uint pair_slots = counts->pair_slot_count;
-  for (uint pair = get_global_id(0); pair < pair_slots; pair += get_global_size(0)) {
-    const uint rank = pair_ranks[pair];
-    if (rank != ISO_INVALID_ID) {
-      const uint slot = slot_of(frame, table, pair_block_ids[pair]);
-      const uint to = slot_offsets[slot] + rank;
-      pair_ids[to] = pair;
-      slots[to] = slot;
+/// slots [ISO_GROUP_ITEMS]: of these blocks; ISO_BLOCK_ABSENT of one that is not cached, and of
+/// ISO_INVALID_ID. As find_dual_grid(), reads all first entries before it looks at one.
+ISO_INLINE void find_slots(const FrameParams *frame, global const BlockEntry *table, const uint *block_ids,
+                           uint *slots) {
+  BlockEntry entries[ISO_GROUP_ITEMS];
+  ISO_UNROLL
+  for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
+    const BlockCoords b = block_coords(frame, block_ids[i]);
+    entries[i] = table[table_home(frame, b.x, b.y, b.z)];
+  }
+  ISO_UNROLL
+  for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
+    slots[i] = ISO_BLOCK_ABSENT;
+    if (block_ids[i] != ISO_INVALID_ID && entries[i].block_id == block_ids[i]) {
+      slots[i] = entries[i].slot;
+    } else if (block_ids[i] != ISO_INVALID_ID && entries[i].block_id != ISO_INVALID_ID) {
+      const BlockCoords b = block_coords(frame, block_ids[i]);
+      slots[i] = cached_slot(frame, table, b.x, b.y, b.z);
     }
   }
 }
 
-/// slot_counts of the visible blocks = 0, for the next pass. Grid-stride.
-kernel void group_clear(global const PassCounts *counts, global const uint *slots,
-                        global const uint *block_ray_offsets, global uint *slot_counts) {
-  const uint visible_count = counts->visible_count;
-  for (uint visible = get_global_id(0); visible < visible_count; visible += get_global_size(0))
-    slot_counts[slots[block_ray_offsets[visible]]] = 0;
+/// pair_slots [pair slots]: the cache slot of each pair's block, or ISO_BLOCK_ABSENT; pair_ranks [pair
+/// slots]: its place among the pairs of that block, if cached. Lists the slots of those blocks. Groups stride
+/// over tiles of pairs; each appends with one global atomic a tile.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_count(
+    const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_block_ids,
+    global const BlockEntry *table, global uint *pair_slots, global uint *pair_ranks,
+    global uint *slot_counts, global uint *candidate_slots, global uint *candidate_count) {
+  const FrameParams *frame = &frame_params;
+  local uint new_slots[PAIR_TILE];
+  local uint num_staged, first_place;
+  const uint count = counts->pair_slot_count, item = get_local_id(0);
+  for (uint tile = get_group_id(0); tile * PAIR_TILE < count; tile += get_num_groups(0)) {
+    const uint first = tile * PAIR_TILE + item;
+    uint block_ids[ISO_GROUP_ITEMS], slots[ISO_GROUP_ITEMS], ranks[ISO_GROUP_ITEMS], num_new;
+    if (item == 0) num_staged = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    /* Step by step for all of the work-item's pairs, so that their loads and atomics are under way together. */
+    ISO_UNROLL
+    for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
+      const uint pair = first + i * ISO_GROUP_SIZE;
+      block_ids[i] = pair < count ? pair_block_ids[pair] : ISO_INVALID_ID;
+    }
+    find_slots(frame, table, block_ids, slots);
+    ISO_UNROLL
+    for (uint i = 0; i < ISO_GROUP_ITEMS; ++i)
+      ranks[i] = slots[i] == ISO_BLOCK_ABSENT ? ISO_INVALID_ID : atomic_inc(&slot_counts[slots[i]]);
+    ISO_UNROLL
+    for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
+      const uint pair = first + i * ISO_GROUP_SIZE;
+      if (pair < count) {
+        pair_slots[pair] = slots[i];
+        pair_ranks[pair] = ranks[i];
+      }
+      if (ranks[i] == 0) new_slots[atomic_inc(&num_staged)] = slots[i];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    num_new = num_staged;
+    if (item == 0 && num_new != 0) first_place = atomic_add(candidate_count, num_new);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint i = item; i < num_new; i += ISO_GROUP_SIZE) candidate_slots[first_place + i] = new_slots[i];
+  }
+}
+
+/// block_rays [visible_count]: of the candidates whose dual grid is cached, in any order; slot_offsets
+/// [slots]: where the pairs of each candidate begin, or ISO_INVALID_ID where it is not visible. slot_counts
+/// of the candidates = 0, for the next pass. Groups stride over the candidates; each draws places with two
+/// global atomics a turn. counts->granted_count and visible_count: 0 before.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_blocks(
+    const FrameParams frame_params, global PassCounts *counts, global const uint *candidate_slots,
+    global const uint *candidate_count, global const uint *slot_block_ids, global const BlockEntry *table,
+    global uint *slot_counts, global uint *slot_offsets, global BlockRays *block_rays) {
+  const FrameParams *frame = &frame_params;
+  local uint num_blocks, num_pairs, first_block, first_pair;
+  const uint candidates = *candidate_count, item = get_local_id(0);
+  for (uint first = get_group_id(0) * ISO_GROUP_SIZE; first < candidates;
+       first += get_num_groups(0) * ISO_GROUP_SIZE) {
+    uint slot = ISO_INVALID_ID, pairs = 0, block = 0, offset = 0;
+    if (item == 0) num_blocks = num_pairs = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (first + item < candidates) {
+      uint own_slot;
+      slot = candidate_slots[first + item];
+      if (dual_grid_is_cached(frame, block_coords(frame, slot_block_ids[slot]), table, &own_slot)) {
+        pairs = slot_counts[slot];
+        block = atomic_inc(&num_blocks);
+        offset = atomic_add(&num_pairs, pairs);
+      }
+      slot_counts[slot] = 0;
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (item == 0 && num_blocks != 0) {
+      first_block = atomic_add(&counts->visible_count, num_blocks);
+      first_pair = atomic_add(&counts->granted_count, num_pairs);
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (slot != ISO_INVALID_ID) slot_offsets[slot] = pairs == 0 ? ISO_INVALID_ID : first_pair + offset;
+    if (pairs != 0) {
+      block_rays[first_block + block].begin = first_pair + offset;
+      block_rays[first_block + block].end = first_pair + offset + pairs;
+    }
+  }
+}
+
+/// pair_ids [granted_count]: the pairs in their groups. Marks the others as not tested. candidate_count = 0,
+/// for the next pass. Grid-stride over pair slots.
+kernel void group_scatter(global const PassCounts *counts, global const uint *pair_block_ids,
+                          global const uint *pair_slots, global const uint *pair_ranks,
+                          global const uint *slot_offsets, global PairHit *pair_hits,
+                          global uint *closest_pairs, global uint *pair_ids, global uint *candidate_count) {
+  const uint count = counts->pair_slot_count, spec_count = counts->spec_count;
+  if (get_global_id(0) == 0) *candidate_count = 0;
+  for (uint pair = get_global_id(0); pair < count; pair += get_global_size(0)) {
+    const uint slot = pair_slots[pair], rank = pair_ranks[pair];
+    const uint offset = slot == ISO_BLOCK_ABSENT ? ISO_INVALID_ID : slot_offsets[slot];
+    if (offset != ISO_INVALID_ID) {
+      pair_ids[offset + rank] = pair;
+    } else {
+      mark_not_tested(pair_hits, closest_pairs, pair, pair_block_ids[pair], spec_count);
+    }
+  }
 }

@@ -41,23 +41,22 @@ ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes las
   return hit;
 }
 
-/// One work-group per visible block, striding over them. pair_ids, slots [granted_count]: pairs sorted by the
-/// slot of their block; block_ray_offsets [visible_count]: where each block's pairs begin. pair_hits [pair
-/// slots]: written for every pair. closest_pairs [active rays]: see closest_pair.h.
+/// One work-group per visible block, striding over them. pair_ids [granted_count]: pairs gathered by their
+/// block; block_rays [visible_count]: which of them are a block's; pair_block_ids [pair slots]. pair_hits
+/// [pair slots]: written for every pair. closest_pairs [active rays]: see closest_pair.h.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
     const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_ids,
-    global const uint *slots, global const uint *block_ray_offsets, global const uint *slot_block_ids,
-    global const BlockEntry *table, global const float *cache_values, global const uint *active_ray_ids,
-    global PairHit *pair_hits, global uint *closest_pairs) {
+    global const BlockRays *block_rays, global const uint *pair_block_ids, global const BlockEntry *table,
+    global const float *cache_values, global const uint *active_ray_ids, global PairHit *pair_hits,
+    global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
   local uint corner_slots[8];
   const LastPlanes last = last_planes(frame);
   const uint visible_count = counts->visible_count, spec_count = counts->spec_count;
   for (uint visible = get_group_id(0); visible < visible_count; visible += get_num_groups(0)) {
-    const uint begin = block_ray_offsets[visible];
-    const uint end = visible + 1 < visible_count ? block_ray_offsets[visible + 1] : counts->granted_count;
-    const BlockCoords b = block_coords(frame, slot_block_ids[slots[begin]]);
+    const uint begin = block_rays[visible].begin, end = block_rays[visible].end;
+    const BlockCoords b = block_coords(frame, pair_block_ids[pair_ids[begin]]);
     for (uint corner = get_local_id(0); corner < 8; corner += ISO_GROUP_SIZE) {
       corner_slots[corner] =
           dual_grid_block(frame, b, corner) == ISO_INVALID_ID
@@ -87,13 +86,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
   }
 }
 
-/// The pairs whose walk came into doubt, walked on from there with 48-bit arithmetic. They are few, but in intersect() the
-/// registers for them would cost a fifth of its speed (H100). Same arguments; grid-stride over the pairs.
+/// The pairs whose walk came into doubt, walked on from there with 48-bit arithmetic. They are few, but in
+/// intersect() the registers for them would cost a fifth of its speed (H100). Same arguments, less
+/// block_rays; grid-stride over the pairs.
 kernel void settle_doubts(const FrameParams frame_params, global const PassCounts *counts,
-                          global const uint *pair_ids, global const uint *slots,
-                          global const uint *slot_block_ids, global const BlockEntry *table,
-                          global const float *cache_values, global const uint *active_ray_ids,
-                          global PairHit *pair_hits, global uint *closest_pairs) {
+                          global const uint *pair_ids, global const uint *pair_block_ids,
+                          global const BlockEntry *table, global const float *cache_values,
+                          global const uint *active_ray_ids, global PairHit *pair_hits,
+                          global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   const LastPlanes last = last_planes(frame);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
@@ -101,7 +101,7 @@ kernel void settle_doubts(const FrameParams frame_params, global const PassCount
     const uint pair = pair_ids[i], start = pair_hits[pair].cell;
     if (start >= ISO_IN_DOUBT) {
       const Ray ray = make_ray(frame, active_ray_ids[pair / counts->spec_count] & ISO_RAY_PIXEL);
-      const BlockCoords b = block_coords(frame, slot_block_ids[slots[i]]);
+      const BlockCoords b = block_coords(frame, pair_block_ids[pair]);
       const int x = (int)(4 * b.x + (start & 3)), y = (int)(4 * b.y + (start >> 2 & 3)),
                 z = (int)(4 * b.z + (start >> 4 & 3));
       const GridWalk block = walk_from(&ray, (int)b.x, (int)b.y, (int)b.z, 4, last);

@@ -1,20 +1,19 @@
 /// scan.cl -- exclusive prefix sum and stream compaction (Sec. 3.6, 4.2).
 /// Counts live on the device: `counts` are the uints of PassCounts, `count_field` says which of them is the
 /// number of entries. (A cast from the struct is what Mesa rusticl gets wrong: README "Devices".) Compaction
-/// = compact_count -> scan_exclusive of the tile sums -> compact_values or compact_indices. A tile is
+/// = compact_count -> scan_exclusive of the tile sums -> compact_values. A tile is
 /// ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever waits for another
 /// one.
 #include "work_group.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
 
-/// values[i] = sum of values[0..i), in place, for ceil(count / divisor) * multiplier entries; their sum goes
-/// to total_field, unless that is ISO_INVALID_ID. One work-group: made for tables of tiles, which are short.
+/// values[i] = sum of values[0..i), in place, for ceil(count / divisor) entries; their sum goes to
+/// total_field, unless that is ISO_INVALID_ID. One work-group: made for tables of tiles, which are short.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exclusive(
-    global uint *values, global uint *counts, uint count_field, uint divisor, uint multiplier,
-    uint total_field) {
+    global uint *values, global uint *counts, uint count_field, uint divisor, uint total_field) {
   local uint sums[ISO_GROUP_SIZE];
-  const uint count = (counts[count_field] + divisor - 1) / divisor * multiplier;
+  const uint count = (counts[count_field] + divisor - 1) / divisor;
   uint carry = 0;
   for (uint tile = 0; tile < count; tile += TILE) {
     const uint begin = tile + get_local_id(0) * ISO_SCAN_ITEMS;
@@ -50,28 +49,19 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_
   }
 }
 
-/// The two compactions differ in what they write for entry i: VALUE.
-#define COMPACT(VALUE)                                                                      \
-  local uint sums[ISO_GROUP_SIZE];                                                          \
-  const uint count = counts[count_field];                                                   \
-  for (uint tile = get_group_id(0); tile * TILE < count; tile += get_num_groups(0)) {       \
-    const uint begin = tile * TILE + get_local_id(0) * ISO_SCAN_ITEMS;                      \
-    uint sum = 0, total;                                                                    \
-    for (uint i = begin; i < begin + ISO_SCAN_ITEMS; ++i) sum += i < count && mask[i] != 0; \
-    uint to = tile_offsets[tile] + group_scan(sums, sum, &total);                           \
-    for (uint i = begin; i < begin + ISO_SCAN_ITEMS; ++i) {                                 \
-      if (i < count && mask[i] != 0) out[to++] = VALUE;                                     \
-    }                                                                                       \
-  }
-
 /// out = values[i] of every i with mask[i] != 0, in order. tile_offsets: scanned sums of compact_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_values(
     global const uint *mask, global const uint *values, global const uint *counts, uint count_field,
-    global const uint *tile_offsets, global uint *out){COMPACT(values[i])}
-
-/// out = every i with mask[i] != 0, in order.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_indices(
-    global const uint *mask, global const uint *counts, uint count_field, global const uint *tile_offsets,
-    global uint *out) {
-  COMPACT(i)
+    global const uint *tile_offsets, global uint *out) {
+  local uint sums[ISO_GROUP_SIZE];
+  const uint count = counts[count_field];
+  for (uint tile = get_group_id(0); tile * TILE < count; tile += get_num_groups(0)) {
+    const uint begin = tile * TILE + get_local_id(0) * ISO_SCAN_ITEMS;
+    uint sum = 0, total, to;
+    for (uint i = begin; i < begin + ISO_SCAN_ITEMS; ++i) sum += i < count && mask[i] != 0;
+    to = tile_offsets[tile] + group_scan(sums, sum, &total);
+    for (uint i = begin; i < begin + ISO_SCAN_ITEMS; ++i) {
+      if (i < count && mask[i] != 0) out[to++] = values[i];
+    }
+  }
 }

@@ -3,12 +3,13 @@
 #include "shared_types.h"
 #include "shared_types_fields.h"
 
-/// sizes[0..3]: sizeof FrameParams, PairHit, HitRecord, PassCounts. One work-item.
+/// sizes[0..4]: sizeof FrameParams, PairHit, BlockRays, HitRecord, PassCounts. One work-item.
 kernel void shared_type_sizes(global uint *sizes) {
   sizes[0] = sizeof(FrameParams);
   sizes[1] = sizeof(PairHit);
-  sizes[2] = sizeof(HitRecord);
-  sizes[3] = sizeof(PassCounts);
+  sizes[2] = sizeof(BlockRays);
+  sizes[3] = sizeof(HitRecord);
+  sizes[4] = sizeof(PassCounts);
 }
 
 // OpenCL C has no offsetof.
@@ -23,6 +24,10 @@ kernel void shared_type_offsets(global uint *offsets) {
   {
     PairHit object;
     ISO_PAIR_HIT_FIELDS(ISO_WRITE_OFFSET)
+  }
+  {
+    BlockRays object;
+    ISO_BLOCK_RAYS_FIELDS(ISO_WRITE_OFFSET)
   }
   {
     HitRecord object;

@@ -52,10 +52,8 @@ inline uint popcount(uint x) {
 #define ISO_MACROCELL_BLOCKS 4       ///< blocks along the edge of a coarse macrocell: 16 voxels
 #define ISO_DUAL_GRID_VERTICES 125u  ///< 5^3
 #define ISO_SCAN_ITEMS 8u            ///< entries per work-item and tile in scan.cl
-#define ISO_RADIX_BITS 4u            ///< key bits per pass of radix_sort.cl
-#define ISO_RADIX_DIGITS 16u
-#define ISO_RADIX_ITEMS 16u  ///< pairs per work-item and tile in radix_sort.cl
-#define ISO_AGE_BUCKETS 64u  ///< ages the LRU tells apart [passes]; older ones count as the oldest
+#define ISO_GROUP_ITEMS 4u           ///< pairs per work-item and tile in group.cl
+#define ISO_AGE_BUCKETS 64u          ///< ages the LRU tells apart [passes]; older ones count as the oldest
 
 /// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's compiler reads a pointer to
 /// constant memory through the cache, again in every turn of a loop.
@@ -99,6 +97,12 @@ typedef struct PairHit {
   float s;  ///< position between the ray's entry (0) and exit (1) of that cell
 } PairHit;
 ISO_CHECK_SIZE(PairHit, 8);
+
+/// Where the pairs of a visible block lie among those gathered by block: from begin to below end.
+typedef struct BlockRays {
+  uint begin, end;
+} BlockRays;
+ISO_CHECK_SIZE(BlockRays, 8);
 
 /// One pixel's hit (design: a hit is cell + local position; t is derived from it).
 typedef struct HitRecord {

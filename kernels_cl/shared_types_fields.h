@@ -16,6 +16,7 @@
   X(screen_begin_x) X(screen_begin_y) X(screen_end_x) X(screen_end_y)       \
   X(per_ray_speculation) X(table_groups)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
+#define ISO_BLOCK_RAYS_FIELDS(X) X(begin) X(end)
 #define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)
 #define ISO_PASS_COUNTS_FIELDS(X)                                           \
   X(pixel_count) X(pass) X(active_count) X(spec_count) X(window_count)      \

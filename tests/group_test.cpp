@@ -50,7 +50,7 @@ class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
       world.begin_pass(pairs, spec_count);
       world.cache.request(world.rays);
       world.assign_slots();
-      group(world.cache, world.rays, world.compaction);
+      group(world.cache, world.rays);
       check(world, group, pairs, tally);
       if (HasFatalFailure()) return tally;
     }
@@ -75,20 +75,20 @@ class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
     const PassCounts counts = world.counts();
     ASSERT_EQ(counts.granted_count, num_granted);
     ASSERT_EQ(counts.visible_count, expected.size());
-    const std::vector<uint> pair_ids = group.groups().pair_ids.read(), slots = group.groups().slots.read(),
-                            offsets = group.groups().block_ray_offsets.read();
+    /* Blocks that hold the pairs expected, each one, leave no room between them or behind. */
+    const std::vector<uint> pair_ids = group.groups().pair_ids.read();
+    const std::vector<BlockRays> block_rays = group.groups().block_rays.read();
     std::set<uint> seen;
-    ASSERT_TRUE(counts.visible_count == 0 || offsets[0] == 0);
     for (uint visible = 0; visible < counts.visible_count; ++visible) {
-      const uint begin = offsets[visible];
-      const uint end = visible + 1 < counts.visible_count ? offsets[visible + 1] : counts.granted_count;
+      const auto [begin, end] = block_rays[visible];
       ASSERT_LT(begin, end);
-      const uint slot = slots[begin];
+      ASSERT_LE(end, counts.granted_count);
+      ASSERT_LT(pair_ids[begin], pairs.size());
+      const uint slot = table[pairs[pair_ids[begin]]];
       ASSERT_TRUE(seen.insert(slot).second) << "slot " << slot << " has two groups";
       ASSERT_TRUE(expected.contains(slot));
       ASSERT_EQ(std::set<uint>(pair_ids.begin() + begin, pair_ids.begin() + end), expected[slot]);
       ASSERT_EQ(end - begin, expected[slot].size());
-      ASSERT_TRUE(std::all_of(slots.begin() + begin, slots.begin() + end, [&](uint s) { return s == slot; }));
     }
     /* The other pairs are not tested, and each ray knows its first. */
     const std::vector<PairHit> hits = world.rays.pair_hits.read();
@@ -152,7 +152,7 @@ TEST_P(GroupOnDevice, OneMissingBlockIsEnoughToWait) {
         sole_missing.insert(static_cast<std::size_t>(std::ranges::find_if(grid, absent) - grid.begin()));
     }
     world.begin_pass(all, 1);
-    group(world.cache, world.rays, world.compaction);
+    group(world.cache, world.rays);
     check(world, group, all, tally);
     if (HasFatalFailure()) return;
   }
@@ -165,7 +165,7 @@ TEST_P(GroupOnDevice, OneHotBlock) {
   EXPECT_EQ(tally.blocks, 3u);
 }
 
-/// More tiles of blocks than work-groups: each group goes on with sums of its own and of others' tiles.
+/// More blocks, and more tiles of pairs, than work-groups take at once: each goes on with others.
 TEST_P(GroupOnDevice, MoreVisibleBlocksThanOneSweepTakes) {
   constexpr uint kNumBlocks = 20 * 20 * 20, kNumPixels = 2 * kNumBlocks + 5;
   const FrameParams frame = plain_frame({80, 80, 80}, kNumPixels);
@@ -181,7 +181,7 @@ TEST_P(GroupOnDevice, MoreVisibleBlocksThanOneSweepTakes) {
     world.begin_pass(pairs, 1);
     world.cache.request(world.rays);
     world.assign_slots();
-    group(world.cache, world.rays, world.compaction);
+    group(world.cache, world.rays);
     check(world, group, pairs, tally);
     if (HasFatalFailure()) return;
   }
@@ -194,7 +194,7 @@ TEST_P(GroupOnDevice, NoPairs) {
   StageWorld world(device_, frame, 8, 64);
   Group group(device_, 10, 8, 64, grouping_);
   world.begin_pass(std::vector<uint>(10, ISO_INVALID_ID), 1);
-  group(world.cache, world.rays, world.compaction);
+  group(world.cache, world.rays);
   EXPECT_EQ(world.counts().granted_count, 0u);
   EXPECT_EQ(world.counts().visible_count, 0u);
 }

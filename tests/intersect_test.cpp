@@ -190,7 +190,7 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     world.cache.request(world.rays);
     world.assign_slots();
     world.fill_slots(voxels);
-    group(world.cache, world.rays, world.compaction);
+    group(world.cache, world.rays);
     intersect(world.cache, group.groups(), world.rays);
 
     const FrameParams &frame = world.frame;

@@ -39,6 +39,11 @@ std::vector<uint> host_offsets() {
     EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "PairHit";
   }
   {
+    using Object = BlockRays;
+    ISO_BLOCK_RAYS_FIELDS(ISO_ADD_OFFSET)
+    EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "BlockRays";
+  }
+  {
     using Object = HitRecord;
     ISO_HIT_RECORD_FIELDS(ISO_ADD_OFFSET)
     EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "HitRecord";
@@ -52,8 +57,8 @@ std::vector<uint> host_offsets() {
 }
 
 TEST_P(SharedTypesOnDevice, SmallSizesAreTheHosts) {
-  const std::vector<uint> expected = {sizeof(FrameParams), sizeof(PairHit), sizeof(HitRecord),
-                                      sizeof(PassCounts)};
+  const std::vector<uint> expected = {sizeof(FrameParams), sizeof(PairHit), sizeof(BlockRays),
+                                      sizeof(HitRecord), sizeof(PassCounts)};
   ocl::Buffer<uint> sizes(device_, "sizes", expected.size());
   ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_sizes"}({1, 1}, sizes);
   EXPECT_EQ(sizes.read(), expected);
