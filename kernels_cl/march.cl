@@ -185,9 +185,9 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
-/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the frame's screen box,
-/// the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass, next_active_count 0
-/// before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
+/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the frame's screen
+/// box, the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last
+/// pass, next_active_count 0 before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
 /// that far more of its work-items fit a device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
@@ -227,7 +227,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
 /// block they wait at; *next, opened. macrocell_masks: as traverse().
 ///
 /// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so few that a device would
-/// wait for the longest of them, each has eight work-items, one for each block of a round; the first block in which anything
+/// wait for the longest of them, each has more work-items, up to one for each block of a round; the first block in which anything
 /// happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const uint *macrocell_masks, global BlockEntry *table,
@@ -376,7 +376,7 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
 /// Of the rays that wait, active_ray_ids [counts->next_active_count], the first counts->window_count ask for the blocks that
 /// they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of frame->per_ray_speculation. Out:
 /// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over the rays; when these are few, each has
-/// eight work-items, which share its blocks out among them.
+/// more work-items, which share its blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const uint *macrocell_masks, global const BlockEntry *table,
     global PassCounts *counts, global const uint *active_ray_ids, global const uint *ray_block_ids,
