@@ -136,7 +136,7 @@ TEST_P(InvarianceOnDevice, SpeculationNeverNeedsMorePasses) {
 // ---- cache size
 
 /// One dual grid for all rays: the first pass asks for far more, and yet every pass takes the first ray on.
-TEST_P(InvarianceOnDevice, SmallestCacheOfEightSlots) {
+TEST_P(InvarianceOnDevice, CacheOfEightSlots) {
   const TestVolume volume = small_volume();
   const FrameStats ample = check(volume, {.size = kTiny, .max_speculation = 1});
   // A block or a ray's end in every pass (blocks) or every other (rays: what is asked for comes with the next).

@@ -49,7 +49,7 @@ class MemoryPlanOnDevice : public testing::TestWithParam<PipelineOnDevice> {
 INSTANTIATE_TEST_SUITE_P(Devices, MemoryPlanOnDevice, testing::ValuesIn(pipelines_under_test()),
                          pipeline_test_name);
 
-TEST_P(MemoryPlanOnDevice, SmallPlanIsWhatIsBooked) {
+TEST_P(MemoryPlanOnDevice, PlanIsWhatIsBooked) {
   for (const glm::uvec3 dims : {glm::uvec3(9, 10, 11), glm::uvec3(33, 5, 18)}) {
     const TestVolume volume(dims, test::noise_field(3), 8);
     for (const std::uint32_t slots : {0u, 8u, 100u}) {

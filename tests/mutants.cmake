@@ -3,6 +3,8 @@
 
 add_library(mutant_main OBJECT mutant_main.cpp)
 target_link_libraries(mutant_main PRIVATE isowave_reference)
+target_compile_options(mutant_main PRIVATE -w $<$<CONFIG:Release>:-O1>)  # what a bug leaves unused is no matter
+target_precompile_headers(mutant_main PRIVATE <CL/opencl.hpp> <algorithm> <fmt/format.h> <glm/glm.hpp> <thread> <vector>)
 
 # add_mutant(<name> <header> <line as it stands> <line with the bug>)
 function(add_mutant name header from to)
@@ -20,7 +22,10 @@ function(add_mutant name header from to)
   add_executable(mutant_${name} $<TARGET_OBJECTS:mutant_main> ${CMAKE_SOURCE_DIR}/reference/scalar_renderer.cpp)
   target_include_directories(mutant_${name} BEFORE PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name})
   target_link_libraries(mutant_${name} PRIVATE isowave_reference)
-  target_compile_options(mutant_${name} PRIVATE -w)  # what a bug leaves unused is no matter
+  target_compile_options(mutant_${name} PRIVATE $<TARGET_PROPERTY:mutant_main,COMPILE_OPTIONS>)
+  target_precompile_headers(mutant_${name} REUSE_FROM mutant_main)
+  # Or clang-tidy would check scalar_renderer.cpp once more for each.
+  set_target_properties(mutant_${name} PROPERTIES EXPORT_COMPILE_COMMANDS OFF)
   add_test(NAME mutant.${name} COMMAND mutant_${name})
 endfunction()
 
