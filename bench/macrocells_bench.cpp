@@ -62,7 +62,7 @@ struct MacrocellsInput {
 void build_ranges(benchmark::State &state) {
   auto &in = input<MacrocellsInput>(state.range(0), state.range(1));
   const auto blocks = static_cast<double>(in.volume.block_count());
-  const double bytes = blocks * (in.stream.bits_per_block / 8.0 + sizeof(cl_ushort));
+  const double bytes = blocks * (in.stream.layout.bits_per_block / 8.0 + sizeof(cl_ushort));
   measure(
       state, {blocks, bytes}, [] {},
       [&] { const Macrocells built(Session::current().device(), in.params, in.stream); });

@@ -86,7 +86,7 @@ struct DecodeInput {
 
 void decode_blocks(benchmark::State &state, Order order) {
   auto &in = input<DecodeInput>(state.range(0), order);
-  const double block_bytes = in.stream.bits_per_block / 8.0 + ISO_BLOCK_VOXELS * sizeof(float) + 8;
+  const double block_bytes = in.stream.layout.bits_per_block / 8.0 + ISO_BLOCK_VOXELS * sizeof(float) + 8;
   measure(
       state, {kNumDecoded, kNumDecoded * block_bytes}, [] {}, [&] { in.run(); });
 }

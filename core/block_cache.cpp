@@ -17,10 +17,6 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
   return num_slots;
 }
 
-std::uint64_t block_count(const FrameParams &grid) {
-  return std::uint64_t{grid.blocks_x} * grid.blocks_y * grid.blocks_z;
-}
-
 std::size_t request_words(const FrameParams &grid) {
   return 2 * std::size_t{(grid.blocks_x + 3) / 4} * ((grid.blocks_y + 3) / 4) * ((grid.blocks_z + 3) / 4);
 }

@@ -4,9 +4,7 @@
 
 namespace isowave {
 
-namespace {
-constexpr std::uint32_t kGroupSize = 64;
-}
+namespace {}
 
 std::string_view to_string(ClosestHit closest) {
   return closest == ClosestHit::kScan ? "scan" : "atomic-min";
@@ -20,7 +18,7 @@ ClosestHit closest_hit_from_string(std::string_view name) {
 }
 
 Composite::Composite(ocl::Device &device, std::uint64_t num_pixels, ClosestHit closest)
-    : range_(ocl::Range::strided(num_pixels, kGroupSize, device)),
+    : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       kernel_(device, "composite", "composite", closest_defines(closest)) {}
 
 void Composite::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction) {

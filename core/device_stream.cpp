@@ -1,7 +1,7 @@
 #include "core/device_stream.hpp"
 
 #include <algorithm>
-#include <numeric>
+#include <limits>
 
 #include "core/error.hpp"
 #include "core/io/mapped_file.hpp"
@@ -10,7 +10,10 @@ namespace isowave {
 
 namespace {
 
-constexpr std::uint64_t kAhead = 2;  ///< words that a decoder reads past its block at most
+StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_part) {
+  return {volume.bits_per_block, words_per_part, volume.error_bound.min_exponent,
+          volume.error_bound.whole_numbers ? 1u : 0u};
+}
 
 /// Uploads the volume's words from word `first` on.
 void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffer<uint> &part) {
@@ -28,48 +31,50 @@ void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffe
 }  // namespace
 
 StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part) {
-  const std::uint64_t blocks = volume.block_count(), bits = volume.bits_per_block;
-  const std::uint64_t largest_words = largest_part / sizeof(uint);
-  if (volume.word_count() <= largest_words) {
-    return {1, static_cast<std::uint32_t>(blocks), {volume.word_count()}};
-  }
-  // So many blocks are whole words.
-  const std::uint64_t unit = 32 / std::gcd<std::uint64_t>(32, bits);
-  const std::uint64_t per_part =
-      largest_words < kAhead ? 0 : (largest_words - kAhead) * 32 / bits / unit * unit;
-  if (per_part == 0 || (blocks + per_part - 1) / per_part > kMaxStreamParts) return {};
+  const std::uint64_t largest_words = largest_part / sizeof(uint), all = volume.word_count();
+  if (all <= largest_words) return {1, 0, {all}};
+  // A block may begin with the last bit of a part.
+  const std::uint64_t beyond = (volume.max_block_bits() + 30) / 32 + kDecoderAhead;
+  const std::uint64_t begins = all - kDecoderAhead;  // blocks begin in that many words
+  const std::uint64_t per_part = std::min<std::uint64_t>(largest_words - std::min(largest_words, beyond),
+                                                         std::numeric_limits<std::uint32_t>::max());
+  if (per_part == 0 || (begins + per_part - 1) / per_part > kMaxStreamParts) return {};
   StreamSplit split;
-  split.blocks_per_part = static_cast<std::uint32_t>(per_part);
-  for (std::uint64_t first = 0; first < blocks; first += per_part, ++split.num_parts) {
-    split.words.push_back((std::min(per_part, blocks - first) * bits + 31) / 32 + kAhead);
+  split.words_per_part = static_cast<std::uint32_t>(per_part);
+  for (std::uint64_t first = 0; first < begins; first += per_part, ++split.num_parts) {
+    split.words.push_back(std::min(per_part + beyond, all - first));
   }
   return split;
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part)
-    : bits_per_block(volume.bits_per_block) {
+    : indexed_(volume.is_indexed()) {
   const std::uint64_t largest = largest_part != 0 ? largest_part : device.capabilities().largest_allocation;
   const StreamSplit split = split_stream(volume, largest);
   if (split.num_parts == 0) {
     throw Error("the compressed volume of {} bytes does not fit {} buffers of {} bytes on device '{}'",
                 volume.word_count() * sizeof(uint), kMaxStreamParts, largest, device.info().name);
   }
-  blocks_per_part = split.blocks_per_part;
-  std::uint64_t first_bit = 0;
+  layout = layout_of(volume, split.words_per_part);
+  std::uint64_t first = 0;
   for (const std::uint64_t words : split.words) {
     parts.emplace_back(device, "zfp stream", words);
-    write_words(volume, first_bit / 32, parts.back());
-    first_bit += std::uint64_t{blocks_per_part} * bits_per_block;
+    write_words(volume, first, parts.back());
+    first += split.words_per_part;
   }
+  if (indexed_) block_index.emplace(device, "block index", std::span<const uint>(volume.index));
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host)
     : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks)),
-      bits_per_block(volume.bits_per_block) {}
+      layout(layout_of(volume, 0)),
+      indexed_(volume.is_indexed()) {}
 
 ocl::Defines DeviceStream::defines() const {
-  if (parts.size() == 1) return {};  // as kernels are built without a word
-  return {{"ISO_STREAM_PARTS", std::to_string(parts.size())}};
+  ocl::Defines defines;  // none: as kernels are built without a word
+  if (parts.size() != 1) defines.emplace("ISO_STREAM_PARTS", fmt::format("{}", parts.size()));
+  if (indexed_) defines.emplace("ISO_STREAM_INDEXED", "1");
+  return defines;
 }
 
 }  // namespace isowave

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/ocl/kernel.hpp"
@@ -15,12 +16,13 @@ namespace isowave {
 /// OpenCL promises that a buffer may have a quarter of a device's memory.
 inline constexpr std::uint32_t kMaxStreamParts = 4;
 
-/// How a volume's words are cut so that no buffer is too large. No block straddles a cut, which is at a whole word.
+/// How a volume's words are cut so that no buffer is too large.
 struct StreamSplit {
-  std::uint32_t num_parts = 0;        ///< 1..4; 0: more would be needed
-  std::uint32_t blocks_per_part = 0;  ///< the last may have fewer
+  std::uint32_t num_parts = 0;  ///< 1..4; 0: more would be needed
+  std::uint32_t words_per_part =
+      0;  ///< from the beginning of one part to that of the next; 0: there is only one
   std::vector<std::uint64_t>
-      words{};  ///< of each part: the next part's first two are at its end, for decoders that read ahead
+      words{};  ///< of each part: the next part's first are at its end, so that a block which begins in it is whole
 };
 /// largest_part: bytes.
 StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part);
@@ -42,11 +44,16 @@ class DeviceStream {
   ocl::Defines defines() const;
   /// Buffer i of 0..3 of a whole stream; where there are fewer, the first.
   const ocl::Buffer<uint> &part(std::size_t i) const { return parts[i < parts.size() ? i : 0]; }
+  /// Where the blocks of a whole stream begin (block_index.h); at a fixed rate any buffer, since nobody looks into it.
+  const ocl::Buffer<uint> &index() const { return block_index ? *block_index : parts[0]; }
 
-  std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none where the volume stays on the host
-  std::unique_ptr<StreamWindow> window;  ///< where the volume stays on the host
-  std::uint32_t blocks_per_part = 0;
-  std::uint32_t bits_per_block;  ///< 9..2048
+  std::vector<ocl::Buffer<uint>> parts;          ///< 1..4; none where the volume stays on the host
+  std::optional<ocl::Buffer<uint>> block_index;  ///< of a volume whose blocks have lengths of their own
+  std::unique_ptr<StreamWindow> window;          ///< where the volume stays on the host
+  StreamLayout layout;
+
+ private:
+  bool indexed_;
 };
 
 }  // namespace isowave

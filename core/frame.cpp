@@ -22,6 +22,18 @@ double largest_component(const glm::dvec3 &v) {
 
 }  // namespace
 
+FrameParams make_grid_params(const VolumeInfo &info) {
+  FrameParams frame{};
+  const glm::uvec3 dims = info.dims, blocks = (dims + 3u) / 4u;
+  frame.dims_x = dims.x;
+  frame.dims_y = dims.y;
+  frame.dims_z = dims.z;
+  frame.blocks_x = blocks.x;
+  frame.blocks_y = blocks.y;
+  frame.blocks_z = blocks.z;
+  return frame;
+}
+
 void check_image_size(ImageSize size) {
   constexpr std::uint64_t kMaxPixels = 1u << 28;
   if (size.num_pixels() == 0 || size.num_pixels() > kMaxPixels) {

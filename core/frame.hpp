@@ -23,6 +23,13 @@ inline std::uint32_t num_owning_blocks(std::uint32_t dim) {
   return (dim + 2) / 4;
 }
 
+inline std::uint64_t block_count(const FrameParams &grid) {
+  return std::uint64_t{grid.blocks_x} * grid.blocks_y * grid.blocks_z;
+}
+
+/// Of the grid only, for what is done before there is a camera.
+FrameParams make_grid_params(const VolumeInfo &info);
+
 /// Sets the frame's screen box: a rectangle of the pixels whose rays, as make_ray() rounds them, may meet its active box.
 void set_screen_box(FrameParams &frame);
 

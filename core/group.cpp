@@ -10,7 +10,6 @@ namespace isowave {
 namespace {
 
 /// Work-items per group of the kernels that take any number.
-constexpr std::uint32_t kGroupSize = 64;
 
 /// Distinct blocks that a pass's pairs can belong to.
 std::uint64_t max_visible(std::uint64_t num_pixels, std::uint32_t num_slots) {
@@ -86,7 +85,7 @@ Group::ByCounting::ByCounting(ocl::Device &device, std::uint64_t num_pixels, std
                               std::uint32_t group_size, ClosestHit closest)
     : pair_tiles_range(tiles_range(num_pixels, group_size, ISO_GROUP_ITEMS, device)),
       candidates_range(ocl::Range::strided(max_visible(num_pixels, num_slots), group_size, device)),
-      pairs_range(ocl::Range::strided(num_pixels, kGroupSize, device, 2)),
+      pairs_range(ocl::Range::strided(num_pixels, ocl::kGroupSize, device, 2)),
       slot_counts(device, "pairs by slot", num_slots),
       slot_offsets(device, "pair offsets by slot", num_slots),
       candidate_count(device, "group candidates", 1),

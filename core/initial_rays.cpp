@@ -4,12 +4,10 @@
 
 namespace isowave {
 
-namespace {
-constexpr std::uint32_t kGroupSize = 64;
-}
+namespace {}
 
 InitialRays::InitialRays(ocl::Device &device, std::uint64_t num_pixels)
-    : range_(ocl::Range::strided(num_pixels, kGroupSize, device)),
+    : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       kernel_(device, "initial_rays", "initial_rays") {}
 
 void InitialRays::operator()(Wavefront &rays, Compaction &compaction) {

@@ -14,11 +14,6 @@ namespace {
 
 constexpr std::uint32_t kNumThresholds = 256;
 constexpr std::uint32_t kMaxSamples = 1u << 14;  ///< blocks decoded for the quantile table
-constexpr std::uint32_t kGroupSize = 64;
-
-std::uint32_t block_count(const FrameParams &f) {
-  return f.blocks_x * f.blocks_y * f.blocks_z;
-}
 
 /// One block in so many is decoded for the quantile table.
 std::uint64_t sample_stride(std::uint64_t num_blocks) {
@@ -36,7 +31,7 @@ std::uint32_t coarse_count(const FrameParams &f) {
 
 Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream)
     : num_coarse_(coarse_count(frame)),
-      coarse_range_(ocl::Range::strided(num_coarse_, kGroupSize, device)),
+      coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
       ranges_(device, "block ranges", block_count(frame)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
       masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
@@ -44,7 +39,7 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
   const auto stage = device.timer().stage("macrocells");
   Partials decode{device, frame, stream, {device, "macrocells", "macrocell_partials", stream.defines()}};
-  thresholds_ = sample_thresholds(device, block_count(frame), decode);
+  thresholds_ = sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame)), decode);
 
   ocl::Kernel<FrameParams, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
               ocl::Out<cl_ushort>>
@@ -55,7 +50,7 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
   const std::uint32_t layer_blocks = frame.blocks_x * frame.blocks_y;
   ocl::Buffer<ValueRange> below(device, "range partials, layer below", 8 * std::size_t{layer_blocks});
   ocl::Buffer<ValueRange> above(device, "range partials, layer above", 8 * std::size_t{layer_blocks});
-  const ocl::Range layer_range = ocl::Range::strided(layer_blocks, kGroupSize, device);
+  const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
 
   decode(0, 1, layer_blocks, below);
   for (std::uint32_t layer = 0; layer < frame.blocks_z; ++layer) {
@@ -78,17 +73,16 @@ std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
 void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
                                       ocl::Buffer<ValueRange> &partials) {
   if (!stream.window) {
-    kernel(ocl::Range::strided(count, kGroupSize, device), frame, stream.part(0), stream.part(1),
-           stream.part(2), stream.part(3), stream.blocks_per_part, stream.bits_per_block, first, stride,
-           count, 0, partials);
+    kernel(ocl::Range::strided(count, ocl::kGroupSize, device), frame, stream.part(0), stream.part(1),
+           stream.part(2), stream.part(3), stream.index(), stream.layout, first, stride, count, 0, partials);
     return;
   }
   std::vector<uint> block_ids(count);
   for (std::uint32_t i = 0; i < count; ++i) block_ids[i] = sampled_block(first + i * stride, stride);
   stream.window->bring(
       block_ids, [&](const ocl::Buffer<uint> &words, std::uint32_t run_first, std::uint32_t run_count) {
-        kernel(ocl::Range::strided(run_count, kGroupSize, device), frame, words, words, words, words, 0,
-               stream.bits_per_block, first + run_first * stride, stride, run_count, run_first, partials);
+        kernel(ocl::Range::strided(run_count, ocl::kGroupSize, device), frame, words, words, words, words,
+               words, stream.layout, first + run_first * stride, stride, run_count, run_first, partials);
       });
 }
 

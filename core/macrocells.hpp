@@ -40,8 +40,9 @@ class Macrocells {
   struct ValueRange {
     float min, max;
   };
-  using PartialsKernel = ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-                                     uint, uint, uint, uint, uint, uint, ocl::Out<ValueRange>>;
+  using PartialsKernel =
+      ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+                  StreamLayout, uint, uint, uint, uint, ocl::Out<ValueRange>>;
   /// Decodes blocks sampled_block(first + i * stride, stride), i in [0, count): partials [8 * count].
   struct Partials {
     void operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,

@@ -27,7 +27,7 @@ constexpr std::uint64_t kPixelsPerUsefulSlot = 8;
 std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequest &request,
                                 std::uint32_t cache_slots) {
   if (request.window_blocks != 0) return request.window_blocks;
-  const std::uint64_t block_bytes = sizeof(uint) * StreamWindow::words_per_block(volume.bits_per_block);
+  const std::uint64_t block_bytes = sizeof(uint) * StreamWindow::words_per_block(volume);
   const std::uint64_t wanted =
       std::min<std::uint64_t>({kWindowBytes / block_bytes, volume.block_count(), cache_slots / 4});
   return static_cast<std::uint32_t>(std::max<std::uint64_t>(wanted, kMinCacheSlots));
@@ -36,8 +36,7 @@ std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequ
 void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
   if (plan.stream == StreamPlace::kHost) {
     plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
-    const std::uint64_t bytes =
-        sizeof(uint) * StreamWindow::half_words(volume.bits_per_block, plan.window_blocks);
+    const std::uint64_t bytes = sizeof(uint) * StreamWindow::half_words(volume, plan.window_blocks);
     for (const char *name : {"stream window", "stream window", "stream staging", "stream staging"}) {
       plan.buffers.push_back({name, bytes});
     }
@@ -54,6 +53,10 @@ void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRe
   for (const std::uint64_t words : split.words) {
     plan.buffers.push_back({"zfp stream", words * sizeof(uint)});
     plan.stream_bytes += words * sizeof(uint);
+  }
+  if (volume.is_indexed()) {
+    plan.buffers.push_back({"block index", sizeof(uint) * block_index_words(volume.block_count())});
+    plan.stream_bytes += plan.buffers.back().bytes;
   }
 }
 

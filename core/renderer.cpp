@@ -71,22 +71,9 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
   return plan_within(device, volume, request, budget, static_cast<std::uint32_t>(std::min(all, most)));
 }
 
-/// Grid constants for the work that is done before there is a camera.
-FrameParams grid_params(const CompressedVolume &volume) {
-  FrameParams frame{};
-  const glm::uvec3 blocks = volume.num_blocks();
-  frame.dims_x = volume.info.dims.x;
-  frame.dims_y = volume.info.dims.y;
-  frame.dims_z = volume.info.dims.z;
-  frame.blocks_x = blocks.x;
-  frame.blocks_y = blocks.y;
-  frame.blocks_z = blocks.z;
-  return frame;
-}
-
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
                       const MemoryPlan &plan) {
-  const FrameParams grid = grid_params(volume);
+  const FrameParams grid = make_grid_params(volume.info);
   DeviceStream stream = plan.stream == StreamPlace::kHost
                             ? DeviceStream(device, volume, OnHost{plan.window_blocks})
                             : DeviceStream(device, volume, options.largest_stream_part);
@@ -123,6 +110,7 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
   const StreamWindow *window = state_.stream.window.get();
   const std::uint64_t uploaded_before = window ? window->uploaded_blocks() : 0;
+  const std::uint64_t uploaded_bytes_before = window ? window->uploaded_bytes() : 0;
   FrameStats stats;
   StallGuard guard(info_.dims);
   readback_.drain();  // of what the frame before had enqueued beyond its last pass
@@ -143,8 +131,7 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   if (!stats.cancelled) pipeline_->end_frame();
   if (window) {
     stats.uploaded_blocks = window->uploaded_blocks() - uploaded_before;
-    stats.uploaded_bytes =
-        stats.uploaded_blocks * sizeof(uint) * StreamWindow::words_per_block(state_.stream.bits_per_block);
+    stats.uploaded_bytes = window->uploaded_bytes() - uploaded_bytes_before;
   }
   stats.total_ms = ms_since(begin);
   return stats;

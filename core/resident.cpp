@@ -9,27 +9,13 @@ namespace isowave {
 
 namespace {
 
-constexpr std::uint32_t kGroupSize = 64;
 constexpr std::uint32_t kTilePixels = 32;             ///< of tiled_pixel(): 8 x 4
 constexpr std::uint32_t kBlocksPerLaunch = 1u << 22;  ///< some milliseconds: watchdogs end long launches
 
 ocl::Defines resident_defines(Solver solver) {
-  ocl::Defines defines = group_defines(kGroupSize);
+  ocl::Defines defines = group_defines(ocl::kGroupSize);
   defines.merge(solver_defines(solver));
   return defines;
-}
-
-/// Grid constants for the work that is done before there is a camera.
-FrameParams grid_params(const CompressedVolume &volume) {
-  FrameParams frame{};
-  const glm::uvec3 dims = volume.info.dims, blocks = volume.num_blocks();
-  frame.dims_x = dims.x;
-  frame.dims_y = dims.y;
-  frame.dims_z = dims.z;
-  frame.blocks_x = blocks.x;
-  frame.blocks_y = blocks.y;
-  frame.blocks_z = blocks.z;
-  return frame;
 }
 
 }  // namespace
@@ -43,7 +29,7 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       info_(volume.info),
       size_(size),
       num_blocks_(static_cast<std::uint32_t>(volume.block_count())),
-      macrocells_(device, grid_params(volume), stream),
+      macrocells_(device, make_grid_params(volume.info), stream),
       values_(device, "decoded volume", volume.block_count() * ISO_BLOCK_VOXELS),
       inside_(device, "voxels inside", volume.block_count()),
       changing_(device, "changing cells", volume.block_count()),
@@ -53,13 +39,13 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       kernel_(device, "resident", "resident", resident_defines(solver)) {
   ocl::Defines decode_defines = resident_defines(solver);
   decode_defines.merge(stream.defines());
-  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, uint, uint, uint, uint,
-              ocl::Out<float>>
+  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, StreamLayout, uint,
+              uint, ocl::Out<float>>
       decode(device, "resident", "resident_decode", decode_defines);
   for (std::uint32_t first = 0; first < num_blocks_; first += kBlocksPerLaunch) {
     const std::uint32_t count = std::min(kBlocksPerLaunch, num_blocks_ - first);
-    decode(ocl::Range::strided(count, kGroupSize, device), stream.part(0), stream.part(1), stream.part(2),
-           stream.part(3), stream.blocks_per_part, stream.bits_per_block, first, count, values_);
+    decode(ocl::Range::strided(count, ocl::kGroupSize, device), stream.part(0), stream.part(1),
+           stream.part(2), stream.part(3), stream.index(), stream.layout, first, count, values_);
   }
   device.finish();
 }
@@ -90,7 +76,7 @@ double Resident::render(const Camera &camera, float isovalue) {
   FrameParams frame = make_frame_params(info_, camera, size_, isovalue);
   if (selected_isovalue_ != isovalue) {
     macrocells_.select(frame);
-    const ocl::Range blocks = ocl::Range::strided(num_blocks_, kGroupSize, device_);
+    const ocl::Range blocks = ocl::Range::strided(num_blocks_, ocl::kGroupSize, device_);
     inside_kernel_(blocks, frame, num_blocks_, values_, inside_);
     changing_kernel_(blocks, frame, num_blocks_, inside_, changing_);
   }
@@ -98,7 +84,7 @@ double Resident::render(const Camera &camera, float isovalue) {
   selected_isovalue_ = isovalue;
   const std::size_t tiles = std::size_t{(size_.width + 7) / 8} * ((size_.height + 3) / 4);
   // One work-item per pixel: rays differ too much in length for strides over them to keep a device busy.
-  kernel_(ocl::Range::covering(tiles * kTilePixels, kGroupSize), frame, macrocells_.masks(), values_,
+  kernel_(ocl::Range::covering(tiles * kTilePixels, ocl::kGroupSize), frame, macrocells_.masks(), values_,
           changing_, hits_);
   device_.finish();
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();

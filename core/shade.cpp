@@ -7,8 +7,6 @@ namespace isowave {
 
 namespace {
 
-constexpr std::uint32_t kGroupSize = 64;
-
 /// GLM's columns -> rows, scaled so that the largest entry is 1: only directions count.
 void store_rows(const glm::dmat3 &m, float *rows) {
   double largest = 0.0;
@@ -60,7 +58,7 @@ Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const s
 }
 
 Shade::Shade(ocl::Device &device, std::uint64_t num_pixels)
-    : range_(ocl::Range::strided(num_pixels, kGroupSize, device)),
+    : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       params_(device, "shading", 1),
       image_(device, "framebuffer", num_pixels),
       kernel_(device, "shade", "shade") {}

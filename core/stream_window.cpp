@@ -51,12 +51,12 @@ StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume, 
     : device_(device),
       volume_(volume),
       window_blocks_(window_blocks),
-      halves_{Half{{device, "stream window", half_words(volume.bits_per_block, window_blocks)},
-                   {device, "stream staging", half_words(volume.bits_per_block, window_blocks)},
+      halves_{Half{{device, "stream window", half_words(volume, window_blocks)},
+                   {device, "stream staging", half_words(volume, window_blocks)},
                    {},
                    {}},
-              Half{{device, "stream window", half_words(volume.bits_per_block, window_blocks)},
-                   {device, "stream staging", half_words(volume.bits_per_block, window_blocks)},
+              Half{{device, "stream window", half_words(volume, window_blocks)},
+                   {device, "stream staging", half_words(volume, window_blocks)},
                    {},
                    {}}} {}
 
@@ -67,35 +67,71 @@ StreamWindow::~StreamWindow() {
   }
 }
 
-void StreamWindow::gather(std::span<const uint> block_ids, std::span<uint> words) const {
+std::uint64_t StreamWindow::words_per_block(const CompressedVolume &volume) {
+  if (!volume.is_indexed()) return (volume.bits_per_block + 31) / 32;
+  return volume.payload_bits() / 32 / volume.block_count() + 1;
+}
+
+std::uint64_t StreamWindow::half_words(const CompressedVolume &volume, std::uint64_t window_blocks) {
+  const std::uint64_t words = window_blocks * words_per_block(volume) + kDecoderAhead;
+  if (!volume.is_indexed()) return words;
+  return std::max<std::uint64_t>(words, (volume.max_block_bits() + 31) / 32 + kDecoderAhead) + window_blocks +
+         1;
+}
+
+std::size_t StreamWindow::run_length(std::span<const uint> block_ids) const {
+  const std::size_t most = std::min<std::size_t>(window_blocks_, block_ids.size());
+  if (!volume_.is_indexed()) return most;
+  std::size_t count = 0;
+  std::uint64_t left = halves_[0].words.size() - kDecoderAhead - window_blocks_ - 1;
+  for (; count < most; ++count) {
+    const std::uint64_t words = (volume_.block_bits(block_ids[count]) + 31) / 32;
+    if (words > left) break;
+    left -= words;
+  }
+  return count;
+}
+
+std::span<uint> StreamWindow::gather(std::span<const uint> block_ids, Half &half) const {
   if (volume_.file) volume_.file->check();
-  const std::size_t block_words = words_per_block(volume_.bits_per_block);
-  parallel_for((block_ids.size() + kGatherBlocks - 1) / kGatherBlocks, 0,
-               [&](std::uint64_t part, std::uint32_t) {
-                 const std::size_t begin = part * kGatherBlocks;
-                 const std::size_t end = std::min(begin + kGatherBlocks, block_ids.size());
-                 for (std::size_t i = begin; i < end; ++i) {
-                   volume_.read_words(std::uint64_t{block_ids[i]} * volume_.bits_per_block,
-                                      words.subspan(i * block_words, block_words));
-                 }
-               });
+  const std::span<uint> words = half.staging.words();
+  const std::size_t count = block_ids.size(), each = words_per_block(volume_);
+  std::size_t end = count * each;
+  if (volume_.is_indexed()) {
+    end = count + 1;
+    for (std::size_t i = 0; i < count; ++i) {
+      words[i] = static_cast<uint>(end);
+      end += (volume_.block_bits(block_ids[i]) + 31) / 32;
+    }
+    words[count] = static_cast<uint>(end);
+  }
+  parallel_for((count + kGatherBlocks - 1) / kGatherBlocks, 0, [&](std::uint64_t part, std::uint32_t) {
+    const std::size_t first = part * kGatherBlocks;
+    for (std::size_t i = first; i < std::min(first + kGatherBlocks, count); ++i) {
+      const std::size_t begin = volume_.is_indexed() ? words[i] : i * each;
+      const std::size_t num_words = volume_.is_indexed() ? words[i + 1] - begin : each;
+      volume_.read_words(volume_.block_begin(block_ids[i]), words.subspan(begin, num_words));
+    }
+  });
+  return words.first(end + kDecoderAhead);
 }
 
 void StreamWindow::bring(std::span<const uint> block_ids, const Use &use) {
-  for (std::size_t first = 0; first < block_ids.size(); first += window_blocks_) {
-    const std::size_t count = std::min<std::size_t>(window_blocks_, block_ids.size() - first);
+  for (std::size_t first = 0; first < block_ids.size();) {
+    const std::size_t count = run_length(block_ids.subspan(first));
     Half &half = halves_[next_half_++ % halves_.size()];
     wait(half.uploaded);
-    const std::span<uint> words = half.staging.words().first(half_words(volume_.bits_per_block, count));
-    gather(block_ids.subspan(first, count), words);
+    const std::span<uint> words = gather(block_ids.subspan(first, count), half);
     {
       const auto stage = device_.timer().stage("upload");
-      half.words.upload(words, half.used, half.uploaded);  // with what decoders read past the last block
+      half.words.upload(words, half.used, half.uploaded);
     }
     hold_back(device_, half.uploaded);
     use(half.words, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count));
     half.used = mark(device_);
     uploaded_blocks_ += count;
+    uploaded_bytes_ += (words.size() - kDecoderAhead) * sizeof(uint);
+    first += count;
   }
 }
 

@@ -23,12 +23,11 @@ class StreamWindow {
   StreamWindow(const StreamWindow &) = delete;
   StreamWindow &operator=(const StreamWindow &) = delete;
 
-  /// Words of one block in the window: it begins with a whole word.
-  static std::uint32_t words_per_block(std::uint32_t bits_per_block) { return (bits_per_block + 31) / 32; }
-  /// Words of one half and of its staging memory. Decoders read two words past their block.
-  static std::uint64_t half_words(std::uint32_t bits_per_block, std::uint64_t window_blocks) {
-    return window_blocks * words_per_block(bits_per_block) + 2;
-  }
+  /// Words of one block in the window, where each begins with a whole word: of every block at a fixed rate, otherwise of most.
+  static std::uint64_t words_per_block(const CompressedVolume &volume);
+  /// Words of one half and of its staging memory: blocks, before them where each begins unless all are alike, and behind them
+  /// two words that decoders read past their block.
+  static std::uint64_t half_words(const CompressedVolume &volume, std::uint64_t window_blocks);
 
   /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in `words`.
   using Use = std::function<void(const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count)>;
@@ -40,6 +39,7 @@ class StreamWindow {
   std::span<const uint> read_granted(const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids);
 
   std::uint64_t uploaded_blocks() const { return uploaded_blocks_; }  ///< since it was made
+  std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }    ///< since it was made
 
  private:
   struct Half {
@@ -49,14 +49,17 @@ class StreamWindow {
     cl::Event used;      ///< words may be overwritten
   };
 
-  void gather(std::span<const uint> block_ids, std::span<uint> words) const;
+  /// Of block_ids, how many of the first fit one half; at least one.
+  std::size_t run_length(std::span<const uint> block_ids) const;
+  /// Fills `half` with these blocks; returns the words that are to be uploaded.
+  std::span<uint> gather(std::span<const uint> block_ids, Half &half) const;
 
   ocl::Device &device_;
   const CompressedVolume &volume_;
   std::uint32_t window_blocks_;
   std::array<Half, 2> halves_;
   std::size_t next_half_ = 0;
-  std::uint64_t uploaded_blocks_ = 0;
+  std::uint64_t uploaded_blocks_ = 0, uploaded_bytes_ = 0;
   PassCounts counts_{};        ///< read_granted() reads them here,
   std::vector<uint> granted_;  ///< and the list here
 };

@@ -19,17 +19,17 @@ struct TypeEntry {
   std::string_view name;
   std::size_t size;
 };
-constexpr std::array<TypeEntry, 8> kTypes{{{VoxelType::kUint8, "uint8", 1},
-                                           {VoxelType::kInt8, "int8", 1},
-                                           {VoxelType::kUint16, "uint16", 2},
-                                           {VoxelType::kInt16, "int16", 2},
-                                           {VoxelType::kUint32, "uint32", 4},
-                                           {VoxelType::kInt32, "int32", 4},
-                                           {VoxelType::kFloat32, "float32", 4},
-                                           {VoxelType::kFloat64, "float64", 8}}};
+constexpr std::array<TypeEntry, 8> kVoxelTypes{{{VoxelType::kUint8, "uint8", 1},
+                                                {VoxelType::kInt8, "int8", 1},
+                                                {VoxelType::kUint16, "uint16", 2},
+                                                {VoxelType::kInt16, "int16", 2},
+                                                {VoxelType::kUint32, "uint32", 4},
+                                                {VoxelType::kInt32, "int32", 4},
+                                                {VoxelType::kFloat32, "float32", 4},
+                                                {VoxelType::kFloat64, "float64", 8}}};
 
 const TypeEntry &entry(VoxelType type) {
-  return kTypes.at(std::size_t(type));
+  return kVoxelTypes.at(std::size_t(type));
 }
 
 }  // namespace
@@ -45,7 +45,7 @@ bool is_integer(VoxelType type) {
 }
 
 VoxelType voxel_type_from_string(std::string_view name) {
-  for (const TypeEntry &candidate : kTypes) {
+  for (const TypeEntry &candidate : kVoxelTypes) {
     if (candidate.name == name) return candidate.type;
   }
   throw Error("unknown voxel type '{}': use uint8, int8, uint16, int16, uint32, int32, float32 or float64",

@@ -7,10 +7,8 @@ namespace isowave {
 
 namespace {
 
-constexpr std::uint32_t kGroupSize = 64;
-
 ocl::Defines all_defines(ocl::Defines stream_defines) {
-  stream_defines.merge(group_defines(kGroupSize));
+  stream_defines.merge(group_defines(ocl::kGroupSize));
   return stream_defines;
 }
 
@@ -19,7 +17,7 @@ ocl::Defines all_defines(ocl::Defines stream_defines) {
 ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines)
     : device_(device),
       stream_defines_(stream_defines),
-      range_(ocl::Range::strided(max_blocks, kGroupSize, device)),
+      range_(ocl::Range::strided(max_blocks, ocl::kGroupSize, device)),
       kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines)) {}
 
 void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
@@ -29,15 +27,14 @@ void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame,
     throw std::invalid_argument("ZfpDecode was built for a stream in another number of parts");
   }
   if (!stream.window) {
-    kernel_(range_, frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3),
-            stream.blocks_per_part, stream.bits_per_block, 0, std::numeric_limits<uint>::max(), counts,
-            block_ids, slots, values, inside);
+    kernel_(range_, frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3), stream.index(),
+            stream.layout, 0, std::numeric_limits<uint>::max(), counts, block_ids, slots, values, inside);
     return;
   }
   stream.window->bring(stream.window->read_granted(counts, block_ids),
                        [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
-                         kernel_(ocl::Range::strided(count, kGroupSize, device_), frame, words, words, words,
-                                 words, 0, stream.bits_per_block, first, first + count, counts, block_ids,
+                         kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), frame, words, words,
+                                 words, words, words, stream.layout, first, first + count, counts, block_ids,
                                  slots, values, inside);
                        });
 }

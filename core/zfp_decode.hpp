@@ -29,8 +29,9 @@ class ZfpDecode {
   ocl::Device &device_;
   ocl::Defines stream_defines_;
   ocl::Range range_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, uint, uint, uint, uint,
-              ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>, ocl::Out<ulong>>
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              StreamLayout, uint, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>,
+              ocl::Out<ulong>>
       kernel_;
 };
 

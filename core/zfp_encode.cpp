@@ -10,7 +10,6 @@ namespace isowave {
 
 namespace {
 
-constexpr std::uint32_t kGroupSize = 64;
 constexpr std::uint32_t kBlock = 4;  // voxels along a block's edge
 
 std::uint64_t block_count(const glm::uvec3 &dims) {
@@ -59,7 +58,7 @@ void ZfpEncode::operator()(const ocl::Buffer<float> &voxels, const glm::uvec3 &d
                            std::uint32_t bits_per_block, ocl::Buffer<uint> &words) {
   const std::uint64_t num_blocks = block_count(dims);
   check_sizes(voxels.size(), dims, bits_per_block, num_blocks * (bits_per_block / 32), words.size());
-  encode_(ocl::Range::strided(num_blocks, kGroupSize, device_), voxels, dims.x, dims.y, dims.z,
+  encode_(ocl::Range::strided(num_blocks, ocl::kGroupSize, device_), voxels, dims.x, dims.y, dims.z,
           bits_per_block, words);
 }
 
@@ -71,7 +70,7 @@ void ZfpEncode::measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec
   if (errors.size() < 2 * num_blocks)
     throw std::invalid_argument(
         fmt::format("ZfpEncode: {} errors do not fit two for each of {} blocks", errors.size(), num_blocks));
-  measure_(ocl::Range::strided(num_blocks, kGroupSize, device_), voxels, dims.x, dims.y, dims.z,
+  measure_(ocl::Range::strided(num_blocks, ocl::kGroupSize, device_), voxels, dims.x, dims.y, dims.z,
            bits_per_block, words, errors);
 }
 

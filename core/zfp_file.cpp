@@ -16,6 +16,7 @@
 #include "core/error.hpp"
 #include "core/io/mapped_file.hpp"
 #include "core/libzfp.hpp"
+#include "core/zfp_accuracy.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;
@@ -23,7 +24,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2;
 constexpr std::array<char, 8> kMagic{'I', 'S', 'O', 'W', 'A', 'V', 'E', '\n'};
 constexpr std::uint64_t kMaxJsonBytes = 1u << 20;
 constexpr std::uint32_t kMinBlockBits = 9;  // "not empty" and the exponent; libzfp reads them at any rate
@@ -36,6 +37,7 @@ struct Footer {
 static_assert(sizeof(Footer) == 24);
 
 std::uint32_t update_crc(std::uint32_t crc, std::span<const std::byte> bytes) {
+  if (bytes.empty()) return crc;  // zlib takes a null pointer for the wish to begin
   return std::uint32_t(::crc32_z(crc, reinterpret_cast<const Bytef *>(bytes.data()), bytes.size()));
 }
 
@@ -44,7 +46,7 @@ std::uint32_t json_crc(std::string_view text, const Footer &footer) {
   return update_crc(update_crc(0, std::as_bytes(std::span(text))), std::as_bytes(std::span(numbers)));
 }
 
-json to_json(const CompressedVolume &volume) {
+json to_json(const CompressedVolume &volume, std::uint64_t index_bytes) {
   const VolumeInfo &info = volume.info;
   json trailer;
   trailer["spacing"] = {info.spacing.x, info.spacing.y, info.spacing.z};
@@ -56,6 +58,11 @@ json to_json(const CompressedVolume &volume) {
   trailer["type"] = to_string(info.type);
   if (std::isfinite(volume.value_range[0])) trailer["value_range"] = volume.value_range;
   if (volume.max_error) trailer["max_error"] = *volume.max_error;
+  if (volume.is_indexed()) {
+    trailer["payload_bits"] = volume.indexed_bits;
+    trailer["index_bytes"] = index_bytes;
+    trailer["whole_numbers"] = volume.error_bound.whole_numbers;
+  }
   return trailer;
 }
 
@@ -64,7 +71,8 @@ glm::dvec3 vector_from(const json &value) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
-void apply_json(const std::string &text, CompressedVolume &volume) {
+/// Returns how many bytes the index has.
+std::uint64_t apply_json(const std::string &text, CompressedVolume &volume) {
   const json trailer = json::parse(text);
   volume.info.spacing = vector_from(trailer.at("spacing"));
   volume.info.origin = vector_from(trailer.at("origin"));
@@ -75,6 +83,59 @@ void apply_json(const std::string &text, CompressedVolume &volume) {
   if (trailer.contains("value_range"))
     volume.value_range = trailer["value_range"].get<std::array<float, 2>>();
   if (trailer.contains("max_error")) volume.max_error = trailer["max_error"].get<double>();
+  if (!volume.is_indexed()) return 0;
+  volume.indexed_bits = trailer.at("payload_bits").get<std::uint64_t>();
+  volume.error_bound.whole_numbers = trailer.at("whole_numbers").get<bool>();
+  volume.error_bound.max_error = volume.max_error;
+  return trailer.at("index_bytes").get<std::uint64_t>();
+}
+
+/// zlib's stream, closed whatever happens.
+struct Inflater : z_stream {
+  Inflater() : z_stream{} {
+    if (::inflateInit(this) != Z_OK) throw std::bad_alloc();
+  }
+  ~Inflater() { ::inflateEnd(this); }
+  Inflater(const Inflater &) = delete;
+  Inflater &operator=(const Inflater &) = delete;
+};
+struct Deflater : z_stream {
+  Deflater() : z_stream{} {
+    if (::deflateInit(this, Z_DEFAULT_COMPRESSION) != Z_OK) throw std::bad_alloc();
+  }
+  ~Deflater() { ::deflateEnd(this); }
+  Deflater(const Deflater &) = delete;
+  Deflater &operator=(const Deflater &) = delete;
+};
+
+constexpr std::size_t kLengthsAtOnce = 1u << 15;
+
+/// The index of so many blocks from their deflated lengths, or nothing where they are not that.
+std::vector<std::uint32_t> inflate_index(std::span<const std::byte> deflated, std::uint64_t num_blocks) {
+  Inflater inflater;
+  inflater.next_in = const_cast<Bytef *>(reinterpret_cast<const Bytef *>(deflated.data()));
+  std::uint64_t in_left = deflated.size();
+  std::vector<std::uint16_t> lengths(kLengthsAtOnce);
+  BlockIndexBuilder index;
+  for (std::uint64_t done = 0; done < num_blocks;) {
+    const std::uint64_t count = std::min<std::uint64_t>(kLengthsAtOnce, num_blocks - done);
+    inflater.next_out = reinterpret_cast<Bytef *>(lengths.data());
+    inflater.avail_out = static_cast<uInt>(count * sizeof(std::uint16_t));
+    while (inflater.avail_out > 0) {
+      if (inflater.avail_in == 0) {
+        inflater.avail_in = static_cast<uInt>(std::min<std::uint64_t>(in_left, 1u << 30));
+        in_left -= inflater.avail_in;
+      }
+      const int status = ::inflate(&inflater, Z_NO_FLUSH);
+      if (status != Z_OK && inflater.avail_out > 0) return {};
+    }
+    for (std::uint64_t i = 0; i < count; ++i) {
+      if (lengths[i] < 1 || lengths[i] > ISO_MAX_BLOCK_BITS) return {};
+      index.add(lengths[i]);
+    }
+    done += count;
+  }
+  return index.finish();
 }
 
 /// A `.zfp` file being read: the checks in the order in which the file is trusted.
@@ -94,11 +155,12 @@ class ZfpFileReader {
   CompressedVolume take_info() { return std::move(volume_); }
 
   CompressedVolume take_mapped() {
-    volume_.file = std::make_shared<MappedFile>(path_, stream_bytes_);
+    volume_.file = std::make_shared<MappedFile>(path_, stream_bytes_ + index_bytes_);
     volume_.file_first_bit = header_bits_;
     if (has_trailer_ && update_crc(0, volume_.file->bytes()) != stream_crc_) {
       throw Error("{}: damaged: the checksum of its stream does not match", path_.string());
     }
+    if (volume_.is_indexed()) read_index();
     return std::move(volume_);
   }
 
@@ -108,6 +170,26 @@ class ZfpFileReader {
         std::fread(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) {
       throw Error("{}: cannot read {} bytes at {}", path_.string(), bytes.size(), offset);
     }
+  }
+
+  /// A file of zfp's own tool has no index: its blocks must be decoded to know where they are.
+  void read_index() {
+    if (!has_trailer_) {
+      volume_.index = index_by_decoding(volume_, path_.string());
+      const std::uint64_t bits = volume_.block_begin(static_cast<std::uint32_t>(volume_.block_count()));
+      const std::uint64_t used = (header_bits_ + bits + 63) / 64 * 8;
+      if (file_size_ > used) {
+        throw Error("{}: damaged: {} unknown bytes after the zfp stream", path_.string(), file_size_ - used);
+      }
+    } else {
+      volume_.index = inflate_index(volume_.file->bytes().subspan(stream_bytes_), volume_.block_count());
+    }
+    const auto num_blocks = static_cast<std::uint32_t>(volume_.block_count());
+    const std::uint64_t end = volume_.index.empty() ? 0 : volume_.block_begin(num_blocks);
+    if (end == 0 || (has_trailer_ && end != volume_.indexed_bits)) {
+      throw Error("{}: damaged: the lengths of its blocks are not those of its stream", path_.string());
+    }
+    volume_.indexed_bits = end;
   }
 
   void read_header() {
@@ -125,9 +207,20 @@ class ZfpFileReader {
     check_kind(*stream, *field);
     volume_.info.dims = glm::uvec3(field->nx, field->ny, field->nz);
     volume_.info.type = VoxelType::kFloat32;
-    volume_.bits_per_block = stream->maxbits;
+    const bool fixed_rate = zfp_stream_compression_mode(stream.get()) == zfp_mode_fixed_rate;
+    volume_.bits_per_block = fixed_rate ? stream->maxbits : 0;
+    if (!fixed_rate) volume_.error_bound.min_exponent = stream->minexp;
     volume_.value_range = {-std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity()};
 
+    if (!fixed_rate) {  // how long the stream is, a trailer tells, or else the file
+      if (volume_.block_count() >= std::numeric_limits<std::uint32_t>::max()) {
+        throw Error("{}: {}x{}x{} voxels: too many for blocks of lengths of their own", path_.string(),
+                    field->nx, field->ny, field->nz);
+      }
+      stream_bytes_ = file_size_;
+      volume_.indexed_bits = 8 * file_size_ - header_bits_;
+      return;
+    }
     const std::uint64_t total_bits = header_bits_ + volume_.block_count() * volume_.bits_per_block;
     stream_bytes_ = (total_bits + 63) / 64 * 8;
     // libzfp can be built with smaller words: its files may end before the 64-bit word does.
@@ -151,9 +244,10 @@ class ZfpFileReader {
     constexpr std::array<const char *, 6> kModes{"unknown",         "expert",         "fixed rate",
                                                  "fixed precision", "fixed accuracy", "reversible"};
     const zfp_mode mode = zfp_stream_compression_mode(&stream);
+    if (mode == zfp_mode_fixed_accuracy) return;
     if (mode != zfp_mode_fixed_rate) {
-      throw Error("{}: zfp mode '{}': only fixed rate is supported (zfp -r)", path_.string(),
-                  kModes.at(mode));
+      throw Error("{}: zfp mode '{}': only fixed rate (zfp -r) and fixed accuracy (zfp -a) are supported",
+                  path_.string(), kModes.at(mode));
     }
     if (stream.maxbits < kMinBlockBits || stream.maxbits > kMaxBlockBits) {
       throw Error("{}: {} bits per zfp block: only {} to {} are supported", path_.string(), stream.maxbits,
@@ -162,39 +256,59 @@ class ZfpFileReader {
   }
 
   void read_trailer() {
-    if (file_size_ == stream_bytes_) return;
-    const std::uint64_t trailer_bytes = file_size_ - stream_bytes_;
+    if (!volume_.is_indexed() && file_size_ == stream_bytes_) return;
+    const std::uint64_t trailer_bytes =
+        file_size_ - (volume_.is_indexed() ? header_bits_ / 8 : stream_bytes_);
     Footer footer{};
     const auto footer_bytes = std::as_writable_bytes(std::span(&footer, 1));
     if (trailer_bytes >= sizeof(Footer)) read_at(file_size_ - sizeof(Footer), footer_bytes);
     if (footer.magic != kMagic) {
+      if (volume_.is_indexed()) return;  // a file of zfp's own tool
       throw Error("{}: damaged: {} unknown bytes after the zfp stream", path_.string(), trailer_bytes);
     }
-    if (footer.version != kVersion) {
+    const std::uint32_t known = volume_.is_indexed() ? kIndexedVersion : kVersion;
+    if (footer.version != known) {
       throw Error("{}: its trailer has version {}, this program knows {}", path_.string(), footer.version,
-                  kVersion);
+                  known);
     }
+    const std::uint64_t json_end = file_size_ - sizeof(Footer);
     std::string text;
-    if (footer.json_bytes <= kMaxJsonBytes && footer.json_bytes + sizeof(Footer) == trailer_bytes) {
+    if (footer.json_bytes <= kMaxJsonBytes && footer.json_bytes + sizeof(Footer) <= trailer_bytes) {
       text.resize(footer.json_bytes);
-      read_at(stream_bytes_, std::as_writable_bytes(std::span(text)));
+      read_at(json_end - footer.json_bytes, std::as_writable_bytes(std::span(text)));
     }
     if (text.empty() || json_crc(text, footer) != footer.json_crc) {
       throw Error("{}: damaged: the checksum of its trailer does not match", path_.string());
     }
     try {
-      apply_json(text, volume_);
+      index_bytes_ = apply_json(text, volume_);
     } catch (const json::exception &error) {
       throw Error("{}: broken trailer: {}", path_.string(), error.what());
     }
+    check_layout(json_end - footer.json_bytes);
     has_trailer_ = true;
     stream_crc_ = footer.stream_crc;
+  }
+
+  /// Header, payload, padding and index end where the JSON text begins.
+  void check_layout(std::uint64_t json_begin) {
+    if (volume_.is_indexed()) {
+      // Neither sum overflows: a block has at least a bit, and not too many.
+      const std::uint64_t bits = volume_.indexed_bits, blocks = volume_.block_count();
+      const bool possible = bits >= blocks && bits <= blocks * ISO_MAX_BLOCK_BITS;
+      stream_bytes_ =
+          possible ? (header_bits_ + bits + 63) / 64 * 8 : std::numeric_limits<std::uint64_t>::max();
+    }
+    if (stream_bytes_ > json_begin || json_begin - stream_bytes_ != index_bytes_) {
+      throw Error("{}: damaged: its stream and index are not as long as its trailer says", path_.string());
+    }
   }
 
   fs::path path_;
   std::unique_ptr<std::FILE, int (*)(std::FILE *)> file_;
   std::uint64_t file_size_ = 0, header_bits_ = 0;
   std::uint64_t stream_bytes_ = 0;  ///< header, payload and padding
+  std::uint64_t index_bytes_ = 0;   ///< behind them
   bool has_trailer_ = false;
   std::uint32_t stream_crc_ = 0;
   CompressedVolume volume_;
@@ -203,7 +317,8 @@ class ZfpFileReader {
 }  // namespace
 
 ZfpFileWriter::ZfpFileWriter(const fs::path &path, const CompressedVolume &volume) : file_(path) {
-  const ZfpHeader header = make_zfp_header(volume.info.dims, volume.bits_per_block);
+  const ZfpHeader header =
+      make_zfp_header(volume.info.dims, volume.bits_per_block, volume.error_bound.min_exponent);
   write(std::as_bytes(std::span(header)));
 }
 
@@ -216,12 +331,36 @@ void ZfpFileWriter::write(std::span<const std::byte> payload) {
 void ZfpFileWriter::commit(const CompressedVolume &volume) {
   const std::array<std::byte, 8> zeros{};
   write(std::span(zeros).first((8 - size_ % 8) % 8));
-  const std::string text = to_json(volume).dump();
-  Footer footer{kVersion, std::uint32_t(text.size()), crc_, 0, kMagic};
+  const std::uint64_t index_bytes = volume.is_indexed() ? write_index(volume) : 0;
+  const std::string text = to_json(volume, index_bytes).dump();
+  Footer footer{volume.is_indexed() ? kIndexedVersion : kVersion, std::uint32_t(text.size()), crc_, 0,
+                kMagic};
   footer.json_crc = json_crc(text, footer);
   file_.write(text);
   file_.write(std::as_bytes(std::span(&footer, 1)));
   file_.commit();
+}
+
+std::uint64_t ZfpFileWriter::write_index(const CompressedVolume &volume) {
+  const std::uint64_t begin = size_, num_blocks = volume.block_count();
+  Deflater deflater;
+  std::vector<std::uint16_t> lengths;
+  std::vector<std::byte> out(1u << 16);
+  for (std::uint64_t done = 0; done < num_blocks; done += lengths.size()) {
+    lengths.resize(std::min<std::uint64_t>(kLengthsAtOnce, num_blocks - done));
+    for (std::size_t i = 0; i < lengths.size(); ++i) {
+      lengths[i] = static_cast<std::uint16_t>(volume.block_bits(static_cast<std::uint32_t>(done + i)));
+    }
+    deflater.next_in = reinterpret_cast<Bytef *>(lengths.data());
+    deflater.avail_in = static_cast<uInt>(lengths.size() * sizeof(std::uint16_t));
+    do {
+      deflater.next_out = reinterpret_cast<Bytef *>(out.data());
+      deflater.avail_out = static_cast<uInt>(out.size());
+      ::deflate(&deflater, done + lengths.size() == num_blocks ? Z_FINISH : Z_NO_FLUSH);
+      write(std::span(out).first(out.size() - deflater.avail_out));
+    } while (deflater.avail_out == 0);
+  }
+  return size_ - begin;
 }
 
 CompressedVolume read_zfp_file(const fs::path &path) {

@@ -3,10 +3,12 @@
 //
 //   bytes  0..11   zfp full header, short form (96 bits)
 //         12..     payload, then zeros to a multiple of 8 bytes: here a file of zfp's own tool ends
-//                  JSON text: spacing, origin, direction, type, value_range, max_error
+//                  only at fixed accuracy: the length of each block in bits, uint16, deflated (zlib)
+//                  JSON text: spacing, origin, direction, type, value_range, max_error; at fixed accuracy also payload_bits,
+//                  index_bytes (deflated), whole_numbers
 //         the last 24 bytes, little endian:
-//                  uint32 version (1) | uint32 length of the JSON text | uint32 CRC-32 of all before the JSON
-//                  text | uint32 CRC-32 of the JSON text and the three numbers before | magic "ISOWAVE\n"
+//                  uint32 version (1; 2 at fixed accuracy) | uint32 length of the JSON text | uint32 CRC-32 of all before the
+//                  JSON text | uint32 CRC-32 of the JSON text and the three numbers before | magic "ISOWAVE\n"
 
 #include <cstddef>
 #include <cstdint>
@@ -21,7 +23,7 @@ namespace isowave {
 /// Writes a `.zfp` file front to back; nothing is left behind without commit().
 class ZfpFileWriter {
  public:
-  /// Writes the header from volume.info.dims and volume.bits_per_block (a multiple of 64).
+  /// Writes the header from volume.info.dims and volume.bits_per_block (a multiple of 64), or volume.error_bound.
   ZfpFileWriter(const std::filesystem::path &path, const CompressedVolume &volume);
   /// Appends payload.
   void write(std::span<const std::byte> payload);
@@ -29,6 +31,8 @@ class ZfpFileWriter {
   void commit(const CompressedVolume &volume);
 
  private:
+  std::uint64_t write_index(const CompressedVolume &volume);
+
   AtomicFile file_;
   std::uint32_t crc_ = 0;
   std::uint64_t size_ = 0;

@@ -1,9 +1,9 @@
 #pragma once
-// Compressed volumes: a standard zfp stream of 4^3 float32 blocks at a fixed number of bits per block, and
-// what zfp's header cannot say. See docs in README "File format".
+// Compressed volumes: a standard zfp stream of 4^3 float32 blocks, at a fixed number of bits per block or with as many as a
+// bound of the error needs, and what zfp's header cannot say. See docs in README "File format".
 //
 // File: zfp full header (96 bits) | block payload, block (bx,by,bz) at index bx + nbx*(by + nby*bz) |
-//       zero padding to a whole 64-bit word | trailer (JSON + checksums, see zfp_file.cpp).
+//       zero padding to a whole 64-bit word | trailer (lengths of blocks, JSON, checksums: see zfp_file.hpp).
 
 #include <array>
 #include <cstdint>
@@ -16,7 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "core/volume.hpp"
+#include "core/voxel_chunks.hpp"
+#include "kernels_cl/block_index.h"
 
 namespace isowave {
 
@@ -25,28 +26,35 @@ namespace ocl {
 class Device;
 }
 
-/// done and total in voxel layers; called from the calling thread.
-using Progress = std::function<void(std::uint32_t done, std::uint32_t total)>;
-
-/// zfp cannot hold every float32 (its block scale is a float32 itself, and decoding overshoots by up to 2x).
-/// Voxels of at least kMaxMagnitude are refused; those below kMinMagnitude become 0, so that no decoder
-/// ever meets an infinity or a denormal.
-inline constexpr float kMaxMagnitude = 0x1p126f;
-inline constexpr float kMinMagnitude = 0x1p-97f;
-
-struct CompressOptions {
-  std::uint32_t rate = 8;          ///< bits per voxel, 1..32
-  std::optional<float> map_nan{};  ///< replaces NaN and +-Inf; unset: refused with count and first position
-  Progress progress{};
-  ocl::Device *device = nullptr;  ///< encodes there instead of with libzfp: the same result, bit for bit
-  bool measure_error = false;     ///< decode everything again for CompressedVolume::max_error
-  std::uint32_t num_threads = 0;  ///< 0: one per processor; the result is the same for any number
+/// How much of its voxels a volume keeps whose blocks have lengths of their own.
+struct ErrorBound {
+  /// Bit planes of blocks end where zfp can promise an error of at most 2^min_exponent (its fixed-accuracy mode).
+  std::int32_t min_exponent = ISO_ALL_PLANES;
+  bool whole_numbers = false;         ///< decoded values are rounded: the source's, which are integers
+  std::optional<double> max_error{};  ///< largest |decoded - source|, measured
 };
 
-/// A fixed-rate zfp volume in host memory.
+struct CompressOptions {
+  std::uint32_t rate = 8;                   ///< bits per voxel, 1..32; or
+  std::optional<ErrorBound> error_bound{};  ///< as many bits as each block needs: see choose_error_bound()
+  ocl::Device *device =
+      nullptr;  ///< encodes there instead of with libzfp: the same result, bit for bit; at a fixed rate
+  bool measure_error = false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_error
+  InputOptions input{};
+};
+
+/// Words past its last bit that a decoder reads at most.
+inline constexpr std::uint64_t kDecoderAhead = 2;
+
+/// A zfp volume in host memory, at a fixed rate or of blocks as long as the error allows.
 struct CompressedVolume {
-  VolumeInfo info;                   ///< type is that of the source before compression
-  std::uint32_t bits_per_block = 0;  ///< 64 * rate; 9..2048 from other writers (1 + 8 bits hold the exponent)
+  VolumeInfo info;  ///< type is that of the source before compression
+  std::uint32_t bits_per_block =
+      0;  ///< 64 * rate; 9..2048 from other writers (1 + 8 bits hold the exponent); 0: see index
+  ErrorBound error_bound{};  ///< at a fixed rate, as it is from the start
+  std::vector<std::uint32_t>
+      index{};  ///< where blocks begin that have lengths of their own: kernels_cl/block_index.h
+  std::uint64_t indexed_bits = 0;  ///< and the length of all of them
   std::vector<std::uint32_t>
       words;  ///< payload from bit 0, little endian; two zero words follow the last bit; empty where file is set
   std::shared_ptr<const MappedFile> file{};  ///< holds the payload instead of words ...
@@ -60,7 +68,13 @@ struct CompressedVolume {
     const glm::uvec3 n = num_blocks();
     return std::uint64_t(n.x) * n.y * n.z;
   }
-  double rate() const { return bits_per_block / 64.0; }  ///< bits per voxel
+  bool is_indexed() const { return bits_per_block == 0; }
+  std::uint64_t payload_bits() const;
+  std::uint64_t block_begin(std::uint32_t block_id) const;  ///< bit of the payload; of block_count(): its end
+  std::uint32_t block_bits(std::uint32_t block_id) const;   ///< length of a block
+  std::uint32_t max_block_bits() const { return is_indexed() ? ISO_MAX_BLOCK_BITS : bits_per_block; }
+  /// Bits per voxel, of partial blocks' padding too; the index not counted.
+  double rate() const { return double(payload_bits()) / (64.0 * double(block_count())); }
   /// Size of words, or what it would be.
   std::uint64_t word_count() const;
   /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its end. Reads a mapped file
@@ -75,13 +89,13 @@ CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
 
-/// Reads a `.zfp` file of ours or any fixed-rate 3D float zfp file with a full header (spacing 1 then).
+/// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full header (spacing 1 then).
 /// Throws Error in one line on a broken header, other types or modes, truncation, checksum mismatch.
 CompressedVolume read_zfp_file(const std::filesystem::path &path);
 /// As read_zfp_file(), but leaves the payload in the file, which is mapped into memory: words stays empty. The checksum is
 /// checked once, here.
 CompressedVolume map_zfp_file(const std::filesystem::path &path);
-/// As read_zfp_file(), but neither reads nor checks the payload: words stays empty.
+/// As read_zfp_file(), but neither reads nor checks the payload: words stays empty, and so may the index.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
 /// Decodes everything with libzfp: [nz][ny][nx] float32. The ground truth of every decoder here.

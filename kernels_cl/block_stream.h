@@ -1,26 +1,52 @@
 /// block_stream.h -- where the bits of a block are on the device (core/device_stream.hpp). OpenCL C 1.2.
 ///
-/// ISO_STREAM_PARTS, by -D: 1 the whole zfp stream is in part_0, block b at bit b * bits_per_block. 2, 3, 4: it is cut into
-/// as many buffers of blocks_per_part blocks, each beginning with a whole block at bit 0. 0: part_0 is a window that holds
-/// only the blocks of this launch, one after the other, each beginning with a whole word.
+/// ISO_STREAM_PARTS, by -D: 1 the whole zfp stream is in part_0. 2, 3, 4: it is cut into as many buffers of layout.words_per_part
+/// words, each going on so far behind its end that a block which begins in it is whole. 0: part_0 is a window that holds only the
+/// blocks of this launch, one after the other, each beginning with a whole word.
+/// ISO_STREAM_INDEXED: 0 all blocks are layout.bits_per_block long. 1: `index` says where they begin (block_index.h); a window
+/// begins with the number of the first word of each of its blocks, and of the one behind the last.
 #ifndef ISOWAVE_BLOCK_STREAM_H
 #define ISOWAVE_BLOCK_STREAM_H
 
+#include "block_index.h"
 #include "zfp_codec.h"
 
 #ifndef ISO_STREAM_PARTS
 #define ISO_STREAM_PARTS 1
 #endif
+#ifndef ISO_STREAM_INDEXED
+#define ISO_STREAM_INDEXED 0
+#endif
 
 /// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z.
 ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_1, global const uint *part_2,
-                             global const uint *part_3, uint blocks_per_part, uint bits_per_block,
+                             global const uint *part_3, global const uint *index, StreamLayout layout,
                              uint block_id, uint place, float *values) {
-  const uint part = ISO_STREAM_PARTS > 1 ? block_id / blocks_per_part : 0;
-  global const uint *words = part == 0 ? part_0 : part == 1 ? part_1 : part == 2 ? part_2 : part_3;
-  const ulong first_bit = ISO_STREAM_PARTS == 0 ? (ulong)place * ((bits_per_block + 31u) & ~31u)
-                                                : (ulong)(block_id - part * blocks_per_part) * bits_per_block;
-  zfp_decode_block(words, first_bit, bits_per_block, values);
+  global const uint *words = part_0;
+  uint bits = layout.bits_per_block;
+  ulong first_bit = (ulong)block_id * bits;
+  if (ISO_STREAM_PARTS == 0 && ISO_STREAM_INDEXED) {
+    first_bit = (ulong)part_0[place] * 32u;
+    bits = (part_0[place + 1u] - part_0[place]) * 32u;
+  } else if (ISO_STREAM_PARTS == 0) {
+    first_bit = (ulong)place * ((bits + 31u) & ~31u);
+  } else if (ISO_STREAM_INDEXED) {
+    first_bit = block_begin(index, block_id);
+    bits = (uint)(block_begin(index, block_id + 1u) - first_bit);
+  }
+  if (ISO_STREAM_PARTS > 1) {
+    const ulong part_bits = (ulong)layout.words_per_part * 32u;
+    const uint part =
+        (first_bit >= part_bits) + (first_bit >= 2u * part_bits) + (first_bit >= 3u * part_bits);
+    words = part == 0 ? part_0 : part == 1 ? part_1 : part == 2 ? part_2 : part_3;
+    first_bit -= part * part_bits;
+  }
+  zfp_decode_block(words, first_bit, bits, layout.min_exponent, values);
+  if (layout.whole_numbers != 0u) {
+    ISO_UNROLL
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+      values[v] = rint(values[v]) + 0.0f; /* no -0, which no integer is */
+  }
 }
 
 #endif

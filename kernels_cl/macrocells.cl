@@ -27,10 +27,10 @@ ISO_INLINE ValueRange join(ValueRange a, ValueRange b) {
 
 /// partials [(first_partial + num_blocks) * 8]: entry 8 b + m is the range of the block's voxels with x = 0 if m & 1, y = 0 if
 /// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is sampled_block(first_block + i * stride, stride) and b is first_partial + i.
-/// part_0 .. bits_per_block: the zfp stream, see block_stream.h. Grid-stride.
+/// part_0 .. layout: the zfp stream, see block_stream.h. Grid-stride.
 kernel void macrocell_partials(const FrameParams frame_params, global const uint *part_0,
                                global const uint *part_1, global const uint *part_2,
-                               global const uint *part_3, uint blocks_per_part, uint bits_per_block,
+                               global const uint *part_3, global const uint *index, const StreamLayout layout,
                                uint first_block, uint stride, uint num_blocks, uint first_partial,
                                global ValueRange *partials) {
   const FrameParams *frame = &frame_params;
@@ -40,7 +40,7 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
     const uint size_x = min(4u, frame->dims_x - 4 * b.x), size_y = min(4u, frame->dims_y - 4 * b.y),
                size_z = min(4u, frame->dims_z - 4 * b.z);
     float values[ISO_BLOCK_VOXELS];
-    decode_block(part_0, part_1, part_2, part_3, blocks_per_part, bits_per_block, block_id, i, values);
+    decode_block(part_0, part_1, part_2, part_3, index, layout, block_id, i, values);
     for (uint lattice = 0; lattice < 8; ++lattice) {
       const uint end_x = lattice & 1 ? 1 : size_x, end_y = lattice & 2 ? 1 : size_y,
                  end_z = lattice & 4 ? 1 : size_z;

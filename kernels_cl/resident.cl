@@ -13,12 +13,12 @@
 
 /// Decodes blocks [first_block, first_block + num_blocks) of the zfp stream, see block_stream.h. Once per volume. Grid-stride.
 kernel void resident_decode(global const uint *part_0, global const uint *part_1, global const uint *part_2,
-                            global const uint *part_3, uint blocks_per_part, uint bits_per_block,
+                            global const uint *part_3, global const uint *index, const StreamLayout layout,
                             uint first_block, uint num_blocks, global float *values) {
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
     const uint block_id = first_block + i;
     float block[ISO_BLOCK_VOXELS];
-    decode_block(part_0, part_1, part_2, part_3, blocks_per_part, bits_per_block, block_id, 0, block);
+    decode_block(part_0, part_1, part_2, part_3, index, layout, block_id, 0, block);
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[(ulong)block_id * ISO_BLOCK_VOXELS + v] = block[v];
   }
 }

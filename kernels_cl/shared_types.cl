@@ -3,13 +3,14 @@
 #include "shared_types.h"
 #include "shared_types_fields.h"
 
-/// sizes[0..4]: sizeof FrameParams, PairHit, BlockRays, HitRecord, PassCounts. One work-item.
+/// sizes[0..5]: sizeof FrameParams, PairHit, BlockRays, HitRecord, StreamLayout, PassCounts. One work-item.
 kernel void shared_type_sizes(global uint *sizes) {
   sizes[0] = sizeof(FrameParams);
   sizes[1] = sizeof(PairHit);
   sizes[2] = sizeof(BlockRays);
   sizes[3] = sizeof(HitRecord);
-  sizes[4] = sizeof(PassCounts);
+  sizes[4] = sizeof(StreamLayout);
+  sizes[5] = sizeof(PassCounts);
 }
 
 // OpenCL C has no offsetof.
@@ -32,6 +33,10 @@ kernel void shared_type_offsets(global uint *offsets) {
   {
     HitRecord object;
     ISO_HIT_RECORD_FIELDS(ISO_WRITE_OFFSET)
+  }
+  {
+    StreamLayout object;
+    ISO_STREAM_LAYOUT_FIELDS(ISO_WRITE_OFFSET)
   }
   {
     PassCounts object;

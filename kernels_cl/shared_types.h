@@ -114,6 +114,17 @@ typedef struct HitRecord {
 } HitRecord;
 ISO_CHECK_SIZE(HitRecord, 36);
 
+/// Where a compressed volume's blocks begin in its zfp stream, and how they are decoded.
+typedef struct StreamLayout {
+  uint bits_per_block;  ///< at a fixed rate; 0: blocks have lengths of their own, see block_index.h
+  uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
+  int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES: with the block's bits
+  uint whole_numbers;  ///< not 0: decoded values are rounded to integers
+} StreamLayout;
+ISO_CHECK_SIZE(StreamLayout, 16);
+
+#define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
+
 /// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input is "the
 /// first n entries" take n from a field of this struct, so that no launch waits for the host.
 typedef struct PassCounts {

@@ -2,7 +2,7 @@
 ///
 /// Portable: OpenCL C 1.2 and C++. Block layout, in bits: 1 "not all zero" | 8 exponent + 127 | bit planes
 /// 31, 30, ... of 64 negabinary coefficients, each plane: n bits verbatim, then group-tested runs; cut at
-/// max_bits.
+/// max_bits (fixed rate), or after the plane that a bound of the error needs (fixed accuracy).
 #ifndef ISOWAVE_ZFP_CODEC_H
 #define ISOWAVE_ZFP_CODEC_H
 
@@ -136,24 +136,34 @@ ISO_INLINE void append_planes(const uint *planes, uint *coefficients) {
 
 /// All loops over the 64 values are unrolled, so that they stay in registers: a GPU has no fast indexed ones.
 
-/// Decodes the block that starts at `first_bit` of `words` and has max_bits bits.
-/// values [64]: x + 4 y + 16 z. Reads at most two words past the block's last bit.
+/// Bit planes of a block with this largest exponent that a bound of 2^min_exponent on the error needs: zfp's own rule, with
+/// 2 (3 + 1) for what the transform adds in three dimensions.
+ISO_INLINE uint zfp_num_planes(int exponent, int min_exponent) {
+  const int num_planes = exponent - min_exponent + 8;
+  return num_planes < 0 ? 0u : (num_planes > 32 ? 32u : (uint)num_planes);
+}
+
+/// Decodes the block that starts at `first_bit` of `words` and has max_bits bits, down to the bit plane of min_exponent
+/// (ISO_ALL_PLANES: as far as its bits go). values [64]: x + 4 y + 16 z. Reads at most two words past the block's last bit.
 ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
-                                 float *values) {
+                                 int min_exponent, float *values) {
   BitReader r = open_bits(words, first_bit);
   uint low[32], high[32]; /* halves of the bit planes, the highest first */
   uint sequence[64], coefficients[64];
   float scale;
-  uint bits, n, i, num_planes = 0, any_high = 0;
-  if (!read_bits(&r, 1)) {
+  int exponent;
+  uint bits, n, i, max_planes, num_planes = 0, any_high = 0;
+  if (max_bits < 9u || !read_bits(&r, 1)) {
     ISO_UNROLL
     for (i = 0; i < 64u; ++i) values[i] = 0.0f;
     return;
   }
-  scale = power_of_two((int)read_bits(&r, 8) - 127 - 30);
+  exponent = (int)read_bits(&r, 8) - 127;
+  scale = power_of_two(exponent - 30);
+  max_planes = zfp_num_planes(exponent, min_exponent);
   bits = max_bits - 9u;
   n = 0; /* coefficients known to be significant: their bits come verbatim */
-  while (bits > 0u && num_planes < 32u) {
+  while (bits > 0u && num_planes < max_planes) {
     const uint verbatim = n < bits ? n : bits;
     ulong ones = read_bits(&r, verbatim < 32u ? verbatim : 32u);
     if (verbatim > 32u) ones |= (ulong)read_bits(&r, verbatim - 32u) << 32;

@@ -6,12 +6,12 @@
 
 /// One work-item decodes one block; the work-group stores them together, so that neighbouring work-items write neighbouring
 /// values. The block of request i goes to slot slots[i]: cache_values [slots * 64], x + 4y + 16z within a slot.
-/// part_0 .. bits_per_block: the zfp stream, see block_stream.h; a window holds the blocks from request `first` on. Which of a
+/// part_0 .. layout: the zfp stream, see block_stream.h; a window holds the blocks from request `first` on. Which of a
 /// block's voxels are inside goes to inside [slots]. Groups stride over requests [first, end), but not beyond
 /// decoded_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_decode(
     const FrameParams frame_params, global const uint *part_0, global const uint *part_1,
-    global const uint *part_2, global const uint *part_3, uint blocks_per_part, uint bits_per_block,
+    global const uint *part_2, global const uint *part_3, global const uint *index, const StreamLayout layout,
     uint first, uint end, global const PassCounts *counts, global const uint *block_ids,
     global const uint *slots, global float *cache_values, global ulong *inside) {
   local float staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
@@ -23,7 +23,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     float values[ISO_BLOCK_VOXELS];
     if (item < num_blocks) {
       uint outside_low = 0, outside_high = 0;
-      decode_block(part_0, part_1, part_2, part_3, blocks_per_part, bits_per_block, block_ids[begin + item],
+      decode_block(part_0, part_1, part_2, part_3, index, layout, block_ids[begin + item],
                    begin + item - first, values);
       ISO_UNROLL
       for (uint v = 32; v-- > 0;) { /* the signs; nothing minus this isovalue is -0 */

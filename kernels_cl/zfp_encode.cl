@@ -52,7 +52,7 @@ kernel void zfp_encode_errors(global const float *voxels, uint nx, uint ny, uint
     const BlockPlace place = place_of(b, nx, ny, nz);
     float values[ISO_BLOCK_VOXELS];
     TwoFloat largest = two_float(0.0f);
-    zfp_decode_block(words, (ulong)b * bits_per_block, bits_per_block, values);
+    zfp_decode_block(words, (ulong)b * bits_per_block, bits_per_block, ISO_ALL_PLANES, values);
     for (uint z = 0; z < place.count_z; ++z) {
       for (uint y = 0; y < place.count_y; ++y) {
         for (uint x = 0; x < place.count_x; ++x) {

@@ -17,7 +17,6 @@ using Vec = std::array<double, 3>;
 using Cell = std::array<int, 3>;
 using Corners = std::array<double, 8>;  ///< minus the isovalue; corner x + 2y + 4z
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kNoAxis = 3;
 
 /// The part of a ray within a closed box of voxel planes. At its ends the coordinate across the plane is that

@@ -3,8 +3,11 @@
 // Each answers with its own maths. Nothing here, nor in any oracle, comes from the kernels.
 
 #include <array>
+#include <limits>
 
 namespace isowave {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A ray in index space: position = origin + t direction, t >= 0. The numbers are taken as exact; the
 /// renderer's float32 ones fit without rounding.

@@ -20,7 +20,6 @@ constexpr unsigned kNumNodes = 15, kFaceNode = 8, kCentreNode = 14;
 constexpr unsigned kNumTetrahedra = 24;
 // Edges that cells share belong to a voxel: three to the next voxels, and four spokes of each of its three lower faces.
 constexpr unsigned kEdgesPerVoxel = 15;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kCellDiagonal = 1.7320508075688772;
 
 using Node = std::array<int, 3>;  ///< half voxels from the cell's lower corner, 0..2

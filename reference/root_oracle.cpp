@@ -16,8 +16,6 @@ namespace {
 
 using Interval = boost::numeric::interval<double>;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// t at which the ray crosses a grid plane of one axis: (plane - origin) / direction, of exact numbers.
 struct Crossing {
   double plane = 0, origin = 0, direction = 1;

@@ -444,7 +444,7 @@ StabilityCase low_rates(std::uint32_t rays, Random &random) {
   for (const std::uint32_t rate : {1u, 2u, 4u}) {
     StabilityScene scene = noise({18, 17, 19}, random, true);
     for (float &v : scene.voxels) v = v < 90 ? 0 : (v < 170 ? 128 : 255);
-    compress_and_decode(scene, {.rate = rate, .num_threads = 1});
+    compress_and_decode(scene, {.rate = rate, .input = {.num_threads = 1}});
     for (const float isovalue : {0.0f, 128.0f, 127.5f}) {
       scene.isovalue = isovalue;
       scene.rays.clear();
@@ -465,7 +465,7 @@ StabilityCase mapped_nan(std::uint32_t rays, Random &random) {
       if (kind == 1) v = std::numeric_limits<float>::infinity();
       if (kind == 2) v = -std::numeric_limits<float>::infinity();
     }
-    compress_and_decode(scene, {.rate = 16, .map_nan = replacement, .num_threads = 1});
+    compress_and_decode(scene, {.rate = 16, .input = {.map_nan = replacement, .num_threads = 1}});
     add_random_rays(scene, random, rays / 3);
     result.scenes.push_back(std::move(scene));
   }

@@ -50,6 +50,43 @@ TEST(Cli, ConvertAndInfo) {
   EXPECT_NE(text.out.find("value_range    0.0 249.0"), std::string::npos) << text.out;
 }
 
+TEST(Cli, ConvertWithinAnError) {
+  const TemporaryFolder folder;
+  const std::string zfp = quoted(folder / "n.zfp");
+  const auto info_of = [&](const std::string &options) {
+    const auto convert = run_isowave("convert " + kNucleon + " " + options + " -o " + zfp);
+    EXPECT_EQ(convert.status, 0) << convert.err;
+    EXPECT_EQ(convert.err, "") << "quiet in a pipe";
+    const auto info = run_isowave("info --json " + zfp);
+    EXPECT_EQ(info.status, 0) << info.err;
+    return nlohmann::json::parse(info.out);
+  };
+  const auto absolute = info_of("--tolerance 2.49");
+  EXPECT_EQ(absolute["format"], "zfp, fixed accuracy");
+  EXPECT_LE(absolute["max_error"], 2.49);
+  EXPECT_GT(absolute["max_error"], 0.0);
+  EXPECT_EQ(absolute["exact"], false);
+  EXPECT_EQ(info_of("--tolerance-relative 0.01"), absolute) << "of a range from 0 to 249";
+  const auto exact = info_of("--exact");
+  EXPECT_EQ(exact["max_error"], 0.0);
+  EXPECT_EQ(exact["exact"], true);
+  EXPECT_GT(exact["rate"], absolute["rate"]);
+  const auto render =
+      run_isowave("render " + zfp + " --isovalue 100 --size 32x24 -o " + quoted(folder / "n.png"));
+  EXPECT_EQ(render.status, 0) << render.err;
+
+  const std::string to = " -o " + quoted(folder / "a.zfp");
+  expect_one_line_error("convert " + kNucleon + " --tolerance 0" + to, "above 0");
+  expect_one_line_error("convert " + kNucleon + " --tolerance 1 --exact" + to, "xact");
+  expect_one_line_error("convert " + kNucleon + " --tolerance 1 --rate 8" + to, "rate");
+  expect_one_line_error("convert " + kNucleon + " --exact --device cpu" + to, "fixed rate only");
+  expect_one_line_error("convert generate:sphere_8x8x8_float32 --exact" + to, "float32");
+  write_file(folder / "c_4x4x4_uint8.raw", std::string(64, 'x'));
+  expect_one_line_error("convert " + quoted(folder / "c_4x4x4_uint8.raw") + " --tolerance-relative 0.1" + to,
+                        "no range");
+  EXPECT_EQ(folder.num_files(), 3u) << "n.zfp, n.png and c";
+}
+
 TEST(Cli, ConvertOnADeviceWritesTheSameFile) {
   const TemporaryFolder folder;
   const std::string host = quoted(folder / "host.zfp"), device = quoted(folder / "device.zfp");

@@ -12,6 +12,7 @@
 #include "core/io/mapped_file.hpp"
 #include "core/macrocells.hpp"
 #include "core/zfp_decode.hpp"
+#include "kernels_cl/zfp_codec.h"
 #include "tests/run_program.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
@@ -23,12 +24,28 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 constexpr std::uint32_t kOddBits[] = {9, 37, 64, 100, 777, 2048};
+constexpr std::int32_t kOddExponents[] = {-20, -3, 1};  ///< of volumes whose blocks have lengths of their own
 
 /// 6^3 blocks, partial ones too: 2, 3 and 4 parts can be had even where only 32 blocks are whole words.
 constexpr glm::uvec3 kDims(23, 22, 21);
 
 CompressedVolume volume_of(std::uint32_t bits_per_block, const glm::uvec3 &dims = kDims) {
   return compress_with_libzfp(random_voxels(dims, -3, 3, bits_per_block), dims, bits_per_block);
+}
+
+CompressedVolume indexed_volume(std::int32_t min_exponent, const glm::uvec3 &dims = kDims) {
+  return compress_with_libzfp(random_voxels(dims, -3, 3, 7), dims, 0, min_exponent);
+}
+
+/// Of every kind.
+std::vector<std::pair<std::string, CompressedVolume>> odd_volumes() {
+  std::vector<std::pair<std::string, CompressedVolume>> volumes;
+  for (const std::uint32_t bits : kOddBits)
+    volumes.emplace_back(fmt::format("{} bits per block", bits), volume_of(bits));
+  for (const std::int32_t exponent : kOddExponents) {
+    volumes.emplace_back(fmt::format("planes to 2^{}", exponent), indexed_volume(exponent));
+  }
+  return volumes;
 }
 
 /// 3^3 blocks of 100 bits; 8 are whole words.
@@ -46,13 +63,12 @@ std::uint64_t limit_for(const CompressedVolume &volume, std::uint32_t num_parts)
 
 // ---- cutting
 
-TEST(StreamSplit, PartsHoldWholeBlocksAndKeepTheLimit) {
-  for (const std::uint32_t bits : kOddBits) {
-    const CompressedVolume volume = volume_of(bits);
+TEST(StreamSplit, PartsHoldTheirBlocksAndKeepTheLimit) {
+  for (const auto &[name, volume] : odd_volumes()) {
     const std::uint64_t all = volume.word_count() * sizeof(uint);
     std::uint32_t last_parts = 1;
     for (std::uint64_t limit = all; limit > 0; --limit) {
-      SCOPED_TRACE(fmt::format("{} bits per block, {} of {} bytes", bits, limit, all));
+      SCOPED_TRACE(fmt::format("{}, {} of {} bytes", name, limit, all));
       const StreamSplit split = split_stream(volume, limit);
       if (split.num_parts == 0) {
         EXPECT_EQ(last_parts, kMaxStreamParts) << "given up too early";
@@ -63,9 +79,14 @@ TEST(StreamSplit, PartsHoldWholeBlocksAndKeepTheLimit) {
       last_parts = split.num_parts;
       for (const std::uint64_t words : split.words) EXPECT_LE(words * sizeof(uint), limit);
       if (split.num_parts == 1) continue;
-      EXPECT_EQ(std::uint64_t{split.blocks_per_part} * bits % 32, 0u) << "a part begins inside a word";
-      EXPECT_LT(std::uint64_t{split.blocks_per_part} * (split.num_parts - 1), volume.block_count());
-      EXPECT_GE(std::uint64_t{split.blocks_per_part} * split.num_parts, volume.block_count());
+      for (std::uint32_t b = 0; b < volume.block_count(); ++b) {
+        const std::uint64_t part = volume.block_begin(b) / 32 / split.words_per_part;
+        ASSERT_LT(part, split.num_parts);
+        const std::uint64_t end =
+            volume.block_begin(b) + volume.block_bits(b) - part * split.words_per_part * 32;
+        ASSERT_LE((end + 31) / 32 + 2, split.words[part])
+            << "block " << b << ", and what decoders read past it";
+      }
     }
     EXPECT_EQ(last_parts, kMaxStreamParts);
   }
@@ -184,20 +205,44 @@ INSTANTIATE_TEST_SUITE_P(Devices, DeviceStreamOnDevice, testing::ValuesIn(device
                          device_test_name);
 
 TEST_P(DeviceStreamOnDevice, SmallPartsDecodeToTheSameBits) {
-  const CompressedVolume volume = small_volume();
-  for (const std::uint32_t parts : {2u, 4u}) {
-    SCOPED_TRACE(fmt::format("{} parts", parts));
-    const DeviceStream stream(device_, volume, limit_for(volume, parts));
-    ASSERT_EQ(stream.parts.size(), parts);
-    expect_decoded(volume, stream);
+  for (const CompressedVolume &volume : {small_volume(), indexed_volume(-2, {9, 10, 11})}) {
+    for (const std::uint32_t parts : {2u, 4u}) {
+      SCOPED_TRACE(fmt::format("{} bits per block, {} parts", volume.bits_per_block, parts));
+      const DeviceStream stream(device_, volume, limit_for(volume, parts));
+      ASSERT_EQ(stream.parts.size(), parts);
+      expect_decoded(volume, stream);
+    }
   }
 }
 
+TEST_P(DeviceStreamOnDevice, SmallWholeNumbersAreRounded) {
+  CompressedVolume volume = indexed_volume(-1, {9, 10, 11});
+  volume.error_bound.whole_numbers = true;
+  expect_decoded(volume, DeviceStream(device_, volume));
+  expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
+}
+
+/// An index that lies about where blocks begin gives wrong values, but nothing outside the stream is read.
+TEST_P(DeviceStreamOnDevice, SmallLyingIndexStaysInside) {
+  CompressedVolume volume = indexed_volume(-4, {9, 10, 11});
+  const auto num_blocks = static_cast<uint>(volume.block_count());
+  BlockIndexBuilder index;  // all blocks but the last are a bit long
+  for (uint b = 0; b + 1 < num_blocks; ++b) index.add(1);
+  index.add(static_cast<uint>(
+      std::min<std::uint64_t>(volume.payload_bits() - (num_blocks - 1), ISO_MAX_BLOCK_BITS)));
+  volume.index = index.finish();
+  std::vector<float> expected(64 * std::size_t{num_blocks});
+  for (uint b = 0; b < num_blocks; ++b) {
+    zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
+                     volume.error_bound.min_exponent, expected.data() + 64 * std::size_t{b});
+  }
+  EXPECT_EQ(first_difference(decode(volume, DeviceStream(device_, volume)), expected), kNoDifference);
+}
+
 TEST_P(DeviceStreamOnDevice, PartsOfEveryRate) {
-  for (const std::uint32_t bits : kOddBits) {
-    const CompressedVolume volume = volume_of(bits);
+  for (const auto &[name, volume] : odd_volumes()) {
     for (const std::uint32_t parts : {1u, 2u, 3u, 4u}) {
-      SCOPED_TRACE(fmt::format("{} bits per block, {} parts", bits, parts));
+      SCOPED_TRACE(fmt::format("{}, {} parts", name, parts));
       const std::uint64_t limit = limit_for(volume, parts);
       ASSERT_NE(limit, 0u);
       const DeviceStream stream(device_, volume, limit);
@@ -216,20 +261,20 @@ TEST_P(DeviceStreamOnDevice, MoreThanFourPartsAreRefused) {
 }
 
 TEST_P(DeviceStreamOnDevice, SmallWindowsDecodeToTheSameBits) {
-  const CompressedVolume volume = small_volume();
-  for (const std::uint32_t window : {8u, 1000u}) {
-    SCOPED_TRACE(window);
-    const DeviceStream stream(device_, volume, OnHost{window});
-    expect_decoded(volume, stream);
-    EXPECT_EQ(stream.window->uploaded_blocks(), volume.block_count());
+  for (const CompressedVolume &volume : {small_volume(), indexed_volume(-2, {9, 10, 11})}) {
+    for (const std::uint32_t window : {8u, 1000u}) {
+      SCOPED_TRACE(fmt::format("{} bits per block, window of {}", volume.bits_per_block, window));
+      const DeviceStream stream(device_, volume, OnHost{window});
+      expect_decoded(volume, stream);
+      EXPECT_EQ(stream.window->uploaded_blocks(), volume.block_count());
+    }
   }
 }
 
 TEST_P(DeviceStreamOnDevice, WindowsOfEveryRate) {
-  for (const std::uint32_t bits : kOddBits) {
-    const CompressedVolume volume = volume_of(bits);
+  for (const auto &[name, volume] : odd_volumes()) {
     for (const std::uint32_t window : {1u, 8u, 107u, 108u, 216u, 217u}) {
-      SCOPED_TRACE(fmt::format("{} bits per block, window of {}", bits, window));
+      SCOPED_TRACE(fmt::format("{}, window of {}", name, window));
       const DeviceStream stream(device_, volume, OnHost{window});
       EXPECT_TRUE(stream.parts.empty());
       expect_decoded(volume, stream);
@@ -280,7 +325,9 @@ TEST_P(DeviceStreamOnDevice, SmallMemoryIsBooked) {
   }
   {
     const DeviceStream stream(device_, volume, limit_for(volume, 3));
-    EXPECT_EQ(device_.ledger().current(), (volume.word_count() + 2 * 2) * sizeof(uint));
+    EXPECT_EQ(device_.ledger().current(), (volume.word_count() + 2 * (2 + 2)) * sizeof(uint))
+        << "behind two of three parts, a block's 64 bits from the last bit on, and two words that decoders "
+           "read";
   }
   EXPECT_EQ(device_.ledger().current(), 0u);
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/frame.hpp"
+#include "core/zfp_accuracy.hpp"
 #include "core/zfp_stream.hpp"
 #include "reference/scalar_renderer.hpp"
 
@@ -62,6 +63,12 @@ class ArrayVolume : public VolumeReader {
 struct TestVolume {
   explicit TestVolume(VolumeReader &reader, std::uint32_t rate)
       : compressed(compress(reader, CompressOptions{.rate = rate})), voxels(decode_with_libzfp(compressed)) {}
+  /// Blocks as long as the goal demands. info.type: an integer type, where it is exact.
+  TestVolume(const VolumeInfo &info, std::vector<float> source, const ErrorGoal &goal) {
+    ArrayVolume reader(info, std::move(source));
+    compressed = compress(reader, CompressOptions{.error_bound = choose_error_bound(reader, goal, {})});
+    voxels = decode_with_libzfp(compressed);
+  }
   TestVolume(const VolumeInfo &info, std::vector<float> source, std::uint32_t rate)
       : TestVolume(ArrayVolume(info, std::move(source)), rate) {}
   TestVolume(const glm::uvec3 &dims, const VoxelFunction &field, std::uint32_t rate = 8)

@@ -218,7 +218,7 @@ TEST_P(InvarianceOnDevice, ImageShapes) {
 
 // ---- one renderer, many frames
 
-TEST_P(InvarianceOnDevice, SmallWarmCacheDecodesNothing) {
+TEST_P(InvarianceOnDevice, WarmCacheDecodesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Renderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
@@ -259,7 +259,7 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
   }
 }
 
-TEST_P(InvarianceOnDevice, SmallMemoryIsFixedBeforeTheFirstFrame) {
+TEST_P(InvarianceOnDevice, MemoryIsFixedBeforeTheFirstFrame) {
   const TestVolume volume = small_volume();
   Renderer renderer(device_, volume.compressed, GetParam().with({.size = kTiny, .cache_slots = 20}));
   const ocl::MemoryLedger &ledger = device_.ledger();
@@ -316,7 +316,7 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
   }
 }
 
-TEST_P(InvarianceOnDevice, SmallCancelledFrameLeavesNoTrace) {
+TEST_P(InvarianceOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
   Renderer renderer(device_, volume.compressed,
@@ -338,7 +338,7 @@ TEST_P(InvarianceOnDevice, SmallCancelledFrameLeavesNoTrace) {
 }
 
 /// With profiling every stage is timed and the host waits after each pass: the same bits.
-TEST_P(InvarianceOnDevice, SmallProfilingChangesNothing) {
+TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   ocl::Device device(GetParam().device, true);

@@ -51,13 +51,19 @@ INSTANTIATE_TEST_SUITE_P(Devices, MemoryPlanOnDevice, testing::ValuesIn(pipeline
 
 TEST_P(MemoryPlanOnDevice, PlanIsWhatIsBooked) {
   for (const glm::uvec3 dims : {glm::uvec3(9, 10, 11), glm::uvec3(33, 5, 18)}) {
-    const TestVolume volume(dims, test::noise_field(3), 8);
-    for (const std::uint32_t slots : {0u, 8u, 100u}) {
-      SCOPED_TRACE(fmt::format("{} x {} x {}, {} slots", dims.x, dims.y, dims.z, slots));
-      ocl::Device device(GetParam().device);
-      const Renderer renderer(device, volume.compressed,
-                              GetParam().with({.size = size_, .cache_slots = slots}));
-      expect_booked(device, renderer.memory_plan());
+    const std::vector<float> voxels = test::sample(dims, test::noise_field(3));
+    const TestVolume fixed_rate(test::grid_info(dims), voxels, 8);
+    const TestVolume accurate(test::grid_info(dims), voxels, ErrorGoal{0.01});
+    for (const TestVolume *volume : {&fixed_rate, &accurate}) {
+      for (const auto &[slots, place] :
+           {std::pair(0u, StreamPlace::kDevice), {8u, StreamPlace::kDevice}, {100u, StreamPlace::kHost}}) {
+        SCOPED_TRACE(fmt::format("{} x {} x {}, {} bits per block, {} slots", dims.x, dims.y, dims.z,
+                                 volume->compressed.bits_per_block, slots));
+        ocl::Device device(GetParam().device);
+        const Renderer renderer(device, volume->compressed,
+                                GetParam().with({.size = size_, .cache_slots = slots, .stream = place}));
+        expect_booked(device, renderer.memory_plan());
+      }
     }
   }
 }
@@ -148,9 +154,9 @@ TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
   request.window_blocks = 200;  // more than the volume has
   EXPECT_EQ(plan_of(on_device - 1, 10).stream, StreamPlace::kDevice);
   request.window_blocks = 0;
-  request.largest_stream_part = 32 * 256 + 8;  // 125 blocks of 256 bytes: four parts
+  request.largest_stream_part = 32 * 256 + 264;  // 125 blocks of 256 bytes: four parts
   EXPECT_EQ(plan_of(~std::uint64_t(0), 10).stream, StreamPlace::kDevice);
-  request.largest_stream_part = 31 * 256 + 8;  // five
+  request.largest_stream_part = 31 * 256 + 264;  // five
   EXPECT_EQ(plan_of(~std::uint64_t(0), 10).stream, StreamPlace::kHost);
   request.stream = StreamPlace::kDevice;
   EXPECT_THAT(refusal([&] { plan_of(on_device, 10); }), HasSubstr("leave it on the host"));

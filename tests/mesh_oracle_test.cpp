@@ -14,8 +14,6 @@ namespace {
 
 using test::sample;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// Sum over triangles of the volume between them and the origin [voxels^3]: of a closed surface, what it encloses,
 /// positive when its triangles are counter-clockwise from outside.
 double enclosed_volume(const IsoMesh &mesh) {

@@ -117,6 +117,31 @@ TEST_P(RenderOnDevice, FuelAtLowRate) {
   EXPECT_GT(check(volume, {1, 10, 70, 150}, kMedium), 1000u);
 }
 
+/// Blocks of lengths of their own, and integers that are drawn as they are in their file.
+TEST_P(RenderOnDevice, SmallErrorBounds) {
+  const VolumeInfo info = test::grid_info({9, 10, 11});
+  const TestVolume volume(info, test::sample(info.dims, test::noise_field(5)), ErrorGoal{0.05});
+  EXPECT_GT(check(volume, {orbit_cameras(info, 1)[0]}, {0.5f}, kSmall), 20u);
+}
+
+TEST_P(RenderOnDevice, ErrorBounds) {
+  const VolumeInfo info = test::grid_info({37, 30, 26});
+  for (const double tolerance : {0.5, 0.01, 1e-6}) {
+    SCOPED_TRACE(tolerance);
+    const TestVolume volume(info, test::sample(info.dims, test::gyroid_field(9)), ErrorGoal{tolerance});
+    EXPECT_GT(check(volume, {0.2f}, kMedium), 500u);
+  }
+}
+
+TEST_P(RenderOnDevice, ExactVolumesAreTheirSource) {
+  const auto open = [] { return open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz"); };
+  std::vector<float> source(open()->info().num_voxels());
+  open()->read_layers(0, open()->info().dims.z, source);
+  const TestVolume volume(open()->info(), source, ErrorGoal{0, true});
+  ASSERT_EQ(volume.voxels, source);
+  EXPECT_GT(check(volume, {1, 70, 69.5f}, kMedium), 1000u);
+}
+
 TEST_P(RenderOnDevice, SheetsAndNoiseAtEveryRate) {
   for (const std::uint32_t rate : {1u, 4u, 32u}) {
     SCOPED_TRACE(fmt::format("rate {}", rate));

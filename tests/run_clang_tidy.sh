@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# run_clang_tidy.sh BUILD FILE...: checks FILEs against the root .clang-tidy, as many at once as there are processors.
+# run_clang_tidy.sh BUILD FILE...: checks FILEs, or all that is in a folder, against the root .clang-tidy, as many at once as there are processors.
 # BUILD holds compile_commands.json, made for g++: its precompiled header (which clang cannot read) and its warning
 # flags (the compiler's job) are taken out of a copy first.
 set -euo pipefail
@@ -20,4 +20,4 @@ check() {
 }
 export -f check
 # shellcheck disable=SC2016 # $0 is the inner shell's
-printf '%s\0' "$@" | xargs -0 -n 1 -P "$(nproc)" bash -c 'check "$0"'
+find "$@" -type f -regex '.*\.c[px][px]' -print0 | xargs -0 -n 1 -P "$(nproc)" bash -c 'check "$0"'

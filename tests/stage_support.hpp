@@ -16,6 +16,7 @@
 
 #include "core/device_counts.hpp"
 #include "core/libzfp.hpp"
+#include "core/zfp_accuracy.hpp"
 #include "core/zfp_stream.hpp"
 #include "kernels_cl/shared_types.h"
 #include "kernels_cl/shared_types_fields.h"
@@ -72,21 +73,31 @@ inline FrameParams grid_frame(const glm::uvec3 &dims) {
   return frame;
 }
 
-/// Compresses [nz][ny][nx] voxels by one call of libzfp, at any number of bits per block, 9..2048.
+/// Compresses [nz][ny][nx] voxels by one call of libzfp, at any number of bits per block, 9..2048; 0: with the bit planes of
+/// min_exponent.
 inline CompressedVolume compress_with_libzfp(std::vector<float> voxels, const glm::uvec3 &dims,
-                                             std::uint32_t bits_per_block) {
+                                             std::uint32_t bits_per_block,
+                                             std::int32_t min_exponent = ISO_ALL_PLANES) {
   CompressedVolume volume;
   volume.info.dims = dims;
   volume.bits_per_block = bits_per_block;
-  std::vector<std::uint64_t> words(volume.block_count() * bits_per_block / 64 + 2);
-  const ZfpStream stream = make_zfp_stream(bits_per_block);
+  volume.error_bound.min_exponent = min_exponent;
+  std::vector<std::uint64_t> words(volume.block_count() * volume.max_block_bits() / 64 + 2);
+  const ZfpStream stream = make_zfp_stream(bits_per_block, min_exponent);
   const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint64_t)), &stream_close);
   const ZfpField field(zfp_field_3d(voxels.data(), zfp_type_float, dims.x, dims.y, dims.z), &zfp_field_free);
   zfp_stream_set_bit_stream(stream.get(), bits.get());
-  if (zfp_compress(stream.get(), field.get()) == 0) throw std::logic_error("zfp: cannot compress");
-  volume.words.resize((volume.block_count() * bits_per_block + 31) / 32 + 2);
+  const std::size_t bytes = zfp_compress(stream.get(), field.get());
+  if (bytes == 0) throw std::logic_error("zfp: cannot compress");
+  volume.indexed_bits = 8 * bytes;
+  volume.words.resize((volume.payload_bits() + 31) / 32 + 2);
   std::memcpy(volume.words.data(), words.data(),
               std::min(volume.words.size() * sizeof(std::uint32_t), words.size() * sizeof(std::uint64_t)));
+  if (volume.is_indexed()) {
+    volume.index = index_by_decoding(volume, "a test");
+    volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
+    volume.words.resize((volume.payload_bits() + 31) / 32 + 2);
+  }
   return volume;
 }
 

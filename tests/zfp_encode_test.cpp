@@ -289,7 +289,7 @@ TEST_P(CompressOnDevice, RefusesAndMapsAsTheHost) {
   EXPECT_THAT([&] { compress_to_file(reader, options, folder / "a.zfp"); },
               ThrowsMessage<Error>(AllOf(HasSubstr("2 of 4680000 voxels"), HasSubstr("(7,5,2)"))));
   EXPECT_EQ(folder.num_files(), 0u);
-  options.map_nan = -2.0f;
+  options.input.map_nan = -2.0f;
   expect_same_as_host(dims, voxels, options);
 
   voxels.back() = kMaxMagnitude;

@@ -87,16 +87,16 @@ TEST(Compress, ManyChunksAndAnyThreadCount) {
   CompressOptions options;
   options.rate = 2;
   options.measure_error = true;
-  options.num_threads = 1;
+  options.input.num_threads = 1;
   std::vector<std::uint32_t> steps;
-  options.progress = [&](std::uint32_t done, std::uint32_t total) {
+  options.input.progress = [&](std::uint32_t done, std::uint32_t total) {
     EXPECT_EQ(total, 19u);
     steps.push_back(done);
   };
   const CompressedVolume one = compress(reader, options);
   EXPECT_GT(steps.size(), 1u);
   EXPECT_EQ(steps.back(), 19u);
-  options.num_threads = 5;
+  options.input.num_threads = 5;
   const CompressedVolume five = compress(reader, options);
   EXPECT_EQ(one.words, five.words);
   EXPECT_EQ(one.max_error, five.max_error);
@@ -168,12 +168,12 @@ TEST(Compress, NanAndInfAreCountedOrMapped) {
   EXPECT_THAT([&] { compress_to_file(reader, options, folder / "a.zfp"); },
               ThrowsMessage<Error>(AllOf(HasSubstr("3 of 4680000 voxels"), HasSubstr("(7,5,2)"))));
   EXPECT_EQ(folder.num_files(), 0u);
-  options.map_nan = -2.0f;
+  options.input.map_nan = -2.0f;
   options.rate = 32;
   const CompressedVolume mapped = compress(reader, options);
   EXPECT_EQ(mapped.value_range, (std::array{-2.0f, 1.0f}));
   EXPECT_NEAR(decode_with_libzfp(mapped).back(), -2.0f, 1e-6);
-  options.map_nan = NAN;
+  options.input.map_nan = NAN;
   EXPECT_THROW(compress(reader, options), Error);
 }
 
@@ -203,7 +203,7 @@ TEST(Compress, MagnitudesThatZfpCannotHold) {
 
 TEST(Compress, RangeOfValuesThatNeedAndNeedNoLook) {
   CompressOptions options;
-  options.map_nan = 5.0f;
+  options.input.map_nan = 5.0f;
   for (const float other : {-0.0f, 1e-40f, -1e-40f, std::numeric_limits<float>::infinity(), -3.0f}) {
     for (const float most : {0.0f, -0.0f, 2.0f}) {
       std::vector<float> voxels(64 * 8, most);
@@ -290,7 +290,6 @@ TEST(ZfpFile, OtherKindsAreRefusedByName) {
                                         {"-f -2 16 32 -r 8", "2D"},
                                         {"-f -4 8 8 4 2 -r 8", "4D"},
                                         {"-f -3 8 8 8 -p 8", "fixed precision"},
-                                        {"-f -3 8 8 8 -a 0.1", "fixed accuracy"},
                                         {"-f -3 8 8 8 -R", "reversible"},
                                         {"-f -3 8 8 8 -c 64 512 0 -1074", "expert"},
                                         {"-f -3 8 8 8 -c 512 512 12 -1074", "expert"},

@@ -18,8 +18,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "'<f4' is written and read as it lies in memory");
 
 // File: magic, version (2 bytes), length of the header (2 bytes in format 1, 4 bytes later), header, voxels.
-constexpr std::string_view kMagic = "\x93NUMPY";
-constexpr std::size_t kPreamble = kMagic.size() + 4;
+constexpr std::string_view kNpyMagic = "\x93NUMPY";
+constexpr std::size_t kPreamble = kNpyMagic.size() + 4;
 constexpr std::size_t kAlignment = 64;          ///< numpy starts the voxels at a multiple of this
 constexpr std::uint32_t kMaxHeader = 1u << 20;  ///< no header of a plain array comes near
 
@@ -63,7 +63,7 @@ void write_npy(const FloatImage &image, const std::filesystem::path &path) {
   const char preamble[] = {1, 0, static_cast<char>(length & 0xff), static_cast<char>(length >> 8)};
 
   AtomicFile out(path);
-  out.write(kMagic);
+  out.write(kNpyMagic);
   out.write(std::string_view(preamble, sizeof preamble));
   out.write(header);
   out.write(std::as_bytes(std::span(image.pixels)));
@@ -78,9 +78,9 @@ FloatImage read_npy(const std::filesystem::path &path) {
     return bool(in.read(static_cast<char *>(to), static_cast<std::streamsize>(bytes)));
   };
 
-  char magic[kMagic.size()];
+  char magic[kNpyMagic.size()];
   std::uint8_t version[2], length[4] = {};
-  if (!get(magic, sizeof magic) || std::string_view(magic, sizeof magic) != kMagic) {
+  if (!get(magic, sizeof magic) || std::string_view(magic, sizeof magic) != kNpyMagic) {
     throw Error("{}: not a .npy file", where);
   }
   if (!get(version, sizeof version)) throw Error("{}: truncated .npy header", where);

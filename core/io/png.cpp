@@ -19,7 +19,7 @@ namespace {
 // false, and leave the message in Message; their callers own everything and throw.
 
 constexpr std::size_t kSignatureBytes = 8;
-constexpr std::uint64_t kMaxDeflateRatio = 1032;  ///< deflate codes at most 258 bytes in 2 bits
+constexpr std::uint64_t kMaxIdatRatio = 1032;  ///< deflate codes at most 258 bytes in 2 bits
 
 struct Message {
   char text[120] = "unknown error";
@@ -133,7 +133,7 @@ Image8 read_png(const std::filesystem::path &path) {
   const std::uint64_t bytes = std::uint64_t(row_bytes) * image.height;
   // A broken header may ask for any size: believe it only as far as the file could hold it, at 1 bit per
   // pixel at least.
-  if (bytes / 32 / kMaxDeflateRatio > std::filesystem::file_size(path)) {
+  if (bytes / 32 / kMaxIdatRatio > std::filesystem::file_size(path)) {
     throw Error("{}: broken PNG: {} x {} pixels cannot come from a file this small", where, image.width,
                 image.height);
   }

@@ -34,6 +34,9 @@ struct Local {
   std::size_t count;
 };
 
+/// Work-items of a work-group where a stage leaves no choice.
+inline constexpr std::uint32_t kGroupSize = 64;
+
 /// The one-dimensional shape of a launch: num_groups work-groups of group_size work-items.
 struct Range {
   std::size_t num_groups = 0;

@@ -47,7 +47,13 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   const glm::uvec3 blocks = volume.num_blocks();
   result["blocks"] = {blocks.x, blocks.y, blocks.z};
   result["block_count"] = volume.block_count();
-  result["bits_per_block"] = volume.bits_per_block;
+  result["format"] = volume.is_indexed() ? "zfp, fixed accuracy" : "zfp, fixed rate";
+  if (volume.is_indexed()) {
+    result["zfp_tolerance"] = std::ldexp(1.0, volume.error_bound.min_exponent);
+    result["exact"] = volume.error_bound.whole_numbers;
+  } else {
+    result["bits_per_block"] = volume.bits_per_block;
+  }
   result["rate"] = volume.rate();
   if (std::isfinite(volume.value_range[0])) result["value_range"] = volume.value_range;
   if (volume.max_error) result["max_error"] = *volume.max_error;
@@ -102,7 +108,6 @@ void run(const InfoArgs &options) {
     result["file_bytes"] = std::filesystem::file_size(options.input);
   }
   if (is_zfp_name(options.input)) {
-    result["format"] = "zfp, fixed rate";
     result.update(describe_zfp(options.input, overrides, options.no_scan));
   } else {
     const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);

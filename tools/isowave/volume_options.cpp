@@ -106,7 +106,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   const std::unique_ptr<VolumeReader> reader = open_any_volume(path, overrides);
   CompressOptions options;
   options.rate = rate;
-  options.progress = make_progress_bar("compressing");
+  options.input.progress = make_progress_bar("compressing");
   options.device = device;
   CompressedVolume volume = compress(*reader, options);
   if (device) device->timer().collect();  // they belong to no frame

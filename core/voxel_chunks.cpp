@@ -1,0 +1,167 @@
+#include "core/voxel_chunks.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <future>
+#include <string>
+#include <vector>
+
+#include "core/error.hpp"
+#include "core/parallel_for.hpp"
+
+namespace isowave {
+
+namespace {
+
+constexpr std::uint64_t kChunkVoxels = 1ull << 22;  // enough to keep threads busy, 16 MiB
+
+/// What is learnt of a run of voxels.
+struct Findings {
+  std::uint64_t bad_count = 0, first_bad = ~std::uint64_t(0);  ///< NaN, Inf; linear voxel index
+  std::uint64_t too_large_count = 0, first_too_large = ~std::uint64_t(0);
+  float min = std::numeric_limits<float>::infinity(), max = -std::numeric_limits<float>::infinity();
+
+  bool refused() const { return bad_count > 0 || too_large_count > 0; }
+
+  void add(const Findings &other) {
+    bad_count += other.bad_count;
+    first_bad = std::min(first_bad, other.first_bad);
+    too_large_count += other.too_large_count;
+    first_too_large = std::min(first_too_large, other.first_too_large);
+    min = std::min(min, other.min);
+    max = std::max(max, other.max);
+  }
+};
+
+/// Adds the range of `values` to `found` if each of them is compressed as it is. Else returns false. Made for
+/// vector instructions: no branches, and the bits of floats as integers of the same order.
+bool add_plain_values(std::span<const float> values, Findings &found) {
+  constexpr std::int32_t kMagnitudeBits = 0x7FFFFFFF;
+  constexpr auto kLeast = std::bit_cast<std::int32_t>(kMinMagnitude);
+  constexpr auto kEnd = std::bit_cast<std::int32_t>(kMaxMagnitude);
+  const auto ordered = [](std::int32_t bits) {
+    return bits ^ ((bits >> 31) & kMagnitudeBits);
+  };  // its own inverse
+  std::int32_t min = std::numeric_limits<std::int32_t>::max(), max = std::numeric_limits<std::int32_t>::min();
+  std::uint32_t others = 0;
+  for (const float value : values) {
+    const auto bits = std::bit_cast<std::int32_t>(value);
+    const std::int32_t magnitude = bits & kMagnitudeBits, order = ordered(bits);
+    others |= std::uint32_t(magnitude != 0) &
+              (std::uint32_t(magnitude < kLeast) | std::uint32_t(magnitude >= kEnd));
+    min = std::min(min, order);
+    max = std::max(max, order);
+  }
+  if (others != 0) return false;
+  found.min = std::min(found.min, std::bit_cast<float>(ordered(min)));
+  found.max = std::max(found.max, std::bit_cast<float>(ordered(max)));
+  return true;
+}
+
+/// Checks `values`, the first of which is voxel `first`: maps NaN, flushes tiny ones, notes what cannot be compressed.
+void check_values(std::span<float> values, std::uint64_t first, const std::optional<float> &map_nan,
+                  Findings &found) {
+  if (add_plain_values(values, found)) return;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    float &value = values[i];
+    if (!std::isfinite(value)) {
+      if (!map_nan) {
+        ++found.bad_count;
+        found.first_bad = std::min(found.first_bad, first + i);
+        continue;
+      }
+      value = *map_nan;
+    }
+    found.min = std::min(found.min, value);
+    found.max = std::max(found.max, value);
+    const float magnitude = std::abs(value);
+    if (magnitude < kMinMagnitude) {
+      value = 0.0f;
+    } else if (magnitude >= kMaxMagnitude) {
+      ++found.too_large_count;
+      found.first_too_large = std::min(found.first_too_large, first + i);
+    }
+  }
+}
+
+void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
+  const auto position = [&](std::uint64_t voxel) {
+    const std::uint64_t x = info.dims.x, y = info.dims.y;
+    return fmt::format("({},{},{})", voxel % x, voxel / x % y, voxel / (x * y));
+  };
+  if (found.bad_count > 0) {
+    throw Error("{} of {} voxels are NaN or infinite, the first at {}: give a value for them with --map-nan",
+                found.bad_count, info.num_voxels(), position(found.first_bad));
+  }
+  if (found.too_large_count > 0) {
+    throw Error(
+        "{} of {} voxels are beyond +-{:.4g}, the first at {}: zfp cannot hold them, scale the volume down",
+        found.too_large_count, info.num_voxels(), kMaxMagnitude, position(found.first_too_large));
+  }
+}
+
+/// Checks the rows of a chunk and has them coded, unless a voxel was refused: what follows is only counted then.
+Findings code_rows(const Chunk &chunk, const glm::uvec3 &dims, const InputOptions &options,
+                   ChunkCoder &coder) {
+  const std::uint64_t layer = std::uint64_t(dims.x) * dims.y, rows_per_slab = (dims.y + 3u) / 4u;
+  std::vector<Findings> findings(thread_count(options.num_threads));
+  parallel_for(chunk.num_rows, options.num_threads, [&](std::uint64_t index, std::uint32_t thread) {
+    const auto y = std::uint32_t(index % rows_per_slab) * kBlockEdge,
+               z = std::uint32_t(index / rows_per_slab) * kBlockEdge;
+    const std::uint64_t begin = z * layer + std::uint64_t(y) * dims.x;
+    const BlockRow row{index, chunk.voxels.data() + begin, std::min(kBlockEdge, dims.y - y),
+                       std::min(kBlockEdge, chunk.num_layers - z)};
+    Findings &found = findings[thread];
+    for (std::uint64_t i = 0; i < std::uint64_t(row.ny) * row.nz; ++i) {
+      const std::uint64_t at = begin + i / row.ny * layer + i % row.ny * dims.x;
+      check_values(chunk.voxels.subspan(at, dims.x), chunk.z * layer + at, options.map_nan, found);
+    }
+    if (!found.refused()) coder.code_row(row, thread);
+  });
+  Findings total;
+  for (const Findings &found : findings) total.add(found);
+  return total;
+}
+
+}  // namespace
+
+std::array<float, 2> read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder) {
+  check_volume_info(reader.info(), "volume");
+  if (options.map_nan && !(std::abs(*options.map_nan) < kMaxMagnitude)) {
+    throw Error("--map-nan {}: must be finite and below {:.4g}", *options.map_nan, kMaxMagnitude);
+  }
+  const glm::uvec3 dims = reader.info().dims;
+  const std::uint64_t layer = std::uint64_t(dims.x) * dims.y;
+  const std::uint64_t slabs = std::max<std::uint64_t>(1, kChunkVoxels / (kBlockEdge * layer));
+  const auto chunk_layers =
+      std::uint32_t(std::min<std::uint64_t>(slabs * kBlockEdge, (dims.z + 3u) / 4u * 4u));
+  const auto layers_at = [&](std::uint64_t z) {
+    return z < dims.z ? std::uint32_t(std::min<std::uint64_t>(chunk_layers, dims.z - z)) : 0;
+  };
+  const auto read_ahead = [&](std::uint64_t z, std::vector<float> &voxels) {
+    return std::async(std::launch::async, [&, z] {
+      voxels.resize(layer * layers_at(z));
+      if (layers_at(z) > 0) reader.read_layers(std::uint32_t(z), layers_at(z), voxels);
+    });
+  };
+  Findings total;
+  std::vector<float> current, next;
+  std::future<void> pending = read_ahead(0, next);
+  for (std::uint32_t z = 0; z < dims.z; z += chunk_layers) {
+    pending.get();
+    std::swap(current, next);
+    pending = read_ahead(std::uint64_t(z) + chunk_layers, next);
+    const Chunk chunk{z, layers_at(z), current,
+                      std::uint64_t((dims.y + 3u) / 4u) * ((layers_at(z) + 3u) / 4u)};
+    coder.begin_chunk(chunk);
+    total.add(code_rows(chunk, dims, options, coder));
+    if (!total.refused()) coder.end_chunk(chunk);
+    if (options.progress) options.progress(z + layers_at(z), dims.z);
+  }
+  refuse_bad_voxels(total, reader.info());
+  return {total.min + 0.0f,
+          total.max + 0.0f};  // not -0: of equal values, the one met first would depend on the threads
+}
+
+}  // namespace isowave

@@ -1,0 +1,83 @@
+#pragma once
+// Volumes with a bound on the error: zfp's fixed-accuracy mode, where blocks are as long as the error demands.
+
+#include <vector>
+
+#include "core/zfp_stream.hpp"
+
+namespace isowave {
+
+/// The error that may be made.
+struct ErrorGoal {
+  double tolerance = 0;  ///< largest |decoded - source| allowed, > 0; or, of an integer volume,
+  bool exact = false;    ///< none: decoded values are rounded, and are the source's
+};
+
+/// The fewest bit planes with which no voxel exceeds the goal. zfp's own promise is kept by a factor of 4 to 16 in practice, so
+/// coarser ones than it demands are tried on every voxel. Reads the whole volume. Throws Error: what read_in_chunks() throws; a
+/// goal that is not positive, or finer than zfp can store; exact of other volumes than integers below 2^24.
+ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal, const InputOptions &options);
+
+/// Builds CompressedVolume::index block by block.
+class BlockIndexBuilder {
+ public:
+  /// bits: length of the next block, at most ISO_MAX_BLOCK_BITS.
+  void add(std::uint32_t bits);
+  /// The index of all that was added.
+  std::vector<std::uint32_t> finish();
+
+ private:
+  void note_begin();
+
+  std::vector<std::uint32_t> index_;
+  std::uint64_t count_ = 0, position_ = 0, group_begin_ = 0;
+};
+
+/// Bits laid end to end.
+class BitAppender {
+ public:
+  /// The lowest `count` bits of `words`.
+  void append(std::span<const std::uint64_t> words, std::uint64_t count);
+  /// Whole words so far; the caller may clear them.
+  std::vector<std::uint64_t> words{};
+  /// Fills up the last word with zeros; returns how many bits it had, 0 to 63.
+  std::uint32_t pad();
+
+ private:
+  void push(std::uint64_t bits, std::uint32_t count);
+
+  std::uint64_t buffer_ = 0;
+  std::uint32_t filled_ = 0;
+};
+
+/// Compresses chunks as a bound demands; the payload goes to `sink`, in order.
+class ErrorBoundCoder : public ChunkCoder {
+ public:
+  using Sink = std::function<void(std::span<const std::byte>)>;
+  ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink);
+
+  void begin_chunk(const Chunk &chunk) override;
+  void code_row(const BlockRow &row, std::uint32_t thread) override;
+  void end_chunk(const Chunk &chunk) override;
+  /// Hands over the last bits, as words of 32; returns the index.
+  std::vector<std::uint32_t> finish();
+
+ private:
+  struct CodedRow {
+    BitAppender bits;
+    std::vector<std::uint16_t> lengths;  ///< of its blocks
+  };
+
+  glm::uvec3 dims_;
+  std::int32_t min_exponent_;
+  const Sink &sink_;
+  std::vector<CodedRow> rows_;  ///< of the present chunk
+  BitAppender payload_;
+  BlockIndexBuilder index_;
+};
+
+/// The index of a fixed-accuracy payload that has none, from decoding it front to back. volume.indexed_bits: its length at most.
+/// Throws Error, which names `what`, where it ends too early.
+std::vector<std::uint32_t> index_by_decoding(const CompressedVolume &volume, const std::string &what);
+
+}  // namespace isowave
