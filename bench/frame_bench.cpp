@@ -27,7 +27,8 @@ struct Options {
   std::string volume, device, json, budgets;
   tools::VolumeOptions volume_options;
   std::optional<float> isovalue;
-  std::uint32_t rate = 4, orbit = 10, rounds = 3, max_passes = 2000;
+  tools::CompressionOptions compression{.rate = 4};
+  std::uint32_t orbit = 10, rounds = 3, max_passes = 2000;
   std::vector<std::uint32_t> size = {1280, 720};
   bool resident = true;
   tools::RendererFlags renderer;
@@ -45,7 +46,7 @@ float isovalue_of(const Options &options, const CompressedVolume &volume) {
 /// On a device of its own, so that the memory reported is that of drawing.
 CompressedVolume load(const Options &options, const ocl::DeviceInfo &device_info) {
   ocl::Device device(device_info);
-  return tools::load_volume(options.volume, tools::to_overrides(options.volume_options), options.rate,
+  return tools::load_volume(options.volume, tools::to_overrides(options.volume_options), options.compression,
                             &device);
 }
 
@@ -159,9 +160,7 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("VOLUME", options.volume, "a .zfp file, or " + std::string(tools::kVolumeHelp))->required();
   tools::add_volume_options(app, options.volume_options);
   app.add_option("--isovalue,-i", options.isovalue, "isovalue [the middle of the volume's values]");
-  app.add_option("--rate", options.rate,
-                 "bits per voxel when an uncompressed volume is compressed on the fly")
-      ->capture_default_str();
+  tools::add_compression_options(app, options.compression);
   app.add_option("--size", options.size, "picture size WxH [1280x720]")->delimiter('x')->expected(2);
   app.add_option("--orbit", options.orbit, "views around the volume")
       ->check(CLI::Range(1u, 100000u))

@@ -62,7 +62,7 @@ void reset_peak() {
 // ---- a child: reads an isovalue a line, answers a line of JSON
 
 std::unique_ptr<PeerSide> make_side(const Options &options) {
-  CompressedVolume volume = tools::load_volume(options.volume, {}, options.rate);
+  CompressedVolume volume = tools::load_volume(options.volume, {}, {.rate = options.rate});
   const Camera camera = orbit_cameras(volume.info, 1)[0];
   const ImageSize size{options.size.at(0), options.size.at(1)};
   if (options.side.starts_with("mesh"))

@@ -15,9 +15,9 @@ static_assert(ISO_ALL_PLANES == ZFP_MIN_EXP);  // NOLINT(misc-redundant-expressi
 ZfpStream make_zfp_stream(std::uint32_t bits_per_block, std::int32_t min_exponent) {
   ZfpStream stream(zfp_stream_open(nullptr), &zfp_stream_close);
   const bool accuracy = bits_per_block == 0;
-  if (!stream || !zfp_stream_set_params(stream.get(), accuracy ? ZFP_MIN_BITS : bits_per_block,
-                                        accuracy ? ZFP_MAX_BITS : bits_per_block, ZFP_MAX_PREC,
-                                        accuracy ? min_exponent : ZFP_MIN_EXP)) {
+  if (!stream ||
+      !zfp_stream_set_params(stream.get(), accuracy ? ZFP_MIN_BITS : bits_per_block,
+                             accuracy ? ZFP_MAX_BITS : bits_per_block, ZFP_MAX_PREC, min_exponent)) {
     throw std::invalid_argument(
         "make_zfp_stream: libzfp refuses this number of bits per block, or this exponent");
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -124,9 +125,14 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
   return thresholds;
 }
 
-void Macrocells::select(FrameParams &frame) {
-  frame.isovalue_index = static_cast<std::uint32_t>(
-      std::lower_bound(thresholds_.begin(), thresholds_.end(), frame.isovalue) - thresholds_.begin());
+void Macrocells::select(FrameParams &frame, float value_error) {
+  const auto index_of = [&](float value) {
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) - thresholds_.begin());
+  };
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  const bool exact = value_error == 0.0f;  // sums are rounded: outward, please
+  frame.below_index = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue + value_error, kFar));
+  frame.above_index = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue - value_error, -kFar));
   constexpr int kNone = std::numeric_limits<int>::max();
   box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
   masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_, box_);

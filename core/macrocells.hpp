@@ -22,9 +22,10 @@ class Macrocells {
   /// Bytes that the constructor needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
-  /// Rebuilds masks() for frame.isovalue and sets what the frames of this isovalue need: frame.isovalue_index and the
+  /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of, and sets
+  /// what the frames of this isovalue need: the frame's below_index, above_index and
   /// active box. Waits.
-  void select(FrameParams &frame);
+  void select(FrameParams &frame, float value_error = 0.0f);
   /// Sets the active box of the isovalue selected last.
   void set_active_box(FrameParams &frame) const;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cmath>
 
 #include "core/error.hpp"
 #include "core/stall_guard.hpp"
@@ -93,6 +94,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       options_(checked(options, volume, device)),
       plan_(make_plan(device, volume, options_)),
       info_(volume.info),
+      error_bound_(volume.error_bound),
       state_(make_state(device, volume, options_, plan_)),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
@@ -145,7 +147,7 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
   frame.table_groups = state_.cache.table_groups;
   if (selected_isovalue_ != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
-    state_.macrocells.select(frame);
+    state_.macrocells.select(frame, value_error_);
     state_.cache.classify(state_.rays);
   }
   state_.macrocells.set_active_box(frame);
@@ -165,6 +167,19 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   stats.completed_percent = 100.0 * (pixels - counts.next_active_count) / pixels;
   stats.stage_ms = device_.timer().collect();
   return stats;
+}
+
+void Renderer::set_value_error(double value_error) {
+  const ErrorBound bound = coarser(error_bound_, value_error);
+  StreamLayout &layout = state_.stream.layout;
+  if (layout.min_exponent == bound.min_exponent) return;
+  const bool all_planes = bound.min_exponent == error_bound_.min_exponent;
+  layout.min_exponent = bound.min_exponent;
+  layout.whole_numbers = bound.whole_numbers ? 1 : 0;
+  const double unrounded = error_bound_.whole_numbers ? 0.5 : 0.0;
+  value_error_ = all_planes ? 0.0f : static_cast<float>(std::ldexp(1.0, bound.min_exponent) + unrounded);
+  selected_isovalue_.reset();
+  clear_cache();
 }
 
 void Renderer::clear_cache() {

@@ -74,6 +74,11 @@ class Renderer {
   /// isovalue. Throws Error when a mapped volume's file has become shorter; the next frame is drawn as if this had not been.
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
 
+  /// How far the voxels of further frames may be from the volume's: 0, as at first, not at all; more, and fewer bit planes of
+  /// each block are decoded (coarser()). Forgets the decoded blocks where that changes anything. Throws Error unless it is finite and
+  /// at least 0.
+  void set_value_error(double value_error);
+
   /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture depends
   /// on it. Waits.
   void clear_cache();
@@ -97,6 +102,8 @@ class Renderer {
   RendererOptions options_;
   MemoryPlan plan_;
   VolumeInfo info_;
+  ErrorBound error_bound_;  ///< of the volume
+  float value_error_ = 0;   ///< of the frames' voxels, at most: against those that the ranges were made of
   std::optional<float> selected_isovalue_;  ///< what the macrocell masks stand for
   FrameState state_;
   std::unique_ptr<Pipeline> pipeline_;

@@ -208,20 +208,37 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
   return volume;
 }
 
-std::vector<float> decode_with_libzfp(const CompressedVolume &volume) {
+ErrorBound coarser(const ErrorBound &bound, double value_error) {
+  if (!(value_error >= 0) || !std::isfinite(value_error))
+    throw Error("a value error of {} cannot be allowed: give 0 or more", value_error);
+  const std::int32_t min_exponent = value_error > 0 ? std::ilogb(value_error) : ISO_ALL_PLANES;
+  if (min_exponent <= bound.min_exponent) return bound;
+  return {min_exponent, false, {}};  // rounding would only add to the error
+}
+
+std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double value_error) {
   // libzfp reads whole 64-bit words: four of 32 bits more keep its last read inside.
   std::vector<std::uint32_t> words(volume.word_count() + 4);
   if (volume.file) volume.file->check();
   volume.read_words(0, words);
-  const glm::uvec3 dims = volume.info.dims;
-  std::vector<float> voxels(volume.info.num_voxels());
-  const ZfpStream stream = make_zfp_stream(volume.bits_per_block, volume.error_bound.min_exponent);
+  const glm::uvec3 dims = volume.info.dims, blocks = volume.num_blocks();
+  const ErrorBound bound = coarser(volume.error_bound, value_error);
+  const ZfpStream stream = make_zfp_stream(volume.bits_per_block, bound.min_exponent);
   const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)), &stream_close);
   zfp_stream_set_bit_stream(stream.get(), bits.get());
-  const ZfpField field(zfp_field_3d(voxels.data(), zfp_type_float, dims.x, dims.y, dims.z), &zfp_field_free);
-  if (zfp_decompress(stream.get(), field.get()) == 0) throw std::logic_error("zfp: cannot decode");
-  if (volume.error_bound.whole_numbers) {
-    for (float &voxel : voxels) voxel = std::rint(voxel) + 0.0f;  // as the kernels do
+  std::vector<float> voxels(volume.info.num_voxels());
+  float *voxel = voxels.data();
+  for (std::uint32_t id = 0; id < volume.block_count(); ++id) {
+    const glm::uvec3 at = 4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
+    const glm::uvec3 size = glm::min(dims - at, glm::uvec3(4));
+    stream_rseek(bits.get(), volume.block_begin(id));  // a block may have more bits than are decoded
+    const auto layer = std::ptrdiff_t{dims.x} * dims.y;
+    zfp_decode_partial_block_strided_float_3(stream.get(),
+                                             voxel + at.x + std::ptrdiff_t{dims.x} * at.y + layer * at.z,
+                                             size.x, size.y, size.z, 1, dims.x, layer);
+  }
+  if (bound.whole_numbers) {
+    for (float &value : voxels) value = std::rint(value) + 0.0f;  // as the kernels do
   }
   return voxels;
 }

@@ -34,6 +34,10 @@ struct ErrorBound {
   std::optional<double> max_error{};  ///< largest |decoded - source|, measured
 };
 
+/// The bound of the same blocks when they are decoded to the last bit plane that a difference of at most value_error from all of
+/// them needs; 0: all planes, the same bound.
+ErrorBound coarser(const ErrorBound &bound, double value_error);
+
 struct CompressOptions {
   std::uint32_t rate = 8;                   ///< bits per voxel, 1..32; or
   std::optional<ErrorBound> error_bound{};  ///< as many bits as each block needs: see choose_error_bound()
@@ -98,7 +102,8 @@ CompressedVolume map_zfp_file(const std::filesystem::path &path);
 /// As read_zfp_file(), but neither reads nor checks the payload: words stays empty, and so may the index.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
-/// Decodes everything with libzfp: [nz][ny][nx] float32. The ground truth of every decoder here.
-std::vector<float> decode_with_libzfp(const CompressedVolume &volume);
+/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as value_error allows: see coarser(). The ground
+/// truth of every decoder here.
+std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double value_error = 0);
 
 }  // namespace isowave

@@ -44,8 +44,11 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
   zfp_decode_block(words, first_bit, bits, layout.min_exponent, values);
   if (layout.whole_numbers != 0u) {
     ISO_UNROLL
-    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
-      values[v] = rint(values[v]) + 0.0f; /* no -0, which no integer is */
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
+      const uint rounded = as_uint(rint(values[v]));
+      values[v] =
+          as_float(rounded == 0x80000000u ? 0u : rounded); /* no integer is -0; llvmpipe drops a + 0.0f */
+    }
   }
 }
 

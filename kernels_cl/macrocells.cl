@@ -5,12 +5,11 @@
 /// that a block gives to itself and to its seven -x/-y/-z neighbours, one layer of blocks (in z) at a time;
 /// macrocell_ranges joins them.
 ///
-/// Ranges are stored in 8 bits through `thresholds` [256], ascending from -INFINITY to INFINITY: low = the
-/// last threshold
-/// <= min, high = the first >= max. So they only ever grow: no block is skipped wrongly. With a = the first
-/// threshold
-/// >= isovalue (FrameParams.isovalue_index): some value may be below the isovalue iff low < a, and some at or
-/// above iff high >= a. Both: active. Coarse macrocells of 4^3 blocks hold the union of their blocks.
+/// Ranges are stored in 8 bits through `thresholds` [256], ascending from -INFINITY to INFINITY: low = the last threshold
+/// <= min, high = the first >= max. So they only ever grow: no block is skipped wrongly. With e = how far the frame's voxels may be from
+/// those that ranges were made of, FrameParams.below_index = the first threshold >= isovalue + e and above_index = the first
+/// >= isovalue - e: some value may be below the isovalue iff low < below_index, and some at or above iff high >= above_index.
+/// Both: active. Coarse macrocells of 4^3 blocks hold the union of their blocks.
 #include "block_grid.h"
 #include "block_stream.h"
 
@@ -139,14 +138,14 @@ kernel void macrocell_coarse_ranges(const FrameParams frame_params, uint num_coa
 kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse, global const ushort *ranges,
                             global const ushort *coarse_ranges, global uint *masks, global int *box) {
   const FrameParams *frame = &frame_params;
-  const uint a = frame->isovalue_index;
+  const uint below = frame->below_index, above = frame->above_index;
   for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {
     uint words[2] = {0, 0};
-    if ((coarse_ranges[coarse] & 255u) < a && (uint)coarse_ranges[coarse] >> 8 >= a) {
+    if ((coarse_ranges[coarse] & 255u) < below && (uint)coarse_ranges[coarse] >> 8 >= above) {
       for (uint bit = 0; bit < 64; ++bit) {
         const uint block_id = macrocell_block(frame, coarse, bit);
         if (block_id == ISO_INVALID_ID) continue;
-        if (((uint)ranges[block_id] & 255u) < a && (uint)ranges[block_id] >> 8 >= a)
+        if (((uint)ranges[block_id] & 255u) < below && (uint)ranges[block_id] >> 8 >= above)
           words[bit >> 5] |= 1u << (bit & 31);
       }
     }

@@ -68,8 +68,8 @@ typedef struct FrameParams {
   float pixel_scale;  ///< tan(fovy / 2) / height: half a pixel's step of u and v
   float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
   float isovalue;
-  uint isovalue_index;  ///< the isovalue in the quantile table of macrocells.cl
-  uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+  uint below_index, above_index;  ///< the isovalue in the quantile table of macrocells.cl
+  uint max_spec_count;            ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
   int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
   /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
@@ -77,7 +77,7 @@ typedef struct FrameParams {
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
   uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 148);
+ISO_CHECK_SIZE(FrameParams, 152);
 
 /// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu

@@ -234,6 +234,28 @@ TEST(CliRender, ZfpFilesAndCompressionOnTheFlyAreTheSame) {
   EXPECT_NE(test::read_file(folder / "a.npy"), test::read_file(folder / "c.npy"));
 }
 
+TEST(CliRender, ErrorsInsteadOfARate) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --exact -o " + quoted(folder / "n.zfp")).status, 0);
+  const auto depth = [&](const std::string &arguments) {
+    render(arguments + " -i 80.5 --size 32x32 --depth " + quoted(folder / "a.npy"));
+    return test::read_file(folder / "a.npy");
+  };
+  const std::string exact = depth(quoted(folder / "n.zfp"));
+  EXPECT_EQ(depth(kNucleon + " --exact"), exact);
+  EXPECT_EQ(depth(kNucleon + " --rate 32"), exact) << "as good as no compression";
+  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --value-error 0.1"), exact) << "less than what was left out";
+  const std::string coarse = depth(quoted(folder / "n.zfp") + " --value-error 20");
+  EXPECT_NE(coarse, exact);
+  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --value-error 20 --reference"), coarse);
+  EXPECT_NE(depth(kNucleon + " --tolerance-relative 0.05"), exact);
+  test::expect_one_line_error(
+      "render " + kNucleon + " -i 80 --value-error -1 --depth " + quoted(folder / "b.npy"),
+      "value error of -1");
+  test::expect_one_line_error(
+      "render " + kNucleon + " -i 80 --rate 4 --exact --depth " + quoted(folder / "b.npy"), "rate");
+}
+
 TEST(CliRender, NegativeAndFractionalIsovalues) {
   const TemporaryFolder folder;
   std::vector<float> ramp(512);

@@ -133,6 +133,49 @@ TEST_P(RenderOnDevice, ErrorBounds) {
   }
 }
 
+/// Fewer bit planes than the volume has: the twin of voxels that libzfp decodes likewise; and all of them again.
+TEST_P(RenderOnDevice, SmallValueErrors) {
+  const VolumeInfo info = test::grid_info({9, 10, 11});
+  const std::vector<float> source = test::sample(info.dims, test::gyroid_field(7));
+  const Camera camera = orbit_cameras(info, 1)[0];
+  for (const TestVolume &volume : {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
+    Renderer renderer(device_, volume.compressed, {.size = kSmall});
+    for (const double value_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
+      SCOPED_TRACE(
+          fmt::format("{} bits per block, value error {}", volume.compressed.bits_per_block, value_error));
+      const std::vector<float> voxels = decode_with_libzfp(volume.compressed, value_error);
+      for (std::size_t i = 0; i < voxels.size(); ++i)
+        ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), value_error);
+      renderer.set_value_error(value_error);
+      renderer.render(camera, 0.1f);
+      expect_same_hits(renderer.hits(), render_scalar(make_frame_params(info, camera, kSmall, 0.1f), voxels),
+                       kSmall.width);
+    }
+    for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
+      EXPECT_THROW(renderer.set_value_error(bad), Error);
+  }
+}
+
+/// Blocks whose range does not hold the isovalue, but whose fewer bit planes do, are drawn as well.
+TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
+  const auto open = [] { return open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz"); };
+  std::vector<float> source(open()->info().num_voxels());
+  open()->read_layers(0, open()->info().dims.z, source);
+  const TestVolume volume(open()->info(), source, ErrorGoal{0, true});
+  Renderer renderer(device_, volume.compressed, {.size = kMedium});
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  for (const double value_error : {0.5, 4.0, 64.0}) {
+    renderer.set_value_error(value_error);
+    const std::vector<float> voxels = decode_with_libzfp(volume.compressed, value_error);
+    for (const float isovalue : {0.7f, 70.0f, 255.5f}) {
+      SCOPED_TRACE(fmt::format("value error {}, isovalue {}", value_error, isovalue));
+      renderer.render(camera, isovalue);
+      const FrameParams frame = make_frame_params(volume.info(), camera, kMedium, isovalue);
+      expect_same_hits(renderer.hits(), render_scalar(frame, voxels), kMedium.width);
+    }
+  }
+}
+
 TEST_P(RenderOnDevice, ExactVolumesAreTheirSource) {
   const auto open = [] { return open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz"); };
   std::vector<float> source(open()->info().num_voxels());

@@ -81,7 +81,7 @@ Subject load_subject(const std::string &argument, const BenchSolversArgs &option
   }
   const std::string path = argument.substr(0, colon);
   subject.name = std::filesystem::path(path).filename().string();
-  subject.volume = load_volume(path, to_overrides(options.volume), options.rate);
+  subject.volume = load_volume(path, to_overrides(options.volume), {.rate = options.rate});
   subject.voxels = decode_with_libzfp(subject.volume);
   subject.camera = orbit_cameras(subject.volume.info, 1).front();
   subject.frame =

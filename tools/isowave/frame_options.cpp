@@ -34,7 +34,7 @@ Scene load_scene(const std::string &path, const VolumeOptions &volume, const Fra
   if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
   if (!options.size.empty()) scene.size = parse_size(options.size);
   check_image_size(scene.size);
-  scene.volume = load_volume(path, to_overrides(volume), options.rate, device);
+  scene.volume = load_volume(path, to_overrides(volume), options.compression, device);
   const VolumeInfo &info = scene.volume.info;
   if (file && file->dims && *file->dims != info.dims) {
     throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims), path,
@@ -55,9 +55,10 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
                               .add_option("--isovalue,-i", options.isovalues,
                                           "isovalue; repeat it for more surfaces, each drawn from all views")
                               ->allow_extra_args(false);  // one number each time: VOLUME may follow
+  add_compression_options(command, options.compression);
   command
-      .add_option("--rate", options.rate,
-                  "bits per voxel when an uncompressed volume is compressed on the fly")
+      .add_option("--value-error", options.value_error,
+                  "how far decoded voxels may be from the compressed volume's: fewer bit planes are decoded")
       ->capture_default_str();
   command.add_option("--size", options.size, "picture size WxH [1280x720, or the camera file's]");
   CLI::Option *orbit = command.add_option("--orbit", options.orbit, "draw N views around the volume [1]")

@@ -15,14 +15,15 @@ namespace isowave::tools {
 
 /// Options as typed; load_scene() checks them.
 struct FrameOptions {
-  std::uint32_t rate = 8;  ///< bits per voxel when compressing on the fly
+  CompressionOptions compression;  ///< of a volume that is not
   std::vector<float> isovalues;
+  double value_error = 0;   ///< see Renderer::set_value_error()
   std::string size;         ///< WxH
   std::uint32_t orbit = 0;  ///< views; 0: one, or the camera file's
   std::string cameras;      ///< camera file
 };
 
-/// Adds --isovalue, --size, --orbit, --cameras and --rate. Returns the option --isovalue.
+/// Adds --isovalue, --value-error, --size, --orbit, --cameras and add_compression_options(). Returns the option --isovalue.
 CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options);
 
 /// "1280x720". Throws Error.

@@ -74,8 +74,10 @@ class FrameSource {
 class DeviceFrames : public FrameSource {
  public:
   DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance,
-               const RendererOptions &options)
-      : renderer_(device, scene.volume, options), appearance_(appearance) {}
+               const RendererOptions &options, double value_error)
+      : renderer_(device, scene.volume, options), appearance_(appearance) {
+    renderer_.set_value_error(value_error);
+  }
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
     return renderer_.render(camera, isovalue, on_pass);
   }
@@ -90,8 +92,11 @@ class DeviceFrames : public FrameSource {
 
 class TwinFrames : public FrameSource {
  public:
-  TwinFrames(const Scene &scene, const Appearance &appearance, Solver solver)
-      : scene_(scene), appearance_(appearance), solver_(solver), voxels_(decode_with_libzfp(scene.volume)) {}
+  TwinFrames(const Scene &scene, const Appearance &appearance, Solver solver, double value_error)
+      : scene_(scene),
+        appearance_(appearance),
+        solver_(solver),
+        voxels_(decode_with_libzfp(scene.volume, value_error)) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
@@ -157,6 +162,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
   nlohmann::ordered_json json = {{"size", {scene.size.width, scene.size.height}},
                                  {"views", scene.cameras.size()},
                                  {"isovalues", options.frame.isovalues},
+                                 {"value_error", options.frame.value_error},
                                  {"reference", options.reference}};
   json.update(renderer_options_json(options.renderer));
   return json;
@@ -164,13 +170,15 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
 
 nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVolume &volume) {
   const VolumeInfo &info = volume.info;
-  return {{"file", options.input},
-          {"dims", {info.dims.x, info.dims.y, info.dims.z}},
-          {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
-          {"type", to_string(info.type)},
-          {"rate", volume.rate()},
-          {"blocks", volume.block_count()},
-          {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
+  return {
+      {"file", options.input},
+      {"dims", {info.dims.x, info.dims.y, info.dims.z}},
+      {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
+      {"type", to_string(info.type)},
+      {"rate", volume.rate()},
+      {"max_error", volume.max_error ? nlohmann::ordered_json(*volume.max_error) : nlohmann::ordered_json()},
+      {"blocks", volume.block_count()},
+      {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
 }
 
 /// Outputs go to folders that exist, but for --progress-dir, which is made. Found out before any work is
@@ -230,11 +238,11 @@ void run_render(RenderArgs options) {
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
   if (!device) {
-    TwinFrames frames(scene, appearance, options.renderer.solver);
+    TwinFrames frames(scene, appearance, options.renderer.solver, options.frame.value_error);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {
-    DeviceFrames frames(*device, scene, appearance, options.renderer);
+    DeviceFrames frames(*device, scene, appearance, options.renderer, options.frame.value_error);
     options.renderer = frames.renderer().options();
     if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());

@@ -66,7 +66,8 @@ FrameJudge make_judge(const std::string &name, std::span<const float> voxels, co
 /// Draws with the scalar reference, or with a device.
 class FrameDrawer {
  public:
-  FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device, Solver solver)
+  FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device, Solver solver,
+              double value_error)
       : scene_(scene), voxels_(voxels), solver_(solver) {
     if (device.empty()) return;
     const ocl::DeviceInfo info = ocl::choose_device(device);
@@ -76,6 +77,7 @@ class FrameDrawer {
     options.size = scene.size;
     options.solver = solver;
     renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
+    renderer_->set_value_error(value_error);
   }
 
   std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
@@ -130,7 +132,7 @@ void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, 
 std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vector<std::string> &solvers,
                             ordered_json &document) {
   const Scene scene = load_scene(options.input, options.volume, options.frame);
-  const std::vector<float> voxels = decode_with_libzfp(scene.volume);
+  const std::vector<float> voxels = decode_with_libzfp(scene.volume, options.frame.value_error);
   const glm::uvec3 dims = scene.volume.info.dims;
   const std::vector<std::string> names =
       options.oracles.empty() ? std::vector<std::string>{"roots", "cells", "mesh"} : options.oracles;
@@ -144,7 +146,8 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vecto
                  seconds_since(begin));
     }
     for (const std::string &solver : solvers) {
-      FrameDrawer drawer(scene, voxels, options.device, solver_from_string(solver));
+      FrameDrawer drawer(scene, voxels, options.device, solver_from_string(solver),
+                         options.frame.value_error);
       print_accuracy_header(solver);
       for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
         const FrameParams frame =

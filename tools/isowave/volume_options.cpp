@@ -9,6 +9,7 @@
 #include "core/generate.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
+#include "core/zfp_accuracy.hpp"
 
 namespace isowave::tools {
 
@@ -94,8 +95,41 @@ bool is_zfp_name(const std::string &path) {
   return path.ends_with(".zfp");
 }
 
-CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate,
-                             ocl::Device *device) {
+void add_compression_options(CLI::App &command, CompressionOptions &options) {
+  CLI::Option *rate =
+      command.add_option("--rate", options.rate, "bits per voxel of a volume that is compressed, 1 to 32")
+          ->capture_default_str();
+  CLI::Option *tolerance =
+      command.add_option("--tolerance", options.tolerance,
+                         "instead: as few bits as keep each voxel within this error of the input's");
+  CLI::Option *relative = command.add_option("--tolerance-relative", options.relative_tolerance,
+                                             "the same, as a part of the range of values");
+  CLI::Option *exact =
+      command.add_flag("--exact", options.exact,
+                       "the same, with no error: decoded values are the input's (integers below 2^24 only)");
+  tolerance->excludes(rate, relative, exact);
+  relative->excludes(rate, exact);
+  exact->excludes(rate);
+}
+
+std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
+                                           const CompressionOptions &options, InputOptions input) {
+  if (!options.bounded()) return {};
+  ErrorGoal goal{options.tolerance.value_or(0), options.exact};
+  if (options.relative_tolerance) {
+    ChunkCoder nothing;
+    input.progress = make_progress_bar("reading the value range");
+    const std::array<float, 2> range = read_in_chunks(*open_any_volume(path, overrides), input, nothing);
+    if (range[0] == range[1])
+      throw Error("{}: all voxels are {}: there is no range that an error is relative to", path, range[0]);
+    goal.tolerance = *options.relative_tolerance * (double{range[1]} - double{range[0]});
+  }
+  input.progress = make_progress_bar("measuring errors");
+  return choose_error_bound(*open_any_volume(path, overrides), goal, input);
+}
+
+CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
+                             const CompressionOptions &compression, ocl::Device *device) {
   if (is_zfp_name(path)) {
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
     CompressedVolume volume = map_zfp_file(path);
@@ -105,9 +139,10 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   }
   const std::unique_ptr<VolumeReader> reader = open_any_volume(path, overrides);
   CompressOptions options;
-  options.rate = rate;
+  options.rate = compression.rate;
+  options.error_bound = find_error_bound(path, overrides, compression);
   options.input.progress = make_progress_bar("compressing");
-  options.device = device;
+  options.device = options.error_bound ? nullptr : device;
   CompressedVolume volume = compress(*reader, options);
   if (device) device->timer().collect();  // they belong to no frame
   return volume;

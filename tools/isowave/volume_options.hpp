@@ -29,6 +29,22 @@ RawOverrides to_overrides(const VolumeOptions &options);
 /// N or X Y Z. Throws Error on another count.
 glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers);
 
+/// How a volume is compressed: at a rate, or within an error.
+struct CompressionOptions {
+  std::uint32_t rate = 8;  ///< bits per voxel
+  std::optional<double> tolerance{}, relative_tolerance{};
+  bool exact = false;
+
+  bool bounded() const { return tolerance || relative_tolerance || exact; }
+};
+
+/// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given.
+void add_compression_options(CLI::App &command, CompressionOptions &options);
+/// The bound that was asked for, or none: the rate. Reads all of the volume, for a relative tolerance twice. Throws Error: see
+/// choose_error_bound().
+std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
+                                           const CompressionOptions &options, InputOptions input = {});
+
 /// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path, const RawOverrides &overrides);
 /// The help text of such an argument.
@@ -37,10 +53,10 @@ inline constexpr const char *kVolumeHelp =
 
 /// Whether the name ends in .zfp.
 bool is_zfp_name(const std::string &path);
-/// Maps a .zfp file into memory (its spacing may be overridden), or compresses any other volume at `rate` bits per
-/// voxel, on `device` where one is given. Clears that device's stage times.
-CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides, std::uint32_t rate,
-                             ocl::Device *device = nullptr);
+/// Maps a .zfp file into memory (its spacing may be overridden), or compresses any other volume, at a rate on `device` where one
+/// is given. Clears that device's stage times.
+CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
+                             const CompressionOptions &compression, ocl::Device *device = nullptr);
 
 /// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with the last.
 Progress make_progress_bar(std::string_view label);
