@@ -228,6 +228,7 @@ void run_render(RenderArgs options) {
   for (const float isovalue : options.frame.isovalues) {
     if (std::isnan(isovalue)) throw Error("--isovalue nan: give a number in the volume's value range");
   }
+  coarser({}, options.frame.value_error);  // or throws
   check_outputs(options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
