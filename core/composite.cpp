@@ -4,8 +4,6 @@
 
 namespace isowave {
 
-namespace {}
-
 std::string_view to_string(ClosestHit closest) {
   return closest == ClosestHit::kScan ? "scan" : "atomic-min";
 }

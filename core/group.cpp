@@ -9,8 +9,6 @@ namespace isowave {
 
 namespace {
 
-/// Work-items per group of the kernels that take any number.
-
 /// Distinct blocks that a pass's pairs can belong to.
 std::uint64_t max_visible(std::uint64_t num_pixels, std::uint32_t num_slots) {
   return std::min<std::uint64_t>(num_pixels, num_slots);

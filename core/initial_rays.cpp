@@ -4,8 +4,6 @@
 
 namespace isowave {
 
-namespace {}
-
 InitialRays::InitialRays(ocl::Device &device, std::uint64_t num_pixels)
     : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       kernel_(device, "initial_rays", "initial_rays") {}

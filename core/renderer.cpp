@@ -176,6 +176,7 @@ void Renderer::set_value_error(double value_error) {
   const bool all_planes = bound.min_exponent == error_bound_.min_exponent;
   layout.min_exponent = bound.min_exponent;
   layout.whole_numbers = bound.whole_numbers ? 1 : 0;
+  // Ranges were made of rounded values, and fewer planes are not rounded.
   const double unrounded = error_bound_.whole_numbers ? 0.5 : 0.0;
   value_error_ = all_planes ? 0.0f : static_cast<float>(std::ldexp(1.0, bound.min_exponent) + unrounded);
   selected_isovalue_.reset();

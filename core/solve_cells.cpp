@@ -4,8 +4,6 @@
 
 namespace isowave {
 
-namespace {}
-
 SolveCells::SolveCells(ocl::Device &device, Solver solver)
     : device_(&device), kernel_(device, "solve_cells", "solve_cells", solver_defines(solver)) {}
 

@@ -43,12 +43,12 @@ class BlockCodec {
 
   /// What is left of the block with the bit planes of min_exponent: x + 4y + 16z.
   const std::array<float, ISO_BLOCK_VOXELS> &decode(std::int32_t min_exponent) {
-    zfp_stream_set_params(stream_.get(), ZFP_MIN_BITS, ZFP_MAX_BITS, ZFP_MAX_PREC, min_exponent);
+    set_planes(min_exponent);
     zfp_stream_rewind(stream_.get());
     zfp_decode_block_float_3(stream_.get(), values_.data());
     return values_;
   }
-  /// Encodes with the planes of min_exponent from now on.
+  /// Encodes with the bit planes of min_exponent from now on.
   void set_planes(std::int32_t min_exponent) {
     zfp_stream_set_params(stream_.get(), ZFP_MIN_BITS, ZFP_MAX_BITS, ZFP_MAX_PREC, min_exponent);
   }

@@ -13,8 +13,8 @@ struct ErrorGoal {
   bool exact = false;    ///< none: decoded values are rounded, and are the source's
 };
 
-/// The fewest bit planes with which no voxel exceeds the goal. zfp's own promise is kept by a factor of 4 to 16 in practice, so
-/// coarser ones than it demands are tried on every voxel. Reads the whole volume. Throws Error: what read_in_chunks() throws; a
+/// The fewest bit planes with which no voxel exceeds the goal: zfp's promise is for the worst of all volumes, so up to six planes
+/// fewer than it demands are tried on every voxel. Reads the whole volume. Throws Error: what read_in_chunks() throws; a
 /// goal that is not positive, or finer than zfp can store; exact of other volumes than integers below 2^24.
 ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal, const InputOptions &options);
 
