@@ -190,7 +190,7 @@ CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) 
       [&](Payload payload) {
         const std::size_t begin = words.size();
         words.resize(begin + payload.size() / sizeof(std::uint32_t));
-        std::memcpy(words.data() + begin, payload.data(), payload.size());
+        std::ranges::copy(payload, std::as_writable_bytes(std::span(words).subspan(begin)).begin());
       },
       volume);
   words.resize((volume.payload_bits() + 31) / 32 + 2);
