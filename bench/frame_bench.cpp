@@ -142,7 +142,9 @@ BudgetSweep measure_budgets(const Options &options, std::string command) {
 }
 
 /// Prints one report or the other, and writes it where asked.
-void run(const Options &options, const std::string &command) {
+void run(Options options, const std::string &command) {
+  tools::want_levels(options.renderer, options.compression);
+  if (options.renderer.values.max_pixel_error > 0) options.resident = false;  // it draws the finest level
   nlohmann::ordered_json json;
   if (options.budgets.empty()) {
     const FrameReport report = measure(options, command);

@@ -38,7 +38,7 @@ std::uint32_t BlockCache::capacity_for(std::uint32_t num_slots, std::uint64_t nu
 }
 
 BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t slots,
-                       std::uint64_t num_pixels, std::uint32_t group_size)
+                       std::uint64_t num_pixels, std::uint32_t group_size, bool levels)
     : num_slots(checked_slots(slots)),
       table_groups(table_groups_for(slots)),
       capacity(capacity_for(slots, block_count(grid), num_pixels)),
@@ -57,14 +57,15 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
       free_slots_(device, "free slots", slots),
       age_histogram_(device, "cache ages", ISO_AGE_BUCKETS),
-      request_(device, "block_cache", "cache_request", group_defines(group_size)),
-      age_histogram_kernel_(device, "block_cache", "cache_age_histogram", group_defines(group_size)),
-      select_(device, "block_cache", "cache_select", group_defines(group_size)),
-      evict_(device, "block_cache", "cache_evict", group_defines(group_size)),
-      rebuild_(device, "block_cache", "cache_rebuild", group_defines(group_size)),
-      classify_(device, "block_cache", "cache_classify", group_defines(group_size)),
-      assign_(device, "block_cache", "cache_assign", group_defines(group_size)),
-      clear_(device, "block_cache", "cache_clear", group_defines(group_size)) {
+      request_(device, "block_cache", "cache_request", with_levels(group_defines(group_size), levels)),
+      age_histogram_kernel_(device, "block_cache", "cache_age_histogram",
+                            with_levels(group_defines(group_size), levels)),
+      select_(device, "block_cache", "cache_select", with_levels(group_defines(group_size), levels)),
+      evict_(device, "block_cache", "cache_evict", with_levels(group_defines(group_size), levels)),
+      rebuild_(device, "block_cache", "cache_rebuild", with_levels(group_defines(group_size), levels)),
+      classify_(device, "block_cache", "cache_classify", with_levels(group_defines(group_size), levels)),
+      assign_(device, "block_cache", "cache_assign", with_levels(group_defines(group_size), levels)),
+      clear_(device, "block_cache", "cache_clear", with_levels(group_defines(group_size), levels)) {
   clear();
 }
 

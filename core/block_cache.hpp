@@ -13,10 +13,10 @@ inline constexpr std::uint32_t kMinCacheSlots = 8;
 
 /// What the stages of one pass read of the cache, and add to its requests.
 struct BlockCache {
-  /// num_slots is at least kMinCacheSlots; num_pixels bounds a pass's pairs. `grid`: its blocks are used. Throws Error when
-  /// there are too few slots, or more than 2^30.
+  /// num_slots is at least kMinCacheSlots; num_pixels bounds a pass's pairs. `grid`: its blocks are used, those of the finest
+  /// level where frames may have several levels of detail. Throws Error when there are too few slots, or more than 2^30.
   BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots, std::uint64_t num_pixels,
-             std::uint32_t group_size);
+             std::uint32_t group_size, bool levels = false);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones. Out:
   /// counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request_ahead.)

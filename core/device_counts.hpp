@@ -23,4 +23,10 @@ inline ocl::Defines group_defines(std::uint32_t group_size) {
   return {{"ISO_GROUP_SIZE", std::to_string(group_size) + "u"}};
 }
 
+/// For kernels of frames that may be drawn at several levels of detail.
+inline ocl::Defines with_levels(ocl::Defines defines, bool levels) {
+  if (levels) defines.insert({"ISO_LEVELS", "1"});
+  return defines;
+}
+
 }  // namespace isowave

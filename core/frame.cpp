@@ -31,6 +31,9 @@ FrameParams make_grid_params(const VolumeInfo &info) {
   frame.blocks_x = blocks.x;
   frame.blocks_y = blocks.y;
   frame.blocks_z = blocks.z;
+  frame.id_blocks_x = blocks.x;
+  frame.id_blocks_y = blocks.y;
+  frame.end_t = std::numeric_limits<float>::infinity();
   return frame;
 }
 
@@ -70,13 +73,7 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   right *= t_scale;
   up *= t_scale;
 
-  FrameParams frame{};
-  frame.dims_x = info.dims.x;
-  frame.dims_y = info.dims.y;
-  frame.dims_z = info.dims.z;
-  frame.blocks_x = (info.dims.x + 3) / 4;
-  frame.blocks_y = (info.dims.y + 3) / 4;
-  frame.blocks_z = (info.dims.z + 3) / 4;
+  FrameParams frame = make_grid_params(info);
   frame.active_end_x = static_cast<int>(num_owning_blocks(info.dims.x));
   frame.active_end_y = static_cast<int>(num_owning_blocks(info.dims.y));
   frame.active_end_z = static_cast<int>(num_owning_blocks(info.dims.z));

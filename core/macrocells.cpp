@@ -131,8 +131,9 @@ void Macrocells::select(FrameParams &frame, float value_error) {
   };
   constexpr float kFar = std::numeric_limits<float>::infinity();
   const bool exact = value_error == 0.0f;  // sums are rounded: outward, please
-  frame.below_index = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue + value_error, kFar));
-  frame.above_index = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue - value_error, -kFar));
+  below_index_ = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue + value_error, kFar));
+  above_index_ = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue - value_error, -kFar));
+  set_indices(frame);
   constexpr int kNone = std::numeric_limits<int>::max();
   box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
   masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_, box_);
@@ -144,6 +145,11 @@ void Macrocells::select(FrameParams &frame, float value_error) {
     active_box_[3 + i] = std::min(active_box_[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
   }
   set_active_box(frame);
+}
+
+void Macrocells::set_indices(FrameParams &frame) const {
+  frame.below_index = below_index_;
+  frame.above_index = above_index_;
 }
 
 void Macrocells::set_active_box(FrameParams &frame) const {

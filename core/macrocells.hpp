@@ -26,7 +26,9 @@ class Macrocells {
   /// what the frames of this isovalue need: the frame's below_index, above_index and
   /// active box. Waits.
   void select(FrameParams &frame, float value_error = 0.0f);
-  /// Sets the active box of the isovalue selected last.
+  /// Sets below_index and above_index of the isovalue selected last.
+  void set_indices(FrameParams &frame) const;
+  /// Sets its active box.
   void set_active_box(FrameParams &frame) const;
 
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
@@ -62,6 +64,7 @@ class Macrocells {
   ocl::Buffer<uint> masks_;
   ocl::Buffer<int> box_;
   std::array<int, 6> active_box_{};  ///< begin x, y, z, end x, y, z [blocks]
+  std::uint32_t below_index_ = 0, above_index_ = 0;
   std::vector<float> thresholds_;
   ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::Out<uint>, ocl::Out<int>>
       masks_kernel_;

@@ -2,6 +2,8 @@
 // Pipeline `rays`: each ray walks through the blocks that are cached until it hits, leaves, or waits for one that is not
 // (Sec. 3.3, 3.7, 4.4 in one stage; kernels_cl/march.cl).
 
+#include <optional>
+
 #include "core/block_cache.hpp"
 #include "core/macrocells.hpp"
 #include "core/ocl/kernel.hpp"
@@ -12,11 +14,18 @@ namespace isowave {
 
 class March {
  public:
-  March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver);
+  /// levels: frames may have several levels of detail.
+  March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
+        bool levels = false);
 
   /// Begins a frame: rays.hits are none, rays.next_active_ray_ids those that meet an active block; their count goes to
   /// counts.next_active_count, the frame before having left 0 there. Asynchronous.
   void start_rays(const Macrocells &macrocells, Wavefront &rays);
+
+  /// Begins the next band of a frame, rays.frame: as start_rays(), but of the rays that have no hit; `before` and
+  /// macrocells_before are those of the band before. Asynchronous.
+  void cross_border(const FrameParams &before, const Macrocells &macrocells_before,
+                    const Macrocells &macrocells, Wavefront &rays);
 
   /// Takes rays further, as far as what was requested in the pass before has been provided. Out: rays.hits,
   /// next_active_ray_ids, ray_block_ids; counts.hit_count, granted_count (blocks intersected), next_active_count.
@@ -31,6 +40,10 @@ class March {
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<HitRecord>>
       start_rays_;
+  std::optional<ocl::Kernel<FrameParams, FrameParams, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>,
+                            ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>,
+                            ocl::In<HitRecord>>>
+      cross_border_;
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
               ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<CacheState>>

@@ -33,14 +33,18 @@ std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequ
   return static_cast<std::uint32_t>(std::max<std::uint64_t>(wanted, kMinCacheSlots));
 }
 
+std::uint64_t num_macrocells(const CompressedVolume &volume) {
+  const glm::uvec3 cells = (volume.num_blocks() + 3u) / 4u;
+  return std::uint64_t{cells.x} * cells.y * cells.z;
+}
+
 void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
   if (plan.stream == StreamPlace::kHost) {
-    plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
     const std::uint64_t bytes = sizeof(uint) * StreamWindow::half_words(volume, plan.window_blocks);
     for (const char *name : {"stream window", "stream window", "stream staging", "stream staging"}) {
       plan.buffers.push_back({name, bytes});
     }
-    plan.stream_bytes = 4 * bytes;
+    plan.stream_bytes += 4 * bytes;
     return;
   }
   const std::uint64_t largest = request.largest_stream_part != 0 ? request.largest_stream_part
@@ -58,6 +62,18 @@ void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRe
     plan.buffers.push_back({"block index", sizeof(uint) * block_index_words(volume.block_count())});
     plan.stream_bytes += plan.buffers.back().bytes;
   }
+}
+
+/// What the volume, or one of its levels of detail, needs for itself.
+void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
+  add_stream(plan, volume, request);
+  const std::uint64_t num_cells = num_macrocells(volume);
+  plan.buffers.insert(plan.buffers.end(), {{"block ranges", 2 * volume.block_count()},
+                                           {"macrocell ranges", 2 * num_cells},
+                                           {"macrocell masks", 8 * num_cells},
+                                           {"active box", 6 * sizeof(int)}});
+  plan.setup_bytes =
+      std::max(plan.setup_bytes, plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
 }
 
 bool fits_parts(const CompressedVolume &volume, const MemoryRequest &request) {
@@ -119,14 +135,16 @@ std::uint64_t MemoryPlan::peak() const {
 
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots) {
-  const std::uint64_t pixels = request.num_pixels, blocks = volume.block_count(), slots = cache_slots;
-  const glm::uvec3 cells = (volume.num_blocks() + 3u) / 4u;
-  const std::uint64_t num_cells = std::uint64_t{cells.x} * cells.y * cells.z;
-  const std::uint64_t listed = BlockCache::capacity_for(cache_slots, blocks, pixels);
+  const std::uint64_t pixels = request.num_pixels, slots = cache_slots;
+  const std::uint64_t listed = BlockCache::capacity_for(cache_slots, volume.block_count(), pixels);
   MemoryPlan plan;
   plan.cache_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
-  add_stream(plan, volume, request);
+  if (plan.stream == StreamPlace::kHost)
+    plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
+  add_level(plan, volume, request);
+  for (std::size_t i = 0; request.with_levels && i < volume.coarser.size(); ++i)
+    add_level(plan, volume.coarser[i], request);
   plan.buffers.insert(plan.buffers.end(),
                       {{"pass counts", sizeof(PassCounts)},
                        {"pass counts, previous", sizeof(PassCounts)},
@@ -135,18 +153,13 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"hits", sizeof(HitRecord) * pixels},
                        {"ray states", 4 * pixels},
                        {"active ray ids", 4 * pixels},
-                       {"active ray ids, next", 4 * pixels},
-                       {"block ranges", 2 * blocks},
-                       {"macrocell ranges", 2 * num_cells},
-                       {"macrocell masks", 8 * num_cells},
-                       {"active box", 6 * sizeof(int)}});
+                       {"active ray ids, next", 4 * pixels}});
   if (request.pipeline == PipelineKind::kBlocks) {
     add_pairs(plan, request);
   } else {  // the pairs' arrays are empty: OpenCL has no buffers of 0 bytes
     plan.buffers.insert(plan.buffers.end(),
                         {{"mask", 1}, {"pair block ids", 1}, {"pair hits", 1}, {"closest pairs", 1}});
   }
-  plan.setup_bytes = plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks());
   plan.buffers.insert(plan.buffers.end(),
                       {{"block table", 8 * sizeof(BlockEntry) * BlockCache::table_groups_for(cache_slots)},
                        {"block cache", ISO_BLOCK_VOXELS * sizeof(float) * slots},
@@ -154,7 +167,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"cache slot blocks", 4 * slots},
                        {"cache slot stamps", 4 * slots},
                        {"free slots", 4 * slots},
-                       {"requested blocks", 8 * num_cells},
+                       {"requested blocks", 8 * num_macrocells(volume)},
                        {"block requests", 4 * listed},
                        {"decode slots", 4 * listed},
                        {"cache ages", 4 * std::uint64_t{ISO_AGE_BUCKETS}},

@@ -31,6 +31,7 @@ struct MemoryRequest {
   StreamPlace stream = StreamPlace::kAuto;
   std::uint64_t largest_stream_part = 0;  ///< bytes of one buffer of the compressed volume; 0: no limit
   std::uint32_t window_blocks = 0;        ///< see StreamWindow; 0: by the size of cache and blocks
+  bool with_levels = false;               ///< the volume's coarser levels are on the device, too
 };
 
 struct MemoryPlan {

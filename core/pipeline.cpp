@@ -1,5 +1,8 @@
 #include "core/pipeline.hpp"
 
+#include <stdexcept>
+#include <utility>
+
 #include "core/composite.hpp"
 #include "core/group.hpp"
 #include "core/initial_rays.hpp"
@@ -29,6 +32,9 @@ class BlocksPipeline : public Pipeline {
     const auto stage = state_.device.timer().stage("initial_rays");
     initial_rays_(state_.rays, compaction_);
   }
+  void begin_band(const Level &) override {
+    throw std::logic_error("pipeline blocks: a frame has one band");  // the renderer sees to it
+  }
 
   void enqueue_pass() override {
     ocl::StageTimer &timer = state_.device.timer();
@@ -36,13 +42,13 @@ class BlocksPipeline : public Pipeline {
     speculation_.begin_pass(state_.rays);
     {
       const auto stage = timer.stage("traverse");
-      traverse_(state_.macrocells, state_.rays);
+      traverse_(state_.level().macrocells, state_.rays);
     }
     {
       const auto stage = timer.stage("request");
       state_.cache.request(state_.rays);
     }
-    state_.provide_blocks(state_.rays.counts);
+    state_.provide_blocks(state_.rays.counts, state_.level());
     {
       const auto stage = timer.stage("group");
       group_(state_.cache, state_.rays);
@@ -71,33 +77,40 @@ class BlocksPipeline : public Pipeline {
 class RaysPipeline : public Pipeline {
  public:
   RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
-      : state_(state), march_(state.device, state.rays.num_pixels, group_size, solver) {}
+      : state_(state),
+        march_(state.device, state.rays.num_pixels, group_size, solver, state.levels.size() > 1) {}
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("start_rays");
     if (unanswered_) state_.rays.forget_rays();
-    march_.start_rays(state_.macrocells, state_.rays);
+    march_.start_rays(state_.level().macrocells, state_.rays);
+  }
+  void begin_band(const Level &before) override {
+    const auto stage = state_.device.timer().stage("cross_border");
+    march_.cross_border(before.frame, before.macrocells, state_.level().macrocells, state_.rays);
   }
 
   void enqueue_pass() override {
     Wavefront &rays = state_.rays;
     rays.open_pass();
-    if (unanswered_) state_.provide_blocks(rays.previous_counts);
+    if (unanswered_) state_.provide_blocks(rays.previous_counts, *asked_);
     {
       const auto stage = state_.device.timer().stage("march");
-      march_(state_.macrocells, state_.cache, rays);
+      march_(state_.level().macrocells, state_.cache, rays);
     }
     const auto stage = state_.device.timer().stage("request");
-    march_.request_ahead(state_.macrocells, state_.cache, rays);
+    march_.request_ahead(state_.level().macrocells, state_.cache, rays);
     unanswered_ = true;
+    asked_ = &state_.level();
   }
 
-  void end_frame() override { unanswered_ = false; }
+  void end_band() override { unanswered_ = false; }
 
  private:
   FrameState &state_;
   March march_;
   bool unanswered_ = false;  ///< the last pass may have asked for blocks, and left rays
+  Level *asked_ = nullptr;   ///< whose blocks
 };
 
 }  // namespace
@@ -106,7 +119,9 @@ std::string_view to_string(PipelineKind kind) {
   return kind == PipelineKind::kBlocks ? "blocks" : "rays";
 }
 
-void FrameState::provide_blocks(const CountsBuffer &asked) {
+void FrameState::provide_blocks(const CountsBuffer &asked, Level &of) {
+  const FrameParams frame =
+      std::exchange(rays.frame, of.frame);  // a cancelled frame's last band asked, perhaps
   {
     const auto stage = device.timer().stage("cache");
     if (slots_are_scarce) cache.evict(asked, rays);
@@ -114,11 +129,12 @@ void FrameState::provide_blocks(const CountsBuffer &asked) {
   }
   const auto stage = device.timer().stage("decode");
   try {
-    decode(stream, rays.frame, rays.counts, cache);
+    of.decode(of.stream, rays.frame, rays.counts, cache);
   } catch (...) {  // blocks have slots, but no values
     cache.clear();
     throw;
   }
+  rays.frame = frame;
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,

@@ -7,7 +7,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "core/block_cache.hpp"
 #include "core/group.hpp"
@@ -25,19 +27,31 @@ enum class PipelineKind {
 };
 std::string_view to_string(PipelineKind kind);
 
+/// The volume on the device, or one of its levels of detail.
+struct Level {
+  VolumeInfo info;
+  ErrorBound error_bound;  ///< of its blocks
+  DeviceStream stream;
+  Macrocells macrocells;
+  ZfpDecode decode;
+  FrameParams frame{};    ///< its part of the frame at work
+  float value_error = 0;  ///< of decoded voxels, at most: against those that the ranges were made of
+  std::optional<float> selected_isovalue{};  ///< what the macrocell masks stand for
+};
+
 /// What every pipeline works on.
 struct FrameState {
   ocl::Device &device;
-  DeviceStream stream;
+  std::vector<Level> levels;  ///< the finest first
   Wavefront rays;
-  Macrocells macrocells;
   BlockCache cache;
-  ZfpDecode decode;
+  std::size_t level_at = 0;      ///< whose band of the frame is drawn
   bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
 
+  Level &level() { return levels[level_at]; }
   /// Cache and decode: the blocks asked for, asked.requested_count, get slots and values. Asynchronous but where the stream
   /// stays on the host: see ZfpDecode. Where that throws, the cache is empty.
-  void provide_blocks(const CountsBuffer &asked);
+  void provide_blocks(const CountsBuffer &asked, Level &of);
 };
 
 class Pipeline {
@@ -45,10 +59,12 @@ class Pipeline {
   virtual ~Pipeline() = default;
   /// Makes the frame's rays from state.rays.frame. Asynchronous.
   virtual void begin_frame() = 0;
+  /// Makes the rays of the frame's next band, state.level(), from those that left the band of `before`. Asynchronous.
+  virtual void begin_band(const Level &before) = 0;
   /// Enqueues one pass: a chain of launches whose sizes live on the device. Asynchronous.
   virtual void enqueue_pass() = 0;
-  /// Says that no ray is left. Without it, the next frame knows that passes of this one were not followed up.
-  virtual void end_frame() {}
+  /// Says that no ray is left in the frame, or its band. Without it, the next frame knows that passes of this one were not followed up.
+  virtual void end_band() {}
 };
 
 /// `state` must outlive the pipeline.

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/detail.hpp"
 #include "core/error.hpp"
 #include "core/stall_guard.hpp"
 #include "kernels_cl/block_grid.h"
@@ -23,9 +24,16 @@ double ms_since(std::chrono::steady_clock::time_point begin) {
 RendererOptions checked(RendererOptions options, const CompressedVolume &volume, const ocl::Device &device) {
   check_volume_info(volume.info, "the volume");
   check_image_size(options.size);
-  if (volume.block_count() >= ISO_MAX_CACHE_SLOTS) {
-    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", volume.block_count(),
-                ISO_MAX_CACHE_SLOTS);
+  check_levels(volume, options.max_pixel_error);
+  std::uint64_t num_ids = volume.block_count();
+  if (options.max_pixel_error > 0) {
+    if (options.pipeline == PipelineKind::kBlocks)
+      throw Error("pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
+    const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
+    for (const CompressedVolume &level : volume.coarser) num_ids += layer_ids * level.num_blocks().z;
+  }
+  if (num_ids >= ISO_MAX_CACHE_SLOTS) {
+    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids, ISO_MAX_CACHE_SLOTS);
   }
   if (options.max_speculation < 1 || options.max_speculation > ISO_MAX_SPECULATION) {
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
@@ -51,12 +59,18 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
 /// All memory, before any is taken.
 MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options) {
-  const MemoryRequest request{options.size.num_pixels(), options.pipeline, options.grouping,
-                              options.group_size,        options.stream,   options.largest_stream_part,
-                              options.window_blocks};
+  const MemoryRequest request{options.size.num_pixels(),
+                              options.pipeline,
+                              options.grouping,
+                              options.group_size,
+                              options.stream,
+                              options.largest_stream_part,
+                              options.window_blocks,
+                              options.max_pixel_error > 0};
   const std::uint64_t budget =
       options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
-  const std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
+  std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
+  for (const CompressedVolume &level : volume.coarser) all += request.with_levels ? level.block_count() : 0;
   if (options.cache_slots != 0) {
     MemoryPlan plan = plan_with_slots(volume, request, budget, options.cache_slots);
     if (options.memory_budget != 0 && plan.peak() > budget) {
@@ -72,18 +86,26 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
   return plan_within(device, volume, request, budget, static_cast<std::uint32_t>(std::min(all, most)));
 }
 
-FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
-                      const MemoryPlan &plan) {
-  const FrameParams grid = make_grid_params(volume.info);
+Level make_level(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
+                 const MemoryPlan &plan) {
   DeviceStream stream = plan.stream == StreamPlace::kHost
                             ? DeviceStream(device, volume, OnHost{plan.window_blocks})
                             : DeviceStream(device, volume, options.largest_stream_part);
+  Macrocells macrocells(device, make_grid_params(volume.info), stream);
+  ZfpDecode decode(device, plan.cache_slots, stream.defines(), options.max_pixel_error > 0);
+  return {volume.info, volume.error_bound, std::move(stream), std::move(macrocells), std::move(decode)};
+}
+
+FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
+                      const MemoryPlan &plan) {
+  std::vector<Level> levels;
+  levels.push_back(make_level(device, volume, options, plan));
+  for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i)
+    levels.push_back(make_level(device, volume.coarser[i], options, plan));
   Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks);
-  Macrocells macrocells(device, grid, stream);
-  ZfpDecode decode(device, plan.cache_slots, stream.defines());
-  BlockCache cache(device, grid, plan.cache_slots, options.size.num_pixels(), options.group_size);
-  return {device,           std::move(stream), std::move(rays), std::move(macrocells),
-          std::move(cache), std::move(decode)};
+  BlockCache cache(device, make_grid_params(volume.info), plan.cache_slots, options.size.num_pixels(),
+                   options.group_size, levels.size() > 1);
+  return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
 }  // namespace
@@ -93,8 +115,6 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       setup_begin_(std::chrono::steady_clock::now()),
       options_(checked(options, volume, device)),
       plan_(make_plan(device, volume, options_)),
-      info_(volume.info),
-      error_bound_(volume.error_bound),
       state_(make_state(device, volume, options_, plan_)),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
@@ -109,14 +129,24 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
 
 FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &on_pass) {
   const auto begin = std::chrono::steady_clock::now();
-  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
-  const StreamWindow *window = state_.stream.window.get();
-  const std::uint64_t uploaded_before = window ? window->uploaded_blocks() : 0;
-  const std::uint64_t uploaded_bytes_before = window ? window->uploaded_bytes() : 0;
+  const Uploads uploaded_before = uploads();
   FrameStats stats;
-  StallGuard guard(info_.dims);
-  readback_.drain();  // of what the frame before had enqueued beyond its last pass
   begin_frame(camera, isovalue);
+  do {
+    draw_band(on_pass, stats);
+  } while (!stats.cancelled && begin_next_band());
+  state_.rays.frame = state_.levels[0].frame;  // for shading
+  const Uploads uploaded = uploads();
+  stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
+  stats.uploaded_bytes = uploaded.bytes - uploaded_before.bytes;
+  stats.total_ms = ms_since(begin);
+  return stats;
+}
+
+/// The part of the frame that one level of detail draws: all of it, mostly.
+void Renderer::draw_band(const OnPass &on_pass, FrameStats &stats) {
+  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
+  StallGuard guard(state_.level().info.dims);
   for (bool finished = false; !finished && !stats.cancelled;) {
     pipeline_->enqueue_pass();
     readback_.push(state_.rays.counts);
@@ -130,35 +160,70 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
     guard.check(pass.counts);
   }
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
-  if (!stats.cancelled) pipeline_->end_frame();
-  if (window) {
-    stats.uploaded_blocks = window->uploaded_blocks() - uploaded_before;
-    stats.uploaded_bytes = window->uploaded_bytes() - uploaded_bytes_before;
-  }
-  stats.total_ms = ms_since(begin);
-  return stats;
+  if (!stats.cancelled) pipeline_->end_band();
 }
 
 void Renderer::begin_frame(const Camera &camera, float isovalue) {
-  FrameParams &frame = state_.rays.frame;
-  frame = make_frame_params(info_, camera, options_.size, isovalue);
-  frame.max_spec_count = options_.max_speculation;
-  frame.per_ray_speculation = options_.per_ray_speculation;
-  frame.table_groups = state_.cache.table_groups;
-  if (selected_isovalue_ != isovalue) {
-    const auto stage = device_.timer().stage("macrocells");
-    state_.macrocells.select(frame, value_error_);
-    state_.cache.classify(state_.rays);
+  readback_.drain();  // of what the frame before had enqueued beyond its last pass
+  std::vector<VolumeInfo> infos;
+  for (const Level &level : state_.levels) infos.push_back(level.info);
+  const std::vector<FrameParams> frames =
+      make_level_frames(infos, camera, options_.size, isovalue, options_.max_pixel_error);
+  const bool has_bands = std::ranges::count_if(frames, draws) > 1;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    Level &level = state_.levels[i];
+    level.frame = frames[i];
+    level.frame.max_spec_count = options_.max_speculation;
+    level.frame.per_ray_speculation = options_.per_ray_speculation;
+    level.frame.table_groups = state_.cache.table_groups;
+    if (draws(level.frame) && level.selected_isovalue != isovalue) {
+      const auto stage = device_.timer().stage("macrocells");
+      FrameParams frame = level.frame;
+      level.macrocells.select(frame, level.value_error);
+      level.selected_isovalue = isovalue;
+    }
+    level.macrocells.set_indices(level.frame);
+    // A ray's way begins at a border wherever it crosses that.
+    if (!has_bands) level.macrocells.set_active_box(level.frame);
   }
-  state_.macrocells.set_active_box(frame);
-  selected_isovalue_ = isovalue;
+  state_.level_at = static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
+  state_.rays.frame = state_.level().frame;
+  if (classified_isovalue_ != isovalue) {
+    const auto stage = device_.timer().stage("macrocells");
+    state_.cache.classify(state_.rays);
+    classified_isovalue_ = isovalue;
+  }
   pipeline_->begin_frame();
+}
+
+/// Returns whether there is one.
+bool Renderer::begin_next_band() {
+  const Level &before = state_.level();
+  if (state_.level_at + 1 == state_.levels.size() || !draws(state_.levels[state_.level_at + 1].frame))
+    return false;
+  ++state_.level_at;
+  state_.rays.frame = state_.level().frame;
+  readback_.drain();
+  pipeline_->begin_band(before);
+  return true;
+}
+
+Renderer::Uploads Renderer::uploads() const {
+  Uploads sum;
+  for (const Level &level : state_.levels) {
+    if (const StreamWindow *window = level.stream.window.get()) {
+      sum.blocks += window->uploaded_blocks();
+      sum.bytes += window->uploaded_bytes();
+    }
+  }
+  return sum;
 }
 
 PassStats Renderer::stats_of(const PassCounts &counts) {
   const double pixels = static_cast<double>(state_.rays.num_pixels);
   PassStats stats;
   stats.counts = counts;
+  stats.level = static_cast<std::uint32_t>(state_.level_at);
   stats.counts.window_count = std::min(counts.window_count, counts.active_count);
   // A launch that is not needed costs more than a pass that finds slots missing now and then.
   state_.slots_are_scarce =
@@ -170,16 +235,23 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
 }
 
 void Renderer::set_value_error(double value_error) {
-  const ErrorBound bound = coarser(error_bound_, value_error);
-  StreamLayout &layout = state_.stream.layout;
-  if (layout.min_exponent == bound.min_exponent) return;
-  const bool all_planes = bound.min_exponent == error_bound_.min_exponent;
-  layout.min_exponent = bound.min_exponent;
-  layout.whole_numbers = bound.whole_numbers ? 1 : 0;
-  // Ranges were made of rounded values, and fewer planes are not rounded.
-  const double unrounded = error_bound_.whole_numbers ? 0.5 : 0.0;
-  value_error_ = all_planes ? 0.0f : static_cast<float>(std::ldexp(1.0, bound.min_exponent) + unrounded);
-  selected_isovalue_.reset();
+  bool changes = false;
+  for (Level &level : state_.levels) {
+    const ErrorBound bound = coarser(level.error_bound, value_error);
+    StreamLayout &layout = level.stream.layout;
+    if (layout.min_exponent == bound.min_exponent) continue;
+    const bool all_planes = bound.min_exponent == level.error_bound.min_exponent;
+    layout.min_exponent = bound.min_exponent;
+    layout.whole_numbers = bound.whole_numbers ? 1 : 0;
+    // Ranges were made of rounded values, and fewer planes are not rounded.
+    const double unrounded = level.error_bound.whole_numbers ? 0.5 : 0.0;
+    level.value_error =
+        all_planes ? 0.0f : static_cast<float>(std::ldexp(1.0, bound.min_exponent) + unrounded);
+    level.selected_isovalue.reset();
+    changes = true;
+  }
+  if (!changes) return;
+  classified_isovalue_.reset();
   clear_cache();
 }
 
@@ -189,7 +261,7 @@ void Renderer::clear_cache() {
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {
-  return shade_(make_shade_params(info_, appearance), state_.rays);
+  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays);
 }
 
 }  // namespace isowave

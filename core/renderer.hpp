@@ -36,11 +36,15 @@ struct RendererOptions {
   std::uint64_t largest_stream_part = 0;
   /// Blocks uploaded at a time from a volume on the host, at least 8; 0: by the size of cache and blocks.
   std::uint32_t window_blocks = 0;
+  /// Distance in pixels up to which voxels of a coarser level of detail may be apart, see make_level_frames(); 0: the finest
+  /// level draws all.
+  double max_pixel_error = 0;
 };
 
 /// What one pass did: the counts of the device, and what follows from them.
 struct PassStats {
   PassCounts counts{};
+  std::uint32_t level = 0;                 ///< of detail, which it drew
   double utilization_percent = 0;          ///< ray-block pairs that were intersected, of width * height
   double completed_percent = 0;            ///< pixels whose rays have ended, of width * height
   std::map<std::string, double> stage_ms;  ///< by stage; empty unless the device was opened with profiling
@@ -90,22 +94,25 @@ class Renderer {
 
   const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
   const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that was made
-  const Macrocells &macrocells() const { return state_.macrocells; }
+  const Macrocells &macrocells() const { return state_.levels[0].macrocells; }  ///< of the finest level
   double setup_ms() const { return setup_ms_; }  ///< upload, kernel builds, macrocell ranges
 
  private:
   void begin_frame(const Camera &camera, float isovalue);
+  void draw_band(const OnPass &on_pass, FrameStats &stats);
+  bool begin_next_band();
+  struct Uploads {
+    std::uint64_t blocks = 0, bytes = 0;
+  };
+  Uploads uploads() const;
   PassStats stats_of(const PassCounts &counts);
 
   ocl::Device &device_;
   std::chrono::steady_clock::time_point setup_begin_;
   RendererOptions options_;
   MemoryPlan plan_;
-  VolumeInfo info_;
-  ErrorBound error_bound_;  ///< of the volume
-  float value_error_ = 0;   ///< of the frames' voxels, at most: against those that the ranges were made of
-  std::optional<float> selected_isovalue_;  ///< what the macrocell masks stand for
   FrameState state_;
+  std::optional<float> classified_isovalue_;  ///< what the cache's bits of voxels inside stand for
   std::unique_ptr<Pipeline> pipeline_;
   Shade shade_;
   PassReadback readback_;

@@ -135,8 +135,7 @@ void StreamWindow::bring(std::span<const uint> block_ids, const Use &use) {
   }
 }
 
-std::span<const uint> StreamWindow::read_granted(const CountsBuffer &counts,
-                                                 const ocl::Buffer<uint> &block_ids) {
+std::span<uint> StreamWindow::read_granted(const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids) {
   const cl::Event reached = mark(device_);
   cl::Event counts_read, ids_read;
   granted_.resize(block_ids.size());

@@ -35,8 +35,9 @@ class StreamWindow {
   /// uploads of all runs but the last two; the rest is asynchronous. Throws Error when the volume's file has become shorter.
   void bring(std::span<const uint> block_ids, const Use &use);
 
-  /// The first counts.decoded_count of block_ids. Waits for all that is enqueued before. Valid until the next call.
-  std::span<const uint> read_granted(const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids);
+  /// The first counts.decoded_count of block_ids. Waits for all that is enqueued before. Valid until the next call, for the
+  /// caller to change.
+  std::span<uint> read_granted(const CountsBuffer &counts, const ocl::Buffer<uint> &block_ids);
 
   std::uint64_t uploaded_blocks() const { return uploaded_blocks_; }  ///< since it was made
   std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }    ///< since it was made

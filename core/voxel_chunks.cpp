@@ -126,6 +126,23 @@ Findings code_rows(const Chunk &chunk, const glm::uvec3 &dims, const InputOption
 
 }  // namespace
 
+std::uint32_t layers_per_chunk(const glm::uvec3 &dims) {
+  const std::uint64_t layer = std::uint64_t(dims.x) * dims.y;
+  const std::uint64_t slabs = std::max<std::uint64_t>(1, kChunkVoxels / (kBlockEdge * layer));
+  return std::uint32_t(std::min<std::uint64_t>(slabs * kBlockEdge, (dims.z + 3u) / 4u * 4u));
+}
+
+Chunk make_chunk(const glm::uvec3 &dims, std::uint32_t z, std::span<float> voxels) {
+  const auto num_layers = std::uint32_t(voxels.size() / (std::uint64_t(dims.x) * dims.y));
+  return {z, num_layers, voxels, std::uint64_t((dims.y + 3u) / 4u) * ((num_layers + 3u) / 4u)};
+}
+
+void code_chunk(const Chunk &chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder) {
+  coder.begin_chunk(chunk);
+  code_rows(chunk, dims, options, coder);
+  coder.end_chunk(chunk);
+}
+
 std::array<float, 2> read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder) {
   check_volume_info(reader.info(), "volume");
   if (options.map_nan && !(std::abs(*options.map_nan) < kMaxMagnitude)) {
@@ -133,9 +150,7 @@ std::array<float, 2> read_in_chunks(VolumeReader &reader, const InputOptions &op
   }
   const glm::uvec3 dims = reader.info().dims;
   const std::uint64_t layer = std::uint64_t(dims.x) * dims.y;
-  const std::uint64_t slabs = std::max<std::uint64_t>(1, kChunkVoxels / (kBlockEdge * layer));
-  const auto chunk_layers =
-      std::uint32_t(std::min<std::uint64_t>(slabs * kBlockEdge, (dims.z + 3u) / 4u * 4u));
+  const std::uint32_t chunk_layers = layers_per_chunk(dims);
   const auto layers_at = [&](std::uint64_t z) {
     return z < dims.z ? std::uint32_t(std::min<std::uint64_t>(chunk_layers, dims.z - z)) : 0;
   };
@@ -152,8 +167,7 @@ std::array<float, 2> read_in_chunks(VolumeReader &reader, const InputOptions &op
     pending.get();
     std::swap(current, next);
     pending = read_ahead(std::uint64_t(z) + chunk_layers, next);
-    const Chunk chunk{z, layers_at(z), current,
-                      std::uint64_t((dims.y + 3u) / 4u) * ((layers_at(z) + 3u) / 4u)};
+    const Chunk chunk = make_chunk(dims, z, current);
     coder.begin_chunk(chunk);
     total.add(code_rows(chunk, dims, options, coder));
     if (!total.refused()) coder.end_chunk(chunk);

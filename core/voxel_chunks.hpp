@@ -36,6 +36,11 @@ struct Chunk {
   std::uint64_t num_rows = 0;  ///< of blocks along x
 };
 
+/// Layers of the chunks that a volume is cut into, but for its last.
+std::uint32_t layers_per_chunk(const glm::uvec3 &dims);
+/// The chunk of these layers of a volume, the first of which is z.
+Chunk make_chunk(const glm::uvec3 &dims, std::uint32_t z, std::span<float> voxels);
+
 /// A row of blocks along x within a chunk.
 struct BlockRow {
   std::uint64_t index = 0;        ///< in its chunk, in the order of blocks
@@ -53,6 +58,9 @@ class ChunkCoder {
   /// Not called once a voxel was refused.
   virtual void end_chunk(const Chunk &) {}
 };
+
+/// Codes one chunk of voxels that were made here: checked as those of a file are, but none can be refused.
+void code_chunk(const Chunk &chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder);
 
 /// Reads the volume from front to back for `coder`. Returns its [min, max] (after map_nan). Throws Error: voxels that cannot be
 /// compressed, after all of them were looked at; a bad grid; an unfit map_nan.

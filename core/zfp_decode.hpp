@@ -11,7 +11,9 @@ namespace isowave {
 class ZfpDecode {
  public:
   /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams to come.
-  ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {});
+  /// levels: block ids count on through several levels of detail (FrameParams).
+  ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
+            bool levels = false);
 
   /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes in inside
   /// [slots] which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the stream stays on the host, waits for all that is
@@ -28,6 +30,7 @@ class ZfpDecode {
  private:
   ocl::Device &device_;
   ocl::Defines stream_defines_;
+  bool levels_;
   ocl::Range range_;
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
               StreamLayout, uint, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>,

@@ -10,12 +10,14 @@
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
 #include <system_error>
 
 #include "core/error.hpp"
 #include "core/io/mapped_file.hpp"
 #include "core/libzfp.hpp"
+#include "core/pyramid.hpp"
 #include "core/zfp_accuracy.hpp"
 
 namespace isowave {
@@ -24,7 +26,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2;
+constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2, kPyramidVersion = 3;
 constexpr std::array<char, 8> kMagic{'I', 'S', 'O', 'W', 'A', 'V', 'E', '\n'};
 constexpr std::uint64_t kMaxJsonBytes = 1u << 20;
 constexpr std::uint32_t kMinBlockBits = 9;  // "not empty" and the exponent; libzfp reads them at any rate
@@ -46,7 +48,8 @@ std::uint32_t json_crc(std::string_view text, const Footer &footer) {
   return update_crc(update_crc(0, std::as_bytes(std::span(text))), std::as_bytes(std::span(numbers)));
 }
 
-json to_json(const CompressedVolume &volume, std::uint64_t index_bytes) {
+json to_json(const CompressedVolume &volume, std::uint64_t index_bytes,
+             std::span<const std::uint64_t> level_bytes) {
   const VolumeInfo &info = volume.info;
   json trailer;
   trailer["spacing"] = {info.spacing.x, info.spacing.y, info.spacing.z};
@@ -63,6 +66,7 @@ json to_json(const CompressedVolume &volume, std::uint64_t index_bytes) {
     trailer["index_bytes"] = index_bytes;
     trailer["whole_numbers"] = volume.error_bound.whole_numbers;
   }
+  if (!level_bytes.empty()) trailer["level_bytes"] = level_bytes;
   return trailer;
 }
 
@@ -71,8 +75,9 @@ glm::dvec3 vector_from(const json &value) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
-/// Returns how many bytes the index has.
-std::uint64_t apply_json(const std::string &text, CompressedVolume &volume) {
+/// Returns how many bytes the index has. level_bytes: those of the coarser levels.
+std::uint64_t apply_json(const std::string &text, CompressedVolume &volume,
+                         std::vector<std::uint64_t> &level_bytes) {
   const json trailer = json::parse(text);
   volume.info.spacing = vector_from(trailer.at("spacing"));
   volume.info.origin = vector_from(trailer.at("origin"));
@@ -83,6 +88,7 @@ std::uint64_t apply_json(const std::string &text, CompressedVolume &volume) {
   if (trailer.contains("value_range"))
     volume.value_range = trailer["value_range"].get<std::array<float, 2>>();
   if (trailer.contains("max_error")) volume.max_error = trailer["max_error"].get<double>();
+  if (trailer.contains("level_bytes")) level_bytes = trailer["level_bytes"].get<std::vector<std::uint64_t>>();
   if (!volume.is_indexed()) return 0;
   volume.indexed_bits = trailer.at("payload_bits").get<std::uint64_t>();
   volume.error_bound.whole_numbers = trailer.at("whole_numbers").get<bool>();
@@ -141,34 +147,68 @@ std::vector<std::uint32_t> inflate_index(std::span<const std::byte> deflated, st
 /// A `.zfp` file being read: the checks in the order in which the file is trusted.
 class ZfpFileReader {
  public:
-  explicit ZfpFileReader(const fs::path &path)
-      : path_(path), file_(std::fopen(path.c_str(), "rb"), &std::fclose) {
+  explicit ZfpFileReader(const fs::path &path) : path_(path), file_(std::fopen(path.c_str(), "rb"), &close) {
     if (!file_) throw Error("{}: cannot open: {}", path.string(), std::strerror(errno));
     std::error_code error;
     file_size_ = fs::file_size(path, error);
     if (error) throw Error("{}: cannot open: {}", path.string(), error.message());
-    read_header();
-    read_trailer();
-    check_volume_info(volume_.info, path_.string());
+    read_head();
   }
 
-  CompressedVolume take_info() { return std::move(volume_); }
-
-  CompressedVolume take_mapped() {
-    volume_.file = std::make_shared<MappedFile>(path_, stream_bytes_ + index_bytes_);
-    volume_.file_first_bit = header_bits_;
-    if (has_trailer_ && update_crc(0, volume_.file->bytes()) != stream_crc_) {
-      throw Error("{}: damaged: the checksum of its stream does not match", path_.string());
-    }
-    if (volume_.is_indexed()) read_index();
+  CompressedVolume take_info() {
+    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take_info());
     return std::move(volume_);
   }
 
+  CompressedVolume take_mapped() {
+    const auto file = std::make_shared<MappedFile>(path_, bytes_before_trailer());
+    if (has_trailer_ && update_crc(0, file->bytes()) != stream_crc_) {
+      throw Error("{}: damaged: the checksum of its stream does not match", path_.string());
+    }
+    return take_from(file);
+  }
+
  private:
+  static void close(std::FILE *file) {
+    if (file) std::fclose(file);
+  }
+
+  /// A level of detail: a file in the file.
+  ZfpFileReader(const ZfpFileReader &finer, std::uint64_t begin, std::uint64_t size)
+      : path_(finer.path_), file_(finer.file_), begin_(begin), file_size_(size) {
+    read_head();
+    if (!has_trailer_ || !levels_.empty() || volume_.info.dims != coarser_level(finer.volume_.info).dims)
+      throw Error("{}: damaged: one of its levels of detail is none", path_.string());
+    volume_.info = coarser_level(finer.volume_.info);
+  }
+
+  void read_head() {
+    read_header();
+    read_trailer();
+    check_volume_info(volume_.info, path_.string());
+    std::uint64_t begin = begin_ + stream_bytes_ + index_bytes_;
+    for (const std::uint64_t bytes : level_bytes_) {
+      levels_.push_back(ZfpFileReader(levels_.empty() ? *this : levels_.back(), begin, bytes));
+      begin += bytes;
+    }
+  }
+
+  std::uint64_t bytes_before_trailer() const {
+    return std::accumulate(level_bytes_.begin(), level_bytes_.end(), stream_bytes_ + index_bytes_);
+  }
+
+  CompressedVolume take_from(const std::shared_ptr<const MappedFile> &file) {
+    volume_.file = file;
+    volume_.file_first_bit = 8 * begin_ + header_bits_;
+    if (volume_.is_indexed()) read_index();
+    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take_from(file));
+    return std::move(volume_);
+  }
+
   void read_at(std::uint64_t offset, std::span<std::byte> bytes) {
-    if (::fseeko(file_.get(), off_t(offset), SEEK_SET) != 0 ||
+    if (::fseeko(file_.get(), off_t(begin_ + offset), SEEK_SET) != 0 ||
         std::fread(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) {
-      throw Error("{}: cannot read {} bytes at {}", path_.string(), bytes.size(), offset);
+      throw Error("{}: cannot read {} bytes at {}", path_.string(), bytes.size(), begin_ + offset);
     }
   }
 
@@ -182,7 +222,8 @@ class ZfpFileReader {
         throw Error("{}: damaged: {} unknown bytes after the zfp stream", path_.string(), file_size_ - used);
       }
     } else {
-      volume_.index = inflate_index(volume_.file->bytes().subspan(stream_bytes_), volume_.block_count());
+      volume_.index = inflate_index(volume_.file->bytes().subspan(begin_ + stream_bytes_, index_bytes_),
+                                    volume_.block_count());
     }
     const auto num_blocks = static_cast<std::uint32_t>(volume_.block_count());
     const std::uint64_t end = volume_.index.empty() ? 0 : volume_.block_begin(num_blocks);
@@ -267,9 +308,9 @@ class ZfpFileReader {
       throw Error("{}: damaged: {} unknown bytes after the zfp stream", path_.string(), trailer_bytes);
     }
     const std::uint32_t known = volume_.is_indexed() ? kIndexedVersion : kVersion;
-    if (footer.version != known) {
-      throw Error("{}: its trailer has version {}, this program knows {}", path_.string(), footer.version,
-                  known);
+    if (footer.version != known && footer.version != kPyramidVersion) {
+      throw Error("{}: its trailer has version {}, this program knows {} and {}", path_.string(),
+                  footer.version, known, kPyramidVersion);
     }
     const std::uint64_t json_end = file_size_ - sizeof(Footer);
     std::string text;
@@ -281,7 +322,7 @@ class ZfpFileReader {
       throw Error("{}: damaged: the checksum of its trailer does not match", path_.string());
     }
     try {
-      index_bytes_ = apply_json(text, volume_);
+      index_bytes_ = apply_json(text, volume_, level_bytes_);
     } catch (const json::exception &error) {
       throw Error("{}: broken trailer: {}", path_.string(), error.what());
     }
@@ -290,7 +331,7 @@ class ZfpFileReader {
     stream_crc_ = footer.stream_crc;
   }
 
-  /// Header, payload, padding and index end where the JSON text begins.
+  /// Header, payload, padding, index and levels end where the JSON text begins.
   void check_layout(std::uint64_t json_begin) {
     if (volume_.is_indexed()) {
       // Neither sum overflows: a block has at least a bit, and not too many.
@@ -299,16 +340,24 @@ class ZfpFileReader {
       stream_bytes_ =
           possible ? (header_bits_ + bits + 63) / 64 * 8 : std::numeric_limits<std::uint64_t>::max();
     }
-    if (stream_bytes_ > json_begin || json_begin - stream_bytes_ != index_bytes_) {
-      throw Error("{}: damaged: its stream and index are not as long as its trailer says", path_.string());
-    }
+    std::uint64_t left = json_begin;
+    const auto take = [&left](std::uint64_t bytes) {
+      if (bytes > left) return false;
+      left -= bytes;
+      return true;
+    };
+    if (!take(stream_bytes_) || !take(index_bytes_) || !std::ranges::all_of(level_bytes_, take) || left != 0)
+      throw Error("{}: damaged: its parts are not as long as its trailer says", path_.string());
   }
 
   fs::path path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE *)> file_;
+  std::shared_ptr<std::FILE> file_;
+  std::uint64_t begin_ = 0;  ///< of this level in the file
   std::uint64_t file_size_ = 0, header_bits_ = 0;
   std::uint64_t stream_bytes_ = 0;  ///< header, payload and padding
   std::uint64_t index_bytes_ = 0;   ///< behind them
+  std::vector<std::uint64_t> level_bytes_;
+  std::vector<ZfpFileReader> levels_;  ///< coarser ones
   bool has_trailer_ = false;
   std::uint32_t stream_crc_ = 0;
   CompressedVolume volume_;
@@ -316,33 +365,57 @@ class ZfpFileReader {
 
 }  // namespace
 
-ZfpFileWriter::ZfpFileWriter(const fs::path &path, const CompressedVolume &volume) : file_(path) {
-  const ZfpHeader header =
-      make_zfp_header(volume.info.dims, volume.bits_per_block, volume.error_bound.min_exponent);
-  write(std::as_bytes(std::span(header)));
+ZfpFileWriter::ZfpFileWriter(const fs::path &path, const CompressedVolume &volume) {
+  for (std::size_t level = 0; level <= volume.coarser.size(); ++level) {
+    const CompressedVolume &at = level == 0 ? volume : volume.coarser[level - 1];
+    const ZfpHeader header = make_zfp_header(at.info.dims, at.bits_per_block, at.error_bound.min_exponent);
+    parts_.emplace_back(path).write(std::as_bytes(std::span(header)));
+  }
 }
 
-void ZfpFileWriter::write(std::span<const std::byte> payload) {
-  file_.write(payload);
-  crc_ = update_crc(crc_, payload);
-  size_ += payload.size();
+void ZfpFileWriter::write(std::span<const std::byte> payload, std::size_t level) {
+  parts_[level].write(payload);
 }
 
 void ZfpFileWriter::commit(const CompressedVolume &volume) {
-  const std::array<std::byte, 8> zeros{};
-  write(std::span(zeros).first((8 - size_ % 8) % 8));
-  const std::uint64_t index_bytes = volume.is_indexed() ? write_index(volume) : 0;
-  const std::string text = to_json(volume, index_bytes).dump();
-  Footer footer{volume.is_indexed() ? kIndexedVersion : kVersion, std::uint32_t(text.size()), crc_, 0,
-                kMagic};
-  footer.json_crc = json_crc(text, footer);
-  file_.write(text);
-  file_.write(std::as_bytes(std::span(&footer, 1)));
-  file_.commit();
+  Part &all = parts_.front();
+  const std::uint64_t index_bytes = all.write_index(volume);
+  std::vector<std::uint64_t> level_bytes;
+  for (std::size_t level = 1; level < parts_.size(); ++level) {
+    Part &part = parts_[level];
+    const CompressedVolume &coarse = volume.coarser[level - 1];
+    part.write_trailer(coarse, part.write_index(coarse), {});
+    level_bytes.push_back(part.size);
+    part.file.read_back([&all](std::span<const std::byte> bytes) { all.write(bytes); });
+  }
+  all.write_trailer(volume, index_bytes, level_bytes);
+  all.file.commit();
 }
 
-std::uint64_t ZfpFileWriter::write_index(const CompressedVolume &volume) {
-  const std::uint64_t begin = size_, num_blocks = volume.block_count();
+void ZfpFileWriter::Part::write(std::span<const std::byte> bytes) {
+  file.write(bytes);
+  crc = update_crc(crc, bytes);
+  size += bytes.size();
+}
+
+void ZfpFileWriter::Part::write_trailer(const CompressedVolume &volume, std::uint64_t index_bytes,
+                                        std::span<const std::uint64_t> level_bytes) {
+  const std::string text = to_json(volume, index_bytes, level_bytes).dump();
+  const std::uint32_t version = !level_bytes.empty()  ? kPyramidVersion
+                                : volume.is_indexed() ? kIndexedVersion
+                                                      : kVersion;
+  Footer footer{version, std::uint32_t(text.size()), crc, 0, kMagic};
+  footer.json_crc = json_crc(text, footer);
+  write(std::as_bytes(std::span(text)));
+  write(std::as_bytes(std::span(&footer, 1)));
+}
+
+/// Behind the padding of the payload; returns its size, 0 at a fixed rate.
+std::uint64_t ZfpFileWriter::Part::write_index(const CompressedVolume &volume) {
+  const std::array<std::byte, 8> zeros{};
+  write(std::span(zeros).first((8 - size % 8) % 8));
+  if (!volume.is_indexed()) return 0;
+  const std::uint64_t begin = size, num_blocks = volume.block_count();
   Deflater deflater;
   std::vector<std::uint16_t> lengths;
   std::vector<std::byte> out(1u << 16);
@@ -360,7 +433,7 @@ std::uint64_t ZfpFileWriter::write_index(const CompressedVolume &volume) {
       write(std::span(out).first(out.size() - deflater.avail_out));
     } while (deflater.avail_out == 0);
   }
-  return size_ - begin;
+  return size - begin;
 }
 
 CompressedVolume read_zfp_file(const fs::path &path) {

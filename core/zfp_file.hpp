@@ -4,14 +4,16 @@
 //   bytes  0..11   zfp full header, short form (96 bits)
 //         12..     payload, then zeros to a multiple of 8 bytes: here a file of zfp's own tool ends
 //                  only at fixed accuracy: the length of each block in bits, uint16, deflated (zlib)
+//                  only with levels of detail: a whole such file for each coarser level
 //                  JSON text: spacing, origin, direction, type, value_range, max_error; at fixed accuracy also payload_bits,
-//                  index_bytes (deflated), whole_numbers
+//                  index_bytes (deflated), whole_numbers; with levels also level_bytes, a list
 //         the last 24 bytes, little endian:
-//                  uint32 version (1; 2 at fixed accuracy) | uint32 length of the JSON text | uint32 CRC-32 of all before the
+//                  uint32 version (1; 2 at fixed accuracy; 3 with levels) | uint32 length of the JSON text | uint32 CRC-32 of all before the
 //                  JSON text | uint32 CRC-32 of the JSON text and the three numbers before | magic "ISOWAVE\n"
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <span>
 
@@ -20,22 +22,32 @@
 
 namespace isowave {
 
-/// Writes a `.zfp` file front to back; nothing is left behind without commit().
+/// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left behind without commit().
 class ZfpFileWriter {
  public:
-  /// Writes the header from volume.info.dims and volume.bits_per_block (a multiple of 64), or volume.error_bound.
+  /// Writes the headers of volume and of its coarser levels, from their info.dims and bits_per_block (a multiple of 64), or
+  /// error_bound.
   ZfpFileWriter(const std::filesystem::path &path, const CompressedVolume &volume);
-  /// Appends payload.
-  void write(std::span<const std::byte> payload);
-  /// Pads, writes the trailer from all fields but words, and renames the file into place.
+  /// Appends payload of the volume (level 0) or of coarser level `level`.
+  void write(std::span<const std::byte> payload, std::size_t level = 0);
+  /// Pads, writes indices and trailers from all fields but words, and renames the file into place.
   void commit(const CompressedVolume &volume);
 
  private:
-  std::uint64_t write_index(const CompressedVolume &volume);
+  /// A level's file.
+  struct Part {
+    explicit Part(const std::filesystem::path &path) : file(path) {}
+    void write(std::span<const std::byte> bytes);
+    std::uint64_t write_index(const CompressedVolume &volume);
+    void write_trailer(const CompressedVolume &volume, std::uint64_t index_bytes,
+                       std::span<const std::uint64_t> level_bytes);
 
-  AtomicFile file_;
-  std::uint32_t crc_ = 0;
-  std::uint64_t size_ = 0;
+    AtomicFile file;
+    std::uint32_t crc = 0;
+    std::uint64_t size = 0;
+  };
+
+  std::deque<Part> parts_;  ///< the coarser ones only until they are joined to the first
 };
 
 }  // namespace isowave

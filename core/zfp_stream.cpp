@@ -14,6 +14,7 @@
 #include "core/io/mapped_file.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"
+#include "core/pyramid.hpp"
 #include "core/zfp_accuracy.hpp"
 #include "core/zfp_encode.hpp"
 #include "core/zfp_file.hpp"
@@ -25,8 +26,15 @@ namespace {
 using Payload = std::span<const std::byte>;
 using Sink = std::function<void(Payload)>;
 
+/// Compresses the voxels of a level.
+class LevelCoder : public ChunkCoder {
+ public:
+  /// After the last chunk: hands over what is left, and completes `volume`.
+  virtual void finish(CompressedVolume &volume) = 0;
+};
+
 /// Compresses rows of blocks by libzfp.
-class FixedRateCoder : public ChunkCoder {
+class FixedRateCoder : public LevelCoder {
  public:
   FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink)
       : dims_(dims), options_(options), sink_(sink), max_errors_(thread_count(options.input.num_threads)) {}
@@ -66,7 +74,9 @@ class FixedRateCoder : public ChunkCoder {
 
   void end_chunk(const Chunk &) override { sink_(std::as_bytes(std::span(words_))); }
 
-  double max_error() const { return std::ranges::max(max_errors_); }
+  void finish(CompressedVolume &volume) override {
+    if (options_.measure_error) volume.max_error = std::ranges::max(max_errors_);
+  }
 
  private:
   std::uint64_t row_words() const { return std::uint64_t((dims_.x + 3u) / 4u) * options_.rate; }
@@ -80,29 +90,96 @@ class FixedRateCoder : public ChunkCoder {
 };
 
 /// Has a device compress whole chunks.
-class DeviceCoder : public ChunkCoder {
+class DeviceCoder : public LevelCoder {
  public:
   DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink)
-      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error), sink_(sink) {}
+      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error),
+        measure_error_(options.measure_error),
+        sink_(sink) {}
 
   void end_chunk(const Chunk &chunk) override { encoder_.encode(chunk.voxels, chunk.num_layers, sink_); }
 
-  double finish() {
+  void finish(CompressedVolume &volume) override {
     encoder_.finish(sink_);
-    return encoder_.max_error();
+    if (measure_error_) volume.max_error = encoder_.max_error();
   }
 
  private:
   LayerEncoder encoder_;
+  bool measure_error_;
   const Sink &sink_;
 };
 
+/// Compresses blocks of lengths of their own.
+class BoundedCoder : public LevelCoder {
+ public:
+  BoundedCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink)
+      : coder_(dims, bound, sink) {}
+  void begin_chunk(const Chunk &chunk) override { coder_.begin_chunk(chunk); }
+  void code_row(const BlockRow &row, std::uint32_t thread) override { coder_.code_row(row, thread); }
+  void end_chunk(const Chunk &chunk) override { coder_.end_chunk(chunk); }
+  void finish(CompressedVolume &volume) override {
+    volume.index = coder_.finish();
+    volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
+    volume.max_error = volume.error_bound.max_error;
+  }
+
+ private:
+  ErrorBoundCoder coder_;
+};
+
+/// Compresses a level, and makes the voxels of the next from its own.
+class PyramidCoder : public ChunkCoder {
+ public:
+  /// volumes, sinks: of this level and all coarser ones.
+  PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
+               std::span<const Sink> sinks)
+      : volume_(*volumes[0]) {
+    const glm::uvec3 dims = volume_.info.dims;
+    if (volume_.is_indexed()) {
+      coder_ = std::make_unique<BoundedCoder>(dims, volume_.error_bound, sinks[0]);
+    } else if (options.device) {
+      coder_ = std::make_unique<DeviceCoder>(dims, options, sinks[0]);
+    } else {
+      coder_ = std::make_unique<FixedRateCoder>(dims, options, sinks[0]);
+    }
+    if (volumes.size() == 1) return;
+    next_ = std::make_unique<PyramidCoder>(options, volumes.subspan(1), sinks.subspan(1));
+    downsampler_.emplace(dims, options.input.num_threads, [this, &options](const Chunk &chunk) {
+      code_chunk(chunk, next_->volume_.info.dims, options.input, *next_);
+    });
+  }
+  void begin_chunk(const Chunk &chunk) override { coder_->begin_chunk(chunk); }
+  void code_row(const BlockRow &row, std::uint32_t thread) override { coder_->code_row(row, thread); }
+  void end_chunk(const Chunk &chunk) override {
+    coder_->end_chunk(chunk);
+    if (next_) downsampler_->add(chunk.voxels);
+  }
+  void finish() {
+    coder_->finish(volume_);
+    if (next_) next_->finish();
+  }
+
+ private:
+  CompressedVolume &volume_;
+  std::unique_ptr<LevelCoder> coder_;
+  std::unique_ptr<PyramidCoder> next_;
+  std::optional<Downsampler> downsampler_;
+};
+
+/// All but what the voxels decide.
 CompressedVolume describe(const VolumeReader &reader, const CompressOptions &options) {
   if (options.error_bound && options.device)
     throw Error("a device compresses at a fixed rate only: leave the device, or the error bound");
   if (!options.error_bound && (options.rate < 1 || options.rate > 32))
     throw Error("rate {}: must be 1 to 32 bits per voxel", options.rate);
   check_volume_info(reader.info(), "volume");
+  const glm::uvec3 dims = reader.info().dims;
+  const std::uint32_t num_levels = options.levels != 0 ? options.levels : max_levels(dims);
+  if (num_levels > max_levels(dims)) {
+    throw Error("{} levels of detail: a volume of {}x{}x{} voxels can have 1 to {}", num_levels, dims.x,
+                dims.y, dims.z, max_levels(dims));
+  }
   CompressedVolume volume;
   volume.info = reader.info();
   if (options.error_bound) {
@@ -110,27 +187,28 @@ CompressedVolume describe(const VolumeReader &reader, const CompressOptions &opt
   } else {
     volume.bits_per_block = 64 * options.rate;
   }
+  for (CompressedVolume level = volume; volume.coarser.size() + 1 < num_levels;) {
+    level.info = coarser_level(level.info);
+    level.error_bound.whole_numbers = false;  // means of integers are none
+    level.error_bound.max_error.reset();
+    volume.coarser.push_back(level);
+  }
   return volume;
 }
 
-/// Hands the payload to `sink`, in order, and completes `volume`.
-void run(VolumeReader &reader, const CompressOptions &options, const Sink &sink, CompressedVolume &volume) {
-  if (options.error_bound) {
-    ErrorBoundCoder coder(volume.info.dims, *options.error_bound, sink);
-    volume.value_range = read_in_chunks(reader, options.input, coder);
-    volume.index = coder.finish();
-    volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
-    volume.max_error = options.error_bound->max_error;
-  } else if (options.device) {
-    DeviceCoder coder(volume.info.dims, options, sink);
-    volume.value_range = read_in_chunks(reader, options.input, coder);
-    const double max_error = coder.finish();
-    if (options.measure_error) volume.max_error = max_error;
-  } else {
-    FixedRateCoder coder(volume.info.dims, options, sink);
-    volume.value_range = read_in_chunks(reader, options.input, coder);
-    if (options.measure_error) volume.max_error = coder.max_error();
-  }
+/// The volume and its coarser levels.
+std::vector<CompressedVolume *> levels_of(CompressedVolume &volume) {
+  std::vector<CompressedVolume *> levels = {&volume};
+  for (CompressedVolume &level : volume.coarser) levels.push_back(&level);
+  return levels;
+}
+
+/// Hands the payload of each level to its sink, in order, and completes `volume`.
+void run(VolumeReader &reader, const CompressOptions &options, std::span<const Sink> sinks,
+         CompressedVolume &volume) {
+  PyramidCoder coder(options, levels_of(volume), sinks);
+  volume.value_range = read_in_chunks(reader, options.input, coder);
+  coder.finish();
 }
 
 }  // namespace
@@ -181,20 +259,29 @@ void CompressedVolume::read_words(std::uint64_t bit, std::span<std::uint32_t> ou
   std::ranges::fill(out.subspan(num_words + 1), 0u);
 }
 
+void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing) {
+  volume.info.spacing = spacing;
+  const VolumeInfo *finer = &volume.info;
+  for (CompressedVolume &level : volume.coarser) {
+    level.info = coarser_level(*finer);
+    finer = &level.info;
+  }
+}
+
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) {
   CompressedVolume volume = describe(reader, options);
-  std::vector<std::uint32_t> words;
-  words.reserve(volume.bits_per_block == 0 ? 0 : volume.word_count());
-  run(
-      reader, options,
-      [&](Payload payload) {
-        const std::size_t begin = words.size();
-        words.resize(begin + payload.size() / sizeof(std::uint32_t));
-        std::ranges::copy(payload, std::as_writable_bytes(std::span(words).subspan(begin)).begin());
-      },
-      volume);
-  words.resize((volume.payload_bits() + 31) / 32 + 2);
-  volume.words = std::move(words);
+  std::vector<Sink> sinks;
+  for (CompressedVolume *level : levels_of(volume)) {
+    level->words.reserve(level->is_indexed() ? 0 : level->word_count());
+    sinks.push_back([&words = level->words](Payload payload) {
+      const std::size_t begin = words.size();
+      words.resize(begin + payload.size() / sizeof(std::uint32_t));
+      std::ranges::copy(payload, std::as_writable_bytes(std::span(words).subspan(begin)).begin());
+    });
+  }
+  run(reader, options, sinks, volume);
+  for (CompressedVolume *level : levels_of(volume))
+    level->words.resize((level->payload_bits() + 31) / 32 + kDecoderAhead);
   return volume;
 }
 
@@ -202,8 +289,10 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
                                   const std::filesystem::path &path) {
   CompressedVolume volume = describe(reader, options);
   ZfpFileWriter file(path, volume);
-  run(
-      reader, options, [&](Payload payload) { file.write(payload); }, volume);
+  std::vector<Sink> sinks;
+  for (std::size_t level = 0; level <= volume.coarser.size(); ++level)
+    sinks.push_back([&file, level](Payload payload) { file.write(payload, level); });
+  run(reader, options, sinks, volume);
   file.commit(volume);
   return volume;
 }

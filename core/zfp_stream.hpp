@@ -44,6 +44,7 @@ struct CompressOptions {
   ocl::Device *device =
       nullptr;  ///< encodes there instead of with libzfp: the same result, bit for bit; at a fixed rate
   bool measure_error = false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_error
+  std::uint32_t levels = 1;    ///< of detail, the volume itself among them: at most max_levels(); 0: so many
   InputOptions input{};
 };
 
@@ -66,6 +67,8 @@ struct CompressedVolume {
   std::array<float, 2> value_range{};  ///< [min, max] of the source voxels, as float32 and after map_nan;
                                        ///< {-inf, inf} when unknown
   std::optional<double> max_error{};   ///< largest |decoded - source| when it was measured
+  std::vector<CompressedVolume>
+      coarser{};  ///< levels of detail, each of half the voxels along each axis: pyramid.hpp
 
   glm::uvec3 num_blocks() const { return (info.dims + 3u) / 4u; }
   std::uint64_t block_count() const {
@@ -86,7 +89,10 @@ struct CompressedVolume {
   void read_words(std::uint64_t bit, std::span<std::uint32_t> out) const;
 };
 
-/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file).
+/// Gives a volume, and its coarser levels, another spacing.
+void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
+
+/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more levels than it can have).
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
 /// As compress(), but straight to a file and in memory O(nx * ny). Writes to a temporary name and renames;
 /// nothing is left behind on an error. Returns what was written, but for the words, which stay empty.

@@ -13,16 +13,32 @@ typedef struct BlockCoords {
   uint x, y, z;
 } BlockCoords;
 
+/// Place of block (x,y,z) among those of its level of detail, as its stream and its ranges are ordered.
+ISO_INLINE uint level_block_at(const FrameParams *frame, uint x, uint y, uint z) {
+  return x + frame->blocks_x * (y + frame->blocks_y * z);
+}
+
+/// Place among those of its level of the block with this id, of a frame with several levels.
+ISO_INLINE uint level_block_of(const FrameParams *frame, uint block_id) {
+  const uint x = block_id % frame->id_blocks_x, y = block_id / frame->id_blocks_x % frame->id_blocks_y,
+             z = block_id / frame->id_blocks_x / frame->id_blocks_y - frame->id_begin_z;
+  return level_block_at(frame, x, y, z);
+}
+
+/// Wraps around for blocks of finer levels than the frame's, and block_table.h takes that back.
 ISO_INLINE BlockCoords block_coords(const FrameParams *frame, uint block_id) {
+  const uint blocks_x = ISO_LEVELS ? frame->id_blocks_x : frame->blocks_x,
+             blocks_y = ISO_LEVELS ? frame->id_blocks_y : frame->blocks_y;
   BlockCoords b;
-  b.x = block_id % frame->blocks_x;
-  b.y = block_id / frame->blocks_x % frame->blocks_y;
-  b.z = block_id / frame->blocks_x / frame->blocks_y;
+  b.x = block_id % blocks_x;
+  b.y = block_id / blocks_x % blocks_y;
+  b.z = block_id / blocks_x / blocks_y - (ISO_LEVELS ? frame->id_begin_z : 0u);
   return b;
 }
 
 ISO_INLINE uint block_id_at(const FrameParams *frame, uint x, uint y, uint z) {
-  return x + frame->blocks_x * (y + frame->blocks_y * z);
+  return ISO_LEVELS ? x + frame->id_blocks_x * (y + frame->id_blocks_y * (z + frame->id_begin_z))
+                    : level_block_at(frame, x, y, z);
 }
 
 /// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. Always the first would be blind where the

@@ -43,10 +43,11 @@ typedef struct CacheState {
 
 /// Where the search for block (x,y,z) begins. frame->table_groups: entries / 8.
 ISO_INLINE uint table_home(const FrameParams *frame, uint x, uint y, uint z) {
-  uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((z >> 1) * 0xC2B2AE3Du);
+  const uint layer = z + (ISO_LEVELS ? frame->id_begin_z : 0u); /* the same seen from every level */
+  uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((layer >> 1) * 0xC2B2AE3Du);
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   h ^= h >> 13;
-  return 8u * (uint)(((ulong)h * frame->table_groups) >> 32) + (x & 1u) + 2u * (y & 1u) + 4u * (z & 1u);
+  return 8u * (uint)(((ulong)h * frame->table_groups) >> 32) + (x & 1u) + 2u * (y & 1u) + 4u * (layer & 1u);
 }
 
 ISO_INLINE uint table_next(const FrameParams *frame, uint entry) {

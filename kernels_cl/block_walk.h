@@ -27,8 +27,13 @@ ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayE
   return walk_from(ray, x, y, z, 4, last);
 }
 
+/// Is `exit` beyond the band of the ray that this level of detail draws?
+ISO_INLINE int ends_band(const FrameParams *frame, RayEvent exit) {
+  return ISO_LEVELS && !event_before(exit, border_event(frame->end_t));
+}
+
 /// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active blocks, into found [wanted],
-/// `stride` apart. Returns how many there are before the ray has left the box; *block_id becomes the first block not looked at,
+/// `stride` apart. Returns how many there are before the ray has left the box, or its band; *block_id becomes the first block not looked at,
 /// or ISO_INVALID_ID.
 ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
                             uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
@@ -58,7 +63,7 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
           found[stride * k++] = block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z);
         }
         exit = walk_exit(&w, ray);
-        left = leaves(&w, &coarse, exit);
+        left = leaves(&w, &coarse, exit) || ends_band(frame, exit);
         walk_step(&w, ray, exit, 4, last);
       }
     } else {
@@ -66,7 +71,9 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
       left = 1;
     }
     follows = (low | high) != 0;
-    if (left) {
+    if (left && ends_band(frame, exit)) {
+      within = 0;
+    } else if (left) {
       walk_step(&coarse, ray, exit, 4 * ISO_MACROCELL_BLOCKS, last);
       within = coarse.x != behind_x && coarse.y != behind_y && coarse.z != behind_z;
     }
@@ -75,29 +82,33 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
   return k;
 }
 
-/// The block in which a ray enters the box of active blocks, or starts in it; ISO_INVALID_ID if it does not meet the box.
+/// The block in which a ray, or its band, enters the box of active blocks, or starts in it; ISO_INVALID_ID if it does not meet the
+/// box.
 ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
   const LastPlanes last = last_planes(frame);
   LastPlanes begin, end;
-  RayEvent enter;
+  RayEvent enter = border_event(ISO_LEVELS ? frame->begin_t : 0.0f),
+           exit = border_event(ISO_LEVELS ? frame->end_t : INFINITY);
   begin.x = 4 * frame->active_begin_x;
   begin.y = 4 * frame->active_begin_y;
   begin.z = 4 * frame->active_begin_z;
   end.x = min(4 * frame->active_end_x, last.x);
   end.y = min(4 * frame->active_end_y, last.y);
   end.z = min(4 * frame->active_end_z, last.z);
-  if (begin.x >= end.x || !box_entry(ray, begin, end, &enter)) return ISO_INVALID_ID;
+  if (begin.x >= end.x || !clip_to_box(ray, begin, end, &enter, &exit)) return ISO_INVALID_ID;
   return block_id_at(frame, (uint)locate(ray->x, 0, enter, 4, frame->active_begin_x, (end.x - 1) / 4),
                      (uint)locate(ray->y, 1, enter, 4, frame->active_begin_y, (end.y - 1) / 4),
                      (uint)locate(ray->z, 2, enter, 4, frame->active_begin_z, (end.z - 1) / 4));
 }
 
-/// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones.
+/// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones, or the ray's band.
 ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  walk_step(&w, ray, walk_exit(&w, ray), 4, last);
-  return w.x >= frame->active_begin_x && w.x < frame->active_end_x && w.y >= frame->active_begin_y &&
-                 w.y < frame->active_end_y && w.z >= frame->active_begin_z && w.z < frame->active_end_z
+  const RayEvent exit = walk_exit(&w, ray);
+  walk_step(&w, ray, exit, 4, last);
+  return !ends_band(frame, exit) && w.x >= frame->active_begin_x && w.x < frame->active_end_x &&
+                 w.y >= frame->active_begin_y && w.y < frame->active_end_y && w.z >= frame->active_begin_z &&
+                 w.z < frame->active_end_z
              ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
              : ISO_INVALID_ID;
 }

@@ -31,7 +31,7 @@ typedef struct Ray {
   RayAxis x, y, z;
 } Ray;
 
-/// A crossing of a plane of `axis` (0..2), or the start of the ray.
+/// A crossing of a plane of `axis` (0..2), or where the ray starts, or is cut.
 typedef struct RayEvent {
   TwoFloat t;
   int axis;
@@ -48,11 +48,13 @@ ISO_INLINE RayEvent make_event(TwoFloat t, int axis) {
   return e;
 }
 
+/// The ray at t, on no plane: where one level of detail takes over from another.
+ISO_INLINE RayEvent border_event(float t) {
+  return make_event(two_float(t), ISO_AXIS_START);
+}
+
 ISO_INLINE RayEvent start_event(void) {
-  TwoFloat zero;
-  zero.hi = 0.0f;
-  zero.lo = 0.0f;
-  return make_event(zero, ISO_AXIS_START);
+  return border_event(0.0f);
 }
 
 ISO_INLINE RayAxis make_ray_axis(float o, float d) {
@@ -280,16 +282,18 @@ ISO_INLINE int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *e
   return 1;
 }
 
-/// Where the ray enters the box from planes `begin` to planes `end`, or starts in it. Returns 0 if it never does.
+/// Shrinks [*enter, *exit] to the box from planes `begin` to planes `end`. Returns 0 if nothing is left.
+ISO_INLINE int clip_to_box(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter, RayEvent *exit) {
+  return clip_to_slab(r->x, 0, begin.x, end.x, enter, exit) &&
+         clip_to_slab(r->y, 1, begin.y, end.y, enter, exit) &&
+         clip_to_slab(r->z, 2, begin.z, end.z, enter, exit) && event_before(*enter, *exit);
+}
+
+/// Where the ray enters the box, or starts in it. Returns 0 if it never does.
 ISO_INLINE int box_entry(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter) {
-  RayEvent exit;
-  exit.t.hi = INFINITY;
-  exit.t.lo = 0.0f;
-  exit.axis = ISO_AXIS_START;
+  RayEvent exit = border_event(INFINITY);
   *enter = start_event();
-  return clip_to_slab(r->x, 0, begin.x, end.x, enter, &exit) &&
-         clip_to_slab(r->y, 1, begin.y, end.y, enter, &exit) &&
-         clip_to_slab(r->z, 2, begin.z, end.z, enter, &exit) && event_before(*enter, exit);
+  return clip_to_box(r, begin, end, enter, &exit);
 }
 
 /// Where the ray enters the domain [0, dims-1], or starts in it. Returns 0 if it never does.

@@ -15,6 +15,7 @@
 #define ISO_RAY_HIT 1    ///< equal to what isolate() returns, as is
 #define ISO_RAY_DOUBT 2  ///< the next march settles it
 #define ISO_RAY_WAITS 3  ///< for a block that is not cached
+#define ISO_RAY_ENDS 4   ///< its band ends here; + 1: inside
 #if ISO_RAY_DOUBT != ISO_DOUBTFUL
 #error "a result of isolate() must stand for itself"
 #endif
@@ -31,6 +32,7 @@ typedef struct BlockChange {
   GridWalk cell;
   RayEvent enter;
   float w[8];
+  int at_border;  ///< it is where the cell is entered: a level of detail has another opinion than the one before
 } BlockChange;
 
 /// The cells of a block that have voxels of any of those corners.
@@ -68,7 +70,7 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table, 
       voxels[corner] = entries[corner].slot == ISO_BLOCK_ABSENT ? 0 : inside[entries[corner].slot];
     }
     cells = changing_cells(voxels) | cells_of_corners(~*have & 0xFFu);
-    if (*have == 0xFFu) {
+    if (!ISO_CHECK_RACES && *have == 0xFFu) {
       global BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
       entry->changing_low = (uint)cells;
       entry->changing_high = (uint)(cells >> 32);
@@ -77,25 +79,47 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table, 
   return cells;
 }
 
-/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, or ISO_RAY_WAITS where a block of
-/// the dual grid is not cached. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
-/// precise: settle doubts on the spot.
+/// Where the ray's band begins, if it has not entered the region before.
+ISO_INLINE RayEvent band_entry(const FrameParams *frame, RayEvent entry) {
+  const RayEvent begin = border_event(ISO_LEVELS ? frame->begin_t : 0.0f);
+  return ISO_LEVELS && event_before(entry, begin) ? begin : entry;
+}
+
+/// Where it ends, if it does before the ray leaves the region.
+ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
+  return ends_band(frame, exit) ? border_event(frame->end_t) : exit;
+}
+
+/// The side of the isosurface on which the ray is at `e`, by which it enters or leaves the cell. w [8]: its corners.
+ISO_INLINE uint side_at(const Ray *ray, const float *w, const GridWalk *cell, RayEvent e, int leaving) {
+  const CellPoint p = event_position(ray, e, cell->x, cell->y, cell->z, leaving);
+  return segment_cubic(w, p, p).b0 >= 0.0f ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
+}
+
+/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a block of
+/// the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
+/// precise: settle doubts on the spot. side: where the ray was before the border at which its band begins in this block.
 ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
                            global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
-                           local uint *slots, int precise, BlockChange *found) {
+                           local uint *slots, int precise, uint side, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   uint have;
-  int result = ISO_RAY_LEFT, left = 0;
+  int result = ISO_RAY_LEFT, left = 0, ends = 0, ends_here = 0;
   const ulong cells = open_block(frame, table, inside, b, slots, &have);
   if ((have & 1u) == 0) return ISO_RAY_WAITS;
-  if (cells == 0) return ISO_RAY_LEFT;
+  if (!ISO_LEVELS && cells == 0) return ISO_RAY_LEFT;
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  found->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  if (ISO_LEVELS) ends = ends_band(frame, walk_exit(&block, ray));
+  if (cells == 0 && side == ISO_SIDE_UNKNOWN && !ends) return ISO_RAY_LEFT;
+  found->enter = band_entry(frame, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
   found->cell = enter_block(ray, b, found->enter, last);
+  found->at_border = 0;
   while (result == ISO_RAY_LEFT && !left) {
     const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
-    const RayEvent exit = walk_exit(&found->cell, ray);
-    if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0) {
+    const RayEvent cell_exit = walk_exit(&found->cell, ray);
+    const RayEvent exit = band_exit(frame, cell_exit);
+    if (ISO_LEVELS) ends_here = ends && ends_band(frame, cell_exit);
+    if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0 || side != ISO_SIDE_UNKNOWN || ends_here) {
       const uint needed = cell_blocks(x, y, z);
       if ((needed & ~have) != 0) {
         result = ISO_RAY_WAITS;
@@ -107,16 +131,22 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
               cache_values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
               frame->isovalue;
         }
-        result = precise ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y, found->cell.z,
-                                          found->enter, exit, &found->change)
-                         : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
-                                                   found->cell.z, found->enter, exit, &found->change);
+        if (ISO_LEVELS && side != ISO_SIDE_UNKNOWN)
+          found->at_border = side_at(ray, found->w, &found->cell, found->enter, 0) != side;
+        result = found->at_border ? ISO_RAY_HIT
+                 : precise        ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                                   found->cell.z, found->enter, exit, &found->change)
+                           : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                                     found->cell.z, found->enter, exit, &found->change);
+        if (result == ISO_RAY_LEFT && ends_here)
+          result = ISO_RAY_ENDS + (side_at(ray, found->w, &found->cell, exit, 1) == ISO_SIDE_INSIDE);
       }
     }
     if (result == ISO_RAY_LEFT) {
-      left = leaves(&found->cell, &block, exit);
-      walk_step(&found->cell, ray, exit, 1, last);
-      found->enter = exit;
+      left = leaves(&found->cell, &block, cell_exit);
+      walk_step(&found->cell, ray, cell_exit, 1, last);
+      found->enter = cell_exit;
+      side = ISO_SIDE_UNKNOWN;
     }
   }
   return result;
@@ -124,8 +154,10 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
 
 ISO_INLINE HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  const float s =
+      ISO_LEVELS && found->at_border ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);
   return make_hit(frame, ray, found->w, found->cell.x, found->cell.y, found->cell.z, found->enter,
-                  walk_exit(&found->cell, ray), refine(solver, found->change.cubic, found->change.bracket));
+                  band_exit(frame, walk_exit(&found->cell, ray)), s);
 }
 
 /// Appends the rays that go on to next_active_ray_ids. Called by whole work-groups.
@@ -215,11 +247,97 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
       uint block_id = first_block(frame, &ray);
       if (block_id != ISO_INVALID_ID)
         num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
-      if (num_found != 0) ray_block_ids[pixel] = found[item];
+      if (num_found != 0) {
+        ray_block_ids[pixel] = found[item];
+      } else if (ISO_LEVELS) {
+        ray_block_ids[pixel] = ISO_SIDE_UNKNOWN << ISO_RAY_SIDE_SHIFT;
+      }
     }
     append_ray(num_found != 0, pixel | ISO_FIRST_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
                &counts->next_active_count, next_active_ray_ids);
   }
+}
+
+#if ISO_LEVELS
+
+/// The side on which a whole block is; unknown if it is active. See macrocells.cl.
+ISO_INLINE uint side_of_block(const FrameParams *frame, global const ushort *ranges, BlockCoords b) {
+  const uint range = ranges[level_block_at(frame, b.x, b.y, b.z)];
+  const int some_below = (range & 0xFFu) < frame->below_index, some_above = range >> 8 >= frame->above_index;
+  return some_below && some_above ? ISO_SIDE_UNKNOWN : some_above ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
+}
+
+/// Does the ray reach the border at t within the domain? If so, *b is the block it is in just behind it.
+ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
+  const LastPlanes last = last_planes(frame);
+  LastPlanes zero;
+  RayEvent enter = border_event(t), exit = border_event(INFINITY);
+  zero.x = zero.y = zero.z = 0;
+  if (!clip_to_box(ray, zero, last, &enter, &exit) || enter.axis != ISO_AXIS_START) return 0;
+  b->x = (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4);
+  b->y = (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4);
+  b->z = (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4);
+  return 1;
+}
+
+/// Begins the next band of a frame, frame_params, behind `before`, for rays that have no hit. Each ray's side at the border: the
+/// one at which it left the band before (ray_block_ids [pixel]), or else that of the whole block it was in. ranges: of both
+/// levels' blocks. Where the block that it goes on in is not as a whole on that side, the ray stands there, and keeps
+/// the side with it; else it stands at its next active block. The other arguments as in start_rays.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cross_border(
+    const FrameParams before, const FrameParams frame_params, global const ushort *ranges_before,
+    global const ushort *ranges, global const uint *macrocell_masks, global PassCounts *counts,
+    global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global const HitRecord *hits) {
+  const FrameParams *frame = &frame_params;
+  local uint found[ISO_GROUP_SIZE], counters[2];
+  const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
+                        frame->screen_end_y};
+  const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
+  if (get_global_id(0) == 0) next->window_count = counts->pixel_count;
+  if (item == 0) counters[0] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    const uint pixel = begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
+    int goes_on = 0;
+    if (pixel != ISO_INVALID_ID && hits[pixel].t == INFINITY) {
+      const Ray ray = make_ray(frame, pixel), ray_before = make_ray(&before, pixel);
+      uint side = ray_block_ids[pixel] >> ISO_RAY_SIDE_SHIFT, state = 0;
+      uint block_id = first_block(frame, &ray);
+      BlockCoords b;
+      if (side == ISO_SIDE_UNKNOWN && block_at_border(&before, &ray_before, before.end_t, &b))
+        side = side_of_block(&before, ranges_before, b);
+      if (side != ISO_SIDE_UNKNOWN && block_at_border(frame, &ray, frame->begin_t, &b) &&
+          side_of_block(frame, ranges, b) != side) {
+        state = block_id | side << ISO_RAY_SIDE_SHIFT;
+        goes_on = 1;
+      } else if (block_id != ISO_INVALID_ID &&
+                 find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1) != 0) {
+        state = found[item];
+        goes_on = 1;
+      }
+      ray_block_ids[pixel] = state;
+    }
+    append_ray(goes_on, pixel | ISO_FIRST_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
+               &counts->next_active_count, next_active_ray_ids);
+  }
+}
+
+#endif
+
+/// find_blocks() for a ray that stands at block *block_id, which it looks into though it may not be active where it has a side.
+ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
+                                 uint side, uint *block_id, uint wanted, local uint *found) {
+  uint first = 0;
+  if (side != ISO_SIDE_UNKNOWN) {
+    found[0] = *block_id;
+    first = 1;
+    *block_id = block_behind(frame, ray, block_coords(frame, *block_id), last_planes(frame));
+    if (wanted == 1 || *block_id == ISO_INVALID_ID) return 1;
+  }
+  return first + find_blocks(frame, macrocell_masks, ray, block_id, wanted - first,
+                             found + first * ISO_GROUP_SIZE, ISO_GROUP_SIZE);
 }
 
 /// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel], an
@@ -257,10 +375,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const uint i = (begin + item) / lanes, lane = item % lanes;
     const int is_ray = i < num_rays;
     const uint entry = is_ray ? active_ray_ids[i] : 0, pixel = entry & ISO_RAY_PIXEL;
-    const uint from = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
+    const uint state = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
+    const uint from = ISO_LEVELS && is_ray ? state & ISO_RAY_BLOCK : state;
+    const uint side = ISO_LEVELS && is_ray ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
     const Ray ray = make_ray(frame, pixel);
     uint next = from, at = lane, more = 1, waits_as = 0, decides_at = 0;
-    int result = ISO_RAY_LEFT, going = is_ray, first = 1;
+    int result = ISO_RAY_LEFT, going = is_ray, gone = 0, first = 1;
     BlockChange change;
     while (more != 0) {
       uint num_passed = 0;
@@ -273,14 +393,15 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
           found[item] = from;
           next = block_behind(frame, &ray, block_coords(frame, from), last);
         } else {
-          num_found = find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE, found + item,
-                                  ISO_GROUP_SIZE);
+          num_found = find_blocks_from(frame, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
+                                       ISO_BLOCKS_AT_ONCE, found + item);
         }
         for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
-          const int in_doubt = first && at == 0 && (entry & ISO_RAY_IN_DOUBT) != 0;
+          const int stands_here = first && at == 0;
           result = march_block(frame, table, inside, cache_values, &ray,
                                block_coords(frame, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
-                               in_doubt, &change);
+                               stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
+                               stands_here ? side : ISO_SIDE_UNKNOWN, &change);
           if (result == ISO_RAY_LEFT) {
             ++num_passed;
           } else {
@@ -296,10 +417,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         if (lane < place) num_blocks += min(num_passed, (place - lane - 1) / lanes + 1);
         if (decides_at != place) result = ISO_RAY_LEFT;
         going = place == ISO_INVALID_ID && next != ISO_INVALID_ID;
+        gone = place == ISO_INVALID_ID && next == ISO_INVALID_ID;
         if (going) atomic_inc(&num_going);
       }
       first = 0;
-      barrier(CLK_LOCAL_MEM_FENCE);
+      barrier(CLK_LOCAL_MEM_FENCE |
+              CLK_GLOBAL_MEM_FENCE); /* all know where their ray stood: one may say where it is */
       more = num_going;
       barrier(CLK_LOCAL_MEM_FENCE);
     }
@@ -308,11 +431,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       ++num_hits;
       ++num_blocks;
     }
-    const int waits = result >= ISO_RAY_DOUBT;
+    if (ISO_LEVELS && result >= ISO_RAY_ENDS) {
+      const uint left_on = result == ISO_RAY_ENDS ? ISO_SIDE_OUTSIDE : ISO_SIDE_INSIDE;
+      ray_block_ids[pixel] = left_on << ISO_RAY_SIDE_SHIFT;
+    } else if (ISO_LEVELS && gone && lane == 0) {
+      ray_block_ids[pixel] = ISO_SIDE_UNKNOWN << ISO_RAY_SIDE_SHIFT;
+    }
+    const int waits = result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS;
     uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
     if (waits) {
       if (waits_as != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
-      ray_block_ids[pixel] = waits_as;
+      ray_block_ids[pixel] = ISO_LEVELS && waits_as == from ? state : waits_as;
     }
     append_ray(waits,
                pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
@@ -348,7 +477,8 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
   for (uint corner = 0; corner < 8; ++corner) {
     const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
     const uint word = (touched >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
-    missing &= ~((uint)((requests.bits[word] & request_bit(x, y, z)) != 0) << corner);
+    const uint bits = ISO_CHECK_RACES ? atomic_or(&requests.bits[word], 0u) : requests.bits[word];
+    missing &= ~((uint)((bits & request_bit(x, y, z)) != 0) << corner);
   }
   if (missing == 0) return;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
@@ -400,11 +530,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       const Ray ray = make_ray(frame, pixel);
       const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
       const uint ahead = frame->per_ray_speculation ? own : counts->spec_count;
-      uint next = ray_block_ids[pixel]; /* it stands at an active block */
+      const uint state = ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
+      uint next = ISO_LEVELS ? state & ISO_RAY_BLOCK : state,
+           side = ISO_LEVELS ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
-        const uint num_found =
-            find_blocks(frame, macrocell_masks, &ray, &next, min(ahead - asked, ISO_BLOCKS_AT_ONCE),
-                        found + item, ISO_GROUP_SIZE);
+        const uint num_found = find_blocks_from(frame, macrocell_masks, &ray, side, &next,
+                                                min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
+        side = ISO_SIDE_UNKNOWN;
         for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
           const uint block_id = found[at * ISO_GROUP_SIZE + item];
           const BlockCoords b = block_coords(frame, block_id);

@@ -55,6 +55,15 @@ inline uint popcount(uint x) {
 #define ISO_GROUP_ITEMS 4u           ///< pairs per work-item and tile in group.cl
 #define ISO_AGE_BUCKETS 64u          ///< ages the LRU tells apart [passes]; older ones count as the oldest
 
+#ifndef ISO_CHECK_RACES /* by -D, from tests/run_under_oclgrind.sh */
+#define ISO_CHECK_RACES \
+  0 /* 1: what work-items share without order, since any outcome is right, is ordered or not shared */
+#endif
+
+#ifndef ISO_LEVELS   /* by -D */
+#define ISO_LEVELS 0 /* 1: frames are drawn in bands of several levels of detail (core/detail.hpp) */
+#endif
+
 /// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's compiler reads a pointer to
 /// constant memory through the cache, again in every turn of a loop.
 typedef struct FrameParams {
@@ -76,8 +85,12 @@ typedef struct FrameParams {
   uint screen_begin_x, screen_begin_y, screen_end_x, screen_end_y;
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
   uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
+  /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z) of this one is number x +
+  /// id_blocks_x (y + id_blocks_y (id_begin_z + z)).
+  uint id_blocks_x, id_blocks_y, id_begin_z;
+  float begin_t, end_t;  ///< the band of the rays that is drawn at this level [t of the kernels]
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 152);
+ISO_CHECK_SIZE(FrameParams, 172);
 
 /// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu
@@ -85,6 +98,13 @@ ISO_CHECK_SIZE(FrameParams, 152);
 #define ISO_RAY_AHEAD_MAX 6u
 #define ISO_FIRST_LOG_AHEAD 2u  ///< of a new ray
 #define ISO_RAY_IN_DOUBT 0x80000000u
+
+/// With levels of detail, above a ray's block id, or instead of one, when it has left a band: the side it was on at the border.
+#define ISO_RAY_BLOCK 0x3FFFFFFFu
+#define ISO_RAY_SIDE_SHIFT 30u
+#define ISO_SIDE_UNKNOWN 0u
+#define ISO_SIDE_OUTSIDE 1u
+#define ISO_SIDE_INSIDE 2u
 
 #define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED 65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass

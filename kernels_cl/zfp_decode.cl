@@ -1,4 +1,5 @@
 /// zfp_decode.cl -- decodes the pass's new blocks into their cache slots (Sec. 3.5).
+#include "block_grid.h"
 #include "block_stream.h"
 #include "shared_types.h"
 
@@ -23,8 +24,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     float values[ISO_BLOCK_VOXELS];
     if (item < num_blocks) {
       uint outside_low = 0, outside_high = 0;
-      decode_block(part_0, part_1, part_2, part_3, index, layout, block_ids[begin + item],
-                   begin + item - first, values);
+      const uint id = block_ids[begin + item];
+      const uint block_id = ISO_LEVELS ? level_block_of(&frame_params, id) : id;
+      decode_block(part_0, part_1, part_2, part_3, index, layout, block_id, begin + item - first, values);
       ISO_UNROLL
       for (uint v = 32; v-- > 0;) { /* the signs; nothing minus this isovalue is -0 */
         outside_low = outside_low << 1 | as_uint(values[v] - isovalue) >> 31;

@@ -6,7 +6,9 @@
 #include <glm/glm.hpp>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
+#include "core/detail.hpp"
 #include "kernels_cl/cell_intersect.h"
 
 namespace isowave {
@@ -52,6 +54,15 @@ void walk_cells(const FrameParams &frame, const Ray &ray, RayEvent enter, const 
   }
 }
 
+/// The side of the isosurface that a ray is on.
+enum class Side { kUnknown, kOutside, kInside };
+
+/// Where the ray is at `event`, by which it enters or leaves a cell with corners w.
+Side side_at(const Ray &ray, const float *w, const GridWalk &cell, RayEvent event, bool leaving) {
+  const CellPoint at = event_position(&ray, event, cell.x, cell.y, cell.z, leaving);
+  return segment_cubic(w, at, at).b0 >= 0.0f ? Side::kInside : Side::kOutside;
+}
+
 /// The first hit in the cells of `box`, which the ray enters by `enter`.
 HitRecord trace_box(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
                     RayEvent enter, const CellBox &box) {
@@ -76,10 +87,63 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
   return trace_box(frame, voxels, solver, ray, enter, {glm::ivec3(0), {last.x, last.y, last.z}});
 }
 
+/// The first hit of a ray in the band of one level. side: in, of the ray where the band begins, if it comes from another; out, where
+/// the band ends, if the ray gets there within the domain.
+HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
+                     Side &side) {
+  const LastPlanes last = last_planes(&frame), zero{};
+  const RayEvent end = border_event(frame.end_t);
+  RayEvent enter = border_event(frame.begin_t), exit = end;
+  HitRecord hit = no_hit();
+  const Side before = std::exchange(side, Side::kUnknown);
+  if (!clip_to_box(&ray, zero, last, &enter, &exit)) return hit;
+  bool at_border = enter.axis == ISO_AXIS_START && before != Side::kUnknown;
+  const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
+  walk_cells(frame, ray, enter, domain, [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
+    const bool ends = !event_before(cell_exit, end);
+    if (ends) cell_exit = end;
+    CellChange change;
+    float w[8];
+    load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
+    if (at_border && side_at(ray, w, cell, cell_enter, false) != before) {
+      hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, 0.0f);
+      return true;
+    }
+    at_border = false;
+    if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, &change)) {
+      hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
+                     refine(solver, change.cubic, change.bracket));
+      return true;
+    }
+    if (ends) side = side_at(ray, w, cell, cell_exit, true);
+    return ends;
+  });
+  return hit;
+}
+
 void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
   if (voxels.size() != std::size_t{frame.dims_x} * frame.dims_y * frame.dims_z) {
     throw std::invalid_argument("scalar renderer: the voxels do not fit the frame's dims");
   }
+}
+
+/// The hits [height * width] of trace_pixel(pixel), by several threads.
+template <class TracePixel>
+std::vector<HitRecord> trace_pixels(const FrameParams &frame, unsigned threads, TracePixel trace_pixel) {
+  std::vector<HitRecord> hits(std::size_t{frame.width} * frame.height);
+  std::atomic<std::uint32_t> next_row{0};
+  const auto trace_rows = [&] {
+    for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
+      for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel)
+        hits[pixel] = trace_pixel(pixel);
+    }
+  };
+  std::vector<std::jthread> pool;
+  const unsigned num_threads = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+  for (unsigned i = 1; i < num_threads; ++i) pool.emplace_back(trace_rows);
+  trace_rows();
+  pool.clear();
+  return hits;
 }
 
 }  // namespace
@@ -134,21 +198,31 @@ HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float
 std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                                      unsigned threads) {
   check_voxels(frame, voxels);
-  std::vector<HitRecord> hits(std::size_t{frame.width} * frame.height);
-  std::atomic<std::uint32_t> next_row{0};
-  const auto trace_rows = [&] {
-    for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
-      for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel) {
-        hits[pixel] = trace(frame, voxels.data(), solver, make_ray(&frame, pixel));
-      }
-    }
-  };
-  std::vector<std::jthread> pool;
-  const unsigned num_threads = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
-  for (unsigned i = 1; i < num_threads; ++i) pool.emplace_back(trace_rows);
-  trace_rows();
-  pool.clear();
-  return hits;
+  return trace_pixels(frame, threads, [&](std::uint32_t pixel) {
+    return trace(frame, voxels.data(), solver, make_ray(&frame, pixel));
+  });
+}
+
+HitRecord trace_scalar_levels(std::span<const FrameParams> frames, std::span<const std::vector<float>> voxels,
+                              Solver solver, std::span<const Ray> rays) {
+  HitRecord hit = no_hit();
+  Side side = Side::kUnknown;
+  for (std::size_t level = 0; level < frames.size() && !std::isfinite(hit.t); ++level) {
+    if (draws(frames[level]))
+      hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], side);
+  }
+  return hit;
+}
+
+std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
+                                            std::span<const std::vector<float>> voxels, Solver solver,
+                                            unsigned threads) {
+  for (std::size_t level = 0; level < frames.size(); ++level) check_voxels(frames[level], voxels[level]);
+  return trace_pixels(frames[0], threads, [&](std::uint32_t pixel) {
+    std::vector<Ray> rays;
+    for (const FrameParams &frame : frames) rays.push_back(make_ray(&frame, pixel));
+    return trace_scalar_levels(frames, voxels, solver, rays);
+  });
 }
 
 }  // namespace isowave

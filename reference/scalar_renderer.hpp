@@ -19,7 +19,17 @@ namespace isowave {
 std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
                                      Solver solver = kDefaultSolver, unsigned threads = 0);
 
-/// One ray of the same: the hit of `ray` (index space; t in units of frame.t_scale). frame: dims, blocks,
+/// The same for a frame that several levels of detail draw, each its band: frames as make_level_frames() returns them, and
+/// the voxels of each level. The side that a ray is on is carried from cell to cell across borders.
+std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
+                                            std::span<const std::vector<float>> voxels,
+                                            Solver solver = kDefaultSolver, unsigned threads = 0);
+
+/// One ray of the same: rays [level], which is the same ray in each level's index space.
+HitRecord trace_scalar_levels(std::span<const FrameParams> frames, std::span<const std::vector<float>> voxels,
+                              Solver solver, std::span<const Ray> rays);
+
+/// One ray of render_scalar(): the hit of `ray` (index space; t in units of frame.t_scale). frame: dims, blocks,
 /// isovalue and t_scale are used.
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                        const Ray &ray);

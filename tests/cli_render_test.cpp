@@ -256,6 +256,39 @@ TEST(CliRender, ErrorsInsteadOfARate) {
       "render " + kNucleon + " -i 80 --rate 4 --exact --depth " + quoted(folder / "b.npy"), "rate");
 }
 
+TEST(CliRender, LevelsOfDetail) {
+  const TemporaryFolder folder;
+  const std::string file = quoted(folder / "n.zfp");
+  const auto converted = run_isowave("convert " + kNucleon + " --rate 16 --levels all -o " + file);
+  ASSERT_EQ(converted.status, 0) << converted.err;
+  EXPECT_NE(converted.out.find("level of detail 21x21x21"), std::string::npos) << converted.out;
+  const json info = json::parse(run_isowave("info --json " + file).out);
+  EXPECT_EQ(info["coarser"], json({{21, 21, 21}, {11, 11, 11}, {6, 6, 6}}));
+  const auto depth = [&](const std::string &arguments) {
+    render(arguments + " -i 80 --size 32x32 --no-stage-times --stats " + quoted(folder / "a.json") +
+           " --depth " + quoted(folder / "a.npy"));
+    return test::read_file(folder / "a.npy");
+  };
+  const std::string finest = depth(file), coarse = depth(file + " --max-pixel-error 1.5");
+  std::set<int> levels;
+  const json stats = json::parse(test::read_file(folder / "a.json"));
+  for (const json &pass : stats["frames"][0]["per_pass"]) levels.insert(pass["level"].get<int>());
+  EXPECT_GT(levels.size(), 1u) << "one level drew all";
+  EXPECT_EQ(stats["options"]["max_pixel_error"], 1.5);
+  EXPECT_NE(coarse, finest);
+  EXPECT_EQ(depth(file + " --max-pixel-error 1.5 --reference"), coarse);
+  EXPECT_EQ(depth(kNucleon + " --rate 16 --max-pixel-error 1.5"), coarse)
+      << "levels are made when they are needed";
+  EXPECT_EQ(depth(file + " --max-pixel-error 0"), finest);
+
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 4 -o " + file).status, 0);
+  const std::string refused = "render " + file + " -i 80 --reference --depth " + quoted(folder / "b.npy");
+  test::expect_one_line_error(refused + " --max-pixel-error 1", "no levels of detail");
+  test::expect_one_line_error(refused + " --max-pixel-error -1", "a distance of -1 pixels");
+  test::expect_one_line_error("convert " + kNucleon + " --levels 9 -o " + file, "9 levels of detail");
+  test::expect_one_line_error("convert " + kNucleon + " --levels some -o " + file, "--levels");
+}
+
 TEST(CliRender, NegativeAndFractionalIsovalues) {
   const TemporaryFolder folder;
   std::vector<float> ramp(512);

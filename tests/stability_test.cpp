@@ -58,6 +58,11 @@ TEST(Watertight, NotOneRayLeaks) {
   }
 }
 
+TEST(Watertight, NotOneRayLeaksBetweenLevelsOfDetail) {
+  for (const WatertightResult &result : run_watertight(100000, kSeed, kDefaultSolver, RayBands::kLevels))
+    EXPECT_EQ(result.leaks, 0u) << result.surface;
+}
+
 TEST(Watertight, FindsTheLeaksOfALeakySolver) {
   std::uint64_t leaks = 0;
   for (const WatertightResult &result : run_watertight(100000, kSeed, solver_from_string("analytic")))

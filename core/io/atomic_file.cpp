@@ -8,6 +8,7 @@
 #include <cstring>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/error.hpp"
 
@@ -42,13 +43,13 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(target) {
   // commit() names the file through /proc.
   if (::access("/proc/self/fd", X_OK) == 0) {
     const fs::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
-    fd = ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+    fd = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666);
     nameless_ = fd >= 0;
   }
 #endif
-  if (fd < 0) fd = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (fd < 0) fd = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (fd < 0) fail(target_, errno);
-  file_ = ::fdopen(fd, "wb");
+  file_ = ::fdopen(fd, "w+b");
   if (file_ == nullptr) {
     const int error_number = errno;
     ::close(fd);
@@ -65,6 +66,15 @@ AtomicFile::~AtomicFile() {
 void AtomicFile::write(std::span<const std::byte> bytes) {
   if (bytes.empty()) return;  // their address may be null, which fwrite() does not want
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail(target_, errno);
+}
+
+void AtomicFile::read_back(const std::function<void(std::span<const std::byte>)> &take) {
+  errno = 0;
+  if (std::ferror(file_) != 0 || ::fseeko(file_, 0, SEEK_SET) != 0) fail(target_, errno != 0 ? errno : EIO);
+  std::vector<std::byte> piece(1u << 20);
+  while (const std::size_t count = std::fread(piece.data(), 1, piece.size(), file_))
+    take(std::span(piece).first(count));
+  if (std::ferror(file_) != 0) fail(target_, errno != 0 ? errno : EIO);
 }
 
 void AtomicFile::commit() {

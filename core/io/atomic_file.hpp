@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string_view>
 
@@ -26,6 +27,9 @@ class AtomicFile {
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
   /// For libraries that want a C stream (libpng); errors set on it are found by commit().
   std::FILE *stream() { return file_; }
+
+  /// Hands over all that was written, piece by piece. Nothing may follow.
+  void read_back(const std::function<void(std::span<const std::byte>)> &take);
 
   /// Flushes, closes and renames. Throws Error if any write failed. Call once, nothing may follow.
   void commit();

@@ -33,8 +33,10 @@ void run(const ConvertArgs &options) {
     throw Error("--device compresses at a fixed rate only: leave it, or the bound on the error");
   const RawOverrides overrides = to_overrides(options.volume);
   const std::unique_ptr<VolumeReader> reader = open_any_volume(options.path, overrides);
-  CompressOptions compress{
-      .rate = options.compression.rate, .measure_error = !options.no_verify, .input = options.input};
+  CompressOptions compress{.rate = options.compression.rate,
+                           .measure_error = !options.no_verify,
+                           .levels = options.compression.levels,
+                           .input = options.input};
   std::optional<ocl::Device> device;
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   compress.error_bound = find_error_bound(options.path, overrides, options.compression, options.input);
@@ -47,6 +49,11 @@ void run(const ConvertArgs &options) {
   fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", options.output, dims.x, dims.y,
              dims.z, to_string(volume.info.type), with_commas(bytes_in), with_commas(bytes_out),
              volume.rate(), volume.max_error ? fmt::format(", max error {:.6g}", *volume.max_error) : "");
+  for (const CompressedVolume &level : volume.coarser) {
+    const glm::uvec3 coarse = level.info.dims;
+    fmt::print("  level of detail {}x{}x{}: {} bytes\n", coarse.x, coarse.y, coarse.z,
+               with_commas((level.payload_bits() + 7) / 8));
+  }
 }
 
 }  // namespace

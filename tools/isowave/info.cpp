@@ -42,7 +42,7 @@ ordered_json describe_grid(const VolumeInfo &info) {
 ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
   // Reading all of it checks the checksum; the words are not needed afterwards.
   CompressedVolume volume = no_scan ? read_zfp_file_info(path) : read_zfp_file(path);
-  if (overrides.spacing) volume.info.spacing = *overrides.spacing;
+  if (overrides.spacing) set_spacing(volume, *overrides.spacing);
   ordered_json result = describe_grid(volume.info);
   const glm::uvec3 blocks = volume.num_blocks();
   result["blocks"] = {blocks.x, blocks.y, blocks.z};
@@ -57,6 +57,8 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   result["rate"] = volume.rate();
   if (std::isfinite(volume.value_range[0])) result["value_range"] = volume.value_range;
   if (volume.max_error) result["max_error"] = *volume.max_error;
+  for (const CompressedVolume &level : volume.coarser)
+    result["coarser"].push_back({level.info.dims.x, level.info.dims.y, level.info.dims.z});
   return result;
 }
 

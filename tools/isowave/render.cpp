@@ -10,10 +10,11 @@
 #include <memory>
 #include <optional>
 
+#include "core/detail.hpp"
 #include "core/error.hpp"
 #include "core/io/npy.hpp"
 #include "core/renderer.hpp"
-#include "reference/scalar_renderer.hpp"
+#include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/render_stats.hpp"
@@ -92,15 +93,16 @@ class DeviceFrames : public FrameSource {
 
 class TwinFrames : public FrameSource {
  public:
-  TwinFrames(const Scene &scene, const Appearance &appearance, Solver solver, double value_error)
+  TwinFrames(const Scene &scene, const Appearance &appearance, const RendererOptions &options,
+             double value_error)
       : scene_(scene),
         appearance_(appearance),
-        solver_(solver),
-        voxels_(decode_with_libzfp(scene.volume, value_error)) {}
+        options_(options),
+        twin_(scene.volume, options.max_pixel_error, value_error) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
-    hits_ = render_scalar(frame_, voxels_, solver_);
+    hits_ = twin_.render(camera, scene_.size, isovalue, options_.solver);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
@@ -114,8 +116,8 @@ class TwinFrames : public FrameSource {
  private:
   const Scene &scene_;
   Appearance appearance_;
-  Solver solver_;
-  std::vector<float> voxels_;
+  RendererOptions options_;
+  Twin twin_;
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
 };
@@ -229,17 +231,19 @@ void run_render(RenderArgs options) {
     if (std::isnan(isovalue)) throw Error("--isovalue nan: give a number in the volume's value range");
   }
   coarser({}, options.frame.value_error);  // or throws
+  check_max_pixel_error(options.renderer_flags.values.max_pixel_error);
   check_outputs(options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
   const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
+  want_levels(options.renderer_flags, options.frame.compression);
   const Scene scene = load_scene(options.input, options.volume, options.frame, device.get());
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
   if (!device) {
-    TwinFrames frames(scene, appearance, options.renderer.solver, options.frame.value_error);
+    TwinFrames frames(scene, appearance, options.renderer, options.frame.value_error);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {

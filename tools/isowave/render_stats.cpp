@@ -18,7 +18,8 @@ ordered_json vec_json(const glm::dvec3 &v) {
 }
 
 ordered_json pass_json(const PassStats &pass) {
-  ordered_json result = {{"active_rays", pass.counts.active_count},
+  ordered_json result = {{"level", pass.level},
+                         {"active_rays", pass.counts.active_count},
                          {"window_rays", pass.counts.window_count},
                          {"n_spec", pass.counts.spec_count},
                          {"ray_block_pairs", pass.counts.pair_count},

@@ -31,6 +31,10 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
          "auto (on the device if that leaves room for a useful cache)")
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
+  app.add_option("--max-pixel-error", flags.values.max_pixel_error,
+                 "draw far parts by coarser levels of detail, whose voxels are at most so many pixels apart; "
+                 "0: all by the finest")
+      ->capture_default_str();
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
   app.add_option("--grouping", flags.grouping, "how pipeline blocks gathers rays by block: radix or counting")
@@ -67,7 +71,7 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
           {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
           {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
           {"closest", to_string(options.closest)},      {"group_size", options.group_size},
-          {"stream", to_string(options.stream)}};
+          {"stream", to_string(options.stream)},        {"max_pixel_error", options.max_pixel_error}};
 }
 
 }  // namespace isowave::tools

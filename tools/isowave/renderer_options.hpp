@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/renderer.hpp"
+#include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {
 
@@ -17,10 +18,16 @@ struct RendererFlags {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags);
 
+/// Asks for levels of detail of a volume that is compressed now, if they are to be drawn and nobody said how many.
+inline void want_levels(const RendererFlags &flags, CompressionOptions &compression) {
+  if (flags.values.max_pixel_error > 0 && compression.levels == 1) compression.levels = 0;
+}
+
 /// Throws Error on a solver, grouping or way to the closest hit that there is not.
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
-/// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size, stream.
+/// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size, stream,
+/// max_pixel_error.
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options);
 
 }  // namespace isowave::tools

@@ -47,10 +47,12 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, or
     cases.push_back(std::move(entry));
   }
   ordered_json surfaces = ordered_json::array();
-  for (const WatertightResult &result : run_watertight(options.watertight, options.seed, solver)) {
-    fmt::print("watertight {:<17} {:>9} rays, {} leaks\n", result.surface, result.rays, result.leaks);
-    failures += result.leaks;
-    surfaces.push_back({{"surface", result.surface}, {"rays", result.rays}, {"leaks", result.leaks}});
+  for (const RayBands bands : {RayBands::kOne, RayBands::kLevels}) {
+    for (const WatertightResult &result : run_watertight(options.watertight, options.seed, solver, bands)) {
+      fmt::print("watertight {:<20} {:>9} rays, {} leaks\n", result.surface, result.rays, result.leaks);
+      failures += result.leaks;
+      surfaces.push_back({{"surface", result.surface}, {"rays", result.rays}, {"leaks", result.leaks}});
+    }
   }
   document["solvers"].push_back({{"solver", name},
                                  {"cases", std::move(cases)},

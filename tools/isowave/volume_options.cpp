@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cstdio>
+#include <map>
 
 #include "core/error.hpp"
 #include "core/generate.hpp"
@@ -107,6 +108,12 @@ void add_compression_options(CLI::App &command, CompressionOptions &options) {
   CLI::Option *exact =
       command.add_flag("--exact", options.exact,
                        "the same, with no error: decoded values are the input's (integers below 2^24 only)");
+  command
+      .add_option("--levels", options.levels,
+                  "levels of detail of a volume that is compressed, each of half the voxels along each axis, "
+                  "itself among them: a number, or all")
+      ->transform(CLI::Transformer(std::map<std::string, std::uint32_t>{{"all", 0}}))
+      ->capture_default_str();
   tolerance->excludes(rate, relative, exact);
   relative->excludes(rate, exact);
   exact->excludes(rate);
@@ -133,7 +140,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   if (is_zfp_name(path)) {
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
     CompressedVolume volume = map_zfp_file(path);
-    if (overrides.spacing) volume.info.spacing = *overrides.spacing;
+    if (overrides.spacing) set_spacing(volume, *overrides.spacing);
     check_volume_info(volume.info, path);
     return volume;
   }
@@ -141,6 +148,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   CompressOptions options;
   options.rate = compression.rate;
   options.error_bound = find_error_bound(path, overrides, compression);
+  options.levels = compression.levels;
   options.input.progress = make_progress_bar("compressing");
   options.device = options.error_bound ? nullptr : device;
   CompressedVolume volume = compress(*reader, options);

@@ -34,11 +34,12 @@ struct CompressionOptions {
   std::uint32_t rate = 8;  ///< bits per voxel
   std::optional<double> tolerance{}, relative_tolerance{};
   bool exact = false;
+  std::uint32_t levels = 1;  ///< of detail; 0: all there can be
 
   bool bounded() const { return tolerance || relative_tolerance || exact; }
 };
 
-/// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given.
+/// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given, and --levels.
 void add_compression_options(CLI::App &command, CompressionOptions &options);
 /// The bound that was asked for, or none: the rate. Reads all of the volume, for a relative tolerance twice. Throws Error: see
 /// choose_error_bound().

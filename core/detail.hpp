@@ -1,0 +1,35 @@
+#pragma once
+// Level of detail: which of a volume's levels draws which part of the rays.
+//
+// A level is fine enough from where its voxels are at most so many pixels apart. That depends on the distance from the eye alone,
+// so a frame is drawn in bands, from spherical border to border: the finest level nearest. A ray that crosses a border goes on at
+// the next level; where the two levels have it on different sides of the isosurface, the border is its hit, so that no
+// ray slips between them.
+
+#include <span>
+#include <vector>
+
+#include "core/frame.hpp"
+#include "core/zfp_stream.hpp"
+
+namespace isowave {
+
+/// One frame for each level, the finest first: as make_frame_params() makes it, but with the level's band, begin_t to end_t,
+/// which is empty where it draws nothing, and block ids that count on through all levels. The first band begins at the
+/// eye, the last one has no end; a level whose band the volume does not reach into draws nothing. If there are several
+/// bands, the active and the screen boxes are those of the whole domain and image.
+/// max_pixel_error: distance between a level's voxels, in pixels, at most; 0: the finest level draws all. Throws Error: what
+/// make_frame_params() throws.
+std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
+                                           ImageSize size, float isovalue, double max_pixel_error);
+
+inline bool draws(const FrameParams &frame) {
+  return frame.begin_t < frame.end_t;
+}
+
+/// Throws Error unless it is finite and at least 0.
+void check_max_pixel_error(double max_pixel_error);
+/// As well where a volume that could have levels of detail has none, and they are wanted.
+void check_levels(const CompressedVolume &volume, double max_pixel_error);
+
+}  // namespace isowave

@@ -1,0 +1,28 @@
+#pragma once
+// The twin of a renderer: whole frames of a compressed volume, decoded by libzfp and traced by the scalar renderer.
+
+#include <vector>
+
+#include "core/detail.hpp"
+#include "core/solvers.hpp"
+#include "core/zfp_stream.hpp"
+
+namespace isowave {
+
+class Twin {
+ public:
+  /// Decodes the volume, and its coarser levels where max_pixel_error, as RendererOptions', is not 0. value_error: as
+  /// Renderer::set_value_error(). Throws Error: what check_levels() throws.
+  explicit Twin(const CompressedVolume &volume, double max_pixel_error = 0, double value_error = 0);
+
+  /// The hits [height * width] that a renderer must find, bit for bit.
+  std::vector<HitRecord> render(const Camera &camera, ImageSize size, float isovalue,
+                                Solver solver = kDefaultSolver) const;
+
+ private:
+  double max_pixel_error_;
+  std::vector<VolumeInfo> levels_;
+  std::vector<std::vector<float>> voxels_;  ///< of each level
+};
+
+}  // namespace isowave

@@ -1,0 +1,289 @@
+// Frames in bands of several levels of detail: where the borders are, and that every device draws what the twin draws.
+
+#include "core/detail.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "core/error.hpp"
+#include "core/pyramid.hpp"
+#include "core/renderer.hpp"
+#include "reference/twin.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+using test::camera_along;
+using test::expect_same_hits;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr ImageSize kTiny{6, 5}, kSmall{12, 8}, kMedium{96, 64};
+
+std::vector<VolumeInfo> levels_of(const VolumeInfo &finest) {
+  std::vector<VolumeInfo> levels = {finest};
+  while (levels.size() < max_levels(finest.dims)) levels.push_back(coarser_level(levels.back()));
+  return levels;
+}
+
+CompressedVolume pyramid_of(const glm::uvec3 &dims, const test::VoxelFunction &field,
+                            CompressOptions options = {.rate = 8}) {
+  test::ArrayVolume reader(test::grid_info(dims), test::sample(dims, field));
+  options.levels = 0;
+  return compress(reader, options);
+}
+
+// ---- where the borders are
+
+TEST(LevelFrames, BordersAreWhereVoxelsAreFarEnoughApart) {
+  const std::vector<VolumeInfo> levels = levels_of(test::grid_info({64, 64, 64}, {0.5, 1.5, 1}));
+  const Camera camera = camera_along({-10, 48, 32}, {1, 0, 0}, {0, 1, 0}, 90);
+  const ImageSize size{100, 50};
+  const auto frames = make_level_frames(levels, camera, size, 0.5f, 3.0);
+  ASSERT_EQ(frames.size(), 5u);
+  EXPECT_EQ(frames[0].begin_t, 0.0f);
+  std::size_t last = 0;
+  for (std::size_t level = 1; level < frames.size() && draws(frames[level]); ++level) {
+    last = level;
+    const double world = double{frames[level].begin_t} * frames[level].t_scale;
+    EXPECT_EQ(world, double{frames[level - 1].end_t} * frames[level - 1].t_scale) << "not the same border";
+    const double pixel = 2.0 * world / 50;  // a picture of 90 degrees is twice as high as it is far
+    EXPECT_NEAR(1.5 * (1 << level) / pixel, 3.0, 1e-5);
+  }
+  EXPECT_GE(last, 2u);
+  EXPECT_EQ(frames[last].end_t, INFINITY);
+}
+
+TEST(LevelFrames, BlockIdsCountOn) {
+  const std::vector<VolumeInfo> levels = levels_of(test::grid_info({40, 33, 50}));
+  const auto frames = make_level_frames(levels, orbit_cameras(levels[0], 1)[0], kMedium, 0.5f, 1.0);
+  ASSERT_EQ(frames.size(), 4u);
+  for (std::size_t level = 1; level < frames.size(); ++level) {
+    EXPECT_EQ(frames[level].id_begin_z, frames[level - 1].id_begin_z + frames[level - 1].blocks_z);
+    EXPECT_EQ(frames[level].id_blocks_x, frames[0].blocks_x);
+    EXPECT_EQ(frames[level].id_blocks_y, frames[0].blocks_y);
+  }
+}
+
+TEST(LevelFrames, OneLevelDrawsAllWhereTheVolumeReachesNoBorder) {
+  const std::vector<VolumeInfo> levels = levels_of(test::grid_info({64, 64, 64}));
+  const Camera near_camera = orbit_cameras(levels[0], 1)[0];
+  const Camera far_camera = camera_along({32, 32, -2000}, {0, 0, 1});
+  const auto drawn = [&](const Camera &camera, double max_pixel_error) {
+    const auto frames = make_level_frames(levels, camera, {128, 72}, 0.5f, max_pixel_error);
+    EXPECT_EQ(std::ranges::count_if(frames, draws), 1);
+    const auto found = std::ranges::find_if(frames, draws);
+    EXPECT_EQ(found->begin_t, 0.0f);
+    EXPECT_EQ(found->end_t, INFINITY);
+    return found - frames.begin();
+  };
+  EXPECT_EQ(drawn(near_camera, 0), 0);
+  EXPECT_EQ(drawn(near_camera, 1e-3), 0);
+  EXPECT_EQ(drawn(far_camera, 0), 0);
+  EXPECT_EQ(drawn(far_camera, 0.4), 3);  // a pixel is 32 voxels wide
+  EXPECT_EQ(drawn(far_camera, 100), 4);  // there is no coarser one
+}
+
+TEST(LevelFrames, RefusesWhatIsNoDistance) {
+  const std::vector<VolumeInfo> levels = levels_of(test::grid_info({20, 20, 20}));
+  for (const double bad : {-1.0, double(NAN), double(INFINITY)}) {
+    EXPECT_THAT([&] { make_level_frames(levels, orbit_cameras(levels[0], 1)[0], kSmall, 0.5f, bad); },
+                ThrowsMessage<Error>(HasSubstr("pixels between voxels")));
+  }
+}
+
+// ---- pictures
+
+/// Hits at the border between two bands.
+std::size_t num_border_hits(const std::vector<HitRecord> &hits, const std::vector<FrameParams> &frames) {
+  std::size_t count = 0;
+  for (const HitRecord &hit : hits) {
+    for (const FrameParams &frame : frames)
+      count += draws(frame) && frame.begin_t > 0 && hit.t == frame.begin_t * frame.t_scale;
+  }
+  return count;
+}
+
+class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  /// Each camera twice by one renderer. Returns the hits at borders.
+  std::size_t check(const CompressedVolume &volume, const std::vector<Camera> &cameras, float isovalue,
+                    const RendererOptions &options) {
+    SCOPED_TRACE(fmt::format("{} pixels, {} slots", options.max_pixel_error, options.cache_slots));
+    const Twin twin(volume, options.max_pixel_error);
+    std::vector<VolumeInfo> infos = {volume.info};
+    for (const CompressedVolume &level : volume.coarser) infos.push_back(level.info);
+    Renderer renderer(device_, volume, options);
+    std::size_t at_border = 0;
+    for (const Camera &camera : cameras) {
+      const auto expected = twin.render(camera, options.size, isovalue);
+      for (int i = 0; i < 2; ++i) {
+        const FrameStats stats = renderer.render(camera, isovalue);
+        expect_same_hits(renderer.hits(), expected, options.size.width);
+        EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
+      }
+      const auto frames = make_level_frames(infos, camera, options.size, isovalue, options.max_pixel_error);
+      EXPECT_GT(std::ranges::count_if(frames, draws), 1) << "no border is tested";
+      at_border += num_border_hits(expected, frames);
+    }
+    EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());
+    return at_border;
+  }
+
+  ocl::Device device_{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, LevelsOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+
+TEST_P(LevelsOnDevice, SmallFrameIsTheTwins) {
+  const CompressedVolume volume = pyramid_of({9, 10, 11}, test::noise_field(8));
+  EXPECT_GT(check(volume, {orbit_cameras(volume.info, 1)[0]}, 0.1f,
+                  {.size = kSmall, .cache_slots = 20, .max_pixel_error = 1.2}),
+            0u);
+}
+
+TEST_P(LevelsOnDevice, EveryKindOfVolumeAndPlace) {
+  const glm::uvec3 dims(40, 37, 44);
+  const auto cameras = [](const CompressedVolume &volume) {
+    std::vector<Camera> all = orbit_cameras(volume.info, 2);
+    all.push_back(camera_along({11, 13, 17}, {1, 0.4, -0.3}));  // from within
+    all.push_back(camera_along({20, 18, -30}, {0, 0, 1}));      // along planes of every level
+    return all;
+  };
+  std::size_t at_border = 0;
+  for (const auto &field : {test::gyroid_field(11), test::noise_field(5), test::sphere_field(dims)}) {
+    for (const CompressOptions &options :
+         {CompressOptions{.rate = 8}, CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
+      const CompressedVolume volume = pyramid_of(dims, field, options);
+      for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
+        for (const double max_pixel_error : {2.5, 6.0}) {
+          at_border += check(volume, cameras(volume), 0.4f,
+                             {.size = kMedium, .stream = place, .max_pixel_error = max_pixel_error});
+        }
+      }
+    }
+  }
+  EXPECT_GT(at_border, 10u);
+}
+
+TEST_P(LevelsOnDevice, AnyCacheAndSpeculation) {
+  const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
+  const std::vector<Camera> cameras = orbit_cameras(volume.info, 2);
+  check(volume, cameras, 0.4f, {.size = kTiny, .cache_slots = 8, .max_pixel_error = 0.5});
+  check(volume, cameras, 0.4f, {.size = kSmall, .cache_slots = 13, .max_pixel_error = 1});
+  for (const std::uint32_t slots : {64u, 300u}) {
+    for (const std::uint32_t speculation : {1u, 7u, 64u}) {
+      for (const bool per_ray : {false, true}) {
+        check(volume, cameras, 0.4f,
+              {.size = kMedium,
+               .cache_slots = slots,
+               .max_speculation = speculation,
+               .per_ray_speculation = per_ray,
+               .max_pixel_error = 3});
+      }
+    }
+  }
+}
+
+TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
+  const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
+  const std::vector<Camera> cameras = orbit_cameras(volume.info, 3);
+  const Twin twin(volume, 3);
+  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .max_pixel_error = 3});
+  for (std::size_t last_pass = 1; last_pass < 12; ++last_pass) {
+    std::size_t pass = 0;
+    renderer.render(cameras[last_pass % 3], last_pass % 2 ? 0.4f : 0.2f,
+                    [&](const PassStats &) { return ++pass < last_pass; });
+    renderer.render(cameras[0], 0.4f);
+    expect_same_hits(renderer.hits(), twin.render(cameras[0], kMedium, 0.4f), kMedium.width);
+  }
+}
+
+TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
+  const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  Renderer renderer(device_, volume, {.size = kMedium, .max_pixel_error = 3});
+  for (const double value_error : {0.0, 0.3, 0.01}) {
+    renderer.set_value_error(value_error);
+    renderer.render(camera, 0.4f);
+    expect_same_hits(renderer.hits(), Twin(volume, 3, value_error).render(camera, kMedium, 0.4f),
+                     kMedium.width);
+  }
+}
+
+TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
+  const CompressedVolume volume = pyramid_of({64, 64, 64}, test::gyroid_field(16));
+  const Camera camera = camera_along({32, 32, -200}, {0, 0, 1}, {0, 1, 0}, 30);
+  const auto num_decoded = [&](double max_pixel_error) {
+    Renderer renderer(device_, volume, {.size = kMedium, .max_pixel_error = max_pixel_error});
+    const FrameStats stats = renderer.render(camera, 0.4f);
+    return std::accumulate(
+        stats.passes.begin(), stats.passes.end(), std::uint64_t{0},
+        [](std::uint64_t sum, const PassStats &pass) { return sum + pass.counts.decoded_count; });
+  };
+  EXPECT_LT(3 * num_decoded(2.0), num_decoded(0));
+}
+
+TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
+  const CompressedVolume volume = pyramid_of({20, 20, 20}, test::gyroid_field(10));
+  CompressedVolume flat = volume;
+  flat.coarser.clear();
+  EXPECT_THAT([&] { Renderer(device_, flat, {.size = kSmall, .max_pixel_error = 1}); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("no levels of detail"), HasSubstr("--levels"))));
+  EXPECT_THAT(
+      [&] {
+        Renderer(device_, volume, {.size = kSmall, .pipeline = PipelineKind::kBlocks, .max_pixel_error = 1});
+      },
+      ThrowsMessage<Error>(HasSubstr("pipeline blocks")));
+  EXPECT_THROW(Renderer(device_, volume, {.size = kSmall, .max_pixel_error = -1}), Error);
+}
+
+// ---- what it is for
+
+/// Root mean square difference of a picture from the mean of 4 x 4 times as many rays at the finest level.
+double error_of(const Image8 &picture, const Image8 &fine) {
+  double sum = 0;
+  for (std::uint32_t y = 0; y < picture.height; ++y) {
+    for (std::uint32_t x = 0; x < picture.width; ++x) {
+      for (std::uint32_t channel = 0; channel < 3; ++channel) {
+        double mean = 0;
+        for (std::uint32_t i = 0; i < 16; ++i) {
+          const std::size_t at = 4 * x + i % 4 + std::size_t{fine.width} * (4 * y + i / 4);
+          mean += fine.pixels[3 * at + channel] / 16.0;
+        }
+        const double off = picture.pixels[3 * (x + std::size_t{picture.width} * y) + channel] - mean;
+        sum += off * off;
+      }
+    }
+  }
+  return std::sqrt(sum / (3.0 * picture.width * picture.height));
+}
+
+/// Not so of every volume (README "Levels of detail"): a rough surface is darker than the smooth one that a coarse level has.
+TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
+  const glm::uvec3 dims(128, 128, 128);
+  const CompressedVolume volume = pyramid_of(dims, [noise = test::noise_field(5)](const glm::dvec3 &p) {
+    return 40 - glm::length(p - 63.5) + (noise(p) > 0.99 ? 40 : 0);  // a ball, and a voxel in 200 is wrong
+  });
+  const ImageSize size{48, 32}, fine_size{192, 128};
+  const std::array<Twin, 2> twins{Twin(volume), Twin(volume, 0.5)};
+  for (const Camera &camera : orbit_cameras(volume.info, 3)) {
+    const auto picture = [&](ImageSize image, double max_pixel_error) {
+      const FrameParams frame = make_frame_params(volume.info, camera, image, 0.0f);
+      return shade_scalar(frame, make_shade_params(volume.info, {}),
+                          twins[max_pixel_error > 0].render(camera, image, 0.0f));
+    };
+    const Image8 fine = picture(fine_size, 0);
+    const double with = error_of(picture(size, 0.5), fine), without = error_of(picture(size, 0), fine);
+    EXPECT_LT(with, without);
+    RecordProperty("error_with_levels", fmt::format("{:.2f}", with));
+    RecordProperty("error_without", fmt::format("{:.2f}", without));
+  }
+}
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,219 @@
+// Levels of detail: their voxels against a plain triple loop, and volumes that have them in memory and in files.
+
+#include "core/pyramid.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/error.hpp"
+#include "core/io/mapped_file.hpp"
+#include "core/zfp_accuracy.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/run_program.hpp"
+
+namespace isowave {
+namespace {
+
+using test::TemporaryFolder;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// The definition, one voxel at a time: weights 1, 2, 1 along each axis, and copies of the border.
+std::vector<float> plain_downsample(const glm::ivec3 &dims, const std::vector<float> &voxels) {
+  const auto weighted = [](double before, double at, double behind) {
+    return 0.25 * before + 0.5 * at + 0.25 * behind;
+  };
+  const auto fine = [&](int x, int y, int z) {
+    const glm::ivec3 at = glm::clamp(glm::ivec3(x, y, z), glm::ivec3(0), dims - 1);
+    return double(voxels[std::size_t(at.x + dims.x * (at.y + dims.y * at.z))]);
+  };
+  std::vector<float> coarse;
+  for (int z = 0; z <= dims.z / 2; ++z) {
+    for (int y = 0; y <= dims.y / 2; ++y) {
+      for (int x = 0; x <= dims.x / 2; ++x) {
+        const auto along_x = [&](int fy, int fz) {
+          return weighted(fine(2 * x - 1, fy, fz), fine(2 * x, fy, fz), fine(2 * x + 1, fy, fz));
+        };
+        const auto along_y = [&](int fz) {
+          return weighted(along_x(2 * y - 1, fz), along_x(2 * y, fz), along_x(2 * y + 1, fz));
+        };
+        coarse.push_back(float(weighted(along_y(2 * z - 1), along_y(2 * z), along_y(2 * z + 1))));
+      }
+    }
+  }
+  return coarse;
+}
+
+/// Multiples of 1/8 below 2^8: every mean of up to two levels is exact in float, in whatever order it is summed.
+std::vector<float> exact_voxels(const glm::uvec3 &dims, std::uint32_t seed = 5) {
+  std::mt19937 random(seed);
+  std::vector<float> voxels(std::size_t{dims.x} * dims.y * dims.z);
+  for (float &voxel : voxels) voxel = float(random() % 2048) / 8.0f - 100.0f;
+  return voxels;
+}
+
+const std::vector<glm::uvec3> kDims{{8, 8, 8}, {9, 8, 11}, {16, 21, 13}, {31, 8, 40}, {64, 12, 9}};
+
+TEST(Pyramid, VoxelsAreMeansOfTheirNeighbours) {
+  for (const glm::uvec3 &dims : kDims) {
+    SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
+    const std::vector<float> voxels = exact_voxels(dims);
+    EXPECT_EQ(downsample(dims, voxels), plain_downsample(dims, voxels));
+  }
+}
+
+TEST(Pyramid, AnyPiecesAndThreadsGiveTheSameVoxels) {
+  const glm::uvec3 dims{21, 10, 30};
+  const std::vector<float> voxels = test::sample(dims, test::noise_field(3));
+  const std::vector<float> expected = downsample(dims, voxels);
+  for (const std::uint32_t piece : {1u, 2u, 3u, 4u, 29u}) {
+    for (const std::uint32_t threads : {1u, 3u}) {
+      std::vector<float> coarse;
+      std::uint32_t next = 0;
+      Downsampler downsampler(dims, threads, [&](const Chunk &chunk) {
+        EXPECT_EQ(chunk.z, next);
+        next += chunk.num_layers;
+        coarse.insert(coarse.end(), chunk.voxels.begin(), chunk.voxels.end());
+      });
+      const std::size_t layer = std::size_t{dims.x} * dims.y;
+      for (std::uint32_t z = 0; z < dims.z; z += piece) {
+        downsampler.add(std::span(voxels).subspan(z * layer, std::min(piece, dims.z - z) * layer));
+      }
+      EXPECT_EQ(coarse, expected) << piece << " layers at a time, " << threads << " threads";
+    }
+  }
+}
+
+TEST(Pyramid, GridsCoverTheFineOne) {
+  VolumeInfo info = test::grid_info({100, 17, 9}, {1, 2, 0.5});
+  info.type = VoxelType::kUint8;
+  info.origin = {3, 4, 5};
+  const VolumeInfo coarse = coarser_level(info);
+  EXPECT_EQ(coarse.dims, glm::uvec3(51, 9, 5));
+  EXPECT_EQ(coarse.spacing, glm::dvec3(2, 4, 1));
+  EXPECT_EQ(coarse.origin, info.origin);
+  EXPECT_EQ(coarse.type, VoxelType::kFloat32);
+  EXPECT_EQ(max_levels({2048, 2048, 1920}), 10u);
+  EXPECT_EQ(max_levels({100, 17, 9}), 2u);
+  EXPECT_EQ(max_levels({100, 100, 7}), 1u);
+}
+
+TEST(Pyramid, LevelsAreTheVolumesOfTheirVoxels) {
+  for (const glm::uvec3 &dims : kDims) {
+    const std::vector<float> voxels = exact_voxels(dims);
+    test::ArrayVolume reader(test::grid_info(dims, {1, 2, 3}), voxels);
+    const CompressedVolume volume = compress(reader, {.rate = 11, .levels = 0});
+    ASSERT_EQ(volume.coarser.size() + 1, max_levels(dims));
+    std::vector<float> finer = voxels;
+    glm::uvec3 finer_dims = dims;
+    for (const CompressedVolume &level : volume.coarser) {
+      finer = downsample(finer_dims, finer);
+      finer_dims = level.info.dims;
+      test::ArrayVolume alone(level.info, finer);
+      const CompressedVolume expected = compress(alone, {.rate = 11});
+      EXPECT_EQ(level.words, expected.words);
+      EXPECT_EQ(level.info.dims, expected.info.dims);
+      EXPECT_EQ(level.info.spacing, glm::dvec3(1, 2, 3) * double(1 << (&level - volume.coarser.data() + 1)));
+    }
+  }
+}
+
+TEST(Pyramid, LevelsOfAnExactVolumeAreNoIntegers) {
+  const glm::uvec3 dims{20, 20, 20};
+  VolumeInfo info = test::grid_info(dims);
+  info.type = VoxelType::kUint8;
+  test::ArrayVolume reader(info, test::sample(dims, test::plateau_field()));
+  const ErrorBound bound = choose_error_bound(reader, {.tolerance = 0, .exact = true}, {});
+  const CompressedVolume volume = compress(reader, {.error_bound = bound, .levels = 0});
+  EXPECT_TRUE(volume.error_bound.whole_numbers);
+  const std::vector<float> exact = downsample(dims, decode_with_libzfp(volume));
+  const std::vector<float> got = decode_with_libzfp(volume.coarser.at(0));
+  ASSERT_EQ(got.size(), exact.size());
+  float largest = 0, farthest_from_whole = 0;
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    largest = std::max(largest, std::abs(got[i] - exact[i]));
+    farthest_from_whole = std::max(farthest_from_whole, std::abs(got[i] - std::rint(got[i])));
+  }
+  EXPECT_LE(largest, 2.0f);  // as coarse as the volume's planes are, before rounding
+  EXPECT_GT(farthest_from_whole, 0.1f);
+}
+
+class PyramidFile : public testing::Test {
+ protected:
+  CompressedVolume write(const CompressOptions &options) {
+    test::ArrayVolume reader(test::grid_info({30, 19, 24}, {1, 2, 3}),
+                             test::sample({30, 19, 24}, test::gyroid_field(9)));
+    compress_to_file(reader, options, folder_ / "a.zfp");
+    return compress(reader, options);
+  }
+  void expect_refused(const std::string &bytes, const std::string &message) {
+    test::write_file(folder_ / "b.zfp", bytes);
+    EXPECT_THAT([&] { read_zfp_file(folder_ / "b.zfp"); },
+                ThrowsMessage<Error>(AllOf(HasSubstr("b.zfp"), HasSubstr(message))));
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(PyramidFile, EveryLevelComesBack) {
+  for (const CompressOptions &options :
+       {CompressOptions{.rate = 5, .levels = 3},
+        CompressOptions{.error_bound = ErrorBound{.min_exponent = -8}, .levels = 0}}) {
+    const CompressedVolume expected = write(options);
+    const auto check = [&](const CompressedVolume &got, bool payload) {
+      ASSERT_EQ(got.coarser.size(), expected.coarser.size());
+      for (std::size_t i = 0; i < got.coarser.size(); ++i) {
+        const CompressedVolume &level = got.coarser[i];
+        EXPECT_EQ(level.info.dims, expected.coarser[i].info.dims);
+        EXPECT_EQ(level.info.spacing, expected.coarser[i].info.spacing);
+        if (!payload) continue;
+        EXPECT_EQ(level.index, expected.coarser[i].index);
+        EXPECT_EQ(decode_with_libzfp(level), decode_with_libzfp(expected.coarser[i]));
+      }
+    };
+    check(read_zfp_file(folder_ / "a.zfp"), true);
+    check(map_zfp_file(folder_ / "a.zfp"), true);
+    check(read_zfp_file_info(folder_ / "a.zfp"), false);
+    CompressedVolume respaced = read_zfp_file_info(folder_ / "a.zfp");
+    set_spacing(respaced, {5, 6, 7});
+    EXPECT_EQ(respaced.coarser.at(1).info.spacing, glm::dvec3(20, 24, 28));
+  }
+}
+
+TEST_F(PyramidFile, BeginsAsTheVolumeWithoutLevels) {
+  write({.rate = 6, .levels = 0});
+  const std::string with = test::read_file(folder_ / "a.zfp");
+  const CompressedVolume alone = write({.rate = 6});
+  const std::size_t stream_bytes = 12 + alone.payload_bits() / 8;
+  EXPECT_EQ(with.substr(0, stream_bytes), test::read_file(folder_ / "a.zfp").substr(0, stream_bytes));
+}
+
+TEST_F(PyramidFile, DamageIsFound) {
+  const CompressedVolume volume = write({.rate = 4, .levels = 2});
+  const std::string good = test::read_file(folder_ / "a.zfp");
+  for (std::size_t cut = 0; cut < good.size(); cut += 97) {
+    test::write_file(folder_ / "b.zfp", good.substr(0, cut));
+    EXPECT_THROW(read_zfp_file(folder_ / "b.zfp"), Error) << cut;
+  }
+  std::string damaged = good;
+  const std::size_t level_begin = (12 + volume.payload_bits() / 8 + 7) / 8 * 8;
+  damaged[level_begin + 100] ^= 1;  // within the level's payload
+  expect_refused(damaged, "checksum");
+  damaged = good;
+  damaged[level_begin + 5] ^= 1;  // its header
+  test::write_file(folder_ / "b.zfp", damaged);
+  EXPECT_THROW(read_zfp_file(folder_ / "b.zfp"), Error);
+}
+
+TEST_F(PyramidFile, TooManyLevelsAreRefusedAndNothingIsLeft) {
+  EXPECT_THAT([&] { write({.rate = 4, .levels = 4}); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("4 levels of detail"), HasSubstr("1 to 3"))));
+  test::ArrayVolume bad(test::grid_info({30, 19, 24}), std::vector<float>(30 * 19 * 24, NAN));
+  EXPECT_THROW(compress_to_file(bad, {.rate = 4, .levels = 0}, folder_ / "a.zfp"), Error);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / ""));
+}
+
+}  // namespace
+}  // namespace isowave
