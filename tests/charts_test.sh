@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Small runs of `isowave bench solvers` and of `frame_bench --budgets`, and tools/charts of them and of what is no such file.
+# Small runs of `isowave bench solvers`, `isowave bench pareto` and `frame_bench --budgets`, and tools/charts of them and of what is no such file.
 #   charts_test.sh PROGRAM [FRAME_BENCH]
 set -euo pipefail
 program=$1 frame_bench=${2-}
@@ -35,6 +35,32 @@ for bad in old.json broken.json none.json; do
 done
 for bad in "$work/none.raw:1" "$top/tests/data/fuel_64x33x32_uint8.raw.gz" "$work/none.raw:x"; do
   if "$program" bench solvers "$bad" 2>"$work/error" >/dev/null; then fail "$bad was accepted"; fi
+  [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
+done
+
+"$program" bench pareto "$top/tests/data/fuel_64x33x32_uint8.raw.gz" -i 40 --size 96x64 --views 1 --rounds 1 \
+  --storage rate:2,tolerance:2,exact --pipeline rays --solver bernstein --max-pixel-error 0,2 --value-error 0,0.1 \
+  --json "$work/all.json" >"$work/out"
+"$top/tools/charts" "$work/all.json" -o "$work"
+for file in all_pareto.png all_pareto.svg; do
+  [ -s "$work/$file" ] || fail "$file is missing"
+done
+/usr/bin/python3 - "$work/all.json" <<'EOF'
+import json, sys
+points = json.load(open(sys.argv[1]))["points"]
+assert len(points) == 12, len(points)
+exact = [p for p in points if p["storage"] == "exact"]
+best = [p for p in exact if p["max_pixel_error"] == p["value_error"] == 0]
+assert len(best) == 1 and best[0]["wrong_pixels"] == best[0]["depth_p99"] == 0 and best[0]["psnr_db"] is None, best
+assert all(p["psnr_db"] is not None for p in points if p not in best), "only the exact one is without error"
+assert len({p["bytes"] for p in points}) == 3
+assert min(p["decoded_blocks"] for p in exact if p["max_pixel_error"]) < best[0]["decoded_blocks"]
+EOF
+for bad in "--storage rate" "--storage full:3" "--max-pixel-error -1"; do
+  # shellcheck disable=SC2086
+  if "$program" bench pareto "$top/tests/data/fuel_64x33x32_uint8.raw.gz" -i 40 $bad 2>"$work/error" >/dev/null; then
+    fail "$bad was accepted"
+  fi
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
 

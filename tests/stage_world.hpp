@@ -94,18 +94,20 @@ struct StageWorld {
   void fill_slots(const std::vector<float> &voxels) {
     const uint granted = counts().decoded_count;
     const std::vector<uint> blocks = cache.request_block_ids.read(), slots = cache.decode_slots.read();
+    std::vector<float> values = cache.values.read();
     for (uint i = 0; i < granted; ++i) {
       const uint x0 = 4 * (blocks[i] % frame.blocks_x),
                  y0 = 4 * (blocks[i] / frame.blocks_x % frame.blocks_y),
                  z0 = 4 * (blocks[i] / frame.blocks_x / frame.blocks_y);
-      std::vector<float> values(64, std::numeric_limits<float>::quiet_NaN());
       for (uint v = 0; v < 64; ++v) {
         const uint x = x0 + v % 4, y = y0 + v / 4 % 4, z = z0 + v / 16;
-        if (x < frame.dims_x && y < frame.dims_y && z < frame.dims_z)
-          values[v] = voxels[x + frame.dims_x * (y + std::size_t{frame.dims_y} * z)];
+        const bool in_domain = x < frame.dims_x && y < frame.dims_y && z < frame.dims_z;
+        values[64 * std::size_t{slots[i]} + v] =
+            in_domain ? voxels[x + frame.dims_x * (y + std::size_t{frame.dims_y} * z)]
+                      : std::numeric_limits<float>::quiet_NaN();
       }
-      cache.values.write(values, 64 * std::size_t{slots[i]});
     }
+    cache.values.write(values);  // whole: see README "Devices", Oclgrind
   }
 
   FrameParams frame;

@@ -118,6 +118,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       pairs.fill(0xABCDEF01u);
       std::vector<uint> entries = active;  // each looks ahead by its own number, where the frame says so
       for (uint &entry : entries) entry |= entry % 7 << ISO_RAY_AHEAD_SHIFT;
+      entries.resize(rays.num_pixels);  // whole: see README "Devices", Oclgrind
       rays.active_ray_ids.write(entries);
       rays.closest_pairs.fill(0);
       PassCounts counts = distinct_counts();

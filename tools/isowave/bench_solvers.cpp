@@ -33,7 +33,6 @@ namespace {
 using nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kSchema = 1;  ///< of the JSON; tools/charts refuses others
 constexpr std::size_t kMaxSegments = 1 << 20;
 
 struct BenchSolversArgs {
@@ -353,7 +352,7 @@ void run_bench_solvers(const BenchSolversArgs &options) {
   for (const std::string &argument : options.volumes) subjects.push_back(load_subject(argument, options));
   ocl::Device device(info);
   ordered_json document = {
-      {"schema", kSchema},
+      {"schema", kChartsSchema},
       {"benchmark", "solvers"},
       {"device", device_json(info)},
       {"date", fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::chrono::system_clock::now()))},
