@@ -273,7 +273,7 @@ CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) 
   std::vector<Sink> sinks;
   for (CompressedVolume *level : levels_of(volume)) {
     level->words.reserve(level->is_indexed() ? 0 : level->word_count());
-    sinks.push_back([&words = level->words](Payload payload) {
+    sinks.emplace_back([&words = level->words](Payload payload) {
       const std::size_t begin = words.size();
       words.resize(begin + payload.size() / sizeof(std::uint32_t));
       std::ranges::copy(payload, std::as_writable_bytes(std::span(words).subspan(begin)).begin());
@@ -291,7 +291,7 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
   ZfpFileWriter file(path, volume);
   std::vector<Sink> sinks;
   for (std::size_t level = 0; level <= volume.coarser.size(); ++level)
-    sinks.push_back([&file, level](Payload payload) { file.write(payload, level); });
+    sinks.emplace_back([&file, level](Payload payload) { file.write(payload, level); });
   run(reader, options, sinks, volume);
   file.commit(volume);
   return volume;
