@@ -1,6 +1,7 @@
 #include "core/detail.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 

@@ -3,7 +3,8 @@
 // bound of the error needs, and what zfp's header cannot say. See docs in README "File format".
 //
 // File: zfp full header (96 bits) | block payload, block (bx,by,bz) at index bx + nbx*(by + nby*bz) |
-//       zero padding to a whole 64-bit word | trailer (lengths of blocks, JSON, checksums: see zfp_file.hpp).
+//       zero padding to a whole 64-bit word | trailer (lengths of blocks, levels of detail, JSON, checksums:
+//       see zfp_file.hpp).
 
 #include <array>
 #include <cstdint>

@@ -55,6 +55,13 @@ ISO_INLINE Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
   return c;
 }
 
+/// Is the ray inside at `e`, by which it enters or leaves cell (x,y,z)? As the ends of segment_cubic() say. leaving: as in
+/// event_position.
+ISO_INLINE int inside_at(const Ray *r, const float *w, RayEvent e, int x, int y, int z, int leaving) {
+  const CellPoint p = event_position(r, e, x, y, z, leaving);
+  return segment_cubic(w, p, p).b0 >= 0.0f;
+}
+
 /// The field at (x,y,z) of the cell. w [8] as in segment_cubic.
 ISO_INLINE TwoFloat precise_trilinear(const float *w, float x, float y, float z) {
   TwoFloat v[8];

@@ -90,12 +90,6 @@ ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
   return ends_band(frame, exit) ? border_event(frame->end_t) : exit;
 }
 
-/// The side of the isosurface on which the ray is at `e`, by which it enters or leaves the cell. w [8]: its corners.
-ISO_INLINE uint side_at(const Ray *ray, const float *w, const GridWalk *cell, RayEvent e, int leaving) {
-  const CellPoint p = event_position(ray, e, cell->x, cell->y, cell->z, leaving);
-  return segment_cubic(w, p, p).b0 >= 0.0f ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
-}
-
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a block of
 /// the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
 /// precise: settle doubts on the spot. side: where the ray was before the border at which its band begins in this block.
@@ -132,14 +126,16 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
               frame->isovalue;
         }
         if (ISO_LEVELS && side != ISO_SIDE_UNKNOWN)
-          found->at_border = side_at(ray, found->w, &found->cell, found->enter, 0) != side;
+          found->at_border = inside_at(ray, found->w, found->enter, found->cell.x, found->cell.y,
+                                       found->cell.z, 0) != (side == ISO_SIDE_INSIDE);
         result = found->at_border ? ISO_RAY_HIT
                  : precise        ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
                                                    found->cell.z, found->enter, exit, &found->change)
                            : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
                                                      found->cell.z, found->enter, exit, &found->change);
         if (result == ISO_RAY_LEFT && ends_here)
-          result = ISO_RAY_ENDS + (side_at(ray, found->w, &found->cell, exit, 1) == ISO_SIDE_INSIDE);
+          result =
+              ISO_RAY_ENDS + inside_at(ray, found->w, exit, found->cell.x, found->cell.y, found->cell.z, 1);
       }
     }
     if (result == ISO_RAY_LEFT) {

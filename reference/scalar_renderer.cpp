@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -54,15 +55,6 @@ void walk_cells(const FrameParams &frame, const Ray &ray, RayEvent enter, const 
   }
 }
 
-/// The side of the isosurface that a ray is on.
-enum class Side { kUnknown, kOutside, kInside };
-
-/// Where the ray is at `event`, by which it enters or leaves a cell with corners w.
-Side side_at(const Ray &ray, const float *w, const GridWalk &cell, RayEvent event, bool leaving) {
-  const CellPoint at = event_position(&ray, event, cell.x, cell.y, cell.z, leaving);
-  return segment_cubic(w, at, at).b0 >= 0.0f ? Side::kInside : Side::kOutside;
-}
-
 /// The first hit in the cells of `box`, which the ray enters by `enter`.
 HitRecord trace_box(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
                     RayEvent enter, const CellBox &box) {
@@ -87,17 +79,17 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
   return trace_box(frame, voxels, solver, ray, enter, {glm::ivec3(0), {last.x, last.y, last.z}});
 }
 
-/// The first hit of a ray in the band of one level. side: in, of the ray where the band begins, if it comes from another; out, where
-/// the band ends, if the ray gets there within the domain.
+/// The first hit of a ray in the band of one level. inside: in, is the ray where the band begins, if it comes from another; out,
+/// where the band ends, if the ray gets there within the domain.
 HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
-                     Side &side) {
+                     std::optional<bool> &inside) {
   const LastPlanes last = last_planes(&frame), zero{};
   const RayEvent end = border_event(frame.end_t);
   RayEvent enter = border_event(frame.begin_t), exit = end;
   HitRecord hit = no_hit();
-  const Side before = std::exchange(side, Side::kUnknown);
+  const std::optional<bool> before = std::exchange(inside, std::nullopt);
   if (!clip_to_box(&ray, zero, last, &enter, &exit)) return hit;
-  bool at_border = enter.axis == ISO_AXIS_START && before != Side::kUnknown;
+  bool at_border = enter.axis == ISO_AXIS_START && before.has_value();
   const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
   walk_cells(frame, ray, enter, domain, [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
     const bool ends = !event_before(cell_exit, end);
@@ -105,7 +97,10 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
     CellChange change;
     float w[8];
     load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-    if (at_border && side_at(ray, w, cell, cell_enter, false) != before) {
+    const auto inside_now = [&](RayEvent event, bool leaving) {
+      return inside_at(&ray, w, event, cell.x, cell.y, cell.z, leaving) != 0;
+    };
+    if (at_border && inside_now(cell_enter, false) != before) {
       hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, 0.0f);
       return true;
     }
@@ -115,7 +110,7 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
                      refine(solver, change.cubic, change.bracket));
       return true;
     }
-    if (ends) side = side_at(ray, w, cell, cell_exit, true);
+    if (ends) inside = inside_now(cell_exit, true);
     return ends;
   });
   return hit;
@@ -206,10 +201,10 @@ std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const f
 HitRecord trace_scalar_levels(std::span<const FrameParams> frames, std::span<const std::vector<float>> voxels,
                               Solver solver, std::span<const Ray> rays) {
   HitRecord hit = no_hit();
-  Side side = Side::kUnknown;
+  std::optional<bool> inside;
   for (std::size_t level = 0; level < frames.size() && !std::isfinite(hit.t); ++level) {
     if (draws(frames[level]))
-      hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], side);
+      hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], inside);
   }
   return hit;
 }

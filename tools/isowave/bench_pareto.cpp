@@ -13,7 +13,6 @@
 
 #include "core/compare.hpp"
 #include "core/error.hpp"
-#include "core/pyramid.hpp"
 #include "core/renderer.hpp"
 #include "reference/accuracy.hpp"
 #include "tools/isowave/frame_options.hpp"
