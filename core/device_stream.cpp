@@ -11,8 +11,13 @@ namespace isowave {
 namespace {
 
 StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_part) {
-  return {volume.bits_per_block, words_per_part, volume.error_bound.min_exponent,
-          volume.error_bound.whole_numbers ? 1u : 0u};
+  return {volume.bits_per_block,
+          words_per_part,
+          volume.error_bound.min_exponent,
+          volume.error_bound.whole_numbers ? 1u : 0u,
+          0.0f,
+          0.0f,
+          0};
 }
 
 /// Uploads the volume's words from word `first` on.
@@ -47,7 +52,12 @@ StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_p
   return split;
 }
 
-DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part)
+std::uint64_t bound_words(const CompressedVolume &volume) {
+  return (volume.bounds.codes.size() + 3) / 4;
+}
+
+DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part,
+                           bool with_bounds)
     : indexed_(volume.is_indexed()) {
   const std::uint64_t largest = largest_part != 0 ? largest_part : device.capabilities().largest_allocation;
   const StreamSplit split = split_stream(volume, largest);
@@ -62,13 +72,25 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, 
     write_words(volume, first, parts.back());
     first += split.words_per_part;
   }
-  if (indexed_) block_index.emplace(device, "block index", std::span<const uint>(volume.index));
+  add_index(device, indexed_ ? volume.index : std::vector<std::uint32_t>{},
+            with_bounds ? volume.bounds.codes : std::span<const std::uint8_t>{});
 }
 
-DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host)
+DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host, bool with_bounds)
     : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks)),
       layout(layout_of(volume, 0)),
-      indexed_(volume.is_indexed()) {}
+      indexed_(volume.is_indexed()) {
+  if (with_bounds) add_index(device, {}, volume.bounds.codes);  // a window brings where its blocks begin
+}
+
+void DeviceStream::add_index(ocl::Device &device, std::vector<std::uint32_t> words,
+                             std::span<const std::uint8_t> bounds) {
+  layout.bounds_begin = static_cast<std::uint32_t>(words.size());
+  words.resize(words.size() + (bounds.size() + 3) / 4);
+  for (std::size_t block = 0; block < bounds.size(); ++block)
+    words[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
+  if (!words.empty()) block_index.emplace(device, "block index", std::span<const uint>(words));
+}
 
 ocl::Defines DeviceStream::defines() const {
   ocl::Defines defines;  // none: as kernels are built without a word

@@ -38,6 +38,10 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
       masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
       box_(device, "active box", 6),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
+  build(device, frame, stream);
+}
+
+void Macrocells::build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream) {
   const auto stage = device.timer().stage("macrocells");
   Partials decode{device, frame, stream, {device, "macrocells", "macrocell_partials", stream.defines()}};
   thresholds_ = sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame)), decode);
@@ -80,11 +84,12 @@ void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
   }
   std::vector<uint> block_ids(count);
   for (std::uint32_t i = 0; i < count; ++i) block_ids[i] = sampled_block(first + i * stride, stride);
-  stream.window->bring(
-      block_ids, [&](const ocl::Buffer<uint> &words, std::uint32_t run_first, std::uint32_t run_count) {
-        kernel(ocl::Range::strided(run_count, ocl::kGroupSize, device), frame, words, words, words, words,
-               words, stream.layout, first + run_first * stride, stride, run_count, run_first, partials);
-      });
+  stream.window->bring(block_ids,
+                       [&](const ocl::Buffer<uint> &words, std::uint32_t run_first, std::uint32_t run_count) {
+                         kernel(ocl::Range::strided(run_count, ocl::kGroupSize, device), frame, words, words,
+                                words, words, stream.index(words), stream.layout, first + run_first * stride,
+                                stride, run_count, run_first, partials);
+                       });
 }
 
 /// From the block minima and maxima of an even sample of blocks: half of them quantiles, so that one outlier does not coarsen

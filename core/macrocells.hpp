@@ -19,7 +19,10 @@ class Macrocells {
   /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z layer.
   Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
 
-  /// Bytes that the constructor needs beside what stays.
+  /// Builds the ranges again, for the same blocks with other values; the next select() makes the rest. Waits.
+  void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
+
+  /// Bytes that building needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of, and sets

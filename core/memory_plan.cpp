@@ -38,13 +38,21 @@ std::uint64_t num_macrocells(const CompressedVolume &volume) {
   return std::uint64_t{cells.x} * cells.y * cells.z;
 }
 
+void add_index(MemoryPlan &plan, std::uint64_t words) {
+  if (words == 0) return;
+  plan.buffers.push_back({"block index", sizeof(uint) * words});
+  plan.stream_bytes += plan.buffers.back().bytes;
+}
+
 void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
+  const std::uint64_t bounds = request.with_bounds ? bound_words(volume) : 0;
   if (plan.stream == StreamPlace::kHost) {
     const std::uint64_t bytes = sizeof(uint) * StreamWindow::half_words(volume, plan.window_blocks);
     for (const char *name : {"stream window", "stream window", "stream staging", "stream staging"}) {
       plan.buffers.push_back({name, bytes});
     }
     plan.stream_bytes += 4 * bytes;
+    add_index(plan, bounds);
     return;
   }
   const std::uint64_t largest = request.largest_stream_part != 0 ? request.largest_stream_part
@@ -58,10 +66,7 @@ void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRe
     plan.buffers.push_back({"zfp stream", words * sizeof(uint)});
     plan.stream_bytes += words * sizeof(uint);
   }
-  if (volume.is_indexed()) {
-    plan.buffers.push_back({"block index", sizeof(uint) * block_index_words(volume.block_count())});
-    plan.stream_bytes += plan.buffers.back().bytes;
-  }
+  add_index(plan, (volume.is_indexed() ? block_index_words(volume.block_count()) : 0) + bounds);
 }
 
 /// What the volume, or one of its levels of detail, needs for itself.
@@ -174,6 +179,13 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"cache state", sizeof(CacheState)},
                        {"shading", sizeof(ShadeParams)},
                        {"framebuffer", 4 * pixels}});
+  for (const CompressedVolume &level :
+       volume.coarser) {  // whose ranges are built again for Renderer::draw_bound()
+    if (request.with_levels && request.with_bounds) {
+      plan.setup_bytes =
+          std::max(plan.setup_bytes, plan.total() + Macrocells::setup_scratch_bytes(level.num_blocks()));
+    }
+  }
   return plan;
 }
 

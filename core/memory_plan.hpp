@@ -32,6 +32,7 @@ struct MemoryRequest {
   std::uint64_t largest_stream_part = 0;  ///< bytes of one buffer of the compressed volume; 0: no limit
   std::uint32_t window_blocks = 0;        ///< see StreamWindow; 0: by the size of cache and blocks
   bool with_levels = false;               ///< the volume's coarser levels are on the device, too
+  bool with_bounds = false;               ///< and the bounds of their blocks' errors
 };
 
 struct MemoryPlan {

@@ -13,6 +13,7 @@
 
 #include "core/block_cache.hpp"
 #include "core/group.hpp"
+#include "core/level_bounds.hpp"
 #include "core/macrocells.hpp"
 #include "core/solvers.hpp"
 #include "core/wavefront.hpp"
@@ -31,11 +32,13 @@ std::string_view to_string(PipelineKind kind);
 struct Level {
   VolumeInfo info;
   ErrorBound error_bound;  ///< of its blocks
+  LevelError error;        ///< of its field against the volume's
   DeviceStream stream;
   Macrocells macrocells;
   ZfpDecode decode;
   FrameParams frame{};    ///< its part of the frame at work
-  float value_error = 0;  ///< of decoded voxels, at most: against those that the ranges were made of
+  float range_error = 0;  ///< of decoded voxels, at most: against those that the ranges were made of
+  float ranges_unit = 0;  ///< StreamLayout::bound_unit when they were
   std::optional<float> selected_isovalue{};  ///< what the macrocell masks stand for
 };
 

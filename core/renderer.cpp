@@ -4,6 +4,8 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <cstring>
+#include <stdexcept>
 
 #include "core/detail.hpp"
 #include "core/error.hpp"
@@ -66,7 +68,8 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                               options.stream,
                               options.largest_stream_part,
                               options.window_blocks,
-                              options.max_pixel_error > 0};
+                              options.max_pixel_error > 0,
+                              options.with_bounds};
   const std::uint64_t budget =
       options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
   std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
@@ -86,22 +89,25 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
   return plan_within(device, volume, request, budget, static_cast<std::uint32_t>(std::min(all, most)));
 }
 
-Level make_level(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
-                 const MemoryPlan &plan) {
+Level make_level(ocl::Device &device, const CompressedVolume &volume, const LevelError &error,
+                 const RendererOptions &options, const MemoryPlan &plan) {
   DeviceStream stream = plan.stream == StreamPlace::kHost
-                            ? DeviceStream(device, volume, OnHost{plan.window_blocks})
-                            : DeviceStream(device, volume, options.largest_stream_part);
+                            ? DeviceStream(device, volume, OnHost{plan.window_blocks}, options.with_bounds)
+                            : DeviceStream(device, volume, options.largest_stream_part, options.with_bounds);
   Macrocells macrocells(device, make_grid_params(volume.info), stream);
   ZfpDecode decode(device, plan.cache_slots, stream.defines(), options.max_pixel_error > 0);
-  return {volume.info, volume.error_bound, std::move(stream), std::move(macrocells), std::move(decode)};
+  return {volume.info,       volume.error_bound,    error,
+          std::move(stream), std::move(macrocells), std::move(decode)};
 }
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
                       const MemoryPlan &plan) {
   std::vector<Level> levels;
-  levels.push_back(make_level(device, volume, options, plan));
-  for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i)
-    levels.push_back(make_level(device, volume.coarser[i], options, plan));
+  levels.push_back(make_level(device, volume, {volume, true}, options, plan));
+  for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i) {
+    const CompressedVolume &level = volume.coarser[i];
+    levels.push_back(make_level(device, level, {level, false}, options, plan));
+  }
   Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks);
   BlockCache cache(device, make_grid_params(volume.info), plan.cache_slots, options.size.num_pixels(),
                    options.group_size, levels.size() > 1);
@@ -116,6 +122,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       options_(checked(options, volume, device)),
       plan_(make_plan(device, volume, options_)),
       state_(make_state(device, volume, options_, plan_)),
+      value_range_(volume.value_range),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
       shade_(device, options_.size.num_pixels()),
@@ -177,9 +184,10 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
     level.frame.per_ray_speculation = options_.per_ray_speculation;
     level.frame.table_groups = state_.cache.table_groups;
     if (draws(level.frame) && level.selected_isovalue != isovalue) {
+      update_ranges(level);
       const auto stage = device_.timer().stage("macrocells");
       FrameParams frame = level.frame;
-      level.macrocells.select(frame, level.value_error);
+      level.macrocells.select(frame, level.range_error);
       level.selected_isovalue = isovalue;
     }
     level.macrocells.set_indices(level.frame);
@@ -235,24 +243,76 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
 }
 
 void Renderer::set_value_error(double value_error) {
+  coarser({}, value_error);  // or throws
+  value_error_ = value_error;
+  update_layouts();
+}
+
+void Renderer::draw_bound(FieldBound bound) {
+  if (bound != FieldBound::kNone) {
+    if (!options_.with_bounds) throw std::logic_error("the renderer was made without bounds");
+    const double magnitude = magnitude_of(value_range_);
+    for (const Level &level : state_.levels) value_offset(level.error, bound, 0, magnitude);  // or throws
+  }
+  bound_ = bound;
+  update_layouts();
+}
+
+/// Has blocks decoded as value_error_ and bound_ say.
+void Renderer::update_layouts() {
   bool changes = false;
   for (Level &level : state_.levels) {
-    const ErrorBound bound = coarser(level.error_bound, value_error);
-    StreamLayout &layout = level.stream.layout;
-    if (layout.min_exponent == bound.min_exponent) continue;
-    const bool all_planes = bound.min_exponent == level.error_bound.min_exponent;
-    layout.min_exponent = bound.min_exponent;
-    layout.whole_numbers = bound.whole_numbers ? 1 : 0;
-    // Ranges were made of rounded values, and fewer planes are not rounded.
-    const double unrounded = level.error_bound.whole_numbers ? 0.5 : 0.0;
-    level.value_error =
-        all_planes ? 0.0f : static_cast<float>(std::ldexp(1.0, bound.min_exponent) + unrounded);
-    level.selected_isovalue.reset();
+    const ErrorBound planes = coarser(level.error_bound, value_error_);
+    const double few_planes = plane_error(level.error_bound, value_error_);
+    StreamLayout layout = level.stream.layout;
+    layout.min_exponent = planes.min_exponent;
+    layout.whole_numbers = planes.whole_numbers ? 1 : 0;
+    const double magnitude = bound_ == FieldBound::kNone ? 0.0 : magnitude_of(value_range_);
+    const ValueOffset offset = value_offset(level.error, bound_, few_planes, magnitude);
+    layout.value_offset = offset.uniform;
+    layout.bound_unit = offset.unit;
+    if (std::memcmp(&layout, &level.stream.layout, sizeof(layout)) == 0) continue;
     changes = true;
+    level.selected_isovalue.reset();
+    level.stream.layout = layout;
+    level.range_error = static_cast<float>(few_planes) + std::abs(offset.uniform);
+    // All of the finest level would take longer to decode again than the blocks that wider ranges let in.
+    if (&level == &state_.levels.front() && bound_ != FieldBound::kNone)
+      level.range_error += level.error.largest_bound;
   }
   if (!changes) return;
   classified_isovalue_.reset();
   clear_cache();
+}
+
+/// Builds the ranges of a coarser level again where its blocks are raised or lowered, each by its own bound, since they were built.
+void Renderer::update_ranges(Level &level) {
+  const StreamLayout layout = level.stream.layout;
+  if (&level == &state_.levels.front() || level.ranges_unit == layout.bound_unit) return;
+  level.stream.layout.value_offset = 0;  // which range_error stands for, as for fewer bit planes
+  level.stream.layout.min_exponent = level.error_bound.min_exponent;
+  level.stream.layout.whole_numbers = level.error_bound.whole_numbers ? 1 : 0;
+  level.macrocells.build(device_, make_grid_params(level.info), level.stream);
+  level.stream.layout = layout;
+  level.ranges_unit = layout.bound_unit;
+}
+
+void Renderer::set_max_pixel_error(double max_pixel_error) {
+  check_max_pixel_error(max_pixel_error);
+  if (max_pixel_error > 0 && state_.levels.size() == 1) {
+    throw Error("a renderer of the finest level alone cannot draw with {} pixels between voxels",
+                max_pixel_error);
+  }
+  options_.max_pixel_error = max_pixel_error;
+}
+
+void Renderer::set_size(ImageSize size) {
+  check_image_size(size);
+  if (size.num_pixels() > state_.rays.num_pixels) {
+    throw Error("{}x{} pixels are more than the {} that the renderer was made for", size.width, size.height,
+                state_.rays.num_pixels);
+  }
+  options_.size = size;
 }
 
 void Renderer::clear_cache() {

@@ -39,6 +39,7 @@ struct RendererOptions {
   /// Distance in pixels up to which voxels of a coarser level of detail may be apart, see make_level_frames(); 0: the finest
   /// level draws all.
   double max_pixel_error = 0;
+  bool with_bounds = false;  ///< draw_bound() will be called
 };
 
 /// What one pass did: the counts of the device, and what follows from them.
@@ -83,12 +84,31 @@ class Renderer {
   /// at least 0.
   void set_value_error(double value_error);
 
+  /// Whether it was made for levels of detail.
+  bool has_levels() const { return state_.levels.size() > 1; }
+  double value_error() const { return value_error_; }
+
+  /// What further frames draw: the volume, as at first, or the field that is nowhere above, or nowhere below what the volume's voxels were
+  /// before compression, trilinear between them: decoded values are lowered or raised by the bound of their error. Forgets
+  /// the decoded blocks where that changes, and decodes coarser levels to build their ranges again. Needs options().with_bounds. Throws Error where the error is not known.
+  void draw_bound(FieldBound bound);
+
+  /// Distance in pixels up to which voxels of a coarser level may be apart in further frames; options().max_pixel_error at first. Throws
+  /// Error unless it is finite and at least 0, and 0 where the renderer was made for the finest level.
+  void set_max_pixel_error(double max_pixel_error);
+  /// Pixels of further frames, no more than the renderer was made for: hits() and shade() are of the first so many.
+  void set_size(ImageSize size);
+
   /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture depends
   /// on it. Waits.
   void clear_cache();
 
   /// The hit buffer [height * width], row 0 at the top. Waits.
-  std::vector<HitRecord> hits() const { return state_.rays.hits.read(); }
+  std::vector<HitRecord> hits() const {
+    std::vector<HitRecord> hits = state_.rays.hits.read();
+    hits.resize(options_.size.num_pixels());
+    return hits;
+  }
   /// The picture of the hit buffer. Waits.
   Image8 shade(const Appearance &appearance = {});
 
@@ -99,6 +119,8 @@ class Renderer {
 
  private:
   void begin_frame(const Camera &camera, float isovalue);
+  void update_layouts();
+  void update_ranges(Level &level);
   void draw_band(const OnPass &on_pass, FrameStats &stats);
   bool begin_next_band();
   struct Uploads {
@@ -112,6 +134,9 @@ class Renderer {
   RendererOptions options_;
   MemoryPlan plan_;
   FrameState state_;
+  std::array<float, 2> value_range_;  ///< of the volume before compression
+  double value_error_ = 0;
+  FieldBound bound_ = FieldBound::kNone;
   std::optional<float> classified_isovalue_;  ///< what the cache's bits of voxels inside stand for
   std::unique_ptr<Pipeline> pipeline_;
   Shade shade_;

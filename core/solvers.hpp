@@ -20,6 +20,11 @@ std::string_view to_string(Solver solver);
 /// itself after 3 to 5). Throws Error naming the solvers.
 Solver solver_from_string(std::string_view name);
 
+/// Whether it misses no crossing, and converges.
+inline bool finds_all(Solver solver) {
+  return solver.kind == kDefaultSolver.kind && solver.max_steps >= kDefaultSolver.max_steps;
+}
+
 /// What a kernel that includes solver.h is built with: it is built for one solver, so that the others cost it nothing.
 ocl::Defines solver_defines(Solver solver);
 

@@ -208,21 +208,28 @@ std::uint32_t BitAppender::pad() {
 }
 
 ErrorBoundCoder::ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink)
-    : dims_(dims), min_exponent_(bound.min_exponent), sink_(sink) {}
+    : dims_(dims), bound_(bound), sink_(sink) {}
 
 void ErrorBoundCoder::begin_chunk(const Chunk &chunk) {
   rows_.assign(chunk.num_rows, {});
+  if (bound_.max_error) return;
+  chunk_errors_ = errors_.size();
+  errors_.resize(chunk_errors_ + chunk.num_rows * ((dims_.x + 3) / 4));
 }
 
 void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
   CodedRow &coded = rows_[row.index];
-  BlockCodec codec(min_exponent_);
+  BlockCodec codec(bound_.min_exponent);
+  const std::ptrdiff_t layer = std::ptrdiff_t{dims_.x} * dims_.y;
   const std::uint32_t blocks_x = (dims_.x + 3) / 4;
   coded.lengths.reserve(blocks_x);
   for (std::uint32_t bx = 0; bx < blocks_x; ++bx) {
-    const std::uint32_t length = codec.encode(row, bx, dims_.x, std::ptrdiff_t{dims_.x} * dims_.y);
+    const std::uint32_t length = codec.encode(row, bx, dims_.x, layer);
     coded.lengths.push_back(static_cast<std::uint16_t>(length));
     coded.bits.append(codec.words(), length);
+    if (bound_.max_error) continue;
+    errors_[chunk_errors_ + row.index * blocks_x + bx] =
+        largest_error(codec.decode(bound_.min_exponent), row, bx, dims_.x, layer, bound_.whole_numbers);
   }
   coded.bits.pad();
 }

@@ -37,11 +37,12 @@ void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame,
   }
   const std::span<uint> granted = stream.window->read_granted(counts, block_ids);
   for (uint &id : granted) id = levels_ ? level_block_of(&frame, id) : id;
-  stream.window->bring(
-      granted, [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
-        kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), frame, words, words, words, words,
-                words, stream.layout, first, first + count, counts, block_ids, slots, values, inside);
-      });
+  stream.window->bring(granted,
+                       [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
+                         kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), frame, words, words,
+                                 words, words, stream.index(words), stream.layout, first, first + count,
+                                 counts, block_ids, slots, values, inside);
+                       });
 }
 
 }  // namespace isowave

@@ -143,7 +143,7 @@ void LayerEncoder::hand_over(const Result &result, const Sink &sink) {
                 ocl::error_name(error.err()));
   }
   for (std::size_t i = 0; i < result.errors.size(); i += 2) {
-    max_error_ = std::max(max_error_, double{result.errors[i]} + double{result.errors[i + 1]});
+    block_errors_.push_back(double{result.errors[i]} + double{result.errors[i + 1]});
   }
   sink(std::as_bytes(std::span<const uint>(result.words)));
 }

@@ -57,8 +57,8 @@ class LayerEncoder {
   /// Hands the last piece to `sink`.
   void finish(const Sink &sink);
 
-  /// Largest |decoded - voxel| of what `sink` got; 0 unless measured.
-  double max_error() const { return max_error_; }
+  /// Largest |decoded - voxel| of each block that `sink` got; none unless measured.
+  const std::vector<double> &block_errors() const { return block_errors_; }
 
  private:
   /// What the device sends back of a piece.
@@ -75,7 +75,7 @@ class LayerEncoder {
   glm::uvec3 dims_, piece_dims_;  ///< of the volume; of the largest piece
   std::uint32_t bits_per_block_;
   bool measure_error_;
-  double max_error_ = 0;
+  std::vector<double> block_errors_;
   ZfpEncode zfp_encode_;
   ocl::Buffer<float> voxels_;
   ocl::Buffer<uint> words_;

@@ -16,6 +16,7 @@
 
 #include "core/error.hpp"
 #include "core/io/mapped_file.hpp"
+#include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/pyramid.hpp"
 #include "core/zfp_accuracy.hpp"
@@ -26,7 +27,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2, kPyramidVersion = 3;
+constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2, kPyramidVersion = 4;
+constexpr std::uint32_t kBoundlessPyramidVersion = 3;  ///< as before levels had bounds: is read, not written
 constexpr std::array<char, 8> kMagic{'I', 'S', 'O', 'W', 'A', 'V', 'E', '\n'};
 constexpr std::uint64_t kMaxJsonBytes = 1u << 20;
 constexpr std::uint32_t kMinBlockBits = 9;  // "not empty" and the exponent; libzfp reads them at any rate
@@ -48,7 +50,12 @@ std::uint32_t json_crc(std::string_view text, const Footer &footer) {
   return update_crc(update_crc(0, std::as_bytes(std::span(text))), std::as_bytes(std::span(numbers)));
 }
 
-json to_json(const CompressedVolume &volume, std::uint64_t index_bytes,
+/// What stands between a stream and its trailer [bytes].
+struct PartSizes {
+  std::uint64_t index = 0, bounds = 0;
+};
+
+json to_json(const CompressedVolume &volume, const PartSizes &sizes,
              std::span<const std::uint64_t> level_bytes) {
   const VolumeInfo &info = volume.info;
   json trailer;
@@ -63,8 +70,12 @@ json to_json(const CompressedVolume &volume, std::uint64_t index_bytes,
   if (volume.max_error) trailer["max_error"] = *volume.max_error;
   if (volume.is_indexed()) {
     trailer["payload_bits"] = volume.indexed_bits;
-    trailer["index_bytes"] = index_bytes;
+    trailer["index_bytes"] = sizes.index;
     trailer["whole_numbers"] = volume.error_bound.whole_numbers;
+  }
+  if (sizes.bounds != 0) {
+    trailer["bounds_bytes"] = sizes.bounds;
+    trailer["bounds_exponent"] = volume.bounds.exponent;
   }
   if (!level_bytes.empty()) trailer["level_bytes"] = level_bytes;
   return trailer;
@@ -75,9 +86,9 @@ glm::dvec3 vector_from(const json &value) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
-/// Returns how many bytes the index has. level_bytes: those of the coarser levels.
-std::uint64_t apply_json(const std::string &text, CompressedVolume &volume,
-                         std::vector<std::uint64_t> &level_bytes) {
+/// level_bytes: those of the coarser levels.
+PartSizes apply_json(const std::string &text, CompressedVolume &volume,
+                     std::vector<std::uint64_t> &level_bytes) {
   const json trailer = json::parse(text);
   volume.info.spacing = vector_from(trailer.at("spacing"));
   volume.info.origin = vector_from(trailer.at("origin"));
@@ -89,11 +100,17 @@ std::uint64_t apply_json(const std::string &text, CompressedVolume &volume,
     volume.value_range = trailer["value_range"].get<std::array<float, 2>>();
   if (trailer.contains("max_error")) volume.max_error = trailer["max_error"].get<double>();
   if (trailer.contains("level_bytes")) level_bytes = trailer["level_bytes"].get<std::vector<std::uint64_t>>();
-  if (!volume.is_indexed()) return 0;
+  PartSizes sizes;
+  if (trailer.contains("bounds_bytes")) {
+    sizes.bounds = trailer["bounds_bytes"].get<std::uint64_t>();
+    volume.bounds.exponent = trailer.at("bounds_exponent").get<std::int32_t>();
+  }
+  if (!volume.is_indexed()) return sizes;
   volume.indexed_bits = trailer.at("payload_bits").get<std::uint64_t>();
   volume.error_bound.whole_numbers = trailer.at("whole_numbers").get<bool>();
   volume.error_bound.max_error = volume.max_error;
-  return trailer.at("index_bytes").get<std::uint64_t>();
+  sizes.index = trailer.at("index_bytes").get<std::uint64_t>();
+  return sizes;
 }
 
 /// zlib's stream, closed whatever happens.
@@ -114,34 +131,45 @@ struct Deflater : z_stream {
   Deflater &operator=(const Deflater &) = delete;
 };
 
-constexpr std::size_t kLengthsAtOnce = 1u << 15;
+constexpr std::size_t kItemsAtOnce = 1u << 15;
 
-/// The index of so many blocks from their deflated lengths, or nothing where they are not that.
-std::vector<std::uint32_t> inflate_index(std::span<const std::byte> deflated, std::uint64_t num_blocks) {
+/// Calls take(items) with `total` items of a deflated piece of a file, a few at a time, until it returns false. Returns whether all of
+/// that worked.
+template <typename T, typename Take>
+bool inflate_items(std::span<const std::byte> deflated, std::uint64_t total, const Take &take) {
   Inflater inflater;
   inflater.next_in = const_cast<Bytef *>(reinterpret_cast<const Bytef *>(deflated.data()));
   std::uint64_t in_left = deflated.size();
-  std::vector<std::uint16_t> lengths(kLengthsAtOnce);
-  BlockIndexBuilder index;
-  for (std::uint64_t done = 0; done < num_blocks;) {
-    const std::uint64_t count = std::min<std::uint64_t>(kLengthsAtOnce, num_blocks - done);
-    inflater.next_out = reinterpret_cast<Bytef *>(lengths.data());
-    inflater.avail_out = static_cast<uInt>(count * sizeof(std::uint16_t));
+  std::vector<T> items;
+  for (std::uint64_t done = 0; done < total; done += items.size()) {
+    items.resize(std::min<std::uint64_t>(kItemsAtOnce, total - done));
+    inflater.next_out = reinterpret_cast<Bytef *>(items.data());
+    inflater.avail_out = static_cast<uInt>(items.size() * sizeof(T));
     while (inflater.avail_out > 0) {
       if (inflater.avail_in == 0) {
         inflater.avail_in = static_cast<uInt>(std::min<std::uint64_t>(in_left, 1u << 30));
         in_left -= inflater.avail_in;
       }
       const int status = ::inflate(&inflater, Z_NO_FLUSH);
-      if (status != Z_OK && inflater.avail_out > 0) return {};
+      if (status != Z_OK && inflater.avail_out > 0) return false;
     }
-    for (std::uint64_t i = 0; i < count; ++i) {
-      if (lengths[i] < 1 || lengths[i] > ISO_MAX_BLOCK_BITS) return {};
-      index.add(lengths[i]);
-    }
-    done += count;
+    if (!take(std::span<const T>(items))) return false;
   }
-  return index.finish();
+  return true;
+}
+
+/// The index of so many blocks from their deflated lengths, or nothing where they are not that.
+std::vector<std::uint32_t> inflate_index(std::span<const std::byte> deflated, std::uint64_t num_blocks) {
+  BlockIndexBuilder index;
+  const bool whole =
+      inflate_items<std::uint16_t>(deflated, num_blocks, [&](std::span<const std::uint16_t> lengths) {
+        for (const std::uint16_t length : lengths) {
+          if (length < 1 || length > ISO_MAX_BLOCK_BITS) return false;
+          index.add(length);
+        }
+        return true;
+      });
+  return whole ? index.finish() : std::vector<std::uint32_t>{};
 }
 
 /// A `.zfp` file being read: the checks in the order in which the file is trusted.
@@ -186,7 +214,7 @@ class ZfpFileReader {
     read_header();
     read_trailer();
     check_volume_info(volume_.info, path_.string());
-    std::uint64_t begin = begin_ + stream_bytes_ + index_bytes_;
+    std::uint64_t begin = begin_ + stream_bytes_ + sizes_.index + sizes_.bounds;
     for (const std::uint64_t bytes : level_bytes_) {
       levels_.push_back(ZfpFileReader(levels_.empty() ? *this : levels_.back(), begin, bytes));
       begin += bytes;
@@ -194,13 +222,15 @@ class ZfpFileReader {
   }
 
   std::uint64_t bytes_before_trailer() const {
-    return std::accumulate(level_bytes_.begin(), level_bytes_.end(), stream_bytes_ + index_bytes_);
+    return std::accumulate(level_bytes_.begin(), level_bytes_.end(),
+                           stream_bytes_ + sizes_.index + sizes_.bounds);
   }
 
   CompressedVolume take_from(const std::shared_ptr<const MappedFile> &file) {
     volume_.file = file;
     volume_.file_first_bit = 8 * begin_ + header_bits_;
     if (volume_.is_indexed()) read_index();
+    if (sizes_.bounds != 0) read_bounds();
     for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take_from(file));
     return std::move(volume_);
   }
@@ -222,7 +252,7 @@ class ZfpFileReader {
         throw Error("{}: damaged: {} unknown bytes after the zfp stream", path_.string(), file_size_ - used);
       }
     } else {
-      volume_.index = inflate_index(volume_.file->bytes().subspan(begin_ + stream_bytes_, index_bytes_),
+      volume_.index = inflate_index(volume_.file->bytes().subspan(begin_ + stream_bytes_, sizes_.index),
                                     volume_.block_count());
     }
     const auto num_blocks = static_cast<std::uint32_t>(volume_.block_count());
@@ -231,6 +261,19 @@ class ZfpFileReader {
       throw Error("{}: damaged: the lengths of its blocks are not those of its stream", path_.string());
     }
     volume_.indexed_bits = end;
+  }
+
+  void read_bounds() {
+    const auto deflated = volume_.file->bytes().subspan(begin_ + stream_bytes_ + sizes_.index, sizes_.bounds);
+    std::vector<std::uint8_t> &codes = volume_.bounds.codes;
+    const bool whole =
+        inflate_items<std::uint8_t>(deflated, volume_.block_count(), [&](std::span<const std::uint8_t> some) {
+          codes.insert(codes.end(), some.begin(), some.end());
+          return true;
+        });
+    const std::int32_t exponent = volume_.bounds.exponent;
+    if (!whole || exponent < kMinBoundExponent || exponent > kMaxBoundExponent)
+      throw Error("{}: damaged: a level of detail has no bounds of its errors", path_.string());
   }
 
   void read_header() {
@@ -308,7 +351,8 @@ class ZfpFileReader {
       throw Error("{}: damaged: {} unknown bytes after the zfp stream", path_.string(), trailer_bytes);
     }
     const std::uint32_t known = volume_.is_indexed() ? kIndexedVersion : kVersion;
-    if (footer.version != known && footer.version != kPyramidVersion) {
+    if (footer.version != known && footer.version != kBoundlessPyramidVersion &&
+        footer.version != kPyramidVersion) {
       throw Error("{}: its trailer has version {}, this program knows {} and {}", path_.string(),
                   footer.version, known, kPyramidVersion);
     }
@@ -322,7 +366,7 @@ class ZfpFileReader {
       throw Error("{}: damaged: the checksum of its trailer does not match", path_.string());
     }
     try {
-      index_bytes_ = apply_json(text, volume_, level_bytes_);
+      sizes_ = apply_json(text, volume_, level_bytes_);
     } catch (const json::exception &error) {
       throw Error("{}: broken trailer: {}", path_.string(), error.what());
     }
@@ -331,7 +375,7 @@ class ZfpFileReader {
     stream_crc_ = footer.stream_crc;
   }
 
-  /// Header, payload, padding, index and levels end where the JSON text begins.
+  /// Header, payload, padding, index, bounds and levels end where the JSON text begins.
   void check_layout(std::uint64_t json_begin) {
     if (volume_.is_indexed()) {
       // Neither sum overflows: a block has at least a bit, and not too many.
@@ -346,7 +390,8 @@ class ZfpFileReader {
       left -= bytes;
       return true;
     };
-    if (!take(stream_bytes_) || !take(index_bytes_) || !std::ranges::all_of(level_bytes_, take) || left != 0)
+    if (!take(stream_bytes_) || !take(sizes_.index) || !take(sizes_.bounds) ||
+        !std::ranges::all_of(level_bytes_, take) || left != 0)
       throw Error("{}: damaged: its parts are not as long as its trailer says", path_.string());
   }
 
@@ -355,13 +400,17 @@ class ZfpFileReader {
   std::uint64_t begin_ = 0;  ///< of this level in the file
   std::uint64_t file_size_ = 0, header_bits_ = 0;
   std::uint64_t stream_bytes_ = 0;  ///< header, payload and padding
-  std::uint64_t index_bytes_ = 0;   ///< behind them
+  PartSizes sizes_;                 ///< behind them
   std::vector<std::uint64_t> level_bytes_;
   std::vector<ZfpFileReader> levels_;  ///< coarser ones
   bool has_trailer_ = false;
   std::uint32_t stream_crc_ = 0;
   CompressedVolume volume_;
 };
+
+std::uint32_t version_of(const CompressedVolume &volume, bool has_levels) {
+  return has_levels ? kPyramidVersion : volume.is_indexed() ? kIndexedVersion : kVersion;
+}
 
 }  // namespace
 
@@ -379,16 +428,17 @@ void ZfpFileWriter::write(std::span<const std::byte> payload, std::size_t level)
 
 void ZfpFileWriter::commit(const CompressedVolume &volume) {
   Part &all = parts_.front();
-  const std::uint64_t index_bytes = all.write_index(volume);
+  const PartSizes sizes{all.write_index(volume), all.write_bounds(volume)};
   std::vector<std::uint64_t> level_bytes;
   for (std::size_t level = 1; level < parts_.size(); ++level) {
     Part &part = parts_[level];
     const CompressedVolume &coarse = volume.coarser[level - 1];
-    part.write_trailer(coarse, part.write_index(coarse), {});
+    const PartSizes part_sizes{part.write_index(coarse), part.write_bounds(coarse)};
+    part.write_trailer(to_json(coarse, part_sizes, {}).dump(), version_of(coarse, false));
     level_bytes.push_back(part.size);
     part.file.read_back([&all](std::span<const std::byte> bytes) { all.write(bytes); });
   }
-  all.write_trailer(volume, index_bytes, level_bytes);
+  all.write_trailer(to_json(volume, sizes, level_bytes).dump(), version_of(volume, !level_bytes.empty()));
   all.file.commit();
 }
 
@@ -398,16 +448,32 @@ void ZfpFileWriter::Part::write(std::span<const std::byte> bytes) {
   size += bytes.size();
 }
 
-void ZfpFileWriter::Part::write_trailer(const CompressedVolume &volume, std::uint64_t index_bytes,
-                                        std::span<const std::uint64_t> level_bytes) {
-  const std::string text = to_json(volume, index_bytes, level_bytes).dump();
-  const std::uint32_t version = !level_bytes.empty()  ? kPyramidVersion
-                                : volume.is_indexed() ? kIndexedVersion
-                                                      : kVersion;
+void ZfpFileWriter::Part::write_trailer(const std::string &text, std::uint32_t version) {
   Footer footer{version, std::uint32_t(text.size()), crc, 0, kMagic};
   footer.json_crc = json_crc(text, footer);
   write(std::as_bytes(std::span(text)));
   write(std::as_bytes(std::span(&footer, 1)));
+}
+
+/// Deflates what next() returns, again and again, until that is empty; returns its size.
+template <typename T>
+std::uint64_t ZfpFileWriter::Part::write_deflated(const std::function<std::span<const T>()> &next) {
+  const std::uint64_t begin = size;
+  Deflater deflater;
+  std::vector<std::byte> out(1u << 16);
+  for (bool last = false; !last;) {
+    const std::span<const T> items = next();
+    last = items.empty();
+    deflater.next_in = const_cast<Bytef *>(reinterpret_cast<const Bytef *>(items.data()));
+    deflater.avail_in = static_cast<uInt>(items.size_bytes());
+    do {
+      deflater.next_out = reinterpret_cast<Bytef *>(out.data());
+      deflater.avail_out = static_cast<uInt>(out.size());
+      ::deflate(&deflater, last ? Z_FINISH : Z_NO_FLUSH);
+      write(std::span(out).first(out.size() - deflater.avail_out));
+    } while (deflater.avail_out == 0);
+  }
+  return size - begin;
 }
 
 /// Behind the padding of the payload; returns its size, 0 at a fixed rate.
@@ -415,25 +481,26 @@ std::uint64_t ZfpFileWriter::Part::write_index(const CompressedVolume &volume) {
   const std::array<std::byte, 8> zeros{};
   write(std::span(zeros).first((8 - size % 8) % 8));
   if (!volume.is_indexed()) return 0;
-  const std::uint64_t begin = size, num_blocks = volume.block_count();
-  Deflater deflater;
+  const std::uint64_t num_blocks = volume.block_count();
+  std::uint64_t done = 0;
   std::vector<std::uint16_t> lengths;
-  std::vector<std::byte> out(1u << 16);
-  for (std::uint64_t done = 0; done < num_blocks; done += lengths.size()) {
-    lengths.resize(std::min<std::uint64_t>(kLengthsAtOnce, num_blocks - done));
-    for (std::size_t i = 0; i < lengths.size(); ++i) {
-      lengths[i] = static_cast<std::uint16_t>(volume.block_bits(static_cast<std::uint32_t>(done + i)));
-    }
-    deflater.next_in = reinterpret_cast<Bytef *>(lengths.data());
-    deflater.avail_in = static_cast<uInt>(lengths.size() * sizeof(std::uint16_t));
-    do {
-      deflater.next_out = reinterpret_cast<Bytef *>(out.data());
-      deflater.avail_out = static_cast<uInt>(out.size());
-      ::deflate(&deflater, done + lengths.size() == num_blocks ? Z_FINISH : Z_NO_FLUSH);
-      write(std::span(out).first(out.size() - deflater.avail_out));
-    } while (deflater.avail_out == 0);
-  }
-  return size - begin;
+  return write_deflated<std::uint16_t>([&] {
+    lengths.resize(std::min<std::uint64_t>(kItemsAtOnce, num_blocks - done));
+    for (std::uint16_t &length : lengths)
+      length = static_cast<std::uint16_t>(volume.block_bits(static_cast<std::uint32_t>(done++)));
+    return std::span<const std::uint16_t>(lengths);
+  });
+}
+
+/// Behind the index; returns its size, 0 where there are none.
+std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) {
+  std::span<const std::uint8_t> left = volume.bounds.codes;
+  if (left.empty()) return 0;
+  return write_deflated<std::uint8_t>([&] {
+    const std::span<const std::uint8_t> some = left.first(std::min(kItemsAtOnce, left.size()));
+    left = left.subspan(some.size());
+    return some;
+  });
 }
 
 CompressedVolume read_zfp_file(const fs::path &path) {

@@ -6,12 +6,16 @@
 #include "core/zfp_stream.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <functional>
+#include <limits>
 #include <stdexcept>
 
 #include "core/error.hpp"
 #include "core/io/mapped_file.hpp"
+#include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"
 #include "core/pyramid.hpp"
@@ -29,19 +33,35 @@ using Sink = std::function<void(Payload)>;
 /// Compresses the voxels of a level.
 class LevelCoder : public ChunkCoder {
  public:
-  /// After the last chunk: hands over what is left, and completes `volume`.
-  virtual void finish(CompressedVolume &volume) = 0;
+  /// After the last chunk: hands over what is left, and completes `volume`. Returns the largest error of each block, where errors
+  /// were measured.
+  virtual std::vector<float> finish(CompressedVolume &volume) = 0;
 };
+
+std::vector<float> rounded_up(std::span<const double> errors) {
+  std::vector<float> result(errors.size());
+  std::ranges::transform(errors, result.begin(), [](double error) {
+    const float nearest = static_cast<float>(error);
+    return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
+                                   : nearest;
+  });
+  return result;
+}
 
 /// Compresses rows of blocks by libzfp.
 class FixedRateCoder : public LevelCoder {
  public:
   FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink)
-      : dims_(dims), options_(options), sink_(sink), max_errors_(thread_count(options.input.num_threads)) {}
+      : dims_(dims), options_(options), sink_(sink) {}
 
-  void begin_chunk(const Chunk &chunk) override { words_.resize(chunk.num_rows * row_words()); }
+  void begin_chunk(const Chunk &chunk) override {
+    words_.resize(chunk.num_rows * row_words());
+    if (!options_.measure_error) return;
+    chunk_errors_ = errors_.size();
+    errors_.resize(chunk_errors_ + chunk.num_rows * blocks_x());
+  }
 
-  void code_row(const BlockRow &row, std::uint32_t thread) override {
+  void code_row(const BlockRow &row, std::uint32_t) override {
     const std::span<std::uint64_t> words = std::span(words_).subspan(row.index * row_words(), row_words());
     const ZfpStream stream = make_zfp_stream(64 * options_.rate);
     const ZfpBits bits(stream_open(words.data(), words.size_bytes()), &stream_close);
@@ -62,31 +82,34 @@ class FixedRateCoder : public LevelCoder {
     if (zfp_decompress(stream.get(), copy.get()) == 0)
       throw std::logic_error("zfp: cannot decode its own blocks");
     const float *value = decoded.data();
+    double *errors = errors_.data() + chunk_errors_ + row.index * blocks_x();
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y) {
         const float *source = row.voxels + z * layer_size() + std::ptrdiff_t(y) * dims_.x;
-        for (std::uint32_t x = 0; x < dims_.x; ++x, ++value) {
-          max_errors_[thread] = std::max(max_errors_[thread], std::abs(double(*value) - double(source[x])));
-        }
+        for (std::uint32_t x = 0; x < dims_.x; ++x, ++value)
+          errors[x / 4] = std::max(errors[x / 4], std::abs(double(*value) - double(source[x])));
       }
     }
   }
 
   void end_chunk(const Chunk &) override { sink_(std::as_bytes(std::span(words_))); }
 
-  void finish(CompressedVolume &volume) override {
-    if (options_.measure_error) volume.max_error = std::ranges::max(max_errors_);
+  std::vector<float> finish(CompressedVolume &volume) override {
+    if (options_.measure_error) volume.max_error = std::ranges::max(errors_);
+    return rounded_up(errors_);
   }
 
  private:
-  std::uint64_t row_words() const { return std::uint64_t((dims_.x + 3u) / 4u) * options_.rate; }
+  std::uint32_t blocks_x() const { return (dims_.x + 3u) / 4u; }
+  std::uint64_t row_words() const { return std::uint64_t{blocks_x()} * options_.rate; }
   std::ptrdiff_t layer_size() const { return std::ptrdiff_t(dims_.x) * dims_.y; }
 
   glm::uvec3 dims_;
   const CompressOptions &options_;
   const Sink &sink_;
   std::vector<std::uint64_t> words_;  ///< of the present chunk
-  std::vector<double> max_errors_;    ///< of each thread
+  std::vector<double> errors_;        ///< of each block so far
+  std::size_t chunk_errors_ = 0;      ///< the first of the present chunk
 };
 
 /// Has a device compress whole chunks.
@@ -99,9 +122,10 @@ class DeviceCoder : public LevelCoder {
 
   void end_chunk(const Chunk &chunk) override { encoder_.encode(chunk.voxels, chunk.num_layers, sink_); }
 
-  void finish(CompressedVolume &volume) override {
+  std::vector<float> finish(CompressedVolume &volume) override {
     encoder_.finish(sink_);
-    if (measure_error_) volume.max_error = encoder_.max_error();
+    if (measure_error_) volume.max_error = std::ranges::max(encoder_.block_errors());
+    return rounded_up(encoder_.block_errors());
   }
 
  private:
@@ -118,10 +142,15 @@ class BoundedCoder : public LevelCoder {
   void begin_chunk(const Chunk &chunk) override { coder_.begin_chunk(chunk); }
   void code_row(const BlockRow &row, std::uint32_t thread) override { coder_.code_row(row, thread); }
   void end_chunk(const Chunk &chunk) override { coder_.end_chunk(chunk); }
-  void finish(CompressedVolume &volume) override {
+  std::vector<float> finish(CompressedVolume &volume) override {
     volume.index = coder_.finish();
     volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
-    volume.max_error = volume.error_bound.max_error;
+    if (volume.error_bound.max_error) {  // the finest level, of which every block is about as far off
+      volume.max_error = volume.error_bound.max_error;
+      return std::vector<float>(volume.block_count(), rounded_up(std::array{*volume.max_error}).front());
+    }
+    volume.max_error = volume.error_bound.max_error = std::ranges::max(coder_.block_errors());
+    return rounded_up(coder_.block_errors());
   }
 
  private:
@@ -145,26 +174,43 @@ class PyramidCoder : public ChunkCoder {
     }
     if (volumes.size() == 1) return;
     next_ = std::make_unique<PyramidCoder>(options, volumes.subspan(1), sinks.subspan(1));
-    downsampler_.emplace(dims, options.input.num_threads, [this, &options](const Chunk &chunk) {
-      code_chunk(chunk, next_->volume_.info.dims, options.input, *next_);
+    const glm::uvec3 coarse_dims = next_->volume_.info.dims;
+    bounds_.emplace(dims, coarse_dims, options.input.num_threads);
+    downsampler_.emplace(dims, options.input.num_threads, [this, &options, coarse_dims](const Chunk &chunk) {
+      code_chunk(chunk, coarse_dims, options.input, *next_);
+      bounds_->add_coarse(chunk.voxels);
     });
   }
   void begin_chunk(const Chunk &chunk) override { coder_->begin_chunk(chunk); }
   void code_row(const BlockRow &row, std::uint32_t thread) override { coder_->code_row(row, thread); }
   void end_chunk(const Chunk &chunk) override {
     coder_->end_chunk(chunk);
-    if (next_) downsampler_->add(chunk.voxels);
+    if (!next_) return;
+    bounds_->add_fine(chunk.voxels);
+    downsampler_->add(chunk.voxels);
   }
   void finish() {
-    coder_->finish(volume_);
-    if (next_) next_->finish();
+    const std::vector<float> errors = coder_->finish(volume_);
+    if (next_) {
+      volume_.bounds = encode_bounds(errors);
+      next_->finish_coarser(bounds_->finish({}));
+    }
   }
 
  private:
+  /// off: how far this level's blocks are from the finest level, before they are compressed.
+  void finish_coarser(const std::vector<float> &off) {
+    std::vector<float> bounds = coder_->finish(volume_);
+    std::ranges::transform(bounds, off, bounds.begin(), std::plus());
+    volume_.bounds = encode_bounds(bounds);
+    if (next_) next_->finish_coarser(bounds_->finish(off));
+  }
+
   CompressedVolume &volume_;
   std::unique_ptr<LevelCoder> coder_;
   std::unique_ptr<PyramidCoder> next_;
   std::optional<Downsampler> downsampler_;
+  std::optional<LevelBounds> bounds_;  ///< of the next level
 };
 
 /// All but what the voxels decide.

@@ -49,6 +49,13 @@ struct CompressOptions {
   InputOptions input{};
 };
 
+/// How far the field of a level of detail may be from that of the volume before compression, by block: codes of
+/// kernels_cl/block_bound.h, in units of 2^exponent.
+struct BlockBounds {
+  std::vector<std::uint8_t> codes{};
+  std::int32_t exponent = 0;
+};
+
 /// Words past its last bit that a decoder reads at most.
 inline constexpr std::uint64_t kDecoderAhead = 2;
 
@@ -68,6 +75,7 @@ struct CompressedVolume {
   std::array<float, 2> value_range{};  ///< [min, max] of the source voxels, as float32 and after map_nan;
                                        ///< {-inf, inf} when unknown
   std::optional<double> max_error{};   ///< largest |decoded - source| when it was measured
+  BlockBounds bounds{};                ///< of a level of detail; no codes: not known
   std::vector<CompressedVolume>
       coarser{};  ///< levels of detail, each of half the voxels along each axis: pyramid.hpp
 

@@ -8,6 +8,7 @@
 #ifndef ISOWAVE_BLOCK_STREAM_H
 #define ISOWAVE_BLOCK_STREAM_H
 
+#include "block_bound.h"
 #include "block_index.h"
 #include "zfp_codec.h"
 
@@ -49,6 +50,13 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
       values[v] =
           as_float(rounded == 0x80000000u ? 0u : rounded); /* no integer is -0; llvmpipe drops a + 0.0f */
     }
+  }
+  if (layout.value_offset != 0.0f || layout.bound_unit != 0.0f) {
+    float offset = layout.value_offset;
+    if (layout.bound_unit != 0.0f)
+      offset += layout.bound_unit * packed_block_bound(index + layout.bounds_begin, block_id);
+    ISO_UNROLL
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] += offset;
   }
 }
 

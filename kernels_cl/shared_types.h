@@ -140,8 +140,12 @@ typedef struct StreamLayout {
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
   int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES: with the block's bits
   uint whole_numbers;  ///< not 0: decoded values are rounded to integers
+  /// Added to all of a block's values, to draw a bound of the volume: value_offset + bound_unit * its packed_block_bound(), of
+  /// codes that begin with word bounds_begin of the index. Both 0: nothing.
+  float value_offset, bound_unit;
+  uint bounds_begin;
 } StreamLayout;
-ISO_CHECK_SIZE(StreamLayout, 16);
+ISO_CHECK_SIZE(StreamLayout, 28);
 
 #define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
 

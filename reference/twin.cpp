@@ -1,15 +1,41 @@
 #include "reference/twin.hpp"
 
+#include "kernels_cl/block_bound.h"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave {
 
-Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_error)
+namespace {
+
+/// Adds to the voxels of each block what its values are lowered or raised by.
+void add_offset(const CompressedVolume &level, const ValueOffset &offset, std::vector<float> &voxels) {
+  const glm::uvec3 dims = level.info.dims, blocks = level.num_blocks();
+  float *value = voxels.data();
+  for (std::uint32_t z = 0; z < dims.z; ++z) {
+    for (std::uint32_t y = 0; y < dims.y; ++y) {
+      for (std::uint32_t x = 0; x < dims.x; ++x, ++value) {
+        const std::size_t block = x / 4 + blocks.x * (y / 4 + std::size_t{blocks.y} * (z / 4));
+        float sum = offset.uniform;
+        if (offset.unit != 0) sum += offset.unit * block_bound(level.bounds.codes[block]);
+        *value += sum;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_error, FieldBound bound)
     : max_pixel_error_(max_pixel_error) {
   check_levels(volume, max_pixel_error);
   const auto add = [&](const CompressedVolume &level) {
     levels_.push_back(level.info);
     voxels_.push_back(decode_with_libzfp(level, value_error));
+    if (bound == FieldBound::kNone) return;
+    const ValueOffset offset =
+        value_offset({level, &level == &volume}, bound, plane_error(level.error_bound, value_error),
+                     magnitude_of(volume.value_range));
+    add_offset(level, offset, voxels_.back());
   };
   add(volume);
   if (max_pixel_error == 0) return;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/detail.hpp"
+#include "core/level_bounds.hpp"
 #include "core/solvers.hpp"
 #include "core/zfp_stream.hpp"
 
@@ -12,8 +13,9 @@ namespace isowave {
 class Twin {
  public:
   /// Decodes the volume, and its coarser levels where max_pixel_error, as RendererOptions', is not 0. value_error: as
-  /// Renderer::set_value_error(). Throws Error: what check_levels() throws.
-  explicit Twin(const CompressedVolume &volume, double max_pixel_error = 0, double value_error = 0);
+  /// Renderer::set_value_error(). bound: as Renderer::draw_bound(). Throws Error: what check_levels() throws.
+  explicit Twin(const CompressedVolume &volume, double max_pixel_error = 0, double value_error = 0,
+                FieldBound bound = FieldBound::kNone);
 
   /// The hits [height * width] that a renderer must find, bit for bit.
   std::vector<HitRecord> render(const Camera &camera, ImageSize size, float isovalue,

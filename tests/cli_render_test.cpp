@@ -289,6 +289,38 @@ TEST(CliRender, LevelsOfDetail) {
   test::expect_one_line_error("convert " + kNucleon + " --levels some -o " + file, "--levels");
 }
 
+TEST(CliRender, MaxError) {
+  const TemporaryFolder folder;
+  const std::string file = quoted(folder / "n.zfp"), map = quoted(folder / "e.npy");
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 16 --levels all -o " + file).status, 0);
+  const auto error_of = [&](const std::string &arguments) {
+    const auto run = render(arguments + " -i 80 --size 64x48 --no-stage-times --error-map " + map +
+                            " --stats " + quoted(folder / "a.json"));
+    EXPECT_NE(run.out.find("pixels of the true surface"), std::string::npos) << run.out;
+    return json::parse(test::read_file(folder / "a.json"))["frames"][0]["error"];
+  };
+  const json error = error_of(file + " --max-error 0.5");
+  EXPECT_TRUE(error["reachable"].get<bool>());
+  EXPECT_GT(error["certified"], 0.9 * error["pixels"].get<double>());
+  EXPECT_GT(error["tries"].size(), 3u);
+  EXPECT_LE(error["median"], error["p99"]);
+  const FloatImage bounds = read_npy(folder / "e.npy");
+  EXPECT_EQ(bounds.pixels.size(), 64u * 48);
+  EXPECT_EQ(std::ranges::count_if(bounds.pixels, [](float bound) { return bound > 0 && bound <= 0.5f; }),
+            error["certified"].get<int>());
+  EXPECT_EQ(error_of(kNucleon + " --rate 16 --max-error 0.5")["chosen"], error["chosen"])
+      << "a volume that is compressed now";
+  const json out_of_reach = error_of(kNucleon + " --rate 2 --max-error 0.001");
+  EXPECT_FALSE(out_of_reach["reachable"].get<bool>());
+  EXPECT_EQ(out_of_reach["chosen"], json({{"max_pixel_error", 0.0}, {"value_error", 0.0}}));
+
+  const std::string command = "render " + file + " -i 80 --depth " + quoted(folder / "b.npy");
+  test::expect_one_line_error(command + " --max-error 1 --reference", "--reference cannot choose");
+  test::expect_one_line_error(command + " --max-error 0", "an error of 0 pixels");
+  test::expect_one_line_error(command + " --max-error 1 --value-error 1", "leave out --value-error");
+  test::expect_one_line_error(command + " --error-map " + map, "--error-map needs --max-error");
+}
+
 TEST(CliRender, NegativeAndFractionalIsovalues) {
   const TemporaryFolder folder;
   std::vector<float> ramp(512);

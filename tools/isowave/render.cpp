@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/choose_detail.hpp"
 #include "core/detail.hpp"
 #include "core/error.hpp"
 #include "core/io/npy.hpp"
@@ -37,7 +38,8 @@ struct RenderArgs {
   RendererOptions renderer;  ///< what the flags ask for
   bool reference = false, no_stage_times = false, verbose = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
-  std::string image, depth, stats, progress_dir;
+  std::string image, depth, stats, progress_dir, error_map;
+  std::optional<double> max_error;  ///< pixels
 };
 
 /// "#RRGGBB" -> [0,1]^3.
@@ -70,26 +72,90 @@ class FrameSource {
   virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
   virtual std::vector<HitRecord> hits() = 0;
   virtual Image8 shade() = 0;
+  /// How far the frame drawn last may be off, for its --stats; prints it. error_map: the .npy to write, or empty. Null where nobody
+  /// asked.
+  virtual nlohmann::ordered_json bound_error(const Camera &, float /*isovalue*/,
+                                             const fs::path & /*error_map*/) {
+    return {};
+  }
 };
 
 class DeviceFrames : public FrameSource {
  public:
   DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance,
-               const RendererOptions &options, double value_error)
-      : renderer_(device, scene.volume, options), appearance_(appearance) {
+               const RendererOptions &options, double value_error, std::optional<double> max_error)
+      : volume_(scene.volume),
+        renderer_(device, scene.volume, options),
+        appearance_(appearance),
+        max_error_(max_error) {
     renderer_.set_value_error(value_error);
   }
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
+    if (max_error_) choice_ = choose_detail(renderer_, volume_, camera, isovalue, *max_error_);
     return renderer_.render(camera, isovalue, on_pass);
   }
+  nlohmann::ordered_json bound_error(const Camera &camera, float isovalue,
+                                     const fs::path &error_map) override;
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
   Image8 shade() override { return renderer_.shade(appearance_); }
   const Renderer &renderer() const { return renderer_; }
 
  private:
+  const CompressedVolume &volume_;
   Renderer renderer_;
   Appearance appearance_;
+  std::optional<double> max_error_;
+  DetailChoice choice_;
 };
+
+nlohmann::ordered_json detail_json(const Detail &detail) {
+  return {{"max_pixel_error", detail.max_pixel_error}, {"value_error", detail.value_error}};
+}
+
+nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float isovalue,
+                                                 const fs::path &error_map) {
+  if (!max_error_) return {};
+  const Certificate certificate = certify(renderer_, volume_, camera, isovalue, renderer_.hits());
+  const CertificateSummary summary = summarize(certificate, *max_error_);
+  const double certified =
+      summary.num_pixels == 0 ? 100.0 : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
+  fmt::print(
+      "  within {} pixels of the true surface: {:.2f} % of {} pixels (bound: median {:.3g}, p99 {:.3g}); {} "
+      "uncertain\n"
+      "  with voxels up to {} pixels apart and values up to {} off; chosen in {:.0f} ms, bounded in {:.0f} "
+      "ms\n",
+      *max_error_, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
+      with_commas(summary.num_uncertain), choice_.detail.max_pixel_error, choice_.detail.value_error,
+      choice_.total_ms, certificate.total_ms);
+  if (!choice_.reachable) {
+    spdlog::warn(
+        "most pixels cannot be kept within {} pixels: at full detail half of them are within {:.3g}; a "
+        "volume "
+        "converted with --tolerance {:.2g} would do",
+        *max_error_, choice_.median, choice_.tolerance);
+  }
+  if (!error_map.empty())
+    write_npy({renderer_.options().size.width, renderer_.options().size.height, certificate.bounds},
+              error_map);
+  nlohmann::ordered_json tries = nlohmann::ordered_json::array();
+  for (const DetailChoice::Try &each : choice_.tries) {
+    tries.push_back(detail_json(each.detail));
+    tries.back()["certified"] = each.certified;
+  }
+  return {{"max_error", *max_error_},
+          {"reachable", choice_.reachable},
+          {"chosen", detail_json(choice_.detail)},
+          {"tries", tries},
+          {"choice_ms", choice_.total_ms},
+          {"pixels", summary.num_pixels},
+          {"certified", summary.num_certified},
+          {"uncertain", summary.num_uncertain},
+          {"median", summary.median},
+          {"p99", summary.p99},
+          {"max", summary.max},
+          {"bound_ms", certificate.total_ms},
+          {"decoded_blocks", certificate.decoded_blocks}};
+}
 
 class TwinFrames : public FrameSource {
  public:
@@ -155,6 +221,11 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
       result.push_back(frame_json(isovalue, view, camera, stats));
+      const fs::path error_map = options.error_map.empty()
+                                     ? fs::path{}
+                                     : frame_path(options.error_map, scene, options, isovalue, view);
+      const nlohmann::ordered_json error = frames.bound_error(camera, isovalue, error_map);
+      if (!error.is_null()) result.back()["error"] = error;
     }
   }
   return result;
@@ -186,7 +257,7 @@ nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVo
 /// Outputs go to folders that exist, but for --progress-dir, which is made. Found out before any work is
 /// done.
 void check_outputs(const RenderArgs &options) {
-  for (const std::string &output : {options.image, options.depth, options.stats}) {
+  for (const std::string &output : {options.image, options.depth, options.stats, options.error_map}) {
     const fs::path folder = fs::path(output).parent_path();
     if (!folder.empty() && !fs::is_directory(folder))
       throw Error("cannot write {}: {} is no folder", output, folder.string());
@@ -224,6 +295,17 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
              with_commas(plan.total()), with_commas(plan.cache_slots), with_commas(plan.setup_bytes));
 }
 
+void check_choice(const RenderArgs &options) {
+  if (!options.max_error) {
+    if (!options.error_map.empty()) throw Error("--error-map needs --max-error");
+    return;
+  }
+  check_max_error(*options.max_error);
+  if (options.reference) throw Error("--reference cannot choose: leave out --max-error");
+  if (options.frame.value_error > 0 || options.renderer_flags.values.max_pixel_error > 0)
+    throw Error("--max-error chooses for itself: leave out --value-error and --max-pixel-error");
+}
+
 void run_render(RenderArgs options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
@@ -232,13 +314,20 @@ void run_render(RenderArgs options) {
   }
   coarser({}, options.frame.value_error);  // or throws
   check_max_pixel_error(options.renderer_flags.values.max_pixel_error);
+  check_choice(options);
   check_outputs(options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
   const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
+  if (options.max_error) {
+    options.frame.compression.measure_error = true;
+    options.renderer_flags.values.max_pixel_error = 1;  // for levels of detail to be there
+    options.renderer_flags.values.with_bounds = true;
+  }
   want_levels(options.renderer_flags, options.frame.compression);
   const Scene scene = load_scene(options.input, options.volume, options.frame, device.get());
+  if (options.max_error && scene.volume.coarser.empty()) options.renderer_flags.values.max_pixel_error = 0;
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
@@ -247,7 +336,8 @@ void run_render(RenderArgs options) {
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {
-    DeviceFrames frames(*device, scene, appearance, options.renderer, options.frame.value_error);
+    DeviceFrames frames(*device, scene, appearance, options.renderer, options.frame.value_error,
+                        options.max_error);
     options.renderer = frames.renderer().options();
     if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());
@@ -280,6 +370,12 @@ void add_render(CLI::App &app) {
                       "PNG; NAME_isoV_viewK.png when there are several frames");
   command->add_option("--depth", options->depth,
                       "float32 .npy [H,W]: distance from the eye, inf where nothing is hit");
+  command->add_option(
+      "--max-error", options->max_error,
+      "choose levels of detail and bit planes for each frame, so that its surface is within so "
+      "many pixels of the true one, and say for how many pixels that is certain");
+  command->add_option("--error-map", options->error_map,
+                      "float32 .npy [H,W] of --max-error: the bound of each pixel, inf where there is none");
   command->add_option("--stats", options->stats, "JSON statistics of every frame and pass");
   command->add_flag("--no-stage-times", options->no_stage_times,
                     "leave ms per stage out of --stats: measuring them makes the host wait after each pass");

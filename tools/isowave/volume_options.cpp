@@ -149,6 +149,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   options.rate = compression.rate;
   options.error_bound = find_error_bound(path, overrides, compression);
   options.levels = compression.levels;
+  options.measure_error = compression.measure_error;
   options.input.progress = make_progress_bar("compressing");
   options.device = options.error_bound ? nullptr : device;
   CompressedVolume volume = compress(*reader, options);

@@ -34,7 +34,8 @@ struct CompressionOptions {
   std::uint32_t rate = 8;  ///< bits per voxel
   std::optional<double> tolerance{}, relative_tolerance{};
   bool exact = false;
-  std::uint32_t levels = 1;  ///< of detail; 0: all there can be
+  std::uint32_t levels = 1;    ///< of detail; 0: all there can be
+  bool measure_error = false;  ///< at a fixed rate, too
 
   bool bounded() const { return tolerance || relative_tolerance || exact; }
 };

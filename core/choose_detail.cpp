@@ -1,0 +1,88 @@
+#include "core/choose_detail.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "core/error.hpp"
+
+namespace isowave {
+
+namespace {
+
+/// Of the small picture: a pixel for so many of the frame along each axis, but no fewer rows.
+constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
+/// Distances between voxels that are tried [pixels].
+constexpr std::array kPixelErrors{8.0, 4.0, 2.0, 1.0, 0.5, 0.25};
+constexpr int kMaxPlaneTries = 8;
+
+}  // namespace
+
+void check_max_error(double max_error) {
+  if (!(max_error > 0) || !std::isfinite(max_error))
+    throw Error("an error of {} pixels cannot be kept: give more than 0", max_error);
+}
+
+DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
+                           float isovalue, double max_error) {
+  check_max_error(max_error);
+  const auto begin = std::chrono::steady_clock::now();
+  const ImageSize size = renderer.options().size;
+  const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
+  const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
+  const double stride = double(size.height) / small.height;
+  const auto set = [&](const Detail &detail, double scale) {
+    renderer.set_max_pixel_error(detail.max_pixel_error / scale);
+    renderer.set_value_error(detail.value_error);
+  };
+  const std::optional<double> error = known_max_error(volume);  // or certify() throws
+  DetailChoice choice;
+  const auto summary_of = [&](const Detail &detail) {
+    set(detail, stride);
+    renderer.render(camera, isovalue);
+    const CertificateSummary summary =
+        summarize(certify(renderer, volume, camera, isovalue, renderer.hits()), max_error / stride);
+    const double all = std::max<double>(double(summary.num_pixels), 1);
+    choice.tries.push_back({detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
+    return summary;
+  };
+  renderer.set_size(small);
+  try {
+    choice.median = stride * summary_of({}).median;
+    choice.tolerance = *error * max_error / choice.median;
+    const double best = choice.tries.front().certified;
+    choice.reachable = best >= 0.5;
+    const auto suffices = [&](const Detail &detail) {
+      summary_of(detail);
+      return choice.tries.back().certified >= best - kLostShare;
+    };
+    if (choice.reachable) {
+      const auto pixel_error = std::ranges::find_if(kPixelErrors, [&](double distance) {
+        return renderer.has_levels() && suffices({distance, 0});
+      });
+      if (pixel_error != kPixelErrors.end()) choice.detail.max_pixel_error = *pixel_error;
+      // Halved until it suffices, or no longer matters beside the error that the volume has anyway.
+      const double range = double{volume.value_range[1]} - double{volume.value_range[0]};
+      double value_error = std::exp2(std::floor(std::log2(std::max(range, 1e-30) / 8)));
+      for (int i = 0; i < kMaxPlaneTries && value_error > *error / 2; ++i, value_error /= 2) {
+        if (plane_error(volume.error_bound, value_error) == 0 ||
+            !suffices({choice.detail.max_pixel_error, value_error}))
+          continue;
+        choice.detail.value_error = value_error;
+        break;
+      }
+    }
+  } catch (...) {
+    renderer.set_size(size);
+    set({}, 1);
+    throw;
+  }
+  renderer.set_size(size);
+  set(choice.detail, 1);
+  choice.total_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return choice;
+}
+
+}  // namespace isowave

@@ -1,0 +1,42 @@
+#pragma once
+// The cheapest way to draw a frame within an error: how coarse its levels of detail, how few its bit planes may be.
+
+#include <vector>
+
+#include "core/certify.hpp"
+
+namespace isowave {
+
+struct Detail {
+  double max_pixel_error = 0;  ///< RendererOptions::max_pixel_error
+  double value_error = 0;      ///< Renderer::set_value_error()
+};
+
+struct DetailChoice {
+  Detail detail;
+  bool reachable = true;  ///< most pixels keep the error at full detail
+  double median = 0;      ///< bound there [pixels]
+  double tolerance = 0;   ///< error of the volume's voxels with which the median would be max_error
+  /// What was tried, and the share of pixels that are not certain to miss and keep the error with it.
+  struct Try {
+    Detail detail;
+    double certified = 0;
+  };
+  std::vector<Try> tries;
+  double total_ms = 0;
+};
+
+/// Share of the pixels that may lose their certificate, against full detail.
+inline constexpr double kLostShare = 0.01;
+
+/// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so many pixels, and their bounds
+/// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, coarsest first, then bit planes: the
+/// first that loses no more than kLostShare. Full detail, where most pixels do not keep max_error even so. max_error: pixels, above 0.
+/// Throws Error as certify() does.
+DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
+                           float isovalue, double max_error);
+
+/// Throws Error unless it is finite and above 0.
+void check_max_error(double max_error);
+
+}  // namespace isowave

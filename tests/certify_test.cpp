@@ -1,0 +1,304 @@
+// Bounds of a frame's error: never exceeded against the volume before compression, in double precision; and what is chosen by them.
+
+#include "core/certify.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "core/choose_detail.hpp"
+#include "core/error.hpp"
+#include "core/level_bounds.hpp"
+#include "core/pyramid.hpp"
+#include "kernels_cl/block_bound.h"
+#include "kernels_cl/grid_dda.h"
+#include "reference/cell_oracle.hpp"
+#include "reference/twin.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+using test::camera_along;
+using test::expect_same_hits;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr ImageSize kSmall{12, 8}, kMedium{96, 64};
+
+struct Scene {
+  Scene(const glm::uvec3 &dims, const test::VoxelFunction &field, CompressOptions options)
+      : source(test::sample(dims, field)) {
+    test::ArrayVolume reader(test::grid_info(dims, {1, 1.25, 0.75}), source);
+    options.measure_error = true;
+    options.levels = 0;
+    volume = compress(reader, options);
+  }
+
+  std::vector<float> source;
+  CompressedVolume volume;
+};
+
+// ---- bounds of levels
+
+TEST(BlockBound, CodesAscendByASixteenth) {
+  EXPECT_EQ(block_bound(0), 0.0f);
+  EXPECT_EQ(block_bound(255), ISO_BOUND_MAX);
+  for (uint code = 1; code < 256; ++code) {
+    EXPECT_GT(block_bound(code), block_bound(code - 1));
+    if (code > 16) {
+      EXPECT_LE(block_bound(code), block_bound(code - 1) * 1.0625f);
+    }
+  }
+}
+
+TEST(BlockBound, AreNeverBelow) {
+  for (const float scale : {0x1p-120f, 1e-3f, 1.0f, 3e20f}) {
+    std::vector<float> bounds = {0.0f};
+    for (int i = 0; i < 400; ++i) bounds.push_back(scale / (1.0f + float(i * i)));
+    const BlockBounds coded = encode_bounds(bounds);
+    for (std::size_t i = 0; i < bounds.size(); ++i) {
+      const double value = std::ldexp(double{block_bound(coded.codes[i])}, coded.exponent);
+      EXPECT_GE(value, double{bounds[i]});
+      if (scale > 0x1p-100f) {
+        EXPECT_LE(value, 1.07 * double{bounds[i]} + 4e-6 * double{scale});
+      }
+    }
+  }
+  EXPECT_THAT(encode_bounds(std::array{0.0f, 0.0f}).codes, testing::Each(0));
+}
+
+/// The field that the bounds span, trilinear like the volume's own, against the difference at random places.
+TEST(LevelBounds, HoldBetweenVoxels) {
+  for (const glm::uvec3 &dims : {glm::uvec3(33, 32, 40), glm::uvec3(17, 41, 20)}) {
+    const Scene scene(dims, test::noise_field(3), {.rate = 16});
+    const CellOracle truth(scene.source, {dims.x, dims.y, dims.z}, 0.5f);
+    std::mt19937 random(5);
+    for (std::size_t level = 0; level < scene.volume.coarser.size(); ++level) {
+      const CompressedVolume &coarse = scene.volume.coarser[level];
+      const std::vector<float> voxels = decode_with_libzfp(coarse);
+      const glm::uvec3 n = coarse.info.dims, blocks = coarse.num_blocks();
+      std::vector<float> bounds(voxels.size());
+      for (std::uint32_t z = 0; z < n.z; ++z) {
+        for (std::uint32_t y = 0; y < n.y; ++y) {
+          for (std::uint32_t x = 0; x < n.x; ++x) {
+            const std::size_t block = x / 4 + blocks.x * (y / 4 + std::size_t{blocks.y} * (z / 4));
+            bounds[x + n.x * (y + std::size_t{n.y} * z)] =
+                std::ldexp(block_bound(coarse.bounds.codes[block]), coarse.bounds.exponent);
+          }
+        }
+      }
+      const CellOracle coarse_field(voxels, {n.x, n.y, n.z}, 0.5f), bound(bounds, {n.x, n.y, n.z}, 0.5f);
+      const double scale = double(2u << level);
+      double closest = 1e9;
+      for (int i = 0; i < 5000; ++i) {
+        std::array<double, 3> fine{}, at{};
+        for (int axis = 0; axis < 3; ++axis) {
+          fine[std::size_t(axis)] = double(dims[axis] - 1) * double(random()) * 0x1p-32;
+          at[std::size_t(axis)] = fine[std::size_t(axis)] / scale;
+        }
+        const double off = std::abs(coarse_field.field(at) - truth.field(fine)),
+                     most = bound.field(at) + 1e-6;
+        ASSERT_LE(off, most) << "level " << level + 1;
+        closest = std::min(closest, most / off);
+      }
+      EXPECT_LT(closest, 2.5) << "a bound that is never needed, level " << level + 1;
+    }
+  }
+}
+
+// ---- what is certified
+
+/// Checks each bound of a frame against the source. Returns the slack, bound / error, of the median pixel.
+double expect_kept(const Certificate &certificate, std::span<const HitRecord> drawn, const Scene &scene,
+                   const Camera &camera, ImageSize size, float isovalue) {
+  const FrameParams frame = make_frame_params(scene.volume.info, camera, size, isovalue);
+  const glm::uvec3 dims = scene.volume.info.dims;
+  const CellOracle truth(scene.source, {dims.x, dims.y, dims.z}, isovalue);
+  const double pixel_at_1 = 2 * std::tan(glm::radians(camera.fovy_deg) / 2) / size.height;
+  std::vector<double> slacks;
+  for (std::uint32_t pixel = 0; pixel < drawn.size(); ++pixel) {
+    const double bound = double{certificate.bounds[pixel]};
+    if (std::isinf(bound)) continue;
+    const Ray ray = make_ray(&frame, pixel);
+    const OracleHit hit = truth.first_hit({{double{ray.x.o}, double{ray.y.o}, double{ray.z.o}},
+                                           {double{ray.x.d}, double{ray.y.d}, double{ray.z.d}}});
+    EXPECT_EQ(hit.hit, bound > 0) << "pixel " << pixel;
+    EXPECT_EQ(std::isfinite(drawn[pixel].t), bound > 0);
+    if (!hit.hit || bound == 0) continue;
+    const double t = double{drawn[pixel].t},
+                 off = std::abs(t - hit.t * double{frame.t_scale}) / (t * pixel_at_1);
+    EXPECT_LE(off, bound) << "pixel " << pixel;
+    slacks.push_back(bound / off);
+  }
+  if (slacks.empty()) return 0;
+  std::ranges::sort(slacks);
+  return slacks[slacks.size() / 2];
+}
+
+class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  ocl::Device device_{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, CertifyOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+
+TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
+  const Scene scene({9, 10, 11}, test::gyroid_field(9), {.rate = 6});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  Renderer renderer(device_, scene.volume, {.size = kSmall, .cache_slots = 20, .with_bounds = true});
+  for (const FieldBound bound : {FieldBound::kLower, FieldBound::kUpper, FieldBound::kNone}) {
+    renderer.draw_bound(bound);
+    renderer.render(camera, 0.4f);
+    expect_same_hits(renderer.hits(), Twin(scene.volume, 0, 0, bound).render(camera, kSmall, 0.4f),
+                     kSmall.width);
+  }
+}
+
+TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
+  for (const CompressOptions &options :
+       {CompressOptions{.rate = 8}, CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
+    const Scene scene({40, 37, 44}, test::gyroid_field(11), options);
+    const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+    for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
+      ocl::Device device(GetParam());
+      Renderer renderer(device, scene.volume,
+                        {.size = kMedium, .stream = place, .max_pixel_error = 4, .with_bounds = true});
+      EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
+      for (const double value_error : {0.0, 0.1}) {
+        renderer.set_value_error(value_error);
+        for (const FieldBound bound : {FieldBound::kUpper, FieldBound::kNone, FieldBound::kLower}) {
+          renderer.draw_bound(bound);
+          renderer.render(camera, 0.4f);
+          expect_same_hits(renderer.hits(),
+                           Twin(scene.volume, 4, value_error, bound).render(camera, kMedium, 0.4f),
+                           kMedium.width);
+        }
+        renderer.draw_bound(FieldBound::kNone);
+      }
+      EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
+      EXPECT_LE(device.ledger().peak(), renderer.memory_plan().peak());
+    }
+  }
+}
+
+TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
+  std::uint64_t certified = 0, all = 0;
+  for (const glm::uvec3 &dims : {glm::uvec3(64, 60, 56), glm::uvec3(33, 48, 40)}) {
+    for (const auto &field : {test::gyroid_field(24), test::sphere_field(dims), test::noise_field(7)}) {
+      for (const CompressOptions &options :
+           {CompressOptions{.rate = 8}, CompressOptions{.error_bound = ErrorBound{.min_exponent = -8}}}) {
+        const Scene scene(dims, field, options);
+        Renderer renderer(device_, scene.volume,
+                          {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
+        std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
+        cameras.push_back(camera_along({20, 18, 16}, {0.3, 0.2, 1}));  // from within
+        for (const Camera &camera : cameras) {
+          for (const Detail &detail : {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
+            renderer.set_max_pixel_error(detail.max_pixel_error);
+            renderer.set_value_error(detail.value_error);
+            renderer.render(camera, 0.3f);
+            const std::vector<HitRecord> drawn = renderer.hits();
+            const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
+            expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
+            const CertificateSummary summary = summarize(certificate, 10);
+            certified += summary.num_certified;
+            all += summary.num_pixels;
+            renderer.render(camera, 0.3f);  // and the volume is drawn again
+            expect_same_hits(renderer.hits(), drawn, kMedium.width);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(2 * certified, all) << "too few for a test";
+}
+
+TEST_P(CertifyOnDevice, BoundsAreTight) {
+  const Scene scene({96, 96, 96}, test::gyroid_field(48), {.error_bound = ErrorBound{.min_exponent = -6}});
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  for (const double max_pixel_error : {0.0, 2.0}) {
+    renderer.set_max_pixel_error(max_pixel_error);
+    renderer.render(camera, 0.3f);
+    const std::vector<HitRecord> drawn = renderer.hits();
+    const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
+    const double slack = expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
+    const CertificateSummary summary = summarize(certificate, 1e9);
+    EXPECT_LT(slack, 20);  // the bound is of the worst of a million voxels
+    EXPECT_GT(summary.num_certified, summary.num_pixels * 7 / 10) << max_pixel_error;
+  }
+}
+
+TEST_P(CertifyOnDevice, ChoosesLessForMore) {
+  const Scene scene({96, 96, 96}, test::gyroid_field(48), {.error_bound = ErrorBound{.min_exponent = -10}});
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  double pixel_error = -1, value_error = -1;
+  for (const double max_error : {0.00005, 0.05, 1.0, 4.0}) {
+    const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, max_error);
+    EXPECT_GE(choice.detail.max_pixel_error, pixel_error);
+    if (choice.detail.max_pixel_error == pixel_error) {
+      EXPECT_GE(choice.detail.value_error, value_error);
+    }
+    pixel_error = choice.detail.max_pixel_error;
+    value_error = choice.detail.value_error;
+    EXPECT_EQ(renderer.options().max_pixel_error, pixel_error);
+    EXPECT_EQ(renderer.value_error(), value_error);
+    EXPECT_EQ(renderer.options().size.width, kMedium.width);
+    if (max_error == 0.00005) {
+      EXPECT_FALSE(choice.reachable);
+      EXPECT_LT(choice.tolerance, *scene.volume.max_error);
+      EXPECT_EQ(pixel_error, 0);
+    } else {
+      EXPECT_TRUE(choice.reachable);
+      renderer.render(camera, 0.3f);
+      const std::vector<HitRecord> drawn = renderer.hits();
+      const CertificateSummary summary =
+          summarize(certify(renderer, scene.volume, camera, 0.3f, drawn), max_error);
+      EXPECT_GT(double(summary.num_certified),
+                (choice.tries[0].certified - 0.08) * double(summary.num_pixels));
+    }
+  }
+  EXPECT_GT(pixel_error, 0);
+}
+
+TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
+  const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  const auto certify_with = [&](const CompressedVolume &volume, const RendererOptions &options) {
+    Renderer renderer(device_, volume, options);
+    renderer.render(camera, 0.3f);
+    certify(renderer, volume, camera, 0.3f, renderer.hits());
+  };
+  EXPECT_NO_THROW(certify_with(scene.volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}));
+  CompressedVolume volume = scene.volume;
+  volume.max_error.reset();
+  volume.bounds = {};
+  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
+              ThrowsMessage<Error>(HasSubstr("--no-verify")));
+  volume = scene.volume;
+  volume.coarser[0].bounds = {};
+  EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));
+  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}); },
+              ThrowsMessage<Error>(HasSubstr("--levels")));
+  volume = scene.volume;
+  volume.value_range = {-INFINITY, INFINITY};
+  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
+              ThrowsMessage<Error>(HasSubstr("range of values")));
+  EXPECT_THAT(
+      [&] {
+        certify_with(scene.volume,
+                     {.size = kSmall, .solver = solver_from_string("linear"), .with_bounds = true});
+      },
+      ThrowsMessage<Error>(HasSubstr("bernstein")));
+  Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true});
+  EXPECT_THROW(renderer.set_max_pixel_error(1), Error);
+  EXPECT_THROW(renderer.set_size({13, 8}), Error);
+  for (const double bad : {0.0, -1.0, double{INFINITY}, double{NAN}})
+    EXPECT_THROW(choose_detail(renderer, scene.volume, camera, 0.3f, bad), Error);
+}
+
+}  // namespace
+}  // namespace isowave
