@@ -116,15 +116,27 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
       certificate.decoded_blocks += pass.counts.decoded_count;
     return renderer.hits();
   };
-  const std::vector<HitRecord> lower = draw(FieldBound::kLower), upper = draw(FieldBound::kUpper);
+  std::vector<HitRecord> lower, upper;
+  try {
+    lower = draw(FieldBound::kLower);
+    upper = draw(FieldBound::kUpper);
+  } catch (...) {
+    renderer.draw_bound(FieldBound::kNone);
+    throw;
+  }
   renderer.draw_bound(FieldBound::kNone);
 
-  std::vector<VolumeInfo> infos = {volume.info};
   std::vector<const CompressedVolume *> levels = {&volume};
-  for (const CompressedVolume &level : volume.coarser) {
-    if (options.max_pixel_error == 0) break;
-    infos.push_back(level.info);
-    levels.push_back(&level);
+  if (options.max_pixel_error > 0) {
+    for (const CompressedVolume &level : volume.coarser) levels.push_back(&level);
+  }
+  std::vector<VolumeInfo> infos;
+  std::vector<ValueOffset> offsets;
+  for (const CompressedVolume *level : levels) {
+    infos.push_back(level->info);
+    offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
+                                   plane_error(level->error_bound, renderer.value_error()),
+                                   magnitude_of(volume.value_range)));
   }
   const std::vector<FrameParams> frames =
       make_level_frames(infos, camera, options.size, isovalue, options.max_pixel_error);
@@ -133,12 +145,8 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   constexpr std::uint32_t kRows = 8;  // of pixels, that share decoded blocks
   parallel_for((options.size.height + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
     std::vector<BlockValues> values;
-    for (std::size_t i = 0; i < levels.size(); ++i) {
-      const ValueOffset offset = value_offset({*levels[i], i == 0}, FieldBound::kUpper,
-                                              plane_error(levels[i]->error_bound, renderer.value_error()),
-                                              magnitude_of(volume.value_range));
-      values.emplace_back(*levels[i], renderer.value_error(), offset);
-    }
+    for (std::size_t i = 0; i < levels.size(); ++i)
+      values.emplace_back(*levels[i], renderer.value_error(), offsets[i]);
     const auto first = static_cast<std::uint32_t>(part * kRows * options.size.width);
     const std::uint32_t end =
         std::min(first + kRows * options.size.width, static_cast<std::uint32_t>(drawn.size()));

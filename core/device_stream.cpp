@@ -94,7 +94,7 @@ void DeviceStream::add_index(ocl::Device &device, std::vector<std::uint32_t> wor
 
 ocl::Defines DeviceStream::defines() const {
   ocl::Defines defines;  // none: as kernels are built without a word
-  if (parts.size() != 1) defines.emplace("ISO_STREAM_PARTS", fmt::format("{}", parts.size()));
+  if (parts.size() != 1) defines.emplace("ISO_STREAM_PARTS", parts.empty() ? "0" : "4");
   if (indexed_) defines.emplace("ISO_STREAM_INDEXED", "1");
   return defines;
 }

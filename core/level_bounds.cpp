@@ -141,10 +141,14 @@ LevelError::LevelError(const CompressedVolume &level, bool finest) {
   if (!bounds.codes.empty()) {
     uniform = 0;
     unit = std::ldexp(1.0f, bounds.exponent);
-    largest_bound = unit * block_bound(std::ranges::max(bounds.codes));
   } else if (finest) {
     uniform = known_max_error(level);
   }
+}
+
+float largest_bound(const BlockBounds &bounds) {
+  if (bounds.codes.empty()) return 0;
+  return std::ldexp(block_bound(std::ranges::max(bounds.codes)), bounds.exponent);
 }
 
 double plane_error(const ErrorBound &bound, double value_error) {

@@ -57,8 +57,8 @@ struct LevelError {
 
   std::optional<double> uniform;  ///< of every value; nothing is known without it
   float unit = 0;                 ///< and of its block's bound besides
-  float largest_bound = 0;        ///< of a block
 };
+float largest_bound(const BlockBounds &bounds);
 
 /// How far decoded values may be from those of all bit planes where coarser(bound, value_error) leaves planes out.
 double plane_error(const ErrorBound &bound, double value_error);

@@ -33,6 +33,7 @@ struct Level {
   VolumeInfo info;
   ErrorBound error_bound;  ///< of its blocks
   LevelError error;        ///< of its field against the volume's
+  float largest_bound;     ///< of a block's error
   DeviceStream stream;
   Macrocells macrocells;
   ZfpDecode decode;

@@ -96,8 +96,8 @@ Level make_level(ocl::Device &device, const CompressedVolume &volume, const Leve
                             : DeviceStream(device, volume, options.largest_stream_part, options.with_bounds);
   Macrocells macrocells(device, make_grid_params(volume.info), stream);
   ZfpDecode decode(device, plan.cache_slots, stream.defines(), options.max_pixel_error > 0);
-  return {volume.info,       volume.error_bound,    error,
-          std::move(stream), std::move(macrocells), std::move(decode)};
+  return {volume.info,           volume.error_bound, error, largest_bound(volume.bounds), std::move(stream),
+          std::move(macrocells), std::move(decode)};
 }
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
@@ -275,10 +275,13 @@ void Renderer::update_layouts() {
     changes = true;
     level.selected_isovalue.reset();
     level.stream.layout = layout;
-    level.range_error = static_cast<float>(few_planes) + std::abs(offset.uniform);
+    level.range_error = static_cast<float>(few_planes);
+    if (bound_ == FieldBound::kNone) continue;
+    const float bound = level.largest_bound;
+    level.range_error += std::abs(offset.uniform);
     // All of the finest level would take longer to decode again than the blocks that wider ranges let in.
-    if (&level == &state_.levels.front() && bound_ != FieldBound::kNone)
-      level.range_error += level.error.largest_bound;
+    if (&level == &state_.levels.front()) level.range_error += bound;
+    level.range_error += 0x1p-20f * (static_cast<float>(magnitude) + level.range_error + bound);  // roundings
   }
   if (!changes) return;
   classified_isovalue_.reset();

@@ -105,8 +105,8 @@ class Renderer {
 
   /// The hit buffer [height * width], row 0 at the top. Waits.
   std::vector<HitRecord> hits() const {
-    std::vector<HitRecord> hits = state_.rays.hits.read();
-    hits.resize(options_.size.num_pixels());
+    std::vector<HitRecord> hits(options_.size.num_pixels());
+    state_.rays.hits.read(hits);
     return hits;
   }
   /// The picture of the hit buffer. Waits.

@@ -66,7 +66,9 @@ Shade::Shade(ocl::Device &device, std::uint64_t num_pixels)
 Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays) {
   params_.write({&params, 1});
   kernel_(range_, rays.frame, params_, rays.hits, image_);
-  return rgb_image(rays.frame, image_.read());
+  std::vector<uint> packed(std::size_t{rays.frame.width} * rays.frame.height);
+  image_.read(packed);
+  return rgb_image(rays.frame, packed);
 }
 
 }  // namespace isowave

@@ -208,13 +208,11 @@ std::uint32_t BitAppender::pad() {
 }
 
 ErrorBoundCoder::ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink)
-    : dims_(dims), bound_(bound), sink_(sink) {}
+    : dims_(dims), bound_(bound), sink_(sink), errors_(!bound.max_error) {}
 
 void ErrorBoundCoder::begin_chunk(const Chunk &chunk) {
   rows_.assign(chunk.num_rows, {});
-  if (bound_.max_error) return;
-  chunk_errors_ = errors_.size();
-  errors_.resize(chunk_errors_ + chunk.num_rows * ((dims_.x + 3) / 4));
+  if (!bound_.max_error) errors_.begin(chunk.num_rows * ((dims_.x + 3) / 4));
 }
 
 void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
@@ -228,13 +226,14 @@ void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
     coded.lengths.push_back(static_cast<std::uint16_t>(length));
     coded.bits.append(codec.words(), length);
     if (bound_.max_error) continue;
-    errors_[chunk_errors_ + row.index * blocks_x + bx] =
+    errors_.some()[row.index * blocks_x + bx] =
         largest_error(codec.decode(bound_.min_exponent), row, bx, dims_.x, layer, bound_.whole_numbers);
   }
   coded.bits.pad();
 }
 
 void ErrorBoundCoder::end_chunk(const Chunk &) {
+  errors_.end();
   for (const CodedRow &row : rows_) {
     std::uint64_t bits = 0;
     for (const std::uint16_t length : row.lengths) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/block_errors.hpp"
 #include "core/zfp_stream.hpp"
 
 namespace isowave {
@@ -61,8 +62,8 @@ class ErrorBoundCoder : public ChunkCoder {
   void end_chunk(const Chunk &chunk) override;
   /// Hands over the last bits, as words of 32; returns the index.
   std::vector<std::uint32_t> finish();
-  /// Largest |decoded - source| of each block; none where the bound says what it is of all.
-  const std::vector<double> &block_errors() const { return errors_; }
+  /// Largest |decoded - source| of blocks; none where the bound says what it is of all.
+  BlockErrors &errors() { return errors_; }
 
  private:
   struct CodedRow {
@@ -73,9 +74,8 @@ class ErrorBoundCoder : public ChunkCoder {
   glm::uvec3 dims_;
   ErrorBound bound_;
   const Sink &sink_;
-  std::vector<double> errors_;    ///< of each block so far
-  std::size_t chunk_errors_ = 0;  ///< the first of the present chunk
-  std::vector<CodedRow> rows_;    ///< of the present chunk
+  BlockErrors errors_;
+  std::vector<CodedRow> rows_;  ///< of the present chunk
   BitAppender payload_;
   BlockIndexBuilder index_;
 };

@@ -75,16 +75,17 @@ void ZfpEncode::measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec
 }
 
 LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block,
-                           bool measure_error)
+                           bool measure_error, BlockErrors errors)
     : device_(device),
       dims_(dims),
       piece_dims_(largest_piece(dims)),
       bits_per_block_(bits_per_block),
       measure_error_(measure_error),
+      errors_(std::move(errors)),
       zfp_encode_(device),
       voxels_(device, "voxels to encode", voxel_count(piece_dims_)),
       words_(device, "encoded words", block_count(piece_dims_) * (bits_per_block / 32) + 1),
-      errors_(device, "encoding errors", measure_error ? 2 * block_count(piece_dims_) : 0) {}
+      device_errors_(device, "encoding errors", measure_error ? 2 * block_count(piece_dims_) : 0) {}
 
 LayerEncoder::~LayerEncoder() {
   try {
@@ -128,9 +129,9 @@ void LayerEncoder::enqueue_piece(const glm::uvec3 &dims) {
   zfp_encode_(voxels_, dims, bits_per_block_, words_);
   current_.words.resize(num_blocks * (bits_per_block_ / 32));
   if (measure_error_) {
-    zfp_encode_.measure_errors(voxels_, dims, bits_per_block_, words_, errors_);
+    zfp_encode_.measure_errors(voxels_, dims, bits_per_block_, words_, device_errors_);
     current_.errors.resize(2 * num_blocks);
-    errors_.read_async(current_.errors, current_.done);
+    device_errors_.read_async(current_.errors, current_.done);
   }
   words_.read_async(current_.words, current_.done);
 }
@@ -142,9 +143,10 @@ void LayerEncoder::hand_over(const Result &result, const Sink &sink) {
     throw Error("device '{}' failed to encode voxels: {}: {}", device_.info().name, error.what(),
                 ocl::error_name(error.err()));
   }
-  for (std::size_t i = 0; i < result.errors.size(); i += 2) {
-    block_errors_.push_back(double{result.errors[i]} + double{result.errors[i + 1]});
-  }
+  const std::span<double> errors = errors_.begin(result.errors.size() / 2);
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    errors[i] = double{result.errors[2 * i]} + double{result.errors[2 * i + 1]};
+  errors_.end();
   sink(std::as_bytes(std::span<const uint>(result.words)));
 }
 

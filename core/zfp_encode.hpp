@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/block_errors.hpp"
 #include "core/ocl/kernel.hpp"
 #include "kernels_cl/shared_types.h"
 
@@ -45,7 +46,8 @@ class LayerEncoder {
   using Sink = std::function<void(std::span<const std::byte>)>;
 
   /// dims: of the whole volume. bits_per_block: a multiple of 64.
-  LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block, bool measure_error);
+  LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block, bool measure_error,
+               BlockErrors errors = BlockErrors(false));
   ~LayerEncoder();
   LayerEncoder(const LayerEncoder &) = delete;
   LayerEncoder &operator=(const LayerEncoder &) = delete;
@@ -57,8 +59,8 @@ class LayerEncoder {
   /// Hands the last piece to `sink`.
   void finish(const Sink &sink);
 
-  /// Largest |decoded - voxel| of each block that `sink` got; none unless measured.
-  const std::vector<double> &block_errors() const { return block_errors_; }
+  /// Largest |decoded - voxel| of blocks that `sink` got; none unless measured.
+  BlockErrors &errors() { return errors_; }
 
  private:
   /// What the device sends back of a piece.
@@ -75,11 +77,11 @@ class LayerEncoder {
   glm::uvec3 dims_, piece_dims_;  ///< of the volume; of the largest piece
   std::uint32_t bits_per_block_;
   bool measure_error_;
-  std::vector<double> block_errors_;
+  BlockErrors errors_;
   ZfpEncode zfp_encode_;
   ocl::Buffer<float> voxels_;
   ocl::Buffer<uint> words_;
-  ocl::Buffer<float> errors_;
+  ocl::Buffer<float> device_errors_;
   Result current_, previous_;  ///< of the piece at work, and of the one before it
   bool in_flight_ = false;     ///< current_ is to come
 };

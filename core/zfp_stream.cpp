@@ -13,6 +13,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/block_errors.hpp"
 #include "core/error.hpp"
 #include "core/io/mapped_file.hpp"
 #include "core/level_bounds.hpp"
@@ -38,27 +39,15 @@ class LevelCoder : public ChunkCoder {
   virtual std::vector<float> finish(CompressedVolume &volume) = 0;
 };
 
-std::vector<float> rounded_up(std::span<const double> errors) {
-  std::vector<float> result(errors.size());
-  std::ranges::transform(errors, result.begin(), [](double error) {
-    const float nearest = static_cast<float>(error);
-    return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
-                                   : nearest;
-  });
-  return result;
-}
-
 /// Compresses rows of blocks by libzfp.
 class FixedRateCoder : public LevelCoder {
  public:
   FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink)
-      : dims_(dims), options_(options), sink_(sink) {}
+      : dims_(dims), options_(options), sink_(sink), errors_(options.levels != 1) {}
 
   void begin_chunk(const Chunk &chunk) override {
     words_.resize(chunk.num_rows * row_words());
-    if (!options_.measure_error) return;
-    chunk_errors_ = errors_.size();
-    errors_.resize(chunk_errors_ + chunk.num_rows * blocks_x());
+    if (options_.measure_error) errors_.begin(chunk.num_rows * blocks_x());
   }
 
   void code_row(const BlockRow &row, std::uint32_t) override {
@@ -82,7 +71,7 @@ class FixedRateCoder : public LevelCoder {
     if (zfp_decompress(stream.get(), copy.get()) == 0)
       throw std::logic_error("zfp: cannot decode its own blocks");
     const float *value = decoded.data();
-    double *errors = errors_.data() + chunk_errors_ + row.index * blocks_x();
+    double *errors = errors_.some().data() + row.index * blocks_x();
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y) {
         const float *source = row.voxels + z * layer_size() + std::ptrdiff_t(y) * dims_.x;
@@ -92,11 +81,14 @@ class FixedRateCoder : public LevelCoder {
     }
   }
 
-  void end_chunk(const Chunk &) override { sink_(std::as_bytes(std::span(words_))); }
+  void end_chunk(const Chunk &) override {
+    sink_(std::as_bytes(std::span(words_)));
+    errors_.end();
+  }
 
   std::vector<float> finish(CompressedVolume &volume) override {
-    if (options_.measure_error) volume.max_error = std::ranges::max(errors_);
-    return rounded_up(errors_);
+    if (options_.measure_error) volume.max_error = errors_.max();
+    return errors_.take();
   }
 
  private:
@@ -108,15 +100,15 @@ class FixedRateCoder : public LevelCoder {
   const CompressOptions &options_;
   const Sink &sink_;
   std::vector<std::uint64_t> words_;  ///< of the present chunk
-  std::vector<double> errors_;        ///< of each block so far
-  std::size_t chunk_errors_ = 0;      ///< the first of the present chunk
+  BlockErrors errors_;
 };
 
 /// Has a device compress whole chunks.
 class DeviceCoder : public LevelCoder {
  public:
   DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink)
-      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error),
+      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error,
+                 BlockErrors(options.levels != 1)),
         measure_error_(options.measure_error),
         sink_(sink) {}
 
@@ -124,8 +116,8 @@ class DeviceCoder : public LevelCoder {
 
   std::vector<float> finish(CompressedVolume &volume) override {
     encoder_.finish(sink_);
-    if (measure_error_) volume.max_error = std::ranges::max(encoder_.block_errors());
-    return rounded_up(encoder_.block_errors());
+    if (measure_error_) volume.max_error = encoder_.errors().max();
+    return encoder_.errors().take();
   }
 
  private:
@@ -147,10 +139,11 @@ class BoundedCoder : public LevelCoder {
     volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
     if (volume.error_bound.max_error) {  // the finest level, of which every block is about as far off
       volume.max_error = volume.error_bound.max_error;
-      return std::vector<float>(volume.block_count(), rounded_up(std::array{*volume.max_error}).front());
+      if (volume.coarser.empty()) return {};
+      return std::vector<float>(volume.block_count(), BlockErrors::rounded_up(*volume.max_error));
     }
-    volume.max_error = volume.error_bound.max_error = std::ranges::max(coder_.block_errors());
-    return rounded_up(coder_.block_errors());
+    volume.max_error = volume.error_bound.max_error = coder_.errors().max();
+    return coder_.errors().take();
   }
 
  private:

@@ -1,6 +1,6 @@
 /// block_stream.h -- where the bits of a block are on the device (core/device_stream.hpp). OpenCL C 1.2.
 ///
-/// ISO_STREAM_PARTS, by -D: 1 the whole zfp stream is in part_0. 2, 3, 4: it is cut into as many buffers of layout.words_per_part
+/// ISO_STREAM_PARTS, by -D: 1 the whole zfp stream is in part_0. 4: it is cut into up to four buffers of layout.words_per_part
 /// words, each going on so far behind its end that a block which begins in it is whole. 0: part_0 is a window that holds only the
 /// blocks of this launch, one after the other, each beginning with a whole word.
 /// ISO_STREAM_INDEXED: 0 all blocks are layout.bits_per_block long. 1: `index` says where they begin (block_index.h); a window

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <filesystem>
 
 #include "core/choose_detail.hpp"
 #include "core/error.hpp"
@@ -21,6 +22,7 @@
 namespace isowave {
 namespace {
 
+namespace fs = std::filesystem;
 using test::camera_along;
 using test::expect_same_hits;
 using testing::HasSubstr;
@@ -32,6 +34,16 @@ struct Scene {
   Scene(const glm::uvec3 &dims, const test::VoxelFunction &field, CompressOptions options)
       : source(test::sample(dims, field)) {
     test::ArrayVolume reader(test::grid_info(dims, {1, 1.25, 0.75}), source);
+    compress_from(reader, options);
+  }
+  Scene(const std::string &file, const CompressOptions &options) {
+    const auto reader = open_volume(fs::path(ISOWAVE_TEST_DATA) / file);
+    source.resize(reader->info().num_voxels());
+    reader->read_layers(0, reader->info().dims.z, source);
+    test::ArrayVolume array(reader->info(), source);
+    compress_from(array, options);
+  }
+  void compress_from(VolumeReader &reader, CompressOptions options) {
     options.measure_error = true;
     options.levels = 0;
     volume = compress(reader, options);
@@ -215,6 +227,29 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
   EXPECT_GT(2 * certified, all) << "too few for a test";
 }
 
+TEST_P(CertifyOnDevice, RealVolumes) {
+  std::uint64_t certified = 0, all = 0;
+  for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
+    const Scene scene(file, {.rate = 8});
+    Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
+    for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
+      for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
+        for (const double max_pixel_error : {0.0, 2.0}) {
+          renderer.set_max_pixel_error(max_pixel_error);
+          renderer.render(camera, isovalue);
+          const std::vector<HitRecord> drawn = renderer.hits();
+          const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
+          expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
+          const CertificateSummary summary = summarize(certificate, 4);
+          certified += summary.num_certified;
+          all += summary.num_pixels;
+        }
+      }
+    }
+  }
+  EXPECT_GT(2 * certified, all) << "too few for a test";
+}
+
 TEST_P(CertifyOnDevice, BoundsAreTight) {
   const Scene scene({96, 96, 96}, test::gyroid_field(48), {.error_bound = ErrorBound{.min_exponent = -6}});
   Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
@@ -262,6 +297,21 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
     }
   }
   EXPECT_GT(pixel_error, 0);
+}
+
+TEST_P(CertifyOnDevice, SmallerPicturesAreTheTwins) {
+  const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  Renderer renderer(device_, scene.volume, {.size = kMedium});
+  for (const ImageSize size : {kSmall, kMedium, ImageSize{7, 5}}) {
+    renderer.set_size(size);
+    renderer.render(camera, 0.3f);
+    const auto expected = Twin(scene.volume).render(camera, size, 0.3f);
+    expect_same_hits(renderer.hits(), expected, size.width);
+    const FrameParams frame = make_frame_params(scene.volume.info, camera, size, 0.3f);
+    EXPECT_EQ(renderer.shade().pixels,
+              shade_scalar(frame, make_shade_params(scene.volume.info, {}), expected).pixels);
+  }
 }
 
 TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
