@@ -12,7 +12,6 @@
 #include "core/io/mapped_file.hpp"
 #include "core/level_bounds.hpp"
 #include "core/parallel_for.hpp"
-#include "kernels_cl/block_bound.h"
 #include "kernels_cl/cell_intersect.h"
 #include "kernels_cl/zfp_codec.h"
 
@@ -38,8 +37,7 @@ class BlockValues {
       const glm::uvec3 at = glm::uvec3(cell) + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
       const std::uint32_t id = at.x / 4 + blocks.x * (at.y / 4 + blocks.y * (at.z / 4));
       const float value = decoded(id)[at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4)];
-      float offset = upper_.uniform;
-      if (upper_.unit != 0) offset += upper_.unit * block_bound(volume_.bounds.codes[id]);
+      const float offset = offset_of_block(upper_, volume_.bounds, id);
       lower[corner] = value - offset - isovalue;
       upper[corner] = value + offset - isovalue;
     }

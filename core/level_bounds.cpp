@@ -173,6 +173,10 @@ ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane
   return bound == FieldBound::kUpper ? ValueOffset{uniform, error.unit} : ValueOffset{-uniform, -error.unit};
 }
 
+float offset_of_block(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block) {
+  return offset.unit == 0 ? offset.uniform : offset.uniform + offset.unit * block_bound(bounds.codes[block]);
+}
+
 double magnitude_of(const std::array<float, 2> &value_range) {
   const double magnitude = std::max(std::abs(double{value_range[0]}), std::abs(double{value_range[1]}));
   if (!std::isfinite(magnitude)) throw Error("the volume's range of values is not known: convert it again");

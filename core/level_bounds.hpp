@@ -71,6 +71,9 @@ struct ValueOffset {
 /// float32 counts as error, too. Throws Error where the level's error is not known.
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error, double magnitude);
 
+/// What is added to the values of a block: as decode_block() in kernels_cl/block_stream.h adds it up.
+float offset_of_block(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block);
+
 /// The largest magnitude in a volume's range. Throws Error where that is not known.
 double magnitude_of(const std::array<float, 2> &value_range);
 

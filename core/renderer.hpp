@@ -71,7 +71,7 @@ inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 class Renderer {
  public:
   /// Uploads the volume, builds its macrocell ranges and every buffer of the frame; nothing is allocated
-  /// later. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
+  /// later, but what draw_bound() needs for a moment. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
   /// renderer; `volume` need not, unless it stays on the host (memory_plan().stream).
   Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
 

@@ -1,6 +1,5 @@
 #include "reference/twin.hpp"
 
-#include "kernels_cl/block_bound.h"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave {
@@ -15,9 +14,7 @@ void add_offset(const CompressedVolume &level, const ValueOffset &offset, std::v
     for (std::uint32_t y = 0; y < dims.y; ++y) {
       for (std::uint32_t x = 0; x < dims.x; ++x, ++value) {
         const std::size_t block = x / 4 + blocks.x * (y / 4 + std::size_t{blocks.y} * (z / 4));
-        float sum = offset.uniform;
-        if (offset.unit != 0) sum += offset.unit * block_bound(level.bounds.codes[block]);
-        *value += sum;
+        *value += offset_of_block(offset, level.bounds, block);
       }
     }
   }

@@ -122,8 +122,8 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
   fmt::print(
       "  within {} pixels of the true surface: {:.2f} % of {} pixels (bound: median {:.3g}, p99 {:.3g}); {} "
       "uncertain\n"
-      "  with voxels up to {} pixels apart and values up to {} off; chosen in {:.0f} ms, bounded in {:.0f} "
-      "ms\n",
+      "  with voxels up to {} pixels apart and values up to {} off; chosen in {:.0f} ms, bounded in "
+      "{:.0f} ms\n",
       *max_error_, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
       with_commas(summary.num_uncertain), choice_.detail.max_pixel_error, choice_.detail.value_error,
       choice_.total_ms, certificate.total_ms);
@@ -295,6 +295,7 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
              with_commas(plan.total()), with_commas(plan.cache_slots), with_commas(plan.setup_bytes));
 }
 
+/// --max-error and what goes with it.
 void check_choice(const RenderArgs &options) {
   if (!options.max_error) {
     if (!options.error_map.empty()) throw Error("--error-map needs --max-error");
