@@ -179,6 +179,8 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"cache state", sizeof(CacheState)},
                        {"shading", sizeof(ShadeParams)},
                        {"framebuffer", 4 * pixels}});
+  if (request.kept_pixels != 0)
+    plan.buffers.push_back({"kept hits", sizeof(HitRecord) * request.kept_pixels});
   for (const CompressedVolume &level :
        volume.coarser) {  // whose ranges are built again for Renderer::draw_bound()
     if (request.with_levels && request.with_bounds) {

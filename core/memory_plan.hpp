@@ -33,6 +33,7 @@ struct MemoryRequest {
   std::uint32_t window_blocks = 0;        ///< see StreamWindow; 0: by the size of cache and blocks
   bool with_levels = false;               ///< the volume's coarser levels are on the device, too
   bool with_bounds = false;               ///< and the bounds of their blocks' errors
+  std::uint64_t kept_pixels = 0;          ///< of KeptPicture
 };
 
 struct MemoryPlan {

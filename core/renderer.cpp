@@ -69,7 +69,8 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                               options.largest_stream_part,
                               options.window_blocks,
                               options.max_pixel_error > 0,
-                              options.with_bounds};
+                              options.with_bounds,
+                              options.with_kept_picture ? halved(options.size, 1).num_pixels() : 0};
   const std::uint64_t budget =
       options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
   std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
@@ -127,6 +128,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
                               options_.grouping, options_.closest)),
       shade_(device, options_.size.num_pixels()),
       readback_(device) {
+  if (options_.with_kept_picture) kept_.emplace(device, halved(options_.size, 1));
   options_.cache_slots = plan_.cache_slots;
   options_.stream = plan_.stream;
   options_.window_blocks = plan_.window_blocks;
@@ -139,9 +141,11 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   const Uploads uploaded_before = uploads();
   FrameStats stats;
   begin_frame(camera, isovalue);
-  do {
+  draw_band(on_pass, stats);
+  while (!stats.cancelled && !is_last_band()) {
+    begin_next_band();
     draw_band(on_pass, stats);
-  } while (!stats.cancelled && begin_next_band());
+  }
   state_.rays.frame = state_.levels[0].frame;  // for shading
   const Uploads uploaded = uploads();
   stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
@@ -162,8 +166,8 @@ void Renderer::draw_band(const OnPass &on_pass, FrameStats &stats) {
     const PassStats pass = stats_of(readback_.pop());
     stats.passes.push_back(pass);
     stats.rays_hit += pass.counts.hit_count;
-    stats.cancelled = on_pass && !on_pass(pass);
     finished = pass.counts.next_active_count == 0;
+    stats.cancelled = on_pass && !on_pass(pass) && !(finished && is_last_band());
     guard.check(pass.counts);
   }
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
@@ -204,16 +208,17 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
   pipeline_->begin_frame();
 }
 
-/// Returns whether there is one.
-bool Renderer::begin_next_band() {
+bool Renderer::is_last_band() const {
+  const std::size_t next = state_.level_at + 1;
+  return next == state_.levels.size() || !draws(state_.levels[next].frame);
+}
+
+void Renderer::begin_next_band() {
   const Level &before = state_.level();
-  if (state_.level_at + 1 == state_.levels.size() || !draws(state_.levels[state_.level_at + 1].frame))
-    return false;
   ++state_.level_at;
   state_.rays.frame = state_.level().frame;
   readback_.drain();
   pipeline_->begin_band(before);
-  return true;
 }
 
 Renderer::Uploads Renderer::uploads() const {
@@ -228,7 +233,7 @@ Renderer::Uploads Renderer::uploads() const {
 }
 
 PassStats Renderer::stats_of(const PassCounts &counts) {
-  const double pixels = static_cast<double>(state_.rays.num_pixels);
+  const double pixels = static_cast<double>(options_.size.num_pixels());
   PassStats stats;
   stats.counts = counts;
   stats.level = static_cast<std::uint32_t>(state_.level_at);
@@ -316,6 +321,11 @@ void Renderer::set_size(ImageSize size) {
                 state_.rays.num_pixels);
   }
   options_.size = size;
+}
+
+void Renderer::enlarge_kept(const Camera &camera, float isovalue) {
+  state_.rays.frame = make_frame_params(state_.levels[0].info, camera, options_.size, isovalue);
+  kept_.value().show(state_.rays, true);
 }
 
 void Renderer::clear_cache() {

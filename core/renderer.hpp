@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/frame.hpp"
+#include "core/kept_picture.hpp"
 #include "core/memory_plan.hpp"
 #include "core/pass_readback.hpp"
 #include "core/pipeline.hpp"
@@ -39,7 +40,8 @@ struct RendererOptions {
   /// Distance in pixels up to which voxels of a coarser level of detail may be apart, see make_level_frames(); 0: the finest
   /// level draws all.
   double max_pixel_error = 0;
-  bool with_bounds = false;  ///< draw_bound() will be called
+  bool with_bounds = false;        ///< draw_bound() will be called
+  bool with_kept_picture = false;  ///< keep_picture() will be called
 };
 
 /// What one pass did: the counts of the device, and what follows from them.
@@ -57,7 +59,7 @@ struct FrameStats {
   std::uint64_t rays_hit = 0;
   std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
   std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
-  bool cancelled = false;             ///< on_pass said so; the hit buffer holds the picture so far
+  bool cancelled = false;  ///< on_pass said so while rays were left; the hit buffer holds the picture so far
 };
 
 /// Called after each pass, the last included; hits() and shade() show the picture so far. Return false to
@@ -99,6 +101,14 @@ class Renderer {
   /// Pixels of further frames, no more than the renderer was made for: hits() and shade() are of the first so many.
   void set_size(ImageSize size);
 
+  /// For pictures of one frame with more and more pixels (core/time_budget.hpp). Needs options().with_kept_picture.
+  /// Puts the picture aside: of at most half the pixels that the renderer was made for, along each axis, rounded up (halved()).
+  void keep_picture() { kept_.value().keep(state_.rays, options_.size); }
+  /// Where the frame has no hit, it shows the kept picture's, as after rendering was cancelled. The frame must not go on.
+  void fill_from_kept() { kept_.value().show(state_.rays, false); }
+  /// The kept picture with more pixels, as set_size() says; what was drawn is gone. camera, isovalue: of the kept picture.
+  void enlarge_kept(const Camera &camera, float isovalue);
+
   /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture depends
   /// on it. Waits.
   void clear_cache();
@@ -122,7 +132,8 @@ class Renderer {
   void update_layouts();
   void update_ranges(Level &level);
   void draw_band(const OnPass &on_pass, FrameStats &stats);
-  bool begin_next_band();
+  bool is_last_band() const;
+  void begin_next_band();
   struct Uploads {
     std::uint64_t blocks = 0, bytes = 0;
   };
@@ -140,6 +151,7 @@ class Renderer {
   std::optional<float> classified_isovalue_;  ///< what the cache's bits of voxels inside stand for
   std::unique_ptr<Pipeline> pipeline_;
   Shade shade_;
+  std::optional<KeptPicture> kept_;
   PassReadback readback_;
   double setup_ms_ = 0;
 };

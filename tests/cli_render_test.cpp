@@ -321,6 +321,41 @@ TEST(CliRender, MaxError) {
   test::expect_one_line_error(command + " --error-map " + map, "--error-map needs --max-error");
 }
 
+TEST(CliRender, TimeBudget) {
+  const TemporaryFolder folder;
+  const std::string scene = kNucleon + " -i 80 --size 64x48 --no-stage-times ";
+  const auto picture = [&](const std::string &name) { return quoted(folder / (name + ".png")); };
+  ASSERT_EQ(render(scene + "-o " + picture("plain")).status, 0);
+  const auto run = render(scene + "--time-budget 0.001 -o " + picture("quick") + " --refined " +
+                          picture("refined") + " --stats " + quoted(folder / "a.json"));
+  EXPECT_EQ(run.status, 0) << run.err;
+  const json frame = json::parse(test::read_file(folder / "a.json"))["frames"][0]["time_budget"];
+  EXPECT_EQ(frame["budget_ms"], 0.001);
+  EXPECT_FALSE(frame["complete"].get<bool>());
+  ASSERT_EQ(frame["steps"].size(), 1u);
+  EXPECT_EQ(frame["steps"][0]["size"], json({8, 6}));
+  EXPECT_EQ(frame["steps"][0]["max_pixel_error"], 1.0) << "levels of detail are made for it";
+  EXPECT_NE(run.out.find("8x6, voxels up to 1"), std::string::npos) << run.out;
+  const Image8 quick = read_png(folder / "quick.png"), plain = read_png(folder / "plain.png");
+  EXPECT_EQ(quick.width, 64u);
+  EXPECT_NE(quick.pixels, plain.pixels);
+  EXPECT_EQ(read_png(folder / "refined.png").pixels, plain.pixels);
+  ASSERT_EQ(render(scene + "--time-budget 1e9 -o " + picture("ample")).status, 0);
+  EXPECT_EQ(read_png(folder / "ample.png").pixels, plain.pixels);
+  ASSERT_EQ(render(scene + "--pipeline blocks --time-budget 1e9 -o " + picture("ample")).status, 0);
+  EXPECT_EQ(read_png(folder / "ample.png").pixels, plain.pixels);
+
+  const std::string command = "render " + scene + " -o " + picture("a") + " --time-budget ";
+  test::expect_one_line_error(command + "0", "no picture can be drawn in 0 ms");
+  test::expect_one_line_error(command + "nan", "no picture can be drawn");
+  test::expect_one_line_error(command + "9 --reference", "--reference cannot choose");
+  test::expect_one_line_error(command + "9 --max-error 1", "leave out --time-budget");
+  test::expect_one_line_error(command + "9 --progress-dir " + quoted(folder / "p"),
+                              "leave out --progress-dir");
+  test::expect_one_line_error("render " + scene + " --refined " + picture("a"),
+                              "--refined needs --time-budget");
+}
+
 TEST(CliRender, NegativeAndFractionalIsovalues) {
   const TemporaryFolder folder;
   std::vector<float> ramp(512);

@@ -199,9 +199,8 @@ TEST(Cli, FullDiskLeavesNothingAndKeepsTheOldFile) {
   const TemporaryFolder folder;
   write_file(folder / "a.raw", std::string_view("old"));
   // A limit on file size stands in for a full disk; the signal that comes with it must be ignored first.
-  const auto result =
-      test::run_command("trap '' XFSZ; ulimit -f 64; '" ISOWAVE_PROGRAM "' generate sphere --dims 128 -o " +
-                        quoted(folder / "a.raw"));
+  const auto result = test::run_command("trap '' XFSZ; ulimit -f 64; " + test::isowave_program() +
+                                        " generate sphere --dims 128 -o " + quoted(folder / "a.raw"));
   EXPECT_EQ(result.status, 1);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   EXPECT_NE(result.err.find("cannot write"), std::string::npos) << result.err;

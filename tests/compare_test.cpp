@@ -14,6 +14,7 @@
 #include <string>
 
 #include "core/error.hpp"
+#include "tests/run_program.hpp"
 #include "tests/temp_folder.hpp"
 
 namespace isowave {
@@ -96,7 +97,7 @@ class CompareProgram : public testing::Test {
 
   /// Runs `isowave compare` with the folder's files a and b.
   Outcome run(const std::string &a, const std::string &b, const std::string &options = "") {
-    const std::string command = std::string(ISOWAVE_PROGRAM) + " compare " + (folder_ / a).string() + " " +
+    const std::string command = test::isowave_program() + " compare " + (folder_ / a).string() + " " +
                                 (folder_ / b).string() + " " + options + " 2>&1";
     std::FILE *pipe = popen(command.c_str(), "r");
     Outcome outcome;

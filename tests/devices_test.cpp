@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/ocl/device.hpp"
+#include "tests/run_program.hpp"
 
 namespace isowave {
 namespace {
@@ -27,7 +28,7 @@ std::pair<int, std::string> run(const std::string &command) {
 }
 
 TEST(DevicesCommand, JsonListsEveryDeviceAndOneDefault) {
-  const auto [status, output] = run("'" ISOWAVE_PROGRAM "' devices --json");
+  const auto [status, output] = run(test::isowave_program() + " devices --json");
   ASSERT_EQ(status, 0) << output;
   const nlohmann::json list = nlohmann::json::parse(output);
   const std::vector<ocl::DeviceInfo> devices = ocl::list_devices();
@@ -43,7 +44,7 @@ TEST(DevicesCommand, JsonListsEveryDeviceAndOneDefault) {
 }
 
 TEST(DevicesCommand, TableMarksTheDefault) {
-  const auto [status, output] = run("'" ISOWAVE_PROGRAM "' devices");
+  const auto [status, output] = run(test::isowave_program() + " devices");
   ASSERT_EQ(status, 0) << output;
   const ocl::DeviceInfo chosen = ocl::choose_device();
   EXPECT_THAT(output, HasSubstr(fmt::format("\n* {}  {}", chosen.index, to_string(chosen.type))));
@@ -51,7 +52,8 @@ TEST(DevicesCommand, TableMarksTheDefault) {
 }
 
 TEST(DevicesCommand, WrongEnvironmentStillListsTheDevices) {
-  const auto [status, output] = run("ISOWAVE_DEVICE=no-such-device '" ISOWAVE_PROGRAM "' devices 2>&1");
+  const auto [status, output] =
+      run("ISOWAVE_DEVICE=no-such-device " + test::isowave_program() + " devices 2>&1");
   EXPECT_EQ(status, 0);
   EXPECT_THAT(output, HasSubstr("'no-such-device' (from ISOWAVE_DEVICE)"));
   EXPECT_THAT(output, HasSubstr(ocl::list_devices().at(0).name));

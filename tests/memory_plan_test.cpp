@@ -60,8 +60,10 @@ TEST_P(MemoryPlanOnDevice, PlanIsWhatIsBooked) {
         SCOPED_TRACE(fmt::format("{} x {} x {}, {} bits per block, {} slots", dims.x, dims.y, dims.z,
                                  volume->compressed.bits_per_block, slots));
         ocl::Device device(GetParam().device);
-        const Renderer renderer(device, volume->compressed,
-                                GetParam().with({.size = size_, .cache_slots = slots, .stream = place}));
+        const Renderer renderer(
+            device, volume->compressed,
+            GetParam().with(
+                {.size = size_, .cache_slots = slots, .stream = place, .with_kept_picture = slots == 8}));
         expect_booked(device, renderer.memory_plan());
       }
     }

@@ -187,6 +187,15 @@ void RawBuffer::fill_bytes(const void *pattern, std::size_t pattern_bytes, std::
   }
 }
 
+void RawBuffer::copy_bytes(const RawBuffer &from, std::size_t bytes) {
+  if (bytes == 0) return;
+  try {
+    device_->queue().enqueueCopyBuffer(from.mem_, mem_, 0, 0, bytes, nullptr, device_->timer().next_event());
+  } catch (const cl::Error &error) {
+    throw failure(name_, "copy to", error);
+  }
+}
+
 void RawBuffer::check_range(std::size_t count, std::size_t offset, std::size_t size) const {
   if (offset <= size && count <= size - offset) return;
   throw std::invalid_argument(

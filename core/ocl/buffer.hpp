@@ -39,6 +39,7 @@ class RawBuffer {
   void download_bytes(void *dst, std::size_t bytes, std::size_t offset, const cl::Event &after,
                       cl::Event &done) const;
   void fill_bytes(const void *pattern, std::size_t pattern_bytes, std::size_t bytes, std::size_t offset);
+  void copy_bytes(const RawBuffer &from, std::size_t bytes);
   void check_range(std::size_t count, std::size_t offset, std::size_t size) const;
   /// count * element_bytes; SIZE_MAX, which no device has, instead of an overflow.
   static std::size_t bytes_of(std::size_t count, std::size_t element_bytes) {
@@ -109,6 +110,12 @@ class Buffer : public RawBuffer {
     fill_bytes(&value, sizeof(T), count * sizeof(T), offset * sizeof(T));
   }
   void fill(const T &value) { fill(value, 0, size()); }
+  /// Elements [0, count) become those of `from`, in queue order. Does not wait.
+  void copy(const Buffer &from, std::size_t count) {
+    check_range(count, 0, size());
+    from.check_range(count, 0, from.size());
+    copy_bytes(from, count * sizeof(T));
+  }
 };
 
 }  // namespace isowave::ocl

@@ -15,6 +15,7 @@
 #include "core/error.hpp"
 #include "core/io/npy.hpp"
 #include "core/renderer.hpp"
+#include "core/time_budget.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/frame_options.hpp"
@@ -38,8 +39,10 @@ struct RenderArgs {
   RendererOptions renderer;  ///< what the flags ask for
   bool reference = false, no_stage_times = false, verbose = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
-  std::string image, depth, stats, progress_dir, error_map;
-  std::optional<double> max_error;  ///< pixels
+  std::string image, depth, stats, progress_dir, error_map, refined;
+  std::optional<double> max_error;    ///< pixels
+  std::optional<double> time_budget;  ///< ms
+  double max_pixel_error = 0;         ///< of whole frames
 };
 
 /// "#RRGGBB" -> [0,1]^3.
@@ -70,6 +73,8 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
   virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
+  /// Draws the frame once more, however long it takes.
+  virtual FrameStats refine(const Camera &camera, float isovalue) { return render(camera, isovalue, {}); }
   virtual std::vector<HitRecord> hits() = 0;
   virtual Image8 shade() = 0;
   /// How far the frame drawn last may be off, for its --stats; prints it. error_map: the .npy to write, or empty. Null where nobody
@@ -78,22 +83,33 @@ class FrameSource {
                                              const fs::path & /*error_map*/) {
     return {};
   }
+  /// In which steps a frame within --time-budget was drawn, for its --stats; prints them. Null without.
+  virtual nlohmann::ordered_json timed_steps() { return {}; }
 };
 
 class DeviceFrames : public FrameSource {
  public:
-  DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance,
-               const RendererOptions &options, double value_error, std::optional<double> max_error)
+  DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance, const RenderArgs &args)
       : volume_(scene.volume),
-        renderer_(device, scene.volume, options),
+        renderer_(device, scene.volume, args.renderer),
         appearance_(appearance),
-        max_error_(max_error) {
-    renderer_.set_value_error(value_error);
+        max_error_(args.max_error),
+        time_budget_(args.time_budget) {
+    renderer_.set_value_error(args.frame.value_error);
+    if (!time_budget_) return;
+    renderer_.set_max_pixel_error(args.max_pixel_error);
+    timed_frames_.emplace(renderer_);
   }
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
     if (max_error_) choice_ = choose_detail(renderer_, volume_, camera, isovalue, *max_error_);
-    return renderer_.render(camera, isovalue, on_pass);
+    if (!timed_frames_) return renderer_.render(camera, isovalue, on_pass);
+    timed_ = timed_frames_->render(camera, isovalue, *time_budget_);
+    return timed_.stats;
   }
+  FrameStats refine(const Camera &camera, float isovalue) override {
+    return renderer_.render(camera, isovalue);
+  }
+  nlohmann::ordered_json timed_steps() override;
   nlohmann::ordered_json bound_error(const Camera &camera, float isovalue,
                                      const fs::path &error_map) override;
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
@@ -103,10 +119,30 @@ class DeviceFrames : public FrameSource {
  private:
   const CompressedVolume &volume_;
   Renderer renderer_;
+  std::optional<TimedFrames> timed_frames_;
   Appearance appearance_;
-  std::optional<double> max_error_;
+  std::optional<double> max_error_, time_budget_;
   DetailChoice choice_;
+  TimedFrame timed_;
 };
+
+nlohmann::ordered_json DeviceFrames::timed_steps() {
+  if (!timed_frames_) return {};
+  nlohmann::ordered_json steps = nlohmann::ordered_json::array();
+  for (const TimedStep &step : timed_.steps) {
+    fmt::print("  {}x{}, {}: {:.2f} ms, {}\n", step.size.width, step.size.height,
+               step.max_pixel_error == 0
+                   ? "finest level"
+                   : fmt::format("voxels up to {} of its pixels apart", step.max_pixel_error),
+               step.ms, step.cancelled ? fmt::format("{:.1f} % of it", step.completed_percent) : "whole");
+    steps.push_back({{"size", {step.size.width, step.size.height}},
+                     {"max_pixel_error", step.max_pixel_error},
+                     {"ms", step.ms},
+                     {"completed_percent", step.completed_percent},
+                     {"cancelled", step.cancelled}});
+  }
+  return {{"budget_ms", *time_budget_}, {"complete", timed_.complete}, {"steps", steps}};
+}
 
 nlohmann::ordered_json detail_json(const Detail &detail) {
   return {{"max_pixel_error", detail.max_pixel_error}, {"value_error", detail.value_error}};
@@ -226,6 +262,14 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
                                      : frame_path(options.error_map, scene, options, isovalue, view);
       const nlohmann::ordered_json error = frames.bound_error(camera, isovalue, error_map);
       if (!error.is_null()) result.back()["error"] = error;
+      const nlohmann::ordered_json steps = frames.timed_steps();
+      if (!steps.is_null()) result.back()["time_budget"] = steps;
+      if (!options.refined.empty()) {
+        const FrameStats refined = frames.refine(camera, isovalue);
+        write_png(frames.shade(), frame_path(options.refined, scene, options, isovalue, view));
+        fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.rays_hit),
+                   refined.total_ms);
+      }
     }
   }
   return result;
@@ -257,7 +301,8 @@ nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVo
 /// Outputs go to folders that exist, but for --progress-dir, which is made. Found out before any work is
 /// done.
 void check_outputs(const RenderArgs &options) {
-  for (const std::string &output : {options.image, options.depth, options.stats, options.error_map}) {
+  for (const std::string &output :
+       {options.image, options.depth, options.stats, options.error_map, options.refined}) {
     const fs::path folder = fs::path(output).parent_path();
     if (!folder.empty() && !fs::is_directory(folder))
       throw Error("cannot write {}: {} is no folder", output, folder.string());
@@ -295,15 +340,20 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
              with_commas(plan.total()), with_commas(plan.cache_slots), with_commas(plan.setup_bytes));
 }
 
-/// --max-error and what goes with it.
+/// --max-error, --time-budget and what goes with them.
 void check_choice(const RenderArgs &options) {
-  if (!options.max_error) {
-    if (!options.error_map.empty()) throw Error("--error-map needs --max-error");
-    return;
-  }
+  if (!options.max_error && !options.error_map.empty()) throw Error("--error-map needs --max-error");
+  if (!options.time_budget && !options.refined.empty()) throw Error("--refined needs --time-budget");
+  if (!options.max_error && !options.time_budget) return;
+  const char *choice = options.max_error ? "--max-error" : "--time-budget";
+  if (options.reference) throw Error("--reference cannot choose: leave out {}", choice);
+  if (options.time_budget) check_time_budget(*options.time_budget);
+  if (options.time_budget && !options.progress_dir.empty())
+    throw Error("--time-budget draws a frame in steps: leave out --progress-dir");
+  if (!options.max_error) return;
   check_max_error(*options.max_error);
-  if (options.reference) throw Error("--reference cannot choose: leave out --max-error");
-  if (options.frame.value_error > 0 || options.renderer_flags.values.max_pixel_error > 0)
+  if (options.time_budget) throw Error("--max-error takes the time it takes: leave out --time-budget");
+  if (options.frame.value_error > 0 || options.max_pixel_error > 0)
     throw Error("--max-error chooses for itself: leave out --value-error and --max-pixel-error");
 }
 
@@ -314,21 +364,25 @@ void run_render(RenderArgs options) {
     if (std::isnan(isovalue)) throw Error("--isovalue nan: give a number in the volume's value range");
   }
   coarser({}, options.frame.value_error);  // or throws
-  check_max_pixel_error(options.renderer_flags.values.max_pixel_error);
+  options.max_pixel_error = options.renderer_flags.values.max_pixel_error;
+  check_max_pixel_error(options.max_pixel_error);
   check_choice(options);
   check_outputs(options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
   const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
-  if (options.max_error) {
-    options.frame.compression.measure_error = true;
-    options.renderer_flags.values.max_pixel_error = 1;  // for levels of detail to be there
-    options.renderer_flags.values.with_bounds = true;
-  }
+  RendererOptions &wanted = options.renderer_flags.values;
+  options.frame.compression.measure_error |= options.max_error.has_value();
+  wanted.with_bounds = options.max_error.has_value();
+  wanted.with_kept_picture = options.time_budget.has_value();
+  // Whoever chooses has levels of detail to choose from.
+  const bool chooses_levels =
+      options.max_error || (options.time_budget && options.renderer_flags.pipeline != "blocks");
+  if (chooses_levels) wanted.max_pixel_error = 1;
   want_levels(options.renderer_flags, options.frame.compression);
   const Scene scene = load_scene(options.input, options.volume, options.frame, device.get());
-  if (options.max_error && scene.volume.coarser.empty()) options.renderer_flags.values.max_pixel_error = 0;
+  if (chooses_levels && scene.volume.coarser.empty()) wanted.max_pixel_error = options.max_pixel_error;
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
@@ -337,8 +391,7 @@ void run_render(RenderArgs options) {
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {
-    DeviceFrames frames(*device, scene, appearance, options.renderer, options.frame.value_error,
-                        options.max_error);
+    DeviceFrames frames(*device, scene, appearance, options);
     options.renderer = frames.renderer().options();
     if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());
@@ -377,6 +430,12 @@ void add_render(CLI::App &app) {
       "many pixels of the true one, and say for how many pixels that is certain");
   command->add_option("--error-map", options->error_map,
                       "float32 .npy [H,W] of --max-error: the bound of each pixel, inf where there is none");
+  command->add_option(
+      "--time-budget", options->time_budget,
+      "ms for each frame: draws small pictures by coarse levels of detail first, then larger ones, "
+      "as long as there is time");
+  command->add_option("--refined", options->refined,
+                      "PNG of --time-budget: the whole picture, drawn after the other");
   command->add_option("--stats", options->stats, "JSON statistics of every frame and pass");
   command->add_flag("--no-stage-times", options->no_stage_times,
                     "leave ms per stage out of --stats: measuring them makes the host wait after each pass");

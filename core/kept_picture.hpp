@@ -1,0 +1,36 @@
+#pragma once
+// A picture put aside while the same frame is drawn again with more pixels, whose place it takes until they are there. See
+// kernels_cl/kept_picture.cl.
+
+#include <cstdint>
+
+#include "core/frame.hpp"
+#include "core/ocl/kernel.hpp"
+#include "core/wavefront.hpp"
+
+namespace isowave {
+
+/// A picture of half the pixels, so many times, along each axis, rounded up.
+inline ImageSize halved(ImageSize size, unsigned times) {
+  const auto half = [times](std::uint32_t pixels) { return ((pixels - 1) >> times) + 1; };
+  return {half(size.width), half(size.height)};
+}
+
+class KeptPicture {
+ public:
+  /// Largest size of a picture that can be kept.
+  KeptPicture(ocl::Device &device, ImageSize largest);
+
+  /// Copies the hit buffer, a picture of that size. Asynchronous. Throws std::invalid_argument: a larger picture.
+  void keep(const Wavefront &rays, ImageSize size);
+  /// The hit buffer, a picture as large as rays.frame says, takes the kept hits: where it has none, or everywhere. Asynchronous.
+  void show(Wavefront &rays, bool everywhere);
+
+ private:
+  ocl::Device &device_;
+  ImageSize size_{0, 0};
+  ocl::Buffer<HitRecord> hits_;
+  ocl::Kernel<FrameParams, uint, uint, ocl::In<HitRecord>, uint, ocl::Out<HitRecord>> show_;
+};
+
+}  // namespace isowave

@@ -1,0 +1,226 @@
+// Frames within a time: the steps that are drawn, what shows where time was over, and a clock that this file winds itself.
+
+#include "core/time_budget.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/error.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_pipelines.hpp"
+
+namespace isowave {
+namespace {
+
+using test::expect_same_hits;
+using test::TestVolume;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr float kIsovalue = 0.4f;
+constexpr ImageSize kSize{27, 21};  // no multiple of 8
+
+using Hits = std::vector<HitRecord>;
+
+bool same_bits(const HitRecord &a, const HitRecord &b) {
+  return std::memcmp(&a, &b, sizeof(HitRecord)) == 0;
+}
+
+/// The picture of `size` made of a smaller one: each pixel has what covers its centre, both being views of the same height.
+Hits enlarged(const Hits &small, ImageSize from, ImageSize size) {
+  Hits hits;
+  for (std::uint32_t row = 0; row < size.height; ++row) {
+    for (std::uint32_t column = 0; column < size.width; ++column) {
+      const double scale = double(from.height) / size.height, tiny = 1e-9;  // for centres on an edge
+      const double x = (column + 0.5 - 0.5 * size.width) * scale + 0.5 * from.width;
+      const double y = (row + 0.5) * scale;
+      const auto at = [&](double place, std::uint32_t end) {
+        return static_cast<std::size_t>(std::clamp(std::floor(place + tiny), 0.0, end - 1.0));
+      };
+      hits.push_back(small[at(y, from.height) * from.width + at(x, from.width)]);
+    }
+  }
+  return hits;
+}
+
+class KeptPictureOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
+INSTANTIATE_TEST_SUITE_P(Devices, KeptPictureOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+TEST_P(KeptPictureOnDevice, SmallPicturesCoverLargerOnes) {
+  ocl::Device device(GetParam());
+  for (const ImageSize full : {ImageSize{27, 21}, {16, 8}, {3, 3}, {5, 2}}) {
+    const ImageSize small = halved(full, 1);
+    SCOPED_TRACE(fmt::format("{} x {} of {} x {}", small.width, small.height, full.width, full.height));
+    Wavefront rays(device, full.num_pixels(), false);
+    KeptPicture kept(device, small);
+    Hits before(small.num_pixels()), now(full.num_pixels());
+    for (std::size_t i = 0; i < before.size(); ++i) before[i].t = float(i);
+    for (std::size_t i = 0; i < now.size(); ++i) now[i].t = i % 3 == 0 ? 1000.0f : INFINITY;
+    Hits padded = before;
+    padded.resize(full.num_pixels());
+    rays.hits.write(padded);
+    kept.keep(rays, small);
+    rays.hits.write(now);
+    rays.frame.width = full.width;
+    rays.frame.height = full.height;
+    const Hits everywhere = enlarged(before, small, full);
+    Hits expected = now;
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      if (now[i].t == INFINITY) expected[i] = everywhere[i];
+    }
+    kept.show(rays, false);
+    expect_same_hits(rays.hits.read(), expected, full.width);
+    kept.show(rays, true);
+    expect_same_hits(rays.hits.read(), everywhere, full.width);
+    EXPECT_THROW(kept.keep(rays, full), std::invalid_argument);
+  }
+}
+
+class TimeBudgetOnDevice : public testing::TestWithParam<PipelineOnDevice> {
+ protected:
+  /// Every look at the clock takes a millisecond for so many pixels of the picture at work.
+  static constexpr double kPixelsPerMs = 10, kFullLook = 27 * 21 / kPixelsPerMs;
+
+  TimeBudgetOnDevice()
+      : volume_({14, 15, 13}, test::gyroid_field(9), 16),
+        camera_(orbit_cameras(volume_.info(), 1)[0]),
+        device_(GetParam().device),
+        renderer_(device_, volume_.compressed,
+                  GetParam().with({.size = kSize, .cache_slots = 24, .with_kept_picture = true})),
+        frames_(renderer_,
+                [this] { return ms_ += double(renderer_.options().size.num_pixels()) / kPixelsPerMs; }) {}
+
+  /// What the renderer draws without a budget.
+  Hits picture_of(ImageSize size) {
+    renderer_.set_size(size);
+    renderer_.render(camera_, kIsovalue);
+    Hits hits = renderer_.hits();
+    renderer_.set_size(kSize);
+    return hits;
+  }
+
+  TestVolume volume_;
+  Camera camera_;
+  ocl::Device device_;
+  Renderer renderer_;
+  double ms_ = 0;
+  TimedFrames frames_;
+};
+INSTANTIATE_TEST_SUITE_P(Devices, TimeBudgetOnDevice, testing::ValuesIn(pipelines_under_test()),
+                         pipeline_test_name);
+
+TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheSmallestPicture) {
+  const TimedFrame frame = frames_.render(camera_, kIsovalue, 1e-6);
+  const Hits shown = renderer_.hits();
+  ASSERT_EQ(frame.steps.size(), 1u);
+  EXPECT_FALSE(frame.steps[0].cancelled) << "there must be a picture";
+  EXPECT_FALSE(frame.complete);
+  EXPECT_EQ(frame.steps[0].size.width, 4u);
+  EXPECT_EQ(frame.steps[0].size.height, 3u);
+  const Hits small = picture_of({4, 3});
+  EXPECT_GT(test::num_hits(small), 0u);
+  expect_same_hits(shown, enlarged(small, {4, 3}, kSize), kSize.width);
+}
+
+TEST_P(TimeBudgetOnDevice, AmpleTimeGivesTheWholePicture) {
+  const TimedFrame frame = frames_.render(camera_, kIsovalue, 1e9);
+  EXPECT_EQ(frame.steps.size(), 2u) << "nothing between the first and the full picture";
+  EXPECT_TRUE(frame.complete);
+  EXPECT_NEAR(frame.stats.total_ms, ms_ - kFullLook, 1e-6);
+  EXPECT_FALSE(frame.stats.cancelled);
+  expect_same_hits(renderer_.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue), kSize.width);
+}
+
+/// Whatever time there is: each pixel is of the picture cancelled last, or, without a hit there, of the whole one before.
+TEST_P(TimeBudgetOnDevice, ThePictureBeforeShowsThrough) {
+  std::size_t num_mixed = 0, num_complete = 0;
+  for (double budget = 20; budget < 2e4; budget *= 1.5) {
+    SCOPED_TRACE(fmt::format("budget {}", budget));
+    renderer_.clear_cache();
+    const double begin = ms_;
+    const TimedFrame frame = frames_.render(camera_, kIsovalue, budget);
+    const Hits shown = renderer_.hits();
+    ASSERT_FALSE(frame.steps.empty());
+    EXPECT_NEAR(frame.stats.total_ms, ms_ - begin - kFullLook, 1e-6);
+    Hits expected;
+    ImageSize size;  // of the step before
+    for (const TimedStep &step : frame.steps) {
+      EXPECT_EQ(step.cancelled, step.completed_percent < 100);
+      EXPECT_TRUE(!step.cancelled || &step == &frame.steps.back());
+      const Hits hits = enlarged(picture_of(step.size), step.size, kSize);
+      if (!step.cancelled) {
+        expected = hits;
+        size = step.size;
+        continue;
+      }
+      // Which rays were through cannot be known from outside; what shows must be one of both.
+      const Hits under = enlarged(enlarged(picture_of(size), size, step.size), step.size, kSize);
+      std::size_t num_new = 0, num_old = 0;
+      for (std::size_t i = 0; i < shown.size(); ++i) {
+        const bool is_new = same_bits(shown[i], hits[i]), is_old = same_bits(shown[i], under[i]);
+        EXPECT_TRUE(is_new || is_old) << "pixel " << i;
+        num_new += is_new && !is_old;
+        num_old += is_old && !is_new;
+      }
+      num_mixed += num_new > 0 && num_old > 0;
+    }
+    if (!frame.steps.back().cancelled) expect_same_hits(shown, expected, kSize.width);
+    num_complete += frame.complete;
+    EXPECT_EQ(frame.complete, !frame.steps.back().cancelled && frame.steps.back().size.width == kSize.width);
+  }
+  EXPECT_GT(num_complete, 0u);
+  EXPECT_GT(num_mixed, 0u);
+  expect_same_hits(picture_of(kSize), test::twin_hits(volume_, camera_, kSize, kIsovalue), kSize.width);
+}
+
+/// The budget is kept where passes take no longer than the one before, but for the first picture and what follows the last pass.
+TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
+  for (double budget = 15; budget < 1000; budget *= 1.4) {
+    renderer_.clear_cache();
+    const TimedFrame frame = frames_.render(camera_, kIsovalue, budget);
+    const double look = double(frame.steps.back().size.num_pixels()) / kPixelsPerMs;
+    EXPECT_LE(frame.stats.total_ms, std::max(budget, frame.steps[0].ms) + 2 * look + kFullLook);
+  }
+}
+
+TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
+  for (const double budget : {0.0, -1.0, double(NAN), double(INFINITY)}) {
+    EXPECT_THAT([&] { frames_.render(camera_, kIsovalue, budget); },
+                ThrowsMessage<Error>(HasSubstr("no picture can be drawn")));
+  }
+  EXPECT_THROW(frames_.render(camera_, NAN, 1), Error);
+  EXPECT_EQ(renderer_.options().size.width, kSize.width) << "as before";
+  Renderer plain(device_, volume_.compressed, GetParam().with({.size = kSize}));
+  EXPECT_THROW(TimedFrames{plain}, std::logic_error);
+}
+
+/// Coarse levels draw small pictures, the finest the full one.
+TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
+  const glm::uvec3 dims(40, 36, 44);
+  test::ArrayVolume reader(test::grid_info(dims), test::sample(dims, test::sphere_field(dims)));
+  const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 0});
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  for (const ocl::DeviceInfo &info : devices_under_test()) {
+    ocl::Device device(info);
+    Renderer renderer(device, volume, {.size = kSize, .max_pixel_error = 1, .with_kept_picture = true});
+    renderer.set_max_pixel_error(0);
+    TimedFrames frames(renderer);
+    const TimedFrame coarse = frames.render(camera, 0.5f, 1e-6);
+    ASSERT_EQ(coarse.steps.size(), 1u);
+    EXPECT_EQ(coarse.steps[0].max_pixel_error, 1.0);
+    EXPECT_GT(coarse.stats.passes.back().level, 0u);
+    EXPECT_EQ(renderer.options().max_pixel_error, 0.0) << "as before";
+    const TimedFrame fine = frames.render(camera, 0.5f, 1e9);
+    EXPECT_TRUE(fine.complete);
+    EXPECT_EQ(fine.stats.passes.back().level, 0u);
+    const std::vector<float> voxels = decode_with_libzfp(volume);
+    expect_same_hits(renderer.hits(),
+                     render_scalar(make_frame_params(volume.info, camera, kSize, 0.5f), voxels), kSize.width);
+  }
+}
+
+}  // namespace
+}  // namespace isowave
