@@ -9,6 +9,7 @@
 
 #include "bench/run_info.hpp"
 #include "core/error.hpp"
+#include "tools/isowave/render_stats.hpp"
 
 namespace isowave::bench {
 
@@ -156,7 +157,7 @@ void print_sweep(const BudgetSweep &sweep) {
 
 ordered_json to_json(const BudgetSweep &sweep) {
   ordered_json json = {{"benchmark", "budgets"},
-                       {"schema", 1},
+                       {"schema", tools::kChartsSchema},
                        {"command", sweep.common.command},
                        {"date", utc_now()},
                        {"max_passes", sweep.max_passes}};

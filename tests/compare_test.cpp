@@ -137,6 +137,7 @@ TEST_F(CompareProgram, PrintsJson) {
   EXPECT_EQ(depth.at("depth_error").at("max"), 0.0);
   const auto colour = nlohmann::json::parse(run("a.png", "b.png", "--json").output);
   EXPECT_EQ(colour.at("max_channel_difference"), 6);
+  EXPECT_GT(colour.at("flip"), 0.0);
 }
 
 TEST_F(CompareProgram, ErrorsAreOneLine) {

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "core/error.hpp"
+#include "core/flip.hpp"
 #include "tools/isowave/commands.hpp"
 
 namespace isowave::tools {
@@ -45,10 +46,18 @@ void print(const DepthComparison &result) {
   }
 }
 
-void print(const ColourComparison &result) {
+/// With how different they look.
+struct PictureComparison : ColourComparison {
+  PictureComparison(const Image8 &a, const Image8 &b) : ColourComparison(compare_colour(a, b)) {
+    if (num_differing != 0) flip = Flip(a).error(b);
+  }
+  double flip = 0;
+};
+
+void print(const PictureComparison &result) {
   if (!result.psnr_db) return;
-  fmt::print("largest channel difference: {} of 255; PSNR: {:.2f} dB\n", result.max_channel_difference,
-             *result.psnr_db);
+  fmt::print("largest channel difference: {} of 255; PSNR: {:.2f} dB; FLIP: {:.4f}\n",
+             result.max_channel_difference, *result.psnr_db, result.flip);
 }
 
 nlohmann::ordered_json to_json(const DepthComparison &result) {
@@ -66,13 +75,14 @@ nlohmann::ordered_json to_json(const DepthComparison &result) {
   return json;
 }
 
-nlohmann::ordered_json to_json(const ColourComparison &result) {
+nlohmann::ordered_json to_json(const PictureComparison &result) {
   nlohmann::ordered_json json = {{"kind", "colour"},
                                  {"pixels", result.num_pixels},
                                  {"differing", result.num_differing},
                                  {"max_channel_difference", result.max_channel_difference},
                                  {"psnr_db", nullptr}};
   if (result.psnr_db) json["psnr_db"] = *result.psnr_db;
+  json["flip"] = result.flip;
   return json;
 }
 
@@ -100,7 +110,7 @@ void run_compare(const CompareArgs &args) {
   }
   const bool equal = kind == ImageKind::kDepth
                          ? report(compare_depth(read_npy(args.a), read_npy(args.b)), args.json)
-                         : report(compare_colour(read_png(args.a), read_png(args.b)), args.json);
+                         : report(PictureComparison(read_png(args.a), read_png(args.b)), args.json);
   if (args.exact && !equal) throw CLI::RuntimeError(1);
 }
 

@@ -9,7 +9,7 @@
 
 namespace isowave::tools {
 
-inline constexpr int kChartsSchema = 1;  ///< of the JSON of `isowave bench`; tools/charts refuses others
+inline constexpr int kChartsSchema = 2;  ///< of the JSON of `isowave bench`; tools/charts refuses others
 
 /// A device and what it can do.
 nlohmann::ordered_json device_json(const ocl::DeviceInfo &info);
