@@ -14,16 +14,13 @@ namespace isowave {
 namespace {
 
 using nlohmann::json;
+using test::quoted;
 using test::run_isowave;
 using test::TemporaryFolder;
 using test::write_file;
 
 const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
 const std::string kGyroid = "generate:gyroid_20x21x22_uint8";
-
-std::string quoted(const std::filesystem::path &path) {
-  return fmt::format("'{}'", path.string());
-}
 
 std::set<std::string> names_in(const std::filesystem::path &folder) {
   std::set<std::string> names;

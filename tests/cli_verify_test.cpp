@@ -12,6 +12,7 @@ namespace isowave {
 namespace {
 
 using nlohmann::json;
+using test::quoted;
 using test::run_isowave;
 using test::TemporaryFolder;
 using test::write_file;
@@ -58,6 +59,29 @@ TEST(CliVerify, NamesViewsOutOfEmbreesReach) {
   const auto only_cells = run_isowave(arguments + " --oracle cells");
   EXPECT_EQ(only_cells.status, 1) << "nothing was judged";
   EXPECT_NE(only_cells.err.find("no frame"), std::string::npos) << only_cells.err;
+}
+
+TEST(CliVerify, JudgesBoundsOfErrors) {
+  const TemporaryFolder folder;
+  const auto run = run_isowave("verify " + kNucleon +
+                               " -i 80 --orbit 2 --size 64x48 --rate 8 --max-error 2 --device cpu --json " +
+                               quoted(folder / "v.json"));
+  EXPECT_EQ(run.status, 0) << run.err;
+  const json frames = json::parse(test::read_file(folder / "v.json"))["frames"];
+  ASSERT_EQ(frames.size(), 2u);
+  for (const json &frame : frames) {
+    EXPECT_EQ(frame["exceeded"], 0);
+    EXPECT_GT(frame["certified"], 0.9 * frame["pixels"].get<double>());
+    EXPECT_GT(frame["misses"], 0);
+    EXPECT_GE(frame["slack"]["p50"], 1.0);
+  }
+  const std::string command = "verify " + kNucleon + " -i 80 --max-error ";
+  test::expect_one_line_error(command + "0", "an error of 0 pixels");
+  test::expect_one_line_error(command + "1 --oracle cells", "leave out --oracle");
+  test::expect_one_line_error(command + "1 --solver linear", "the default solver");
+  test::expect_one_line_error("verify --max-error 1", "give a VOLUME");
+  test::expect_one_line_error("verify none.zfp -i 80 --max-error 1",
+                              "the volume before compression is needed");
 }
 
 TEST(CliVerify, RefusesWhatItCannotDo) {

@@ -13,15 +13,12 @@ namespace isowave {
 namespace {
 
 using test::expect_one_line_error;
+using test::quoted;
 using test::run_isowave;
 using test::TemporaryFolder;
 using test::write_file;
 
 const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
-
-std::string quoted(const std::filesystem::path &path) {
-  return fmt::format("'{}'", path.string());
-}
 
 TEST(Cli, ConvertAndInfo) {
   const TemporaryFolder folder;

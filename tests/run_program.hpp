@@ -75,10 +75,15 @@ inline ProgramResult run_command(const std::string &command) {
   return result;
 }
 
+/// For the shell.
+inline std::string quoted(const std::filesystem::path &path) {
+  return "'" + path.string() + "'";
+}
+
 /// The program under test, quoted for the shell: what the environment says, where ctest has it tested with sanitizers.
 inline std::string isowave_program() {
   const char *path = std::getenv("ISOWAVE_PROGRAM");
-  return std::string("'") + (path ? path : ISOWAVE_PROGRAM) + "'";
+  return quoted(path ? path : ISOWAVE_PROGRAM);
 }
 
 /// Runs `isowave ARGUMENTS` through the shell.

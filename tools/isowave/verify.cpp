@@ -12,6 +12,7 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/verify_errors.hpp"
 #include "tools/isowave/verify_frames.hpp"
 
 namespace isowave::tools {
@@ -67,7 +68,11 @@ void run_verify(VerifyArgs options) {
   ordered_json document = {{"program", "isowave 0.1.0"}, {"seed", options.seed}};
   std::uint64_t failures = 0;
   const std::string_view judged = all ? to_string(kDefaultSolver) : std::string_view{};
-  if (!options.frames.input.empty()) {
+  if (options.frames.max_error) {
+    if (options.frames.input.empty() || !all)
+      throw Error("--max-error is for frames by the default solver: give a VOLUME alone");
+    failures = verify_errors(options.frames, document);
+  } else if (!options.frames.input.empty()) {
     if (all) options.solvers = {std::string(judged)};
     failures = verify_frames(options.frames, options.solvers, document);
   } else {
@@ -81,6 +86,8 @@ void run_verify(VerifyArgs options) {
     }
   }
   if (!options.json.empty()) write_json(document, options.json);
+  if (failures != 0 && options.frames.max_error)
+    throw Error("{} pixels are farther off than their bounds", failures);
   if (failures != 0) throw Error("{} rays were missed, false, in a wrong cell or place, or leaked", failures);
 }
 

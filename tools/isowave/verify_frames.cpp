@@ -184,6 +184,10 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
       ->check(CLI::IsMember({"roots", "cells", "mesh"}))
       ->allow_extra_args(false);  // one name each time: VOLUME may follow
   command.add_option(
+      "--max-error", options.max_error,
+      "judge what render --max-error promises instead: each pixel's bound against the volume before "
+      "compression");
+  command.add_option(
       "--device", options.device,
       "who draws frames: index, cpu, gpu, or a part of a device's name [the scalar reference]");
 }

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,11 @@ struct VerifyFramesOptions {
   VolumeOptions volume;
   FrameOptions frame;
   std::vector<std::string> oracles;  ///< roots, cells, mesh; none: all
-  std::string device;                ///< empty: the scalar reference draws
+  std::string device;  ///< empty: the scalar reference draws, or with max_error the default device
+  std::optional<double> max_error;  ///< pixels; see verify_errors()
 };
 
-/// Adds VOLUME, the options of volumes and frames, --oracle and --device.
+/// Adds VOLUME, the options of volumes and frames, --oracle, --max-error and --device.
 void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options);
 
 /// Draws every view and isovalue with every solver, prints a row for each oracle and adds it to document["frames"].
