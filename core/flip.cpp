@@ -7,9 +7,11 @@
 #include <glm/glm.hpp>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/parallel_for.hpp"
 
 namespace isowave {
 
@@ -42,28 +44,28 @@ Weights normalized(Weights kernel) {
 
 /// Along rows with some weights, then along columns with others; beyond its borders the picture goes on as at them.
 Plane filtered(const Plane &in, const Weights &along_x, const Weights &along_y) {
-  const std::size_t width = in.width, radius = along_x.size() / 2;
-  const auto height = std::ptrdiff_t(in.height);
+  const std::size_t width = in.width;
   Plane rows{in.width, in.height, std::vector<double>(in.values.size(), 0.0)}, result = rows;
-  std::vector<double> padded(width + 2 * radius);
-  for (std::size_t begin = 0; begin < in.values.size(); begin += width) {
-    const double *row = &in.values[begin];
+  parallel_for(in.height, 0, [&](std::uint64_t y, std::uint32_t) {
+    const std::size_t radius = along_x.size() / 2;
+    const double *row = &in.values[y * width];
+    double *to = &rows.values[y * width];
+    std::vector<double> padded(width + 2 * radius, row[width - 1]);
     std::fill_n(padded.begin(), radius, row[0]);
     std::copy_n(row, width, padded.begin() + std::ptrdiff_t(radius));
-    std::fill_n(padded.end() - std::ptrdiff_t(radius), radius, row[width - 1]);
     for (std::size_t i = 0; i < along_x.size(); ++i) {
-      for (std::size_t x = 0; x < width; ++x) rows.values[begin + x] += along_x[i] * padded[x + i];
+      for (std::size_t x = 0; x < width; ++x) to[x] += along_x[i] * padded[x + i];
     }
-  }
-  for (std::ptrdiff_t y = 0; y < height; ++y) {
-    double *to = &result.values[std::size_t(y) * width];
+  });
+  parallel_for(in.height, 0, [&](std::uint64_t y, std::uint32_t) {
+    double *to = &result.values[y * width];
     for (std::size_t i = 0; i < along_y.size(); ++i) {
-      const std::ptrdiff_t at = std::clamp(y + std::ptrdiff_t(i) - std::ptrdiff_t(along_y.size() / 2),
-                                           std::ptrdiff_t{0}, height - 1);
-      const double *from = &rows.values[std::size_t(at) * width];
+      const std::int64_t at = std::int64_t(y + i) - std::int64_t(along_y.size() / 2);
+      const auto clamped = std::size_t(std::clamp(at, std::int64_t{0}, std::int64_t{in.height} - 1));
+      const double *from = &rows.values[clamped * width];
       for (std::size_t x = 0; x < width; ++x) to[x] += along_y[i] * from[x];
     }
-  }
+  });
   return result;
 }
 
@@ -143,8 +145,11 @@ std::vector<glm::dvec3> as_seen(const Planes &picture, double pixels_per_degree)
       total[channel] += weight * sum * sum;
     }
   }
-  for (glm::dvec3 &color : result)
-    color = hunt_lab_of_rgb(glm::clamp(rgb_of_opponent(color / total), 0.0, 1.0));
+  const std::uint32_t width = picture[0].width;
+  parallel_for(picture[0].height, 0, [&](std::uint64_t row, std::uint32_t) {
+    for (glm::dvec3 &color : std::span(result).subspan(row * width, width))
+      color = hunt_lab_of_rgb(glm::clamp(rgb_of_opponent(color / total), 0.0, 1.0));
+  });
   return result;
 }
 
@@ -199,13 +204,15 @@ double Flip::error(const Image8 &test) const {
   if (a.width != test.width || a.height != test.height)
     throw Error("the images differ in size: {}x{} and {}x{}", a.width, a.height, test.width, test.height);
   const View b = view_of(test, pixels_per_degree_);
-  double sum = 0;
-  for (std::size_t i = 0; i < a.colors.size(); ++i) {
-    const double color = color_error(hyab(a.colors[i], b.colors[i]));
-    const double feature = std::max(std::abs(a.edges[i] - b.edges[i]), std::abs(a.points[i] - b.points[i]));
-    sum += std::pow(color, 1 - std::sqrt(feature / std::numbers::sqrt2));
-  }
-  return sum / double(a.colors.size());
+  std::vector<double> sums(a.height, 0.0);  // by row, so that it is the same sum always
+  parallel_for(a.height, 0, [&](std::uint64_t row, std::uint32_t) {
+    for (std::size_t i = row * a.width; i < (row + 1) * a.width; ++i) {
+      const double color = color_error(hyab(a.colors[i], b.colors[i]));
+      const double feature = std::max(std::abs(a.edges[i] - b.edges[i]), std::abs(a.points[i] - b.points[i]));
+      sums[row] += std::pow(color, 1 - std::sqrt(feature / std::numbers::sqrt2));
+    }
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0) / double(a.colors.size());
 }
 
 }  // namespace isowave

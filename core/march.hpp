@@ -36,21 +36,31 @@ class March {
   void request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:
+  struct Kernels {
+    Kernels(ocl::Device &device, const ocl::Defines &defines);
+    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
+                ocl::Out<uint>, ocl::Out<HitRecord>>
+        start_rays;
+    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
+                ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
+                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<CacheState>>
+        march;
+    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>,
+                ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
+        request_ahead;
+  };
+  struct LevelKernels : Kernels {
+    LevelKernels(ocl::Device &device, const ocl::Defines &defines);
+    ocl::Kernel<FrameParams, FrameParams, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>,
+                ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>,
+                ocl::In<HitRecord>>
+        cross_border;
+  };
+  Kernels &kernels_for(const FrameParams &frame);
+
   ocl::Range range_, start_range_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<HitRecord>>
-      start_rays_;
-  std::optional<ocl::Kernel<FrameParams, FrameParams, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>,
-                            ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>,
-                            ocl::In<HitRecord>>>
-      cross_border_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
-              ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<CacheState>>
-      march_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>,
-              ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
-      request_ahead_;
+  Kernels finest_;                      ///< for frames that the finest level draws alone: a tenth faster
+  std::optional<LevelKernels> levels_;  ///< for all others
 };
 
 }  // namespace isowave

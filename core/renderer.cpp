@@ -323,9 +323,15 @@ void Renderer::set_size(ImageSize size) {
   options_.size = size;
 }
 
+void Renderer::fill_from_kept() {
+  kept_.value().show(state_.rays, false);
+  device_.finish();
+}
+
 void Renderer::enlarge_kept(const Camera &camera, float isovalue) {
   state_.rays.frame = make_frame_params(state_.levels[0].info, camera, options_.size, isovalue);
   kept_.value().show(state_.rays, true);
+  device_.finish();
 }
 
 void Renderer::clear_cache() {

@@ -105,8 +105,9 @@ class Renderer {
   /// Puts the picture aside: of at most half the pixels that the renderer was made for, along each axis, rounded up (halved()).
   void keep_picture() { kept_.value().keep(state_.rays, options_.size); }
   /// Where the frame has no hit, it shows the kept picture's, as after rendering was cancelled. The frame must not go on.
-  void fill_from_kept() { kept_.value().show(state_.rays, false); }
-  /// The kept picture with more pixels, as set_size() says; what was drawn is gone. camera, isovalue: of the kept picture.
+  /// Waits.
+  void fill_from_kept();
+  /// The kept picture with more pixels, as set_size() says; what was drawn is gone. camera, isovalue: of the kept picture. Waits.
   void enlarge_kept(const Camera &camera, float isovalue);
 
   /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture depends

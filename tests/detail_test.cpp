@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <numeric>
 
 #include "core/error.hpp"
@@ -192,14 +193,21 @@ TEST_P(LevelsOnDevice, AnyCacheAndSpeculation) {
 TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const std::vector<Camera> cameras = orbit_cameras(volume.info, 3);
-  const Twin twin(volume, 3);
+  std::map<double, Twin> twins;
+  for (const double max_pixel_error : {0.0, 3.0, 30.0})
+    twins.try_emplace(max_pixel_error, volume, max_pixel_error);
   Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .max_pixel_error = 3});
   for (std::size_t last_pass = 1; last_pass < 12; ++last_pass) {
     std::size_t pass = 0;
     renderer.render(cameras[last_pass % 3], last_pass % 2 ? 0.4f : 0.2f,
                     [&](const PassStats &) { return ++pass < last_pass; });
-    renderer.render(cameras[0], 0.4f);
-    expect_same_hits(renderer.hits(), twin.render(cameras[0], kMedium, 0.4f), kMedium.width);
+    for (const double max_pixel_error :
+         last_pass % 2 ? std::array{3.0, 0.0, 30.0} : std::array{0.0, 30.0, 3.0}) {
+      renderer.set_max_pixel_error(max_pixel_error);  // several levels, the finest or a coarse one alone
+      renderer.render(cameras[0], 0.4f);
+      expect_same_hits(renderer.hits(), twins.at(max_pixel_error).render(cameras[0], kMedium, 0.4f),
+                       kMedium.width);
+    }
   }
 }
 
