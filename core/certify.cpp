@@ -130,10 +130,12 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   }
   std::vector<VolumeInfo> infos;
   std::vector<ValueOffset> offsets;
+  std::vector<double> value_errors;
   for (const CompressedVolume *level : levels) {
+    value_errors.push_back(value_error_of(renderer.value_error(), infos.size()));
     infos.push_back(level->info);
     offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
-                                   plane_error(level->error_bound, renderer.value_error()),
+                                   plane_error(level->error_bound, value_errors.back()),
                                    magnitude_of(volume.value_range)));
   }
   const std::vector<FrameParams> frames =
@@ -144,7 +146,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   parallel_for((options.size.height + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
     std::vector<BlockValues> values;
     for (std::size_t i = 0; i < levels.size(); ++i)
-      values.emplace_back(*levels[i], renderer.value_error(), offsets[i]);
+      values.emplace_back(*levels[i], value_errors[i], offsets[i]);
     const auto first = static_cast<std::uint32_t>(part * kRows * options.size.width);
     const std::uint32_t end =
         std::min(first + kRows * options.size.width, static_cast<std::uint32_t>(drawn.size()));

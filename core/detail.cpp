@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/gtc/matrix_access.hpp>
 #include <limits>
 
 #include "core/error.hpp"
@@ -12,20 +13,23 @@ namespace isowave {
 
 namespace {
 
-/// Distances from the eye of the nearest and the farthest point of a volume's domain, a little apart so that no rounding matters
-/// [world units].
+/// Distances from the eye: none to a point of the volume's domain is less than the first or more than the second, a little apart so that no
+/// rounding matters [world units].
 std::array<double, 2> reach(const VolumeInfo &info, const glm::dvec3 &eye) {
-  const glm::dmat3 to_world = info.index_to_world();
-  const glm::dvec3 last = glm::dvec3(info.dims) - 1.0;
-  const glm::dvec3 centre = info.origin + to_world * (0.5 * last);
-  const double radius = 0.5 * (glm::length(to_world[0]) * last.x + glm::length(to_world[1]) * last.y +
-                               glm::length(to_world[2]) * last.z);
-  double farthest = 0;
+  const glm::dmat3 to_world = info.index_to_world(), to_index = glm::inverse(to_world);
+  const glm::dvec3 last = glm::dvec3(info.dims) - 1.0, at = to_index * (eye - info.origin);
+  double farthest = 0, radius = 0;
   for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 at = last * glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
-    farthest = std::max(farthest, glm::length(info.origin + to_world * at - eye));
+    const glm::dvec3 side(corner & 1, corner >> 1 & 1, corner >> 2);
+    farthest = std::max(farthest, glm::length(to_world * (last * side - at)));
+    radius = std::max(radius, glm::length(to_world * (last * (side - 0.5))));
   }
-  return {0.999 * std::max(0.0, glm::length(eye - centre) - radius), 1.001 * farthest};
+  double nearest = glm::length(to_world * (0.5 * last - at)) - radius;  // to a ball around it
+  for (int axis = 0; axis < 3; ++axis) {                                // and to the planes of its faces
+    const double beyond = std::max(-at[axis], at[axis] - last[axis]);
+    nearest = std::max(nearest, beyond / glm::length(glm::row(to_index, axis)));
+  }
+  return {0.999 * std::max(0.0, nearest), 1.001 * farthest};
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 // the next level; where the two levels have it on different sides of the isosurface, the border is its hit, so that no
 // ray slips between them.
 
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,12 @@ namespace isowave {
 /// make_frame_params() throws.
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
                                            ImageSize size, float isovalue, double max_pixel_error);
+
+/// How far decoded voxels of a level may be off where those of the finest may be by value_error: twice as far as of the level before,
+/// since it is drawn from twice the distance on. So what planes leave out is as many pixels wide at each border.
+inline double value_error_of(double value_error, std::size_t level) {
+  return std::ldexp(value_error, static_cast<int>(level));
+}
 
 inline bool draws(const FrameParams &frame) {
   return frame.begin_t < frame.end_t;

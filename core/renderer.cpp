@@ -266,9 +266,11 @@ void Renderer::draw_bound(FieldBound bound) {
 /// Has blocks decoded as value_error_ and bound_ say.
 void Renderer::update_layouts() {
   bool changes = false;
-  for (Level &level : state_.levels) {
-    const ErrorBound planes = coarser(level.error_bound, value_error_);
-    const double few_planes = plane_error(level.error_bound, value_error_);
+  for (std::size_t i = 0; i < state_.levels.size(); ++i) {
+    Level &level = state_.levels[i];
+    const double value_error = value_error_of(value_error_, i);
+    const ErrorBound planes = coarser(level.error_bound, value_error);
+    const double few_planes = plane_error(level.error_bound, value_error);
     StreamLayout layout = level.stream.layout;
     layout.min_exponent = planes.min_exponent;
     layout.whole_numbers = planes.whole_numbers ? 1 : 0;
@@ -285,7 +287,7 @@ void Renderer::update_layouts() {
     const float bound = level.largest_bound;
     level.range_error += std::abs(offset.uniform);
     // All of the finest level would take longer to decode again than the blocks that wider ranges let in.
-    if (&level == &state_.levels.front()) level.range_error += bound;
+    if (i == 0) level.range_error += bound;
     level.range_error += 0x1p-20f * (static_cast<float>(magnitude) + level.range_error + bound);  // roundings
   }
   if (!changes) return;

@@ -82,7 +82,7 @@ class Renderer {
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
 
   /// How far the voxels of further frames may be from the volume's: 0, as at first, not at all; more, and fewer bit planes of
-  /// each block are decoded (coarser()). Forgets the decoded blocks where that changes anything. Throws Error unless it is finite and
+  /// each block are decoded (coarser()), of coarser levels of detail fewer still (value_error_of()). Forgets the decoded blocks where that changes anything. Throws Error unless it is finite and
   /// at least 0.
   void set_value_error(double value_error);
 

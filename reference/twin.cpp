@@ -26,11 +26,12 @@ Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_
     : max_pixel_error_(max_pixel_error) {
   check_levels(volume, max_pixel_error);
   const auto add = [&](const CompressedVolume &level) {
+    const double level_error = value_error_of(value_error, levels_.size());
     levels_.push_back(level.info);
-    voxels_.push_back(decode_with_libzfp(level, value_error));
+    voxels_.push_back(decode_with_libzfp(level, level_error));
     if (bound == FieldBound::kNone) return;
     const ValueOffset offset =
-        value_offset({level, &level == &volume}, bound, plane_error(level.error_bound, value_error),
+        value_offset({level, &level == &volume}, bound, plane_error(level.error_bound, level_error),
                      magnitude_of(volume.value_range));
     add_offset(level, offset, voxels_.back());
   };

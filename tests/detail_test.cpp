@@ -7,6 +7,7 @@
 
 #include <map>
 #include <numeric>
+#include <random>
 
 #include "core/error.hpp"
 #include "core/pyramid.hpp"
@@ -88,6 +89,50 @@ TEST(LevelFrames, OneLevelDrawsAllWhereTheVolumeReachesNoBorder) {
   EXPECT_EQ(drawn(far_camera, 0), 0);
   EXPECT_EQ(drawn(far_camera, 0.4), 3);  // a pixel is 32 voxels wide
   EXPECT_EQ(drawn(far_camera, 100), 4);  // there is no coarser one
+  EXPECT_EQ(drawn(near_camera, 100), 4) << "finer ones end before the volume begins";
+}
+
+/// Wherever the eye is and however the grid lies: each point of the volume is in the band of the level that is fine enough there.
+TEST(LevelFrames, NoPointIsLeftOut) {
+  std::mt19937 random(11);
+  const auto number = [&](double low, double high) {
+    return low + (high - low) * double(random()) * 0x1p-32;
+  };
+  std::size_t num_drawing = 0, num_frames = 0;
+  for (int i = 0; i < 300; ++i) {
+    VolumeInfo info = test::grid_info({random() % 60 + 5, random() % 60 + 5, random() % 60 + 5},
+                                      {number(0.5, 2), number(0.5, 2), number(0.5, 2)});
+    const glm::dvec3 x = glm::normalize(glm::dvec3(number(-1, 1), number(-1, 1), number(-1, 1)));
+    const glm::dvec3 y =
+        glm::normalize(glm::cross(x, glm::dvec3(number(-1, 1), number(-1, 1), number(-1, 1))));
+    info.direction = glm::dmat3(x, y, glm::cross(x, y));
+    const std::vector<VolumeInfo> levels = levels_of(info);
+    const glm::dmat3 to_world = info.index_to_world();
+    const glm::dvec3 last = glm::dvec3(info.dims) - 1.0;
+    const auto point = [&](double beyond) {
+      const auto along = [&] { return number(-beyond, 1 + beyond); };
+      return info.origin + to_world * (last * glm::dvec3(along(), along(), along()));
+    };
+    const Camera camera = camera_along(point(2), {1, 0.1, 0.2});
+    const double error = std::exp2(number(-3, 6));
+    const auto frames = make_level_frames(levels, camera, kMedium, 0.5f, error);
+    num_drawing += std::size_t(std::ranges::count_if(frames, draws));
+    num_frames += frames.size();
+    const double pixel = 2 * std::tan(glm::radians(30.0)) / kMedium.height;
+    const double voxel = std::max({info.spacing.x, info.spacing.y, info.spacing.z});
+    for (int j = 0; j < 50; ++j) {
+      const double distance = glm::length(point(0) - camera.eye);
+      const double exact = std::log2(error * pixel * distance / voxel);
+      if (std::abs(exact - std::round(exact)) < 1e-4) continue;  // at a border
+      const auto level =
+          static_cast<std::size_t>(std::clamp(std::floor(exact), 0.0, double(levels.size() - 1)));
+      const double t = distance / double{frames[level].t_scale};
+      EXPECT_LE(double{frames[level].begin_t}, t);
+      EXPECT_GE(double{frames[level].end_t}, t);
+      EXPECT_TRUE(draws(frames[level]));
+    }
+  }
+  EXPECT_LT(2 * num_drawing, num_frames) << "most levels are not needed";
 }
 
 TEST(LevelFrames, RefusesWhatIsNoDistance) {
@@ -221,6 +266,26 @@ TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
     expect_same_hits(renderer.hits(), Twin(volume, 3, value_error).render(camera, kMedium, 0.4f),
                      kMedium.width);
   }
+}
+
+/// Of a level alone: the planes of twice the error for each level.
+TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
+  const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  Renderer renderer(device_, volume, {.size = kMedium, .max_pixel_error = 30});
+  renderer.set_value_error(0.02);
+  const FrameStats stats = renderer.render(camera, 0.4f);
+  const std::uint32_t level = stats.passes.front().level;
+  ASSERT_GT(level, 0u);
+  ASSERT_EQ(stats.passes.back().level, level);
+  const auto drawn_with = [&](double value_error) {
+    const CompressedVolume &alone = volume.coarser[level - 1];
+    return render_scalar(make_frame_params(alone.info, camera, kMedium, 0.4f),
+                         decode_with_libzfp(alone, value_error));
+  };
+  const std::vector<float> depth = depth_of(renderer.hits());
+  EXPECT_EQ(depth, depth_of(drawn_with(std::ldexp(0.02, static_cast<int>(level)))));
+  EXPECT_NE(depth, depth_of(drawn_with(0.02)));
 }
 
 TEST_P(LevelsOnDevice, DecodesFewerBlocks) {

@@ -282,6 +282,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
                                  {"value_error", options.frame.value_error},
                                  {"reference", options.reference}};
   json.update(renderer_options_json(options.renderer));
+  json["max_pixel_error"] = options.max_pixel_error;  // where it is chosen, the renderer was made for others
   return json;
 }
 
