@@ -319,7 +319,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cross_bo
       }
       ray_block_ids[pixel] = state;
     }
-    append_ray(goes_on, pixel | ISO_FIRST_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
+    append_ray(goes_on, pixel | ISO_BORDER_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
                &counts->next_active_count, next_active_ray_ids);
   }
 }
