@@ -67,6 +67,21 @@ TEST_P(OclBufferOnDevice, WritesAndReadsParts) {
   EXPECT_EQ(buffer.read(), expected);
 }
 
+TEST_P(OclBufferOnDevice, SmallCopiesEndWhereTheyAreTold) {
+  const std::vector<std::uint32_t> source = counting(10);
+  const ocl::Buffer<std::uint32_t> from(device_, "from", source);
+  ocl::Buffer<std::uint32_t> to(device_, "to", std::vector<std::uint32_t>(6, 99));
+  to.copy(from, 0);
+  EXPECT_THAT(to.read(), Each(99u));
+  to.copy(from, 4);
+  std::vector<std::uint32_t> expected(source.begin(), source.begin() + 4);
+  expected.insert(expected.end(), 2, 99);
+  EXPECT_EQ(to.read(), expected);
+  EXPECT_THROW(to.copy(from, 7), std::invalid_argument);
+  ocl::Buffer<std::uint32_t> large(device_, "large", 20);
+  EXPECT_THROW(large.copy(from, 11), std::invalid_argument);
+}
+
 TEST_P(OclBufferOnDevice, RefusesRangesPastTheEnd) {
   ocl::Buffer<std::uint32_t> buffer(device_, "ray_ids", 10);
   std::vector<std::uint32_t> values(4);

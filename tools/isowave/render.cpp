@@ -77,14 +77,10 @@ class FrameSource {
   virtual FrameStats refine(const Camera &camera, float isovalue) { return render(camera, isovalue, {}); }
   virtual std::vector<HitRecord> hits() = 0;
   virtual Image8 shade() = 0;
-  /// How far the frame drawn last may be off, for its --stats; prints it. error_map: the .npy to write, or empty. Null where nobody
-  /// asked.
-  virtual nlohmann::ordered_json bound_error(const Camera &, float /*isovalue*/,
-                                             const fs::path & /*error_map*/) {
-    return {};
-  }
-  /// In which steps a frame within --time-budget was drawn, for its --stats; prints them. Null without.
-  virtual nlohmann::ordered_json timed_steps() { return {}; }
+  /// Prints what else is known of the frame drawn last, and adds it to its --stats: how far it may be off, the steps it was drawn in.
+  /// error_map: the .npy to write, or empty.
+  virtual void report(const Camera &, float /*isovalue*/, const fs::path & /*error_map*/,
+                      nlohmann::ordered_json & /*frame*/) {}
 };
 
 class DeviceFrames : public FrameSource {
@@ -109,14 +105,19 @@ class DeviceFrames : public FrameSource {
   FrameStats refine(const Camera &camera, float isovalue) override {
     return renderer_.render(camera, isovalue);
   }
-  nlohmann::ordered_json timed_steps() override;
-  nlohmann::ordered_json bound_error(const Camera &camera, float isovalue,
-                                     const fs::path &error_map) override;
+  void report(const Camera &camera, float isovalue, const fs::path &error_map,
+              nlohmann::ordered_json &frame) override {
+    if (max_error_) frame["error"] = bound_error(camera, isovalue, error_map);
+    if (timed_frames_) frame["time_budget"] = timed_steps();
+  }
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
   Image8 shade() override { return renderer_.shade(appearance_); }
   const Renderer &renderer() const { return renderer_; }
 
  private:
+  nlohmann::ordered_json bound_error(const Camera &camera, float isovalue, const fs::path &error_map);
+  nlohmann::ordered_json timed_steps() const;
+
   const CompressedVolume &volume_;
   Renderer renderer_;
   std::optional<TimedFrames> timed_frames_;
@@ -126,8 +127,7 @@ class DeviceFrames : public FrameSource {
   TimedFrame timed_;
 };
 
-nlohmann::ordered_json DeviceFrames::timed_steps() {
-  if (!timed_frames_) return {};
+nlohmann::ordered_json DeviceFrames::timed_steps() const {
   nlohmann::ordered_json steps = nlohmann::ordered_json::array();
   for (const TimedStep &step : timed_.steps) {
     fmt::print("  {}x{}, {}: {:.2f} ms, {}\n", step.size.width, step.size.height,
@@ -150,7 +150,6 @@ nlohmann::ordered_json detail_json(const Detail &detail) {
 
 nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float isovalue,
                                                  const fs::path &error_map) {
-  if (!max_error_) return {};
   const Certificate certificate = certify(renderer_, volume_, camera, isovalue, renderer_.hits());
   const CertificateSummary summary = summarize(certificate, *max_error_);
   const double certified =
@@ -260,10 +259,7 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
       const fs::path error_map = options.error_map.empty()
                                      ? fs::path{}
                                      : frame_path(options.error_map, scene, options, isovalue, view);
-      const nlohmann::ordered_json error = frames.bound_error(camera, isovalue, error_map);
-      if (!error.is_null()) result.back()["error"] = error;
-      const nlohmann::ordered_json steps = frames.timed_steps();
-      if (!steps.is_null()) result.back()["time_budget"] = steps;
+      frames.report(camera, isovalue, error_map, result.back());
       if (!options.refined.empty()) {
         const FrameStats refined = frames.refine(camera, isovalue);
         write_png(frames.shade(), frame_path(options.refined, scene, options, isovalue, view));
