@@ -261,6 +261,8 @@ TEST(CliRender, LevelsOfDetail) {
   EXPECT_NE(converted.out.find("level of detail 21x21x21"), std::string::npos) << converted.out;
   const json info = json::parse(run_isowave("info --json " + file).out);
   EXPECT_EQ(info["coarser"], json({{21, 21, 21}, {11, 11, 11}, {6, 6, 6}}));
+  ASSERT_EQ(info["coarser_error"].size(), 3u);
+  EXPECT_GT(info["coarser_error"][0], info["max_error"]) << "against the finest level before compression";
   const auto depth = [&](const std::string &arguments) {
     render(arguments + " -i 80 --size 32x32 --no-stage-times --stats " + quoted(folder / "a.json") +
            " --depth " + quoted(folder / "a.npy"));

@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "core/level_bounds.hpp"
 #include "core/zfp_stream.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/volume_options.hpp"
@@ -57,8 +58,10 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   result["rate"] = volume.rate();
   if (std::isfinite(volume.value_range[0])) result["value_range"] = volume.value_range;
   if (volume.max_error) result["max_error"] = *volume.max_error;
-  for (const CompressedVolume &level : volume.coarser)
+  for (const CompressedVolume &level : volume.coarser) {
     result["coarser"].push_back({level.info.dims.x, level.info.dims.y, level.info.dims.z});
+    if (!level.bounds.codes.empty()) result["coarser_error"].push_back(largest_bound(level.bounds));
+  }
   return result;
 }
 
