@@ -163,9 +163,13 @@ void Renderer::draw_band(const OnPass &on_pass, FrameStats &stats) {
     readback_.push(state_.rays.counts);
     if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
       continue;  // read one pass behind: the device never waits for us
-    const PassStats pass = stats_of(readback_.pop());
-    stats.passes.push_back(pass);
+    PassStats pass = stats_of(readback_.pop());
     stats.rays_hit += pass.counts.hit_count;
+    // Rays without a hit go on in the next band, but nobody has counted them.
+    const std::uint64_t pixels = options_.size.num_pixels();
+    const std::uint64_t ended = is_last_band() ? pixels - pass.counts.next_active_count : stats.rays_hit;
+    pass.completed_percent = 100.0 * double(ended) / double(pixels);
+    stats.passes.push_back(pass);
     finished = pass.counts.next_active_count == 0;
     stats.cancelled = on_pass && !on_pass(pass) && !(finished && is_last_band());
     guard.check(pass.counts);
@@ -242,7 +246,6 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   state_.slots_are_scarce =
       state_.cache.num_slots < kSmallCache || counts.free_count < state_.cache.num_slots / 4;
   stats.utilization_percent = 100.0 * counts.granted_count / pixels;
-  stats.completed_percent = 100.0 * (pixels - counts.next_active_count) / pixels;
   stats.stage_ms = device_.timer().collect();
   return stats;
 }

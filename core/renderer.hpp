@@ -49,7 +49,7 @@ struct PassStats {
   PassCounts counts{};
   std::uint32_t level = 0;                 ///< of detail, which it drew
   double utilization_percent = 0;          ///< ray-block pairs that were intersected, of width * height
-  double completed_percent = 0;            ///< pixels whose rays have ended, of width * height
+  double completed_percent = 0;            ///< pixels whose rays are known to have ended, of width * height
   std::map<std::string, double> stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 

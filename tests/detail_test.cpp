@@ -288,6 +288,19 @@ TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
   EXPECT_NE(depth, depth_of(drawn_with(0.02)));
 }
 
+/// A band's end is not the rays'.
+TEST_P(LevelsOnDevice, FramesAreCompleteAfterTheLastBand) {
+  const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
+  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .max_pixel_error = 3});
+  const FrameStats stats = renderer.render(orbit_cameras(volume.info, 1)[0], 0.4f);
+  ASSERT_NE(stats.passes.front().level, stats.passes.back().level);
+  for (std::size_t i = 1; i < stats.passes.size(); ++i) {
+    EXPECT_GE(stats.passes[i].completed_percent, stats.passes[i - 1].completed_percent);
+    EXPECT_LT(stats.passes[i - 1].completed_percent, 100.0);
+  }
+  EXPECT_EQ(stats.passes.back().completed_percent, 100.0);
+}
+
 TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
   const CompressedVolume volume = pyramid_of({64, 64, 64}, test::gyroid_field(16));
   const Camera camera = camera_along({32, 32, -200}, {0, 0, 1}, {0, 1, 0}, 30);
