@@ -24,6 +24,12 @@ void check_max_error(double max_error) {
     throw Error("an error of {} pixels cannot be kept: give more than 0", max_error);
 }
 
+RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume) {
+  options.with_bounds = true;
+  options.max_pixel_error = volume.coarser.empty() ? 0 : 1;
+  return options;
+}
+
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
                            float isovalue, double max_error) {
   check_max_error(max_error);

@@ -29,6 +29,9 @@ struct DetailChoice {
 /// Share of the pixels that may lose their certificate, against full detail.
 inline constexpr double kLostShare = 0.01;
 
+/// What a renderer must be made with for choose_detail(): bounds, and all levels of detail that the volume has.
+RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
+
 /// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so many pixels, and their bounds
 /// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, coarsest first, then bit planes: the
 /// first that loses no more than kLostShare. Full detail, where most pixels do not keep max_error even so. max_error: pixels, above 0.

@@ -10,13 +10,6 @@
 namespace isowave {
 namespace {
 
-template <class Image>
-void check_same_size(const Image &a, const Image &b) {
-  if (a.width != b.width || a.height != b.height) {
-    throw Error("the images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height);
-  }
-}
-
 /// Nearest rank: the smallest value that at least `percent` of all values do not exceed. Reorders `values`,
 /// not empty.
 double percentile(std::vector<double> &values, std::size_t percent) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/error.hpp"
 #include "core/io/npy.hpp"
 #include "core/io/png.hpp"
 
@@ -31,6 +32,12 @@ struct ColourComparison {
   std::uint32_t max_channel_difference = 0;  ///< 0..255
   std::optional<double> psnr_db;             ///< over all channels, peak 255; none (infinite) when equal
 };
+
+/// Throws Error when the images differ in size.
+void check_same_size(const auto &a, const auto &b) {
+  if (a.width != b.width || a.height != b.height)
+    throw Error("the images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height);
+}
 
 /// Throws Error when the images differ in size.
 DepthComparison compare_depth(const FloatImage &a, const FloatImage &b);

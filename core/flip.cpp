@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "core/error.hpp"
+#include "core/compare.hpp"
 #include "core/parallel_for.hpp"
 
 namespace isowave {
@@ -201,8 +201,7 @@ Flip::Flip(Flip &&) noexcept = default;
 
 double Flip::error(const Image8 &test) const {
   const View &a = *reference_;
-  if (a.width != test.width || a.height != test.height)
-    throw Error("the images differ in size: {}x{} and {}x{}", a.width, a.height, test.width, test.height);
+  check_same_size(a, test);
   const View b = view_of(test, pixels_per_degree_);
   std::vector<double> sums(a.height, 0.0);  // by row, so that it is the same sum always
   parallel_for(a.height, 0, [&](std::uint64_t row, std::uint32_t) {

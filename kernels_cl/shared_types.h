@@ -96,9 +96,8 @@ ISO_CHECK_SIZE(FrameParams, 172);
 #define ISO_RAY_PIXEL 0x0FFFFFFFu
 #define ISO_RAY_AHEAD_SHIFT 28u
 #define ISO_RAY_AHEAD_MAX 6u
-#define ISO_FIRST_LOG_AHEAD 2u  ///< of a new ray
-#define ISO_BORDER_LOG_AHEAD \
-  3u  ///< of one that crosses a border of levels, where fewer rays are left: H100, 3 to 8 % faster
+#define ISO_FIRST_LOG_AHEAD 2u   ///< of a new ray
+#define ISO_BORDER_LOG_AHEAD 3u  ///< of one that crosses a border of levels (README "Levels of detail")
 #define ISO_RAY_IN_DOUBT 0x80000000u
 
 /// With levels of detail, above a ray's block id, or instead of one, when it has left a band: the side it was on at the border.

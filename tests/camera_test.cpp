@@ -11,7 +11,7 @@
 #include <string>
 
 #include "core/error.hpp"
-#include "tests/temp_folder.hpp"
+#include "tests/run_program.hpp"
 
 namespace isowave {
 namespace {
@@ -38,7 +38,7 @@ class CameraFileTest : public testing::Test {
     return "accepted";
   }
 
-  TempFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(CameraFileTest, ReadsEveryField) {

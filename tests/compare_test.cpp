@@ -15,7 +15,6 @@
 
 #include "core/error.hpp"
 #include "tests/run_program.hpp"
-#include "tests/temp_folder.hpp"
 
 namespace isowave {
 namespace {
@@ -115,7 +114,7 @@ class CompareProgram : public testing::Test {
     write_png({1, 1, 3, {1, 2, 9}}, folder_ / "b.png");
   }
 
-  TempFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(CompareProgram, ExactFailsOnlyOnDifferences) {

@@ -16,7 +16,7 @@
 #include <string>
 
 #include "core/error.hpp"
-#include "tests/temp_folder.hpp"
+#include "tests/run_program.hpp"
 
 namespace isowave {
 namespace {
@@ -59,7 +59,7 @@ class NpyTest : public testing::Test {
     return "accepted";
   }
 
-  TempFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(NpyTest, KeepsEveryBit) {
@@ -78,7 +78,7 @@ TEST_F(NpyTest, KeepsEveryBit) {
     ASSERT_EQ(back.pixels.size(), image.pixels.size());
     EXPECT_EQ(std::memcmp(back.pixels.data(), image.pixels.data(), image.pixels.size() * sizeof(float)), 0);
     EXPECT_TRUE(std::isinf(back.pixels[0]) && back.pixels[0] > 0);
-    EXPECT_EQ(folder_.num_entries(), 1u) << "a temporary file was left";
+    EXPECT_EQ(folder_.num_files(), 1u) << "a temporary file was left";
   }
 }
 
@@ -141,7 +141,7 @@ TEST_F(NpyTest, RefusesOtherArrays) {
 TEST_F(NpyTest, LeavesNothingBehindWhenItCannotWrite) {
   EXPECT_THROW(write_npy({1, 1, {0.0f}}, folder_ / "no/such/folder.npy"), Error);
   EXPECT_THROW(write_npy({2, 2, {0.0f}}, folder_ / "image.npy"), std::invalid_argument);
-  EXPECT_EQ(folder_.num_entries(), 0u);
+  EXPECT_EQ(folder_.num_files(), 0u);
 }
 
 }  // namespace

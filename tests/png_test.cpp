@@ -13,7 +13,7 @@
 #include <string>
 
 #include "core/error.hpp"
-#include "tests/temp_folder.hpp"
+#include "tests/run_program.hpp"
 
 namespace isowave {
 namespace {
@@ -83,7 +83,7 @@ class PngTest : public testing::Test {
     return "accepted";
   }
 
-  TempFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(PngTest, KeepsEveryByte) {
@@ -97,7 +97,7 @@ TEST_F(PngTest, KeepsEveryByte) {
       EXPECT_EQ(back.height, height);
       EXPECT_EQ(back.channels, channels);
       EXPECT_EQ(back.pixels, image.pixels);
-      EXPECT_EQ(folder_.num_entries(), 1u) << "a temporary file was left";
+      EXPECT_EQ(folder_.num_files(), 1u) << "a temporary file was left";
     }
   }
 }
@@ -140,7 +140,7 @@ TEST_F(PngTest, LeavesNothingBehindWhenItCannotWrite) {
   EXPECT_THROW(write_png(Image8{0, 0, 3, {}}, folder_ / "image.png"), Error);
   EXPECT_THROW(write_png(Image8{2, 2, 3, {1}}, folder_ / "image.png"), std::invalid_argument);
   EXPECT_THROW(write_png(Image8{1, 1, 2, {1, 2}}, folder_ / "image.png"), std::invalid_argument);
-  EXPECT_EQ(folder_.num_entries(), 0u);
+  EXPECT_EQ(folder_.num_files(), 0u);
 }
 
 }  // namespace

@@ -17,7 +17,6 @@
 #include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 #include "tests/stage_support.hpp"
-#include "tests/temp_folder.hpp"
 #include "tests/test_devices.hpp"
 #include "tests/zfp_values.hpp"
 

@@ -249,11 +249,9 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
 /// What render --max-error chooses for each view.
 void choose(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
             const std::string &storage, const CompressedVolume &volume, ordered_json &points) {
+  if (options.max_errors.empty()) return;
+  Renderer renderer(device, volume, with_choices({.size = subject.size}, volume));
   for (const double max_error : options.max_errors) {
-    RendererFlags flags{.values = {}};
-    flags.values.max_pixel_error = volume.coarser.empty() ? 0 : 1;
-    flags.values.with_bounds = true;
-    Renderer renderer(device, volume, to_renderer_options(flags, subject.size));
     ordered_json chosen = ordered_json::array();
     const auto prepare = [&](const Camera &camera) {
       const DetailChoice choice = choose_detail(renderer, volume, camera, options.isovalue, max_error);

@@ -30,9 +30,7 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   const glm::uvec3 dims = scene.volume.info.dims;
   std::vector<float> source(scene.volume.info.num_voxels());
   open_any_volume(options.input, to_overrides(options.volume))->read_layers(0, dims.z, source);
-  Renderer renderer(
-      device, scene.volume,
-      {.size = scene.size, .max_pixel_error = scene.volume.coarser.empty() ? 0.0 : 1.0, .with_bounds = true});
+  Renderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
   fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view", "px chosen",
              "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");
   std::uint64_t exceeded = 0;
