@@ -119,7 +119,7 @@ BlockBounds encode_bounds(std::span<const float> bounds) {
     result.exponent =
         std::clamp(std::ilogb(largest / double{ISO_BOUND_MAX}) + 1, kMinBoundExponent, kMaxBoundExponent);
   }
-  std::array<double, 256> values{};
+  std::array<double, ISO_BOUND_CODES> values{};
   for (std::uint32_t code = 0; code < values.size(); ++code)
     values[code] = std::ldexp(double{block_bound(code)}, result.exponent);
   result.codes.reserve(bounds.size());

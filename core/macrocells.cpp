@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/frame.hpp"
+#include "kernels_cl/block_bound.h"
 #include "kernels_cl/block_grid.h"
 
 namespace isowave {
@@ -35,6 +36,7 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
       coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
       ranges_(device, "block ranges", block_count(frame)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
+      limits_(device, "active limits", ISO_BOUND_CODES),
       masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
       box_(device, "active box", 6),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
@@ -130,18 +132,29 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
   return thresholds;
 }
 
-void Macrocells::select(FrameParams &frame, float value_error) {
-  const auto index_of = [&](float value) {
+void Macrocells::select(FrameParams &frame, double value_error, const DeviceStream *moved) {
+  const auto index_of = [&](double value) {
     return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) - thresholds_.begin());
   };
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  const bool exact = value_error == 0.0f;  // sums are rounded: outward, please
-  below_index_ = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue + value_error, kFar));
-  above_index_ = index_of(exact ? frame.isovalue : std::nextafter(frame.isovalue - value_error, -kFar));
+  const double isovalue = double{frame.isovalue};
+  below_index_ = above_index_ = index_of(isovalue);
   set_indices(frame);
+  const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
+  std::array<uint, ISO_BOUND_CODES> limits{};
+  for (std::uint32_t code = 0; code < ISO_BOUND_CODES; ++code) {
+    const double offset = double{layout.value_offset} + double{layout.bound_unit} * double{block_bound(code)};
+    const double error = value_error + std::abs(offset);
+    const double rounded = error == 0 ? 0.0 : value_error + 0x1p-20 * (std::abs(isovalue) + error);
+    const std::uint32_t below = index_of(isovalue + rounded + std::max(-offset, 0.0)),
+                        above = index_of(isovalue - rounded - std::max(offset, 0.0));
+    limits[code] = below | above << 16;
+  }
+  limits_.write(limits);
+  const bool has_bounds = layout.bound_unit != 0;
   constexpr int kNone = std::numeric_limits<int>::max();
   box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
-  masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, masks_, box_);
+  masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, limits_, has_bounds ? 1 : 0,
+                has_bounds ? moved->index() : limits_, layout.bounds_begin, masks_, box_);
   box_.read(active_box_);
   const std::array<std::uint32_t, 3> dims = {frame.dims_x, frame.dims_y, frame.dims_z};
   for (std::size_t i = 0; i < 3; ++i) {

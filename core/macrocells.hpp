@@ -19,16 +19,13 @@ class Macrocells {
   /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z layer.
   Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
 
-  /// Builds the ranges again, for the same blocks with other values; the next select() makes the rest. Waits.
-  void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
-
   /// Bytes that building needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of, and sets
   /// what the frames of this isovalue need: the frame's below_index, above_index and
-  /// active box. Waits.
-  void select(FrameParams &frame, float value_error = 0.0f);
+  /// active box. moved: the stream, if its layout raises or lowers voxels as it did not when the ranges were made. Waits.
+  void select(FrameParams &frame, double value_error = 0, const DeviceStream *moved = nullptr);
   /// Sets below_index and above_index of the isovalue selected last.
   void set_indices(FrameParams &frame) const;
   /// Sets its active box.
@@ -59,17 +56,19 @@ class Macrocells {
     PartialsKernel kernel;
   };
 
+  void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
   std::vector<float> sample_thresholds(ocl::Device &device, std::uint32_t num_blocks, Partials &decode);
 
   std::uint32_t num_coarse_;
   ocl::Range coarse_range_;
   ocl::Buffer<cl_ushort> ranges_, coarse_ranges_;
-  ocl::Buffer<uint> masks_;
+  ocl::Buffer<uint> limits_, masks_;
   ocl::Buffer<int> box_;
   std::array<int, 6> active_box_{};  ///< begin x, y, z, end x, y, z [blocks]
   std::uint32_t below_index_ = 0, above_index_ = 0;
   std::vector<float> thresholds_;
-  ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::Out<uint>, ocl::Out<int>>
+  ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::In<uint>,
+              uint, ocl::Out<uint>, ocl::Out<int>>
       masks_kernel_;
 };
 

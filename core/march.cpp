@@ -44,9 +44,10 @@ void March::start_rays(const Macrocells &macrocells, Wavefront &rays) {
 
 void March::cross_border(const FrameParams &before, const Macrocells &macrocells_before,
                          const Macrocells &macrocells, Wavefront &rays) {
-  levels_.value().cross_border(start_range_, before, rays.frame, macrocells_before.ranges(),
-                               macrocells.ranges(), macrocells.masks(), rays.counts, rays.next_counts,
-                               rays.next_active_ray_ids, rays.ray_block_ids, rays.hits);
+  levels_.value().cross_border(start_range_, before, rays.frame, macrocells_before.masks(),
+                               macrocells_before.ranges(), macrocells.masks(), macrocells.ranges(),
+                               rays.counts, rays.next_counts, rays.next_active_ray_ids, rays.ray_block_ids,
+                               rays.hits);
 }
 
 void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {

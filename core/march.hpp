@@ -51,9 +51,9 @@ class March {
   };
   struct LevelKernels : Kernels {
     LevelKernels(ocl::Device &device, const ocl::Defines &defines);
-    ocl::Kernel<FrameParams, FrameParams, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>,
-                ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>,
-                ocl::In<HitRecord>>
+    ocl::Kernel<FrameParams, FrameParams, ocl::In<uint>, ocl::In<cl_ushort>, ocl::In<uint>,
+                ocl::In<cl_ushort>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
+                ocl::Out<uint>, ocl::In<HitRecord>>
         cross_border;
   };
   Kernels &kernels_for(const FrameParams &frame);

@@ -76,6 +76,7 @@ void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryReq
   plan.buffers.insert(plan.buffers.end(), {{"block ranges", 2 * volume.block_count()},
                                            {"macrocell ranges", 2 * num_cells},
                                            {"macrocell masks", 8 * num_cells},
+                                           {"active limits", 4 * std::uint64_t{ISO_BOUND_CODES}},
                                            {"active box", 6 * sizeof(int)}});
   plan.setup_bytes =
       std::max(plan.setup_bytes, plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
@@ -181,13 +182,6 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"framebuffer", 4 * pixels}});
   if (request.kept_pixels != 0)
     plan.buffers.push_back({"kept hits", sizeof(HitRecord) * request.kept_pixels});
-  for (const CompressedVolume &level :
-       volume.coarser) {  // whose ranges are built again for Renderer::draw_bound()
-    if (request.with_levels && request.with_bounds) {
-      plan.setup_bytes =
-          std::max(plan.setup_bytes, plan.total() + Macrocells::setup_scratch_bytes(level.num_blocks()));
-    }
-  }
   return plan;
 }
 

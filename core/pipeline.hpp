@@ -33,13 +33,12 @@ struct Level {
   VolumeInfo info;
   ErrorBound error_bound;  ///< of its blocks
   LevelError error;        ///< of its field against the volume's
-  float largest_bound;     ///< of a block's error
   DeviceStream stream;
   Macrocells macrocells;
   ZfpDecode decode;
-  FrameParams frame{};    ///< its part of the frame at work
-  float range_error = 0;  ///< of decoded voxels, at most: against those that the ranges were made of
-  float ranges_unit = 0;  ///< StreamLayout::bound_unit when they were
+  FrameParams frame{};  ///< its part of the frame at work
+  double range_error =
+      0;  ///< of decoded voxels, at most: against those that the ranges were made of, all planes
   std::optional<float> selected_isovalue{};  ///< what the macrocell masks stand for
 };
 

@@ -97,8 +97,8 @@ Level make_level(ocl::Device &device, const CompressedVolume &volume, const Leve
                             : DeviceStream(device, volume, options.largest_stream_part, options.with_bounds);
   Macrocells macrocells(device, make_grid_params(volume.info), stream);
   ZfpDecode decode(device, plan.cache_slots, stream.defines(), options.max_pixel_error > 0);
-  return {volume.info,           volume.error_bound, error, largest_bound(volume.bounds), std::move(stream),
-          std::move(macrocells), std::move(decode)};
+  return {volume.info,       volume.error_bound,    error,
+          std::move(stream), std::move(macrocells), std::move(decode)};
 }
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
@@ -192,10 +192,9 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
     level.frame.per_ray_speculation = options_.per_ray_speculation;
     level.frame.table_groups = state_.cache.table_groups;
     if (draws(level.frame) && level.selected_isovalue != isovalue) {
-      update_ranges(level);
       const auto stage = device_.timer().stage("macrocells");
       FrameParams frame = level.frame;
-      level.macrocells.select(frame, level.range_error);
+      level.macrocells.select(frame, level.range_error, &level.stream);
       level.selected_isovalue = isovalue;
     }
     level.macrocells.set_indices(level.frame);
@@ -285,29 +284,11 @@ void Renderer::update_layouts() {
     changes = true;
     level.selected_isovalue.reset();
     level.stream.layout = layout;
-    level.range_error = static_cast<float>(few_planes);
-    if (bound_ == FieldBound::kNone) continue;
-    const float bound = level.largest_bound;
-    level.range_error += std::abs(offset.uniform);
-    // All of the finest level would take longer to decode again than the blocks that wider ranges let in.
-    if (i == 0) level.range_error += bound;
-    level.range_error += 0x1p-20f * (static_cast<float>(magnitude) + level.range_error + bound);  // roundings
+    level.range_error = few_planes;
   }
   if (!changes) return;
   classified_isovalue_.reset();
   clear_cache();
-}
-
-/// Builds the ranges of a coarser level again where its blocks are raised or lowered, each by its own bound, since they were built.
-void Renderer::update_ranges(Level &level) {
-  const StreamLayout layout = level.stream.layout;
-  if (&level == &state_.levels.front() || level.ranges_unit == layout.bound_unit) return;
-  level.stream.layout.value_offset = 0;  // which range_error stands for, as for fewer bit planes
-  level.stream.layout.min_exponent = level.error_bound.min_exponent;
-  level.stream.layout.whole_numbers = level.error_bound.whole_numbers ? 1 : 0;
-  level.macrocells.build(device_, make_grid_params(level.info), level.stream);
-  level.stream.layout = layout;
-  level.ranges_unit = layout.bound_unit;
 }
 
 void Renderer::set_max_pixel_error(double max_pixel_error) {

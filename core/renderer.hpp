@@ -73,7 +73,7 @@ inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 class Renderer {
  public:
   /// Uploads the volume, builds its macrocell ranges and every buffer of the frame; nothing is allocated
-  /// later, but what draw_bound() needs for a moment. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
+  /// later. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
   /// renderer; `volume` need not, unless it stays on the host (memory_plan().stream).
   Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
 
@@ -92,7 +92,7 @@ class Renderer {
 
   /// What further frames draw: the volume, as at first, or the field that is nowhere above, or nowhere below what the volume's voxels were
   /// before compression, trilinear between them: decoded values are lowered or raised by the bound of their error. Forgets
-  /// the decoded blocks where that changes, and decodes coarser levels to build their ranges again. Needs options().with_bounds. Throws Error where the error is not known.
+  /// the decoded blocks where that changes. Needs options().with_bounds. Throws Error where the error is not known.
   void draw_bound(FieldBound bound);
 
   /// Distance in pixels up to which voxels of a coarser level may be apart in further frames; options().max_pixel_error at first. Throws
@@ -131,7 +131,6 @@ class Renderer {
  private:
   void begin_frame(const Camera &camera, float isovalue);
   void update_layouts();
-  void update_ranges(Level &level);
   void draw_band(const OnPass &on_pass, FrameStats &stats);
   bool is_last_band() const;
   void begin_next_band();

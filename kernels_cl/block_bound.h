@@ -7,7 +7,8 @@
 
 ISO_NAMESPACE_BEGIN
 
-#define ISO_BOUND_MAX 507904.0f  ///< of code 255
+#define ISO_BOUND_CODES 256u
+#define ISO_BOUND_MAX 507904.0f  ///< of the last code
 
 /// 0..15, then 16 steps for each doubling; exact.
 ISO_INLINE float block_bound(uint code) {
@@ -15,9 +16,9 @@ ISO_INLINE float block_bound(uint code) {
   return (float)(doublings == 0u ? steps : (16u + steps) << (doublings - 1u));
 }
 
-/// The same for a block, from codes packed four to a word.
-ISO_INLINE float packed_block_bound(ISO_GLOBAL const uint *codes, uint block) {
-  return block_bound(codes[block / 4u] >> (8u * (block & 3u)) & 0xFFu);
+/// The code of a block, of codes packed four to a word.
+ISO_INLINE uint packed_bound_code(ISO_GLOBAL const uint *codes, uint block) {
+  return codes[block / 4u] >> (8u * (block & 3u)) & 0xFFu;
 }
 
 ISO_NAMESPACE_END

@@ -54,7 +54,7 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
   if (layout.value_offset != 0.0f || layout.bound_unit != 0.0f) {
     float offset = layout.value_offset;
     if (layout.bound_unit != 0.0f)
-      offset += layout.bound_unit * packed_block_bound(index + layout.bounds_begin, block_id);
+      offset += layout.bound_unit * block_bound(packed_bound_code(index + layout.bounds_begin, block_id));
     ISO_UNROLL
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] += offset;
   }

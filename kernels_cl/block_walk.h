@@ -17,6 +17,13 @@
 #define ISO_BLOCKS_AT_ONCE 16u
 #endif
 
+ISO_INLINE int is_active(const FrameParams *frame, global const uint *macrocell_masks, BlockCoords b) {
+  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  const uint cell = b.x / 4 + coarse_x * (b.y / 4 + coarse_y * (b.z / 4));
+  const uint bit = (b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3);
+  return (macrocell_masks[2 * cell + bit / 32] >> (bit % 32) & 1u) != 0;
+}
+
 /// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it entered the cell.
 ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e, LastPlanes last) {
   const int bx = coarse->x * ISO_MACROCELL_BLOCKS, by = coarse->y * ISO_MACROCELL_BLOCKS,

@@ -6,10 +6,10 @@
 /// macrocell_ranges joins them.
 ///
 /// Ranges are stored in 8 bits through `thresholds` [256], ascending from -INFINITY to INFINITY: low = the last threshold
-/// <= min, high = the first >= max. So they only ever grow: no block is skipped wrongly. With e = how far the frame's voxels may be from
-/// those that ranges were made of, FrameParams.below_index = the first threshold >= isovalue + e and above_index = the first
-/// >= isovalue - e: some value may be below the isovalue iff low < below_index, and some at or above iff high >= above_index.
-/// Both: active. Coarse macrocells of 4^3 blocks hold the union of their blocks.
+/// <= min, high = the first >= max. So they only ever grow: no block is skipped wrongly. With `below` the first threshold >= isovalue + e and
+/// `above` the first >= isovalue - f, where the frame's voxels may be lower by e and higher by f than those that ranges were made of,
+/// some value may be below the isovalue iff low < below, and some at or above iff high >= above. Both: active. e and f may be
+/// larger for blocks of larger bounds (block_bound.h). Coarse macrocells of 4^3 blocks hold the union of their blocks.
 #include "block_grid.h"
 #include "block_stream.h"
 
@@ -133,19 +133,39 @@ kernel void macrocell_coarse_ranges(const FrameParams frame_params, uint num_coa
   }
 }
 
-/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. box [6]: in, INT_MAX three
+/// limits: `below` in bits 0..15, `above` in bits 16..31.
+ISO_INLINE int holds_isovalue(uint range, uint limits) {
+  return (range & 255u) < (limits & 0xFFFFu) && range >> 8 >= limits >> 16;
+}
+
+/// The largest code of the bounds of a block and those neighbours whose voxels its dual cells have.
+ISO_INLINE uint dual_grid_code(const FrameParams *frame, global const uint *bounds, uint block_id) {
+  const BlockCoords b = block_coords(frame, block_id);
+  uint code = 0;
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint id = dual_grid_block(frame, b, corner);
+    if (id != ISO_INVALID_ID) code = max(code, packed_bound_code(bounds, id));
+  }
+  return code;
+}
+
+/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. limits [256]: of blocks by the code of their
+/// bound, each as wide as the one before at least; without bounds the first is for all blocks. bounds: packed codes, from word bounds_begin on. box [6]: in, INT_MAX three
 /// times and 0 three times; out, first and behind the last macrocell with a bit, x, y, z. Once per isovalue. Grid-stride.
 kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse, global const ushort *ranges,
-                            global const ushort *coarse_ranges, global uint *masks, global int *box) {
+                            global const ushort *coarse_ranges, global const uint *limits, uint has_bounds,
+                            global const uint *bounds, uint bounds_begin, global uint *masks,
+                            global int *box) {
   const FrameParams *frame = &frame_params;
-  const uint below = frame->below_index, above = frame->above_index;
+  const uint widest = limits[has_bounds != 0 ? ISO_BOUND_CODES - 1 : 0];
   for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {
     uint words[2] = {0, 0};
-    if ((coarse_ranges[coarse] & 255u) < below && (uint)coarse_ranges[coarse] >> 8 >= above) {
+    if (holds_isovalue(coarse_ranges[coarse], widest)) {
       for (uint bit = 0; bit < 64; ++bit) {
         const uint block_id = macrocell_block(frame, coarse, bit);
-        if (block_id == ISO_INVALID_ID) continue;
-        if (((uint)ranges[block_id] & 255u) < below && (uint)ranges[block_id] >> 8 >= above)
+        if (block_id == ISO_INVALID_ID || !holds_isovalue(ranges[block_id], widest)) continue;
+        if (has_bounds == 0 ||
+            holds_isovalue(ranges[block_id], limits[dual_grid_code(frame, bounds + bounds_begin, block_id)]))
           words[bit >> 5] |= 1u << (bit & 31);
       }
     }

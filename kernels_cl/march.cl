@@ -260,11 +260,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
 
 #if ISO_LEVELS
 
-/// The side on which a whole block is; unknown if it is active. See macrocells.cl.
-ISO_INLINE uint side_of_block(const FrameParams *frame, global const ushort *ranges, BlockCoords b) {
-  const uint range = ranges[level_block_at(frame, b.x, b.y, b.z)];
-  const int some_below = (range & 0xFFu) < frame->below_index, some_above = range >> 8 >= frame->above_index;
-  return some_below && some_above ? ISO_SIDE_UNKNOWN : some_above ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
+/// The side on which a whole block is; unknown if it is active. See macrocells.cl: the range of one that is not is on its side, too.
+ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
+                              global const ushort *ranges, BlockCoords b) {
+  if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
+  return ranges[level_block_at(frame, b.x, b.y, b.z)] >> 8 >= frame->above_index ? ISO_SIDE_INSIDE
+                                                                                 : ISO_SIDE_OUTSIDE;
 }
 
 /// Does the ray reach the border at t within the domain? If so, *b is the block it is in just behind it.
@@ -285,10 +286,10 @@ ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t
 /// levels' blocks. Where the block that it goes on in is not as a whole on that side, the ray stands there, and keeps
 /// the side with it; else it stands at its next active block. The other arguments as in start_rays.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cross_border(
-    const FrameParams before, const FrameParams frame_params, global const ushort *ranges_before,
-    global const ushort *ranges, global const uint *macrocell_masks, global PassCounts *counts,
-    global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
-    global const HitRecord *hits) {
+    const FrameParams before, const FrameParams frame_params, global const uint *masks_before,
+    global const ushort *ranges_before, global const uint *macrocell_masks, global const ushort *ranges,
+    global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
+    global uint *ray_block_ids, global const HitRecord *hits) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
   const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
@@ -307,9 +308,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cross_bo
       uint block_id = first_block(frame, &ray);
       BlockCoords b;
       if (side == ISO_SIDE_UNKNOWN && block_at_border(&before, &ray_before, before.end_t, &b))
-        side = side_of_block(&before, ranges_before, b);
+        side = side_of_block(&before, masks_before, ranges_before, b);
       if (side != ISO_SIDE_UNKNOWN && block_at_border(frame, &ray, frame->begin_t, &b) &&
-          side_of_block(frame, ranges, b) != side) {
+          side_of_block(frame, macrocell_masks, ranges, b) != side) {
         state = block_id | side << ISO_RAY_SIDE_SHIFT;
         goes_on = 1;
       } else if (block_id != ISO_INVALID_ID &&

@@ -77,8 +77,9 @@ typedef struct FrameParams {
   float pixel_scale;  ///< tan(fovy / 2) / height: half a pixel's step of u and v
   float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
   float isovalue;
-  uint below_index, above_index;  ///< the isovalue in the quantile table of macrocells.cl
-  uint max_spec_count;            ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+  uint below_index,
+      above_index;      ///< the isovalue in the quantile table of macrocells.cl: the first threshold >= it
+  uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
   int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
   /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
@@ -141,7 +142,7 @@ typedef struct StreamLayout {
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
   int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES: with the block's bits
   uint whole_numbers;  ///< not 0: decoded values are rounded to integers
-  /// Added to all of a block's values, to draw a bound of the volume: value_offset + bound_unit * its packed_block_bound(), of
+  /// Added to all of a block's values, to draw a bound of the volume: value_offset + bound_unit * block_bound() of its code, of
   /// codes that begin with word bounds_begin of the index. Both 0: nothing.
   float value_offset, bound_unit;
   uint bounds_begin;
