@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/frame.hpp"
+#include "core/level_bounds.hpp"
 #include "core/zfp_decode.hpp"
 #include "kernels_cl/block_grid.h"
 #include "tests/stage_support.hpp"
@@ -24,6 +25,8 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 /// What a block's dual cells hold, padding left out. min > max: the block owns no cell.
 struct Range {
   float min = kInfinity, max = -kInfinity;
+  /// Half open: inside := f >= isovalue.
+  bool holds(float isovalue) const { return min < isovalue && isovalue <= max; }
 };
 
 std::vector<Range> dual_cell_ranges(const glm::uvec3 &dims, const std::vector<float> &voxels) {
@@ -136,6 +139,15 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     }
   }
 
+  static bool is_selected(const std::vector<uint> &masks, const FrameParams &params, uint block) {
+    const uint x = block % params.blocks_x, y = block / params.blocks_x % params.blocks_y,
+               z = block / params.blocks_x / params.blocks_y;
+    const uint coarse_x = (params.blocks_x + 3) / 4, coarse_y = (params.blocks_y + 3) / 4;
+    const uint coarse = x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4)),
+               bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+    return (masks[2 * coarse + bit / 32] >> bit % 32 & 1) != 0;
+  }
+
   /// A block whose dual cells hold values on both sides must be selected; one that owns no cell must not.
   static void expect_mask(const Macrocells &macrocells, const FrameParams &params,
                           const std::vector<Range> &expected, float isovalue, std::size_t &num_selected,
@@ -143,18 +155,12 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const std::vector<uint> masks = macrocells.masks().read();
     const std::vector<float> &thresholds = macrocells.thresholds();
     const std::vector<cl_ushort> ranges = macrocells.ranges().read();
-    const uint coarse_x = (params.blocks_x + 3) / 4, coarse_y = (params.blocks_y + 3) / 4;
     std::size_t num_bits = 0, num_blocks_selected = 0;
     for (const uint word : masks) num_bits += static_cast<std::size_t>(std::popcount(word));
     for (uint b = 0; b < expected.size(); ++b) {
-      const uint x = b % params.blocks_x, y = b / params.blocks_x % params.blocks_y,
-                 z = b / params.blocks_x / params.blocks_y;
-      const uint coarse = x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4)),
-                 bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
-      const bool selected = masks[2 * coarse + bit / 32] >> bit % 32 & 1;
+      const bool selected = is_selected(masks, params, b);
       const Range &range = expected[b];
-      const bool in_range =
-          range.min < isovalue && isovalue <= range.max;  // half open: inside := f >= isovalue
+      const bool in_range = range.holds(isovalue);
       if (in_range) {
         ASSERT_TRUE(selected) << "block " << b << " of [" << range.min << ", " << range.max << "] is missed";
       }
@@ -205,6 +211,48 @@ TEST_P(MacrocellsOnDevice, RandomVolumesOfAwkwardDims) {
 TEST_P(MacrocellsOnDevice, SmoothVolumesOfAwkwardDims) {
   for (const glm::uvec3 &dims : kAwkwardDims)
     expect_exact(compress_with_libzfp(sphere_voxels(dims), dims, 1024));
+}
+
+/// Ranges are those of the volume; what the isovalue touches where each block is raised or lowered by its own bound follows from them.
+TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
+  const glm::uvec3 dims(17, 10, 9);
+  CompressedVolume volume = compress_with_libzfp(sphere_voxels(dims), dims, 1024);
+  FrameParams params = grid_frame(dims);
+  volume.bounds.exponent = -6;
+  for (std::size_t i = 0; i < volume.block_count(); ++i)
+    volume.bounds.codes.push_back(i % 5 == 0 ? 32 : i % 16);  // 0.5, and up to 0.23
+  DeviceStream stream(device_, volume, 0, true);
+  Macrocells macrocells(device_, params, stream);
+  const std::vector<float> decoded = decode_with_libzfp(volume);
+  std::size_t num_selected = 0, num_in_range = 0, num_if_all_alike = 0;
+  for (const float sign : {-1.0f, 1.0f}) {
+    const ValueOffset offset{0, sign * std::ldexp(1.0f, volume.bounds.exponent)};
+    std::vector<float> moved = decoded;
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+      const std::size_t x = i % dims.x / 4, y = i / dims.x % dims.y / 4, z = i / dims.x / dims.y / 4;
+      moved[i] += offset_of_block(offset, volume.bounds, x + params.blocks_x * (y + params.blocks_y * z));
+    }
+    const std::vector<Range> expected = dual_cell_ranges(dims, moved);
+    for (const float isovalue : awkward_isovalues(expected, 4)) {
+      params.isovalue = isovalue;
+      const auto masks = [&](float uniform, float unit) {
+        stream.layout.value_offset = uniform;
+        stream.layout.bound_unit = unit;
+        macrocells.select(params, 0, &stream);
+        return macrocells.masks().read();
+      };
+      const std::vector<uint> by_block = masks(0, offset.unit), alike = masks(sign * 0.5f, 0);
+      for (uint b = 0; b < expected.size(); ++b) {
+        const bool selected = is_selected(by_block, params, b);
+        ASSERT_TRUE(selected || !expected[b].holds(isovalue)) << "block " << b << " at " << isovalue;
+        num_selected += selected;
+        num_in_range += expected[b].holds(isovalue);
+        num_if_all_alike += is_selected(alike, params, b);
+      }
+    }
+  }
+  EXPECT_LE(num_selected, 3 * num_in_range);
+  EXPECT_LT(num_selected, num_if_all_alike);
 }
 
 /// At 1 bit per voxel zfp overshoots a step several times: ranges must come from decoded values.
