@@ -17,10 +17,6 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
   return num_slots;
 }
 
-std::size_t request_words(const FrameParams &grid) {
-  return 2 * std::size_t{(grid.blocks_x + 3) / 4} * ((grid.blocks_y + 3) / 4) * ((grid.blocks_z + 3) / 4);
-}
-
 }  // namespace
 
 /// Twice as many entries as slots, a quarter of them with evicted blocks' keys at most before the table is rebuilt; not a
@@ -47,7 +43,7 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       inside(device, "voxels inside", slots),
       slot_block_ids(device, "cache slot blocks", slots),
       slot_stamps(device, "cache slot stamps", slots),
-      requested_bits(device, "requested blocks", request_words(grid)),
+      requested_bits(device, "requested blocks", 2 * num_macrocells(grid)),
       request_block_ids(device, "block requests", capacity),
       decode_slots(device, "decode slots", capacity),
       state(device, "cache state", 1),

@@ -32,7 +32,35 @@ std::array<double, 2> reach(const VolumeInfo &info, const glm::dvec3 &eye) {
   return {0.999 * std::max(0.0, nearest), 1.001 * farthest};
 }
 
+/// Lets the next level's ids, ranges and masks begin where those of the one before end.
+void place_behind(const FrameParams &before, FrameParams &frame) {
+  frame.id_blocks_x = before.id_blocks_x;
+  frame.id_blocks_y = before.id_blocks_y;
+  frame.id_begin_z = before.id_begin_z + before.blocks_z;
+  frame.ranges_begin = before.ranges_begin + static_cast<uint>(block_count(before));
+  frame.masks_begin = before.masks_begin + 2 * static_cast<uint>(num_macrocells(before));
+}
+
+void place_levels(std::span<FrameParams> frames) {
+  frames[0].id_blocks_x = frames[0].blocks_x;
+  frames[0].id_blocks_y = frames[0].blocks_y;
+  for (std::size_t i = 1; i < frames.size(); ++i) place_behind(frames[i - 1], frames[i]);
+}
+
 }  // namespace
+
+std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels) {
+  std::vector<FrameParams> grids;
+  for (const VolumeInfo &info : levels) grids.push_back(make_grid_params(info));
+  place_levels(grids);
+  return grids;
+}
+
+FrameParams make_id_grid(std::span<const FrameParams> level_grids) {
+  FrameParams grid = level_grids.front();
+  grid.blocks_z = level_grids.back().id_begin_z + level_grids.back().blocks_z;
+  return grid;
+}
 
 void check_max_pixel_error(double max_pixel_error) {
   if (!(max_pixel_error >= 0) || !std::isfinite(max_pixel_error))
@@ -52,16 +80,9 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
                                            ImageSize size, float isovalue, double max_pixel_error) {
   check_max_pixel_error(max_pixel_error);
   std::vector<FrameParams> frames;
-  for (const VolumeInfo &info : levels) {
-    FrameParams frame = make_frame_params(info, camera, size, isovalue);
-    if (!frames.empty()) {
-      frame.id_blocks_x = frames[0].blocks_x;
-      frame.id_blocks_y = frames[0].blocks_y;
-      frame.id_begin_z = frames.back().id_begin_z + frames.back().blocks_z;
-      frame.begin_t = frame.end_t = 0.0f;
-    }
-    frames.push_back(frame);
-  }
+  for (const VolumeInfo &info : levels) frames.push_back(make_frame_params(info, camera, size, isovalue));
+  place_levels(frames);
+  for (std::size_t i = 1; i < frames.size(); ++i) frames[i].begin_t = frames[i].end_t = 0.0f;
   if (max_pixel_error == 0 || levels.size() == 1) return frames;
 
   const VolumeInfo &finest = levels[0];
@@ -86,10 +107,10 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
     FrameParams &frame = frames[level];
     frame.begin_t = level == first ? 0.0f : border(level, frame);
     frame.end_t = level == last ? std::numeric_limits<float>::infinity() : border(level + 1, frame);
-    if (first == last) continue;
-    frame.screen_begin_x = frame.screen_begin_y = 0;
-    frame.screen_end_x = size.width;
-    frame.screen_end_y = size.height;
+    frames[first].screen_begin_x = std::min(frames[first].screen_begin_x, frame.screen_begin_x);
+    frames[first].screen_begin_y = std::min(frames[first].screen_begin_y, frame.screen_begin_y);
+    frames[first].screen_end_x = std::max(frames[first].screen_end_x, frame.screen_end_x);
+    frames[first].screen_end_y = std::max(frames[first].screen_end_y, frame.screen_end_y);
   }
   return frames;
 }

@@ -18,7 +18,7 @@ namespace isowave {
 /// One frame for each level, the finest first: as make_frame_params() makes it, but with the level's band, begin_t to end_t,
 /// which is empty where it draws nothing, and block ids that count on through all levels. The first band begins at the
 /// eye, the last one has no end; a level whose band the volume does not reach into draws nothing. If there are several
-/// bands, the active and the screen boxes are those of the whole domain and image.
+/// bands, the active box of each is its whole domain, and the first one's screen box is for all.
 /// max_pixel_error: distance between a level's voxels, in pixels, at most; 0: the finest level draws all. Throws Error: what
 /// make_frame_params() throws.
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
@@ -29,6 +29,11 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
 inline double value_error_of(double value_error, std::size_t level) {
   return std::ldexp(value_error, static_cast<int>(level));
 }
+
+/// Grid parameters of each level, with the places of its blocks, ranges and masks among those of all levels.
+std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels);
+/// All levels' ids as those of one grid: its blocks are as many along x and y as the finest level's.
+FrameParams make_id_grid(std::span<const FrameParams> level_grids);
 
 inline bool draws(const FrameParams &frame) {
   return frame.begin_t < frame.end_t;

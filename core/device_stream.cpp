@@ -99,4 +99,9 @@ ocl::Defines DeviceStream::defines() const {
   return defines;
 }
 
+bool DeviceStream::is_window(const ocl::Defines &defines) {
+  const auto parts = defines.find("ISO_STREAM_PARTS");
+  return parts != defines.end() && parts->second == "0";
+}
+
 }  // namespace isowave

@@ -47,6 +47,8 @@ class DeviceStream {
 
   /// For kernels that include block_stream.h.
   ocl::Defines defines() const;
+  /// Do these defines stand for a stream on the host?
+  static bool is_window(const ocl::Defines &defines);
   /// Buffer i of 0..3 of a whole stream; where there are fewer, the first.
   const ocl::Buffer<uint> &part(std::size_t i) const { return parts[i < parts.size() ? i : 0]; }
   /// Where the blocks of a whole stream begin (block_index.h), and the bounds of a level of detail; where there is nothing to look

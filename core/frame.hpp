@@ -27,6 +27,14 @@ inline std::uint64_t block_count(const FrameParams &grid) {
   return std::uint64_t{grid.blocks_x} * grid.blocks_y * grid.blocks_z;
 }
 
+/// Coarse macrocells (kernels_cl/macrocells.cl).
+inline std::uint64_t num_macrocells(const FrameParams &grid) {
+  const auto cells = [](std::uint32_t blocks) {
+    return (std::uint64_t{blocks} + ISO_MACROCELL_BLOCKS - 1) / ISO_MACROCELL_BLOCKS;
+  };
+  return cells(grid.blocks_x) * cells(grid.blocks_y) * cells(grid.blocks_z);
+}
+
 /// Of the grid only, for what is done before there is a camera.
 FrameParams make_grid_params(const VolumeInfo &info);
 

@@ -25,19 +25,16 @@ std::uint64_t num_samples(std::uint64_t num_blocks) {
   return num_blocks / sample_stride(num_blocks);
 }
 
-std::uint32_t coarse_count(const FrameParams &f) {
-  return (f.blocks_x + 3) / 4 * ((f.blocks_y + 3) / 4) * ((f.blocks_z + 3) / 4);
-}
-
 }  // namespace
 
-Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream)
-    : num_coarse_(coarse_count(frame)),
+Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
+                       std::shared_ptr<MacrocellBuffers> buffers)
+    : num_coarse_(static_cast<std::uint32_t>(num_macrocells(frame))),
       coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
-      ranges_(device, "block ranges", block_count(frame)),
+      buffers_(buffers ? std::move(buffers)
+                       : std::make_shared<MacrocellBuffers>(device, block_count(frame), num_coarse_)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
       limits_(device, "active limits", ISO_BOUND_CODES),
-      masks_(device, "macrocell masks", 2 * std::size_t{num_coarse_}),
       box_(device, "active box", 6),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
   build(device, frame, stream);
@@ -62,10 +59,10 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
   decode(0, 1, layer_blocks, below);
   for (std::uint32_t layer = 0; layer < frame.blocks_z; ++layer) {
     if (layer + 1 < frame.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
-    ranges_kernel(layer_range, frame, layer, below, above, thresholds, ranges_);
+    ranges_kernel(layer_range, frame, layer, below, above, thresholds, buffers_->ranges);
     std::swap(below, above);
   }
-  coarse_kernel(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_);
+  coarse_kernel(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_);
   device.finish();
 }
 
@@ -153,8 +150,9 @@ void Macrocells::select(FrameParams &frame, double value_error, const DeviceStre
   const bool has_bounds = layout.bound_unit != 0;
   constexpr int kNone = std::numeric_limits<int>::max();
   box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
-  masks_kernel_(coarse_range_, frame, num_coarse_, ranges_, coarse_ranges_, limits_, has_bounds ? 1 : 0,
-                has_bounds ? moved->index() : limits_, layout.bounds_begin, masks_, box_);
+  masks_kernel_(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_, limits_,
+                has_bounds ? 1 : 0, has_bounds ? moved->index() : limits_, layout.bounds_begin,
+                buffers_->masks, box_);
   box_.read(active_box_);
   const std::array<std::uint32_t, 3> dims = {frame.dims_x, frame.dims_y, frame.dims_z};
   for (std::size_t i = 0; i < 3; ++i) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
 
 #include "core/device_counts.hpp"
@@ -13,11 +14,21 @@
 
 namespace isowave {
 
+/// Of one level of detail or of several, one behind the other: FrameParams::ranges_begin, masks_begin.
+struct MacrocellBuffers {
+  MacrocellBuffers(ocl::Device &device, std::uint64_t num_blocks, std::uint64_t num_macrocells)
+      : ranges(device, "block ranges", num_blocks), masks(device, "macrocell masks", 2 * num_macrocells) {}
+  ocl::Buffer<cl_ushort> ranges;
+  ocl::Buffer<uint> masks;
+};
+
 class Macrocells {
  public:
   /// Decodes every block once, beside a sample for the quantile table, and waits.
   /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z layer.
-  Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
+  /// buffers: shared with other levels; none: its own.
+  Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
+             std::shared_ptr<MacrocellBuffers> buffers = {});
 
   /// Bytes that building needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
@@ -32,10 +43,10 @@ class Macrocells {
   void set_active_box(FrameParams &frame) const;
 
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
-  const ocl::Buffer<uint> &masks() const { return masks_; }
+  const ocl::Buffer<uint> &masks() const { return buffers_->masks; }
   /// [blocks]: low in bits 0..7, high in bits 8..15, indices into thresholds(); low > high: owns no dual
   /// cell.
-  const ocl::Buffer<cl_ushort> &ranges() const { return ranges_; }
+  const ocl::Buffer<cl_ushort> &ranges() const { return buffers_->ranges; }
   /// [256], ascending from -inf to +inf.
   const std::vector<float> &thresholds() const { return thresholds_; }
 
@@ -61,8 +72,9 @@ class Macrocells {
 
   std::uint32_t num_coarse_;
   ocl::Range coarse_range_;
-  ocl::Buffer<cl_ushort> ranges_, coarse_ranges_;
-  ocl::Buffer<uint> limits_, masks_;
+  std::shared_ptr<MacrocellBuffers> buffers_;
+  ocl::Buffer<cl_ushort> coarse_ranges_;
+  ocl::Buffer<uint> limits_;
   ocl::Buffer<int> box_;
   std::array<int, 6> active_box_{};  ///< begin x, y, z, end x, y, z [blocks]
   std::uint32_t below_index_ = 0, above_index_ = 0;

@@ -1,7 +1,5 @@
 #include "core/march.hpp"
 
-#include <limits>
-
 namespace isowave {
 
 namespace {
@@ -19,9 +17,6 @@ March::Kernels::Kernels(ocl::Device &device, const ocl::Defines &defines)
       march(device, "march", "march", defines),
       request_ahead(device, "march", "request_ahead", defines) {}
 
-March::LevelKernels::LevelKernels(ocl::Device &device, const ocl::Defines &defines)
-    : Kernels(device, defines), cross_border(device, "march", "cross_border", defines) {}
-
 March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
              bool levels)
     : range_(ocl::Range::strided(num_pixels, group_size, device)),
@@ -31,37 +26,28 @@ March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_
   if (levels) levels_.emplace(device, march_defines(group_size, solver, true));
 }
 
-March::Kernels &March::kernels_for(const FrameParams &frame) {
-  const bool alone = frame.begin_t == 0 && frame.end_t == std::numeric_limits<float>::infinity();
-  return levels_ && !(alone && frame.id_begin_z == 0) ? *levels_ : finest_;
+March::Kernels &March::kernels_for(const Wavefront &rays) {
+  return levels_ && (rays.num_level_frames > 1 || rays.frame.id_begin_z != 0) ? *levels_ : finest_;
 }
 
 void March::start_rays(const Macrocells &macrocells, Wavefront &rays) {
-  kernels_for(rays.frame)
-      .start_rays(start_range_, rays.frame, macrocells.masks(), rays.counts, rays.next_counts,
-                  rays.next_active_ray_ids, rays.ray_block_ids, rays.hits);
-}
-
-void March::cross_border(const FrameParams &before, const Macrocells &macrocells_before,
-                         const Macrocells &macrocells, Wavefront &rays) {
-  levels_.value().cross_border(start_range_, before, rays.frame, macrocells_before.masks(),
-                               macrocells_before.ranges(), macrocells.masks(), macrocells.ranges(),
-                               rays.counts, rays.next_counts, rays.next_active_ray_ids, rays.ray_block_ids,
-                               rays.hits);
+  kernels_for(rays).start_rays(start_range_, rays.frame, rays.level_frames, rays.num_level_frames,
+                               macrocells.masks(), macrocells.ranges(), rays.counts, rays.next_counts,
+                               rays.next_active_ray_ids, rays.ray_block_ids, rays.hits);
 }
 
 void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  kernels_for(rays.frame)
-      .march(range_, rays.frame, macrocells.masks(), cache.table, cache.inside, cache.values,
-             rays.previous_counts, rays.counts, rays.next_counts, rays.active_ray_ids,
-             rays.next_active_ray_ids, rays.ray_block_ids, rays.hits, cache.state);
+  kernels_for(rays).march(range_, rays.frame, rays.level_frames, rays.num_level_frames, macrocells.masks(),
+                          macrocells.ranges(), cache.table, cache.inside, cache.values, rays.previous_counts,
+                          rays.counts, rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids,
+                          rays.ray_block_ids, rays.hits, cache.state);
 }
 
 void March::request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  kernels_for(rays.frame)
-      .request_ahead(range_, rays.frame, macrocells.masks(), cache.table, rays.counts,
-                     rays.next_active_ray_ids, rays.ray_block_ids, cache.slot_stamps, cache.requested_bits,
-                     cache.request_block_ids, cache.capacity, cache.state);
+  kernels_for(rays).request_ahead(range_, rays.frame, rays.level_frames, rays.num_level_frames,
+                                  macrocells.masks(), cache.table, rays.counts, rays.next_active_ray_ids,
+                                  rays.ray_block_ids, cache.slot_stamps, cache.requested_bits,
+                                  cache.request_block_ids, cache.capacity, cache.state);
 }
 
 }  // namespace isowave

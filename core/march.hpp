@@ -18,14 +18,10 @@ class March {
   March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
         bool levels = false);
 
+  /// macrocells: of any level of detail, since levels share what is used of them.
   /// Begins a frame: rays.hits are none, rays.next_active_ray_ids those that meet an active block; their count goes to
   /// counts.next_active_count, the frame before having left 0 there. Asynchronous.
   void start_rays(const Macrocells &macrocells, Wavefront &rays);
-
-  /// Begins the next band of a frame, rays.frame: as start_rays(), but of the rays that have no hit; `before` and
-  /// macrocells_before are those of the band before. Asynchronous.
-  void cross_border(const FrameParams &before, const Macrocells &macrocells_before,
-                    const Macrocells &macrocells, Wavefront &rays);
 
   /// Takes rays further, as far as what was requested in the pass before has been provided. Out: rays.hits,
   /// next_active_ray_ids, ray_block_ids; counts.hit_count, granted_count (blocks intersected), next_active_count.
@@ -38,29 +34,25 @@ class March {
  private:
   struct Kernels {
     Kernels(ocl::Device &device, const ocl::Defines &defines);
-    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
-                ocl::Out<uint>, ocl::Out<HitRecord>>
+    ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
+                ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>,
+                ocl::Out<HitRecord>>
         start_rays;
-    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
-                ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
-                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<CacheState>>
+    ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
+                ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>, ocl::In<PassCounts>,
+                ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
+                ocl::Out<HitRecord>, ocl::Out<CacheState>>
         march;
-    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>,
-                ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
+    ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>,
+                ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
+                ocl::Out<uint>, uint, ocl::Out<CacheState>>
         request_ahead;
   };
-  struct LevelKernels : Kernels {
-    LevelKernels(ocl::Device &device, const ocl::Defines &defines);
-    ocl::Kernel<FrameParams, FrameParams, ocl::In<uint>, ocl::In<cl_ushort>, ocl::In<uint>,
-                ocl::In<cl_ushort>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
-                ocl::Out<uint>, ocl::In<HitRecord>>
-        cross_border;
-  };
-  Kernels &kernels_for(const FrameParams &frame);
+  Kernels &kernels_for(const Wavefront &rays);
 
   ocl::Range range_, start_range_;
-  Kernels finest_;                      ///< for frames that the finest level draws alone: a tenth faster
-  std::optional<LevelKernels> levels_;  ///< for all others
+  Kernels finest_;                 ///< for frames that the finest level draws alone: a tenth faster
+  std::optional<Kernels> levels_;  ///< for all others
 };
 
 }  // namespace isowave

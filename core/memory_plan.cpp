@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 
+#include "core/detail.hpp"
 #include "core/error.hpp"
 #include "core/pass_readback.hpp"
 #include "core/shade.hpp"
@@ -33,9 +34,12 @@ std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequ
   return static_cast<std::uint32_t>(std::max<std::uint64_t>(wanted, kMinCacheSlots));
 }
 
-std::uint64_t num_macrocells(const CompressedVolume &volume) {
-  const glm::uvec3 cells = (volume.num_blocks() + 3u) / 4u;
-  return std::uint64_t{cells.x} * cells.y * cells.z;
+/// Of the volume and those of its levels of detail that are on the device.
+std::vector<FrameParams> grids_of(const CompressedVolume &volume, const MemoryRequest &request) {
+  std::vector<VolumeInfo> infos = {volume.info};
+  for (std::size_t i = 0; request.with_levels && i < volume.coarser.size(); ++i)
+    infos.push_back(volume.coarser[i].info);
+  return make_level_grids(infos);
 }
 
 void add_index(MemoryPlan &plan, std::uint64_t words) {
@@ -72,12 +76,10 @@ void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRe
 /// What the volume, or one of its levels of detail, needs for itself.
 void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
   add_stream(plan, volume, request);
-  const std::uint64_t num_cells = num_macrocells(volume);
-  plan.buffers.insert(plan.buffers.end(), {{"block ranges", 2 * volume.block_count()},
-                                           {"macrocell ranges", 2 * num_cells},
-                                           {"macrocell masks", 8 * num_cells},
-                                           {"active limits", 4 * std::uint64_t{ISO_BOUND_CODES}},
-                                           {"active box", 6 * sizeof(int)}});
+  plan.buffers.insert(plan.buffers.end(),
+                      {{"macrocell ranges", 2 * num_macrocells(make_grid_params(volume.info))},
+                       {"active limits", 4 * std::uint64_t{ISO_BOUND_CODES}},
+                       {"active box", 6 * sizeof(int)}});
   plan.setup_bytes =
       std::max(plan.setup_bytes, plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
 }
@@ -142,12 +144,20 @@ std::uint64_t MemoryPlan::peak() const {
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots) {
   const std::uint64_t pixels = request.num_pixels, slots = cache_slots;
-  const std::uint64_t listed = BlockCache::capacity_for(cache_slots, volume.block_count(), pixels);
+  const std::vector<FrameParams> grids = grids_of(volume, request);
+  const FrameParams ids = make_id_grid(grids);
+  const std::uint64_t listed = BlockCache::capacity_for(cache_slots, block_count(ids), pixels);
   MemoryPlan plan;
   plan.cache_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
   if (plan.stream == StreamPlace::kHost)
     plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
+  std::uint64_t num_blocks = 0, num_cells = 0;
+  for (const FrameParams &grid : grids) {
+    num_blocks += block_count(grid);
+    num_cells += num_macrocells(grid);
+  }
+  plan.buffers = {{"block ranges", 2 * num_blocks}, {"macrocell masks", 8 * num_cells}};
   add_level(plan, volume, request);
   for (std::size_t i = 0; request.with_levels && i < volume.coarser.size(); ++i)
     add_level(plan, volume.coarser[i], request);
@@ -156,6 +166,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"pass counts, previous", sizeof(PassCounts)},
                        {"pass counts, next", sizeof(PassCounts)},
                        {"pass counts, read back", PassReadback::kMaxInFlight * sizeof(PassCounts)},
+                       {"level frames", sizeof(FrameParams) * grids.size()},
                        {"hits", sizeof(HitRecord) * pixels},
                        {"ray states", 4 * pixels},
                        {"active ray ids", 4 * pixels},
@@ -173,13 +184,16 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"cache slot blocks", 4 * slots},
                        {"cache slot stamps", 4 * slots},
                        {"free slots", 4 * slots},
-                       {"requested blocks", 8 * num_macrocells(volume)},
+                       {"requested blocks", 8 * num_macrocells(ids)},
                        {"block requests", 4 * listed},
                        {"decode slots", 4 * listed},
                        {"cache ages", 4 * std::uint64_t{ISO_AGE_BUCKETS}},
                        {"cache state", sizeof(CacheState)},
                        {"shading", sizeof(ShadeParams)},
                        {"framebuffer", 4 * pixels}});
+  if (grids.size() > 1 && plan.stream == StreamPlace::kHost) {
+    for (std::size_t i = 0; i < grids.size(); ++i) plan.buffers.push_back({"decode places", 4 * listed});
+  }
   if (request.kept_pixels != 0)
     plan.buffers.push_back({"kept hits", sizeof(HitRecord) * request.kept_pixels});
   return plan;

@@ -1,8 +1,5 @@
 #include "core/pipeline.hpp"
 
-#include <stdexcept>
-#include <utility>
-
 #include "core/composite.hpp"
 #include "core/group.hpp"
 #include "core/initial_rays.hpp"
@@ -32,9 +29,6 @@ class BlocksPipeline : public Pipeline {
     const auto stage = state_.device.timer().stage("initial_rays");
     initial_rays_(state_.rays, compaction_);
   }
-  void begin_band(const Level &) override {
-    throw std::logic_error("pipeline blocks: a frame has one band");  // the renderer sees to it
-  }
 
   void enqueue_pass() override {
     ocl::StageTimer &timer = state_.device.timer();
@@ -42,13 +36,13 @@ class BlocksPipeline : public Pipeline {
     speculation_.begin_pass(state_.rays);
     {
       const auto stage = timer.stage("traverse");
-      traverse_(state_.level().macrocells, state_.rays);
+      traverse_(state_.levels[0].macrocells, state_.rays);
     }
     {
       const auto stage = timer.stage("request");
       state_.cache.request(state_.rays);
     }
-    state_.provide_blocks(state_.rays.counts, state_.level());
+    state_.provide_blocks(state_.rays.counts, state_.drawing);
     {
       const auto stage = timer.stage("group");
       group_(state_.cache, state_.rays);
@@ -83,34 +77,32 @@ class RaysPipeline : public Pipeline {
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("start_rays");
     if (unanswered_) state_.rays.forget_rays();
-    march_.start_rays(state_.level().macrocells, state_.rays);
-  }
-  void begin_band(const Level &before) override {
-    const auto stage = state_.device.timer().stage("cross_border");
-    march_.cross_border(before.frame, before.macrocells, state_.level().macrocells, state_.rays);
+    march_.start_rays(macrocells(), state_.rays);
   }
 
   void enqueue_pass() override {
     Wavefront &rays = state_.rays;
     rays.open_pass();
-    if (unanswered_) state_.provide_blocks(rays.previous_counts, *asked_);
+    if (unanswered_) state_.provide_blocks(rays.previous_counts, asked_);
     {
       const auto stage = state_.device.timer().stage("march");
-      march_(state_.level().macrocells, state_.cache, rays);
+      march_(macrocells(), state_.cache, rays);
     }
     const auto stage = state_.device.timer().stage("request");
-    march_.request_ahead(state_.level().macrocells, state_.cache, rays);
+    march_.request_ahead(macrocells(), state_.cache, rays);
     unanswered_ = true;
-    asked_ = &state_.level();
+    asked_ = state_.drawing;
   }
 
-  void end_band() override { unanswered_ = false; }
+  void end_frame() override { unanswered_ = false; }
 
  private:
+  const Macrocells &macrocells() const { return state_.levels[0].macrocells; }
+
   FrameState &state_;
   March march_;
   bool unanswered_ = false;  ///< the last pass may have asked for blocks, and left rays
-  Level *asked_ = nullptr;   ///< whose blocks
+  LevelRange asked_;         ///< of these levels
 };
 
 }  // namespace
@@ -119,9 +111,7 @@ std::string_view to_string(PipelineKind kind) {
   return kind == PipelineKind::kBlocks ? "blocks" : "rays";
 }
 
-void FrameState::provide_blocks(const CountsBuffer &asked, Level &of) {
-  const FrameParams frame =
-      std::exchange(rays.frame, of.frame);  // a cancelled frame's last band asked, perhaps
+void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
   {
     const auto stage = device.timer().stage("cache");
     if (slots_are_scarce) cache.evict(asked, rays);
@@ -129,12 +119,12 @@ void FrameState::provide_blocks(const CountsBuffer &asked, Level &of) {
   }
   const auto stage = device.timer().stage("decode");
   try {
-    of.decode(of.stream, rays.frame, rays.counts, cache);
+    for (std::size_t i = of.first; i < of.end; ++i)
+      levels[i].decode(levels[i].stream, levels[i].frame, rays.counts, cache);
   } catch (...) {  // blocks have slots, but no values
     cache.clear();
     throw;
   }
-  rays.frame = frame;
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,

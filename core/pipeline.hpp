@@ -42,19 +42,23 @@ struct Level {
   std::optional<float> selected_isovalue{};  ///< what the macrocell masks stand for
 };
 
+/// Levels of detail: from `first` to below `end`.
+struct LevelRange {
+  std::size_t first = 0, end = 1;
+};
+
 /// What every pipeline works on.
 struct FrameState {
   ocl::Device &device;
   std::vector<Level> levels;  ///< the finest first
   Wavefront rays;
   BlockCache cache;
-  std::size_t level_at = 0;      ///< whose band of the frame is drawn
+  LevelRange drawing{};          ///< the frame at work
   bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
 
-  Level &level() { return levels[level_at]; }
-  /// Cache and decode: the blocks asked for, asked.requested_count, get slots and values. Asynchronous but where the stream
+  /// Cache and decode: the blocks asked for, asked.requested_count, of those levels, get slots and values. Asynchronous but where the stream
   /// stays on the host: see ZfpDecode. Where that throws, the cache is empty.
-  void provide_blocks(const CountsBuffer &asked, Level &of);
+  void provide_blocks(const CountsBuffer &asked, LevelRange of);
 };
 
 class Pipeline {
@@ -62,12 +66,10 @@ class Pipeline {
   virtual ~Pipeline() = default;
   /// Makes the frame's rays from state.rays.frame. Asynchronous.
   virtual void begin_frame() = 0;
-  /// Makes the rays of the frame's next band, state.level(), from those that left the band of `before`. Asynchronous.
-  virtual void begin_band(const Level &before) = 0;
   /// Enqueues one pass: a chain of launches whose sizes live on the device. Asynchronous.
   virtual void enqueue_pass() = 0;
-  /// Says that no ray is left in the frame, or its band. Without it, the next frame knows that passes of this one were not followed up.
-  virtual void end_band() {}
+  /// Says that no ray is left in the frame. Without it, the next frame knows that passes of this one were not followed up.
+  virtual void end_frame() {}
 };
 
 /// `state` must outlive the pipeline.

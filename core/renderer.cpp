@@ -90,28 +90,32 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
   return plan_within(device, volume, request, budget, static_cast<std::uint32_t>(std::min(all, most)));
 }
 
-Level make_level(ocl::Device &device, const CompressedVolume &volume, const LevelError &error,
-                 const RendererOptions &options, const MemoryPlan &plan) {
-  DeviceStream stream = plan.stream == StreamPlace::kHost
-                            ? DeviceStream(device, volume, OnHost{plan.window_blocks}, options.with_bounds)
-                            : DeviceStream(device, volume, options.largest_stream_part, options.with_bounds);
-  Macrocells macrocells(device, make_grid_params(volume.info), stream);
-  ZfpDecode decode(device, plan.cache_slots, stream.defines(), options.max_pixel_error > 0);
-  return {volume.info,       volume.error_bound,    error,
-          std::move(stream), std::move(macrocells), std::move(decode)};
-}
-
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
                       const MemoryPlan &plan) {
+  std::vector<const CompressedVolume *> volumes = {&volume};
+  for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i)
+    volumes.push_back(&volume.coarser[i]);
+  std::vector<VolumeInfo> infos;
+  for (const CompressedVolume *level : volumes) infos.push_back(level->info);
+  const std::vector<FrameParams> grids = make_level_grids(infos);
+  const FrameParams ids = make_id_grid(grids), &last = grids.back();
+  const bool has_levels = volumes.size() > 1;
+  const auto buffers = std::make_shared<MacrocellBuffers>(device, last.ranges_begin + block_count(last),
+                                                          last.masks_begin / 2 + num_macrocells(last));
+  Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks,
+                 volumes.size());
+  BlockCache cache(device, ids, plan.cache_slots, options.size.num_pixels(), options.group_size, has_levels);
   std::vector<Level> levels;
-  levels.push_back(make_level(device, volume, {volume, true}, options, plan));
-  for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i) {
-    const CompressedVolume &level = volume.coarser[i];
-    levels.push_back(make_level(device, level, {level, false}, options, plan));
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const CompressedVolume &level = *volumes[i];
+    DeviceStream stream = plan.stream == StreamPlace::kHost
+                              ? DeviceStream(device, level, OnHost{plan.window_blocks}, options.with_bounds)
+                              : DeviceStream(device, level, options.largest_stream_part, options.with_bounds);
+    Macrocells macrocells(device, grids[i], stream, buffers);
+    ZfpDecode decode(device, cache.capacity, stream.defines(), has_levels);
+    levels.push_back({level.info, level.error_bound, LevelError(level, i == 0), std::move(stream),
+                      std::move(macrocells), std::move(decode)});
   }
-  Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks);
-  BlockCache cache(device, make_grid_params(volume.info), plan.cache_slots, options.size.num_pixels(),
-                   options.group_size, levels.size() > 1);
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
@@ -139,13 +143,26 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
 FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &on_pass) {
   const auto begin = std::chrono::steady_clock::now();
   const Uploads uploaded_before = uploads();
+  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
   FrameStats stats;
   begin_frame(camera, isovalue);
-  draw_band(on_pass, stats);
-  while (!stats.cancelled && !is_last_band()) {
-    begin_next_band();
-    draw_band(on_pass, stats);
+  stats.first_level = state_.drawing.first;
+  stats.last_level = state_.drawing.end - 1;
+  StallGuard guard(state_.levels[0].info.dims);
+  for (bool finished = false; !finished && !stats.cancelled;) {
+    pipeline_->enqueue_pass();
+    readback_.push(state_.rays.counts);
+    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
+      continue;  // read one pass behind: the device never waits for us
+    const PassStats pass = stats_of(readback_.pop());
+    stats.rays_hit += pass.counts.hit_count;
+    stats.passes.push_back(pass);
+    finished = pass.counts.next_active_count == 0;
+    stats.cancelled = on_pass && !on_pass(pass) && !finished;
+    guard.check(pass.counts);
   }
+  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
+  if (!stats.cancelled) pipeline_->end_frame();
   state_.rays.frame = state_.levels[0].frame;  // for shading
   const Uploads uploaded = uploads();
   stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
@@ -154,74 +171,44 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   return stats;
 }
 
-/// The part of the frame that one level of detail draws: all of it, mostly.
-void Renderer::draw_band(const OnPass &on_pass, FrameStats &stats) {
-  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
-  StallGuard guard(state_.level().info.dims);
-  for (bool finished = false; !finished && !stats.cancelled;) {
-    pipeline_->enqueue_pass();
-    readback_.push(state_.rays.counts);
-    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
-      continue;  // read one pass behind: the device never waits for us
-    PassStats pass = stats_of(readback_.pop());
-    stats.rays_hit += pass.counts.hit_count;
-    // Rays without a hit go on in the next band, but nobody has counted them.
-    const std::uint64_t pixels = options_.size.num_pixels();
-    const std::uint64_t ended = is_last_band() ? pixels - pass.counts.next_active_count : stats.rays_hit;
-    pass.completed_percent = 100.0 * double(ended) / double(pixels);
-    stats.passes.push_back(pass);
-    finished = pass.counts.next_active_count == 0;
-    stats.cancelled = on_pass && !on_pass(pass) && !(finished && is_last_band());
-    guard.check(pass.counts);
-  }
-  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
-  if (!stats.cancelled) pipeline_->end_band();
-}
-
 void Renderer::begin_frame(const Camera &camera, float isovalue) {
   readback_.drain();  // of what the frame before had enqueued beyond its last pass
   std::vector<VolumeInfo> infos;
   for (const Level &level : state_.levels) infos.push_back(level.info);
-  const std::vector<FrameParams> frames =
+  std::vector<FrameParams> frames =
       make_level_frames(infos, camera, options_.size, isovalue, options_.max_pixel_error);
-  const bool has_bands = std::ranges::count_if(frames, draws) > 1;
+  const auto first = std::ranges::find_if(frames, draws);
+  const auto end = std::find_if_not(first, frames.end(), draws);
+  state_.drawing = {static_cast<std::size_t>(first - frames.begin()),
+                    static_cast<std::size_t>(end - frames.begin())};
+  const bool has_bands = end - first > 1;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     Level &level = state_.levels[i];
-    level.frame = frames[i];
-    level.frame.max_spec_count = options_.max_speculation;
-    level.frame.per_ray_speculation = options_.per_ray_speculation;
-    level.frame.table_groups = state_.cache.table_groups;
-    if (draws(level.frame) && level.selected_isovalue != isovalue) {
+    FrameParams &frame = frames[i];
+    frame.max_spec_count = options_.max_speculation;
+    frame.per_ray_speculation = options_.per_ray_speculation;
+    frame.table_groups = state_.cache.table_groups;
+    if (draws(frame) && level.selected_isovalue != isovalue) {
       const auto stage = device_.timer().stage("macrocells");
-      FrameParams frame = level.frame;
-      level.macrocells.select(frame, level.range_error, &level.stream);
+      FrameParams selected = frame;
+      level.macrocells.select(selected, level.range_error, &level.stream);
       level.selected_isovalue = isovalue;
     }
-    level.macrocells.set_indices(level.frame);
+    level.macrocells.set_indices(frame);
     // A ray's way begins at a border wherever it crosses that.
-    if (!has_bands) level.macrocells.set_active_box(level.frame);
+    if (!has_bands) level.macrocells.set_active_box(frame);
+    level.frame = frame;
   }
-  state_.level_at = static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
-  state_.rays.frame = state_.level().frame;
+  level_frames_.assign(first, end);
+  state_.rays.frame = level_frames_.front();
+  state_.rays.num_level_frames = static_cast<std::uint32_t>(level_frames_.size());
+  if (has_levels()) state_.rays.level_frames.write_async(level_frames_);
   if (classified_isovalue_ != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
     state_.cache.classify(state_.rays);
     classified_isovalue_ = isovalue;
   }
   pipeline_->begin_frame();
-}
-
-bool Renderer::is_last_band() const {
-  const std::size_t next = state_.level_at + 1;
-  return next == state_.levels.size() || !draws(state_.levels[next].frame);
-}
-
-void Renderer::begin_next_band() {
-  const Level &before = state_.level();
-  ++state_.level_at;
-  state_.rays.frame = state_.level().frame;
-  readback_.drain();
-  pipeline_->begin_band(before);
 }
 
 Renderer::Uploads Renderer::uploads() const {
@@ -239,11 +226,11 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   const double pixels = static_cast<double>(options_.size.num_pixels());
   PassStats stats;
   stats.counts = counts;
-  stats.level = static_cast<std::uint32_t>(state_.level_at);
   stats.counts.window_count = std::min(counts.window_count, counts.active_count);
   // A launch that is not needed costs more than a pass that finds slots missing now and then.
   state_.slots_are_scarce =
       state_.cache.num_slots < kSmallCache || counts.free_count < state_.cache.num_slots / 4;
+  stats.completed_percent = 100.0 * (pixels - counts.next_active_count) / pixels;
   stats.utilization_percent = 100.0 * counts.granted_count / pixels;
   stats.stage_ms = device_.timer().collect();
   return stats;

@@ -47,14 +47,14 @@ struct RendererOptions {
 /// What one pass did: the counts of the device, and what follows from them.
 struct PassStats {
   PassCounts counts{};
-  std::uint32_t level = 0;                 ///< of detail, which it drew
   double utilization_percent = 0;          ///< ray-block pairs that were intersected, of width * height
-  double completed_percent = 0;            ///< pixels whose rays are known to have ended, of width * height
+  double completed_percent = 0;            ///< pixels whose rays have ended, of width * height
   std::map<std::string, double> stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
 struct FrameStats {
   std::vector<PassStats> passes;
+  std::size_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
   std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
@@ -131,9 +131,6 @@ class Renderer {
  private:
   void begin_frame(const Camera &camera, float isovalue);
   void update_layouts();
-  void draw_band(const OnPass &on_pass, FrameStats &stats);
-  bool is_last_band() const;
-  void begin_next_band();
   struct Uploads {
     std::uint64_t blocks = 0, bytes = 0;
   };
@@ -145,7 +142,8 @@ class Renderer {
   RendererOptions options_;
   MemoryPlan plan_;
   FrameState state_;
-  std::array<float, 2> value_range_;  ///< of the volume before compression
+  std::vector<FrameParams> level_frames_;  ///< of the levels of detail that draw the frame at work
+  std::array<float, 2> value_range_;       ///< of the volume before compression
   double value_error_ = 0;
   FieldBound bound_ = FieldBound::kNone;
   std::optional<float> classified_isovalue_;  ///< what the cache's bits of voxels inside stand for

@@ -28,9 +28,11 @@ inline ocl::Defines closest_defines(ClosestHit closest) {
 }
 
 struct Wavefront {
-  /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not.
-  explicit Wavefront(ocl::Device &device, std::uint64_t pixels, bool with_pairs = true)
+  /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not. levels: of detail.
+  explicit Wavefront(ocl::Device &device, std::uint64_t pixels, bool with_pairs = true,
+                     std::size_t levels = 1)
       : num_pixels(pixels),
+        level_frames(device, "level frames", levels),
         counts(device, "pass counts", 1),
         previous_counts(device, "pass counts, previous", 1),
         next_counts(device, "pass counts, next", 1),
@@ -65,8 +67,11 @@ struct Wavefront {
     std::swap(active_ray_ids, next_active_ray_ids);
   }
 
-  std::uint64_t num_pixels;               ///< R
-  FrameParams frame{};                    ///< of the frame at work
+  std::uint64_t num_pixels;  ///< R
+  FrameParams frame{};       ///< of the frame at work; of several levels of detail, the finest that draws
+  ocl::Buffer<FrameParams>
+      level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
+  std::uint32_t num_level_frames = 1;
   CountsBuffer counts;                    ///< [1] of the pass at work
   CountsBuffer previous_counts;           ///< [1] of the pass before (pipeline `rays`)
   CountsBuffer next_counts;               ///< [1] of the next pass, opened by this one (pipeline `rays`)

@@ -20,9 +20,10 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::D
                      bool levels)
     : device_(device),
       stream_defines_(stream_defines),
-      levels_(levels),
       range_(ocl::Range::strided(max_blocks, ocl::kGroupSize, device)),
-      kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines, levels)) {}
+      kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines, levels)) {
+  if (levels && DeviceStream::is_window(stream_defines)) places_.emplace(device, "decode places", max_blocks);
+}
 
 void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                            const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
@@ -32,17 +33,31 @@ void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame,
   }
   if (!stream.window) {
     kernel_(range_, frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3), stream.index(),
-            stream.layout, 0, std::numeric_limits<uint>::max(), counts, block_ids, slots, values, inside);
+            stream.layout, 0, std::numeric_limits<uint>::max(), counts, block_ids, block_ids, slots, values,
+            inside);
     return;
   }
-  const std::span<uint> granted = stream.window->read_granted(counts, block_ids);
-  for (uint &id : granted) id = levels_ ? level_block_of(&frame, id) : id;
+  std::span<uint> granted = stream.window->read_granted(counts, block_ids);
+  if (places_) granted = granted.first(take_own(granted, frame));
   stream.window->bring(granted,
                        [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
                          kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), frame, words, words,
                                  words, words, stream.index(words), stream.layout, first, first + count,
-                                 counts, block_ids, slots, values, inside);
+                                 counts, places_ ? *places_ : block_ids, block_ids, slots, values, inside);
                        });
+}
+
+/// Keeps the first of block_ids for those of this level, as places in it, and tells the device which they were. Returns how many.
+std::size_t ZfpDecode::take_own(std::span<uint> block_ids, const FrameParams &frame) {
+  std::vector<uint> places;
+  for (std::size_t i = 0; i < block_ids.size(); ++i) {
+    const uint block = level_block_of(&frame, block_ids[i]);
+    if (block == ISO_INVALID_ID) continue;
+    block_ids[places.size()] = block;
+    places.push_back(static_cast<uint>(i));
+  }
+  places_->write(places);
+  return places.size();
 }
 
 }  // namespace isowave

@@ -1,6 +1,9 @@
 #pragma once
 // New blocks -> 4^3 float32 values in their cache slots (Sec. 3.5).
 
+#include <optional>
+#include <span>
+
 #include "core/block_cache.hpp"
 #include "core/device_stream.hpp"
 #include "core/ocl/kernel.hpp"
@@ -11,7 +14,7 @@ namespace isowave {
 class ZfpDecode {
  public:
   /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams to come.
-  /// levels: block ids count on through several levels of detail (FrameParams).
+  /// levels: block ids count on through several levels of detail (FrameParams), and only blocks of the frame's level are decoded.
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
             bool levels = false);
 
@@ -28,13 +31,16 @@ class ZfpDecode {
   }
 
  private:
+  std::size_t take_own(std::span<uint> block_ids, const FrameParams &frame);
+
   ocl::Device &device_;
   ocl::Defines stream_defines_;
-  bool levels_;
   ocl::Range range_;
+  std::optional<ocl::Buffer<uint>>
+      places_;  ///< of this level's requests, where several levels' streams are in windows
   ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              StreamLayout, uint, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>,
-              ocl::Out<ulong>>
+              StreamLayout, uint, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              ocl::Out<float>, ocl::Out<ulong>>
       kernel_;
 };
 

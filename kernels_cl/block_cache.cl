@@ -123,7 +123,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
       const BlockCoords b = block_coords(frame, block_id);
       const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-      if ((cache->first_touched >> corner & 1u) != 0 && dual_grid_block(frame, b, corner) != ISO_INVALID_ID) {
+      /* With levels of detail, what is touched is within the block's own. */
+      if ((cache->first_touched >> corner & 1u) != 0 &&
+          (ISO_LEVELS || dual_grid_block(frame, b, corner) != ISO_INVALID_ID)) {
         const uint slot = cached_slot(frame, table, x, y, z);
         if (slot != ISO_BLOCK_ABSENT) {
           slot_stamps[slot] = counts->pass + 1;
@@ -149,7 +151,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
       const uint displaced = request_block_ids[j];
       if (places[j] == ISO_INVALID_ID) {
         const BlockCoords b = block_coords(frame, displaced);
-        requested_bits[request_word(frame, b.x, b.y, b.z)] &= ~request_bit(b.x, b.y, b.z);
+        requested_bits[request_word(frame, b.x, b.y, b.z)] &= ~request_bit(frame, b.x, b.y, b.z);
       } else {
         request_block_ids[places[j]] = displaced;
       }

@@ -18,11 +18,17 @@ ISO_INLINE uint level_block_at(const FrameParams *frame, uint x, uint y, uint z)
   return x + frame->blocks_x * (y + frame->blocks_y * z);
 }
 
-/// Place among those of its level of the block with this id, of a frame with several levels.
+/// Place among those of this level of the block with this id, of a frame with several levels; ISO_INVALID_ID if it is another level's.
 ISO_INLINE uint level_block_of(const FrameParams *frame, uint block_id) {
   const uint x = block_id % frame->id_blocks_x, y = block_id / frame->id_blocks_x % frame->id_blocks_y,
              z = block_id / frame->id_blocks_x / frame->id_blocks_y - frame->id_begin_z;
-  return level_block_at(frame, x, y, z);
+  return z < frame->blocks_z ? level_block_at(frame, x, y, z)
+                             : ISO_INVALID_ID; /* finer: z has wrapped around */
+}
+
+/// Layer z of a level among those of all levels.
+ISO_INLINE uint id_layer(const FrameParams *frame, uint z) {
+  return z + (ISO_LEVELS ? frame->id_begin_z : 0u);
 }
 
 /// Wraps around for blocks of finer levels than the frame's, and block_table.h takes that back.
@@ -37,7 +43,7 @@ ISO_INLINE BlockCoords block_coords(const FrameParams *frame, uint block_id) {
 }
 
 ISO_INLINE uint block_id_at(const FrameParams *frame, uint x, uint y, uint z) {
-  return ISO_LEVELS ? x + frame->id_blocks_x * (y + frame->id_blocks_y * (z + frame->id_begin_z))
+  return ISO_LEVELS ? x + frame->id_blocks_x * (y + frame->id_blocks_y * id_layer(frame, z))
                     : level_block_at(frame, x, y, z);
 }
 

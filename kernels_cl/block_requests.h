@@ -11,19 +11,22 @@ ISO_INLINE void open_requests(global CacheState *cache) {
   cache->granted = 0;
 }
 
-/// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks.
+/// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks, with several levels of detail
+/// as those of one whose blocks have their ids.
 ISO_INLINE uint request_word(const FrameParams *frame, uint x, uint y, uint z) {
-  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
-  return 2 * ((x >> 2) + coarse_x * ((y >> 2) + coarse_y * (z >> 2))) + (z >> 1 & 1);
+  const uint coarse_x = ((ISO_LEVELS ? frame->id_blocks_x : frame->blocks_x) + 3) / 4,
+             coarse_y = ((ISO_LEVELS ? frame->id_blocks_y : frame->blocks_y) + 3) / 4;
+  const uint layer = id_layer(frame, z);
+  return 2 * ((x >> 2) + coarse_x * ((y >> 2) + coarse_y * (layer >> 2))) + (layer >> 1 & 1);
 }
-ISO_INLINE uint request_bit(uint x, uint y, uint z) {
-  return 1u << ((x & 3) + 4 * (y & 3) + 16 * (z & 1));
+ISO_INLINE uint request_bit(const FrameParams *frame, uint x, uint y, uint z) {
+  return 1u << ((x & 3) + 4 * (y & 3) + 16 * (id_layer(frame, z) & 1));
 }
 
 /// Marks block (x,y,z). Returns 1 to the one who is first.
 ISO_INLINE int mark_request(const FrameParams *frame, volatile global uint *requested_bits, uint x, uint y,
                             uint z) {
-  const uint bit = request_bit(x, y, z);
+  const uint bit = request_bit(frame, x, y, z);
   return (atomic_or(&requested_bits[request_word(frame, x, y, z)], bit) & bit) == 0;
 }
 
@@ -44,7 +47,7 @@ ISO_INLINE void list_request(const FrameParams *frame, global uint *request_bloc
     request_block_ids[place] = block_id;
   } else {
     const BlockCoords b = block_coords(frame, block_id);
-    atomic_and(&requested_bits[request_word(frame, b.x, b.y, b.z)], ~request_bit(b.x, b.y, b.z));
+    atomic_and(&requested_bits[request_word(frame, b.x, b.y, b.z)], ~request_bit(frame, b.x, b.y, b.z));
   }
 }
 

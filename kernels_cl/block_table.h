@@ -43,7 +43,7 @@ typedef struct CacheState {
 
 /// Where the search for block (x,y,z) begins. frame->table_groups: entries / 8.
 ISO_INLINE uint table_home(const FrameParams *frame, uint x, uint y, uint z) {
-  const uint layer = z + (ISO_LEVELS ? frame->id_begin_z : 0u); /* the same seen from every level */
+  const uint layer = id_layer(frame, z); /* the same seen from every level */
   uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((layer >> 1) * 0xC2B2AE3Du);
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   h ^= h >> 13;

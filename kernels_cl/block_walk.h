@@ -17,11 +17,15 @@
 #define ISO_BLOCKS_AT_ONCE 16u
 #endif
 
+ISO_INLINE uint masks_begin(const FrameParams *frame) {
+  return ISO_LEVELS ? frame->masks_begin : 0u;
+}
+
 ISO_INLINE int is_active(const FrameParams *frame, global const uint *macrocell_masks, BlockCoords b) {
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
   const uint cell = b.x / 4 + coarse_x * (b.y / 4 + coarse_y * (b.z / 4));
   const uint bit = (b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3);
-  return (macrocell_masks[2 * cell + bit / 32] >> (bit % 32) & 1u) != 0;
+  return (macrocell_masks[masks_begin(frame) + 2 * cell + bit / 32] >> (bit % 32) & 1u) != 0;
 }
 
 /// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it entered the cell.
@@ -46,6 +50,7 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
                             uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
   const LastPlanes last = last_planes(frame);
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  const uint begin = masks_begin(frame);
   /* The coarse cells behind the box, in the ray's direction. */
   const int behind_x = ray->x.d > 0.0f ? (frame->active_end_x + 3) / 4 : frame->active_begin_x / 4 - 1,
             behind_y = ray->y.d > 0.0f ? (frame->active_end_y + 3) / 4 : frame->active_begin_y / 4 - 1,
@@ -60,7 +65,7 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
   uint k = 0;
   while (within && k < wanted) {
     const uint cell = (uint)coarse.x + coarse_x * ((uint)coarse.y + coarse_y * (uint)coarse.z);
-    const uint low = macrocell_masks[2 * cell], high = macrocell_masks[2 * cell + 1];
+    const uint low = macrocell_masks[begin + 2 * cell], high = macrocell_masks[begin + 2 * cell + 1];
     int left = 0;
     if ((low | high) != 0) {
       if (!follows) w = enter_macrocell(ray, &coarse, exit, last);

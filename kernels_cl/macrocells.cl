@@ -103,7 +103,7 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer, global 
           begin = middle;
       }
     }
-    ranges[i + layer_blocks * layer] = (ushort)(low | high << 8);
+    ranges[frame->ranges_begin + i + layer_blocks * layer] = (ushort)(low | high << 8);
   }
 }
 
@@ -126,8 +126,8 @@ kernel void macrocell_coarse_ranges(const FrameParams frame_params, uint num_coa
     for (uint bit = 0; bit < 64; ++bit) {
       const uint block_id = macrocell_block(frame, coarse, bit);
       if (block_id == ISO_INVALID_ID) continue;
-      low = min(low, (uint)ranges[block_id] & 255u);
-      high = max(high, (uint)ranges[block_id] >> 8);
+      low = min(low, (uint)ranges[frame->ranges_begin + block_id] & 255u);
+      high = max(high, (uint)ranges[frame->ranges_begin + block_id] >> 8);
     }
     coarse_ranges[coarse] = (ushort)(low | high << 8);
   }
@@ -163,14 +163,16 @@ kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse, glo
     if (holds_isovalue(coarse_ranges[coarse], widest)) {
       for (uint bit = 0; bit < 64; ++bit) {
         const uint block_id = macrocell_block(frame, coarse, bit);
-        if (block_id == ISO_INVALID_ID || !holds_isovalue(ranges[block_id], widest)) continue;
-        if (has_bounds == 0 ||
-            holds_isovalue(ranges[block_id], limits[dual_grid_code(frame, bounds + bounds_begin, block_id)]))
+        if (block_id == ISO_INVALID_ID) continue;
+        const uint range = ranges[frame->ranges_begin + block_id];
+        if (holds_isovalue(range, widest) &&
+            (has_bounds == 0 ||
+             holds_isovalue(range, limits[dual_grid_code(frame, bounds + bounds_begin, block_id)])))
           words[bit >> 5] |= 1u << (bit & 31);
       }
     }
-    masks[2 * coarse] = words[0];
-    masks[2 * coarse + 1] = words[1];
+    masks[frame->masks_begin + 2 * coarse] = words[0];
+    masks[frame->masks_begin + 2 * coarse + 1] = words[1];
     if ((words[0] | words[1]) != 0) {
       const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
       const int at[3] = {(int)(coarse % coarse_x), (int)(coarse / coarse_x % coarse_y),

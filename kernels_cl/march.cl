@@ -217,12 +217,81 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
+#if ISO_LEVELS
+
+/// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the block with this id.
+ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint block_id) {
+  const uint layer = block_id / (frames[0].id_blocks_x * frames[0].id_blocks_y);
+  uint level = 0;
+  while (level + 1 < num_frames && layer >= frames[level + 1].id_begin_z) ++level;
+  return level;
+}
+
+/// The side on which a whole block is; unknown if it is active. See macrocells.cl: the range of one that is not is on its side, too.
+ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
+                              global const ushort *ranges, BlockCoords b) {
+  if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
+  return ranges[frame->ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >= frame->above_index
+             ? ISO_SIDE_INSIDE
+             : ISO_SIDE_OUTSIDE;
+}
+
+/// Does the ray reach the border at t within the domain? If so, *b is the block it is in just behind it.
+ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
+  const LastPlanes last = last_planes(frame);
+  LastPlanes zero;
+  RayEvent enter = border_event(t), exit = border_event(INFINITY);
+  zero.x = zero.y = zero.z = 0;
+  if (!clip_to_box(ray, zero, last, &enter, &exit) || enter.axis != ISO_AXIS_START) return 0;
+  b->x = (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4);
+  b->y = (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4);
+  b->z = (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4);
+  return 1;
+}
+
+/// Where a ray goes on that leaves the band of frames[level]: its next block, and its side if it stands there for that; or
+/// ISO_INVALID_ID. side: on which it left, or else the border is in a block that is as a whole on one. Where the block behind the border
+/// is not as a whole on that side, the ray stands there; else at the next active block, in this band or one behind. ranges: of all
+/// levels' blocks. found [1]: scratch.
+ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
+                              global const uint *macrocell_masks, global const ushort *ranges, uint pixel,
+                              uint level, uint side, local uint *found) {
+  uint state = ISO_INVALID_ID;
+  for (; level + 1 < num_frames && state == ISO_INVALID_ID; ++level) {
+    const FrameParams before = frames[level], behind = frames[level + 1];
+    const Ray ray_before = make_ray(&before, pixel), ray = make_ray(&behind, pixel);
+    uint block_id = first_block(&behind, &ray);
+    BlockCoords b;
+    if (side == ISO_SIDE_UNKNOWN && block_at_border(&before, &ray_before, before.end_t, &b))
+      side = side_of_block(&before, macrocell_masks, ranges, b);
+    if (side != ISO_SIDE_UNKNOWN && block_at_border(&behind, &ray, behind.begin_t, &b) &&
+        side_of_block(&behind, macrocell_masks, ranges, b) != side) {
+      state = block_id | side << ISO_RAY_SIDE_SHIFT;
+    } else if (block_id != ISO_INVALID_ID &&
+               find_blocks(&behind, macrocell_masks, &ray, &block_id, 1, found, 1) != 0) {
+      state = found[0];
+    }
+    side = ISO_SIDE_UNKNOWN;
+  }
+  return state;
+}
+
+/// `frame`: that of the level which has block block_id, as a copy of the work-item's own.
+#define ISO_FRAME_OF(frame, block_id)                                                \
+  const FrameParams frame##_params = frames[level_of(frames, num_frames, block_id)]; \
+  const FrameParams *frame = &frame##_params
+#else
+#define ISO_FRAME_OF(frame, block_id) const FrameParams *frame = &frame_params
+#endif
+
 /// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the frame's screen
 /// box, the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last
-/// pass, next_active_count 0 before; *next: the first pass of this frame is for all rays. A kernel of its own, since it is so much leaner than march
+/// pass, next_active_count 0 before; *next: the first pass of this frame is for all rays. frames [num_frames]: with levels of detail, those
+/// that draw, the finest first; frame_params is the first of them. ranges: of their blocks. A kernel of its own, since it is so much leaner than march
 /// that far more of its work-items fit a device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
-    const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    global const uint *macrocell_masks, global const ushort *ranges, global PassCounts *counts,
     global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
     global uint *hit_words) {
   const FrameParams *frame = &frame_params;
@@ -241,91 +310,26 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint pixel = begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
-    uint num_found = 0;
+    uint num_found = 0, log_ahead = ISO_FIRST_LOG_AHEAD;
     if (pixel != ISO_INVALID_ID) {
       const Ray ray = make_ray(frame, pixel);
       uint block_id = first_block(frame, &ray);
       if (block_id != ISO_INVALID_ID)
         num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
-      if (num_found != 0) {
-        ray_block_ids[pixel] = found[item];
-      } else if (ISO_LEVELS) {
-        ray_block_ids[pixel] = ISO_SIDE_UNKNOWN << ISO_RAY_SIDE_SHIFT;
-      }
-    }
-    append_ray(num_found != 0, pixel | ISO_FIRST_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
-               &counts->next_active_count, next_active_ray_ids);
-  }
-}
-
 #if ISO_LEVELS
-
-/// The side on which a whole block is; unknown if it is active. See macrocells.cl: the range of one that is not is on its side, too.
-ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
-                              global const ushort *ranges, BlockCoords b) {
-  if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
-  return ranges[level_block_at(frame, b.x, b.y, b.z)] >> 8 >= frame->above_index ? ISO_SIDE_INSIDE
-                                                                                 : ISO_SIDE_OUTSIDE;
-}
-
-/// Does the ray reach the border at t within the domain? If so, *b is the block it is in just behind it.
-ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
-  const LastPlanes last = last_planes(frame);
-  LastPlanes zero;
-  RayEvent enter = border_event(t), exit = border_event(INFINITY);
-  zero.x = zero.y = zero.z = 0;
-  if (!clip_to_box(ray, zero, last, &enter, &exit) || enter.axis != ISO_AXIS_START) return 0;
-  b->x = (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4);
-  b->y = (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4);
-  b->z = (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4);
-  return 1;
-}
-
-/// Begins the next band of a frame, frame_params, behind `before`, for rays that have no hit. Each ray's side at the border: the
-/// one at which it left the band before (ray_block_ids [pixel]), or else that of the whole block it was in. ranges: of both
-/// levels' blocks. Where the block that it goes on in is not as a whole on that side, the ray stands there, and keeps
-/// the side with it; else it stands at its next active block. The other arguments as in start_rays.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cross_border(
-    const FrameParams before, const FrameParams frame_params, global const uint *masks_before,
-    global const ushort *ranges_before, global const uint *macrocell_masks, global const ushort *ranges,
-    global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global const HitRecord *hits) {
-  const FrameParams *frame = &frame_params;
-  local uint found[ISO_GROUP_SIZE], counters[2];
-  const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
-                        frame->screen_end_y};
-  const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
-  if (get_global_id(0) == 0) next->window_count = num_pixels(frame);
-  if (item == 0) counters[0] = 0;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
-       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint pixel = begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
-    int goes_on = 0;
-    if (pixel != ISO_INVALID_ID && hits[pixel].t == INFINITY) {
-      const Ray ray = make_ray(frame, pixel), ray_before = make_ray(&before, pixel);
-      uint side = ray_block_ids[pixel] >> ISO_RAY_SIDE_SHIFT, state = 0;
-      uint block_id = first_block(frame, &ray);
-      BlockCoords b;
-      if (side == ISO_SIDE_UNKNOWN && block_at_border(&before, &ray_before, before.end_t, &b))
-        side = side_of_block(&before, masks_before, ranges_before, b);
-      if (side != ISO_SIDE_UNKNOWN && block_at_border(frame, &ray, frame->begin_t, &b) &&
-          side_of_block(frame, macrocell_masks, ranges, b) != side) {
-        state = block_id | side << ISO_RAY_SIDE_SHIFT;
-        goes_on = 1;
-      } else if (block_id != ISO_INVALID_ID &&
-                 find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1) != 0) {
-        state = found[item];
-        goes_on = 1;
+      if (num_found == 0) {
+        log_ahead = ISO_BORDER_LOG_AHEAD;
+        found[item] = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0, ISO_SIDE_UNKNOWN,
+                                    found + item);
+        num_found = found[item] != ISO_INVALID_ID;
       }
-      ray_block_ids[pixel] = state;
+#endif
+      if (num_found != 0) ray_block_ids[pixel] = found[item];
     }
-    append_ray(goes_on, pixel | ISO_BORDER_LOG_AHEAD << ISO_RAY_AHEAD_SHIFT, counters,
-               &counts->next_active_count, next_active_ray_ids);
+    append_ray(num_found != 0, pixel | log_ahead << ISO_RAY_AHEAD_SHIFT, counters, &counts->next_active_count,
+               next_active_ray_ids);
   }
 }
-
-#endif
 
 /// find_blocks() for a ray that stands at block *block_id, which it looks into though it may not be active where it has a side.
 ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
@@ -343,13 +347,15 @@ ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *ma
 
 /// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel], an
 /// active block. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait, and in ray_block_ids the
-/// block they wait at; *next, opened. macrocell_masks: as traverse().
+/// block they wait at; *next, opened. macrocell_masks: as traverse(). frame_params, frames, ranges: as start_rays; a ray that leaves
+/// the band of its level waits behind the border.
 ///
 /// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so few that a device would
 /// wait for the longest of them, each has more work-items, up to one for each block of a round; the first block in which anything
 /// happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    const FrameParams frame_params, global const uint *macrocell_masks, global BlockEntry *table,
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    global const uint *macrocell_masks, global const ushort *ranges, global BlockEntry *table,
     global const ulong *inside, global const float *cache_values, global const PassCounts *prev,
     global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
@@ -358,7 +364,6 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
   local uint counters[2], group_hits, group_blocks, num_going;
   volatile local uint deciding[ISO_GROUP_SIZE]; /* of each ray's blocks of the round */
-  const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = prev->next_active_count;
   const uint lanes = lanes_per_ray(num_rays);
   uint num_hits = 0, num_blocks = 0;
@@ -379,7 +384,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const uint state = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
     const uint from = ISO_LEVELS && is_ray ? state & ISO_RAY_BLOCK : state;
     const uint side = ISO_LEVELS && is_ray ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
-    const Ray ray = make_ray(frame, pixel);
+    ISO_FRAME_OF(level, from);
+    const LastPlanes last = last_planes(level);
+    const Ray ray = make_ray(level, pixel);
     uint next = from, at = lane, more = 1, waits_as = 0, decides_at = 0;
     int result = ISO_RAY_LEFT, going = is_ray, gone = 0, first = 1;
     BlockChange change;
@@ -392,15 +399,15 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         uint num_found = 1;
         if (first && lanes == 1) { /* most rays of a cold frame wait right there */
           found[item] = from;
-          next = block_behind(frame, &ray, block_coords(frame, from), last);
+          next = block_behind(level, &ray, block_coords(level, from), last);
         } else {
-          num_found = find_blocks_from(frame, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
+          num_found = find_blocks_from(level, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
                                        ISO_BLOCKS_AT_ONCE, found + item);
         }
         for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
           const int stands_here = first && at == 0;
-          result = march_block(frame, table, inside, cache_values, &ray,
-                               block_coords(frame, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
+          result = march_block(level, table, inside, cache_values, &ray,
+                               block_coords(level, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
                                stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
                                stands_here ? side : ISO_SIDE_UNKNOWN, &change);
           if (result == ISO_RAY_LEFT) {
@@ -428,22 +435,28 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       barrier(CLK_LOCAL_MEM_FENCE);
     }
     if (result == ISO_RAY_HIT) {
-      hits[pixel] = hit_of(frame, &ray, &change);
+      hits[pixel] = hit_of(level, &ray, &change);
       ++num_hits;
       ++num_blocks;
     }
-    if (ISO_LEVELS && result >= ISO_RAY_ENDS) {
-      const uint left_on = result == ISO_RAY_ENDS ? ISO_SIDE_OUTSIDE : ISO_SIDE_INSIDE;
-      ray_block_ids[pixel] = left_on << ISO_RAY_SIDE_SHIFT;
-    } else if (ISO_LEVELS && gone && lane == 0) {
-      ray_block_ids[pixel] = ISO_SIDE_UNKNOWN << ISO_RAY_SIDE_SHIFT;
-    }
-    const int waits = result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS;
+    int waits = result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS;
     uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
     if (waits) {
       if (waits_as != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
       ray_block_ids[pixel] = ISO_LEVELS && waits_as == from ? state : waits_as;
     }
+#if ISO_LEVELS
+    if (result >= ISO_RAY_ENDS || (gone && lane == 0)) {
+      const uint left_on = result == ISO_RAY_ENDS       ? ISO_SIDE_OUTSIDE
+                           : result == ISO_RAY_ENDS + 1 ? ISO_SIDE_INSIDE
+                                                        : ISO_SIDE_UNKNOWN;
+      const uint behind = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel,
+                                        level_of(frames, num_frames, from), left_on, found + item);
+      waits = behind != ISO_INVALID_ID;
+      if (waits) ray_block_ids[pixel] = behind;
+      log_ahead = ISO_BORDER_LOG_AHEAD;
+    }
+#endif
     append_ray(waits,
                pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
                counters, &counts->next_active_count, next_active_ray_ids);
@@ -479,7 +492,7 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
     const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
     const uint word = (touched >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
     const uint bits = ISO_CHECK_RACES ? atomic_or(&requests.bits[word], 0u) : requests.bits[word];
-    missing &= ~((uint)((bits & request_bit(x, y, z)) != 0) << corner);
+    missing &= ~((uint)((bits & request_bit(frame, x, y, z)) != 0) << corner);
   }
   if (missing == 0) return;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
@@ -509,16 +522,15 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
 /// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over the rays; when these are few, each has
 /// more work-items, which share its blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
-    const FrameParams frame_params, global const uint *macrocell_masks, global const BlockEntry *table,
-    global PassCounts *counts, global const uint *active_ray_ids, global const uint *ray_block_ids,
-    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids, uint capacity,
-    global CacheState *cache) {
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,
+    global const uint *active_ray_ids, global const uint *ray_block_ids, global uint *slot_stamps,
+    global uint *requested_bits, global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
                              staged,         &num_staged};
-  const LastPlanes last = last_planes(frame);
   const uint item = get_local_id(0), num_rays = min(counts->next_active_count, counts->window_count);
   const uint lanes = lanes_per_ray(num_rays);
   if (item == 0) num_staged = 0;
@@ -528,21 +540,23 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
     const uint i = (begin + item) / lanes, lane = (begin + item) % lanes;
     if (i < num_rays) {
       const uint entry = active_ray_ids[i], pixel = entry & ISO_RAY_PIXEL;
-      const Ray ray = make_ray(frame, pixel);
-      const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
-      const uint ahead = frame->per_ray_speculation ? own : counts->spec_count;
       const uint state = ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
       uint next = ISO_LEVELS ? state & ISO_RAY_BLOCK : state,
            side = ISO_LEVELS ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
+      ISO_FRAME_OF(level, next);
+      const LastPlanes last = last_planes(level);
+      const Ray ray = make_ray(level, pixel);
+      const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
+      const uint ahead = frame->per_ray_speculation ? own : counts->spec_count;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
-        const uint num_found = find_blocks_from(frame, macrocell_masks, &ray, side, &next,
+        const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,
                                                 min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
         side = ISO_SIDE_UNKNOWN;
         for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
           const uint block_id = found[at * ISO_GROUP_SIZE + item];
-          const BlockCoords b = block_coords(frame, block_id);
+          const BlockCoords b = block_coords(level, block_id);
           const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
-          request_touched(frame, table, slot_stamps, counts->pass, b, touched, requests);
+          request_touched(level, table, slot_stamps, counts->pass, b, touched, requests);
           if (i == 0 && asked + at == 0) {
             cache->first_block_id = block_id;
             cache->first_touched = touched;

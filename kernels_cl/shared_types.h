@@ -89,9 +89,10 @@ typedef struct FrameParams {
   /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z) of this one is number x +
   /// id_blocks_x (y + id_blocks_y (id_begin_z + z)).
   uint id_blocks_x, id_blocks_y, id_begin_z;
-  float begin_t, end_t;  ///< the band of the rays that is drawn at this level [t of the kernels]
+  uint ranges_begin, masks_begin;  ///< this level's among those of all levels (macrocells.cl) [entries]
+  float begin_t, end_t;            ///< the band of the rays that is drawn at this level [t of the kernels]
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 172);
+ISO_CHECK_SIZE(FrameParams, 180);
 
 /// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu
@@ -101,7 +102,7 @@ ISO_CHECK_SIZE(FrameParams, 172);
 #define ISO_BORDER_LOG_AHEAD 3u  ///< of one that crosses a border of levels (README "Levels of detail")
 #define ISO_RAY_IN_DOUBT 0x80000000u
 
-/// With levels of detail, above a ray's block id, or instead of one, when it has left a band: the side it was on at the border.
+/// With levels of detail, above a ray's block id, when it stands behind a border: the side it was on there.
 #define ISO_RAY_BLOCK 0x3FFFFFFFu
 #define ISO_RAY_SIDE_SHIFT 30u
 #define ISO_SIDE_UNKNOWN 0u

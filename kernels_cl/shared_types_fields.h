@@ -16,7 +16,8 @@
   X(active_end_x) X(active_end_y) X(active_end_z)                           \
   X(screen_begin_x) X(screen_begin_y) X(screen_end_x) X(screen_end_y)       \
   X(per_ray_speculation) X(table_groups)                                    \
-  X(id_blocks_x) X(id_blocks_y) X(id_begin_z) X(begin_t) X(end_t)
+  X(id_blocks_x) X(id_blocks_y) X(id_begin_z)                               \
+  X(ranges_begin) X(masks_begin) X(begin_t) X(end_t)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
 #define ISO_BLOCK_RAYS_FIELDS(X) X(begin) X(end)
 #define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)

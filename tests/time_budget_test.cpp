@@ -211,11 +211,11 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
     const TimedFrame coarse = frames.render(camera, 0.5f, 1e-6);
     ASSERT_EQ(coarse.steps.size(), 1u);
     EXPECT_EQ(coarse.steps[0].max_pixel_error, 1.0);
-    EXPECT_GT(coarse.stats.passes.back().level, 0u);
+    EXPECT_GT(coarse.stats.first_level, 0u);
     EXPECT_EQ(renderer.options().max_pixel_error, 0.0) << "as before";
     const TimedFrame fine = frames.render(camera, 0.5f, 1e9);
     EXPECT_TRUE(fine.complete);
-    EXPECT_EQ(fine.stats.passes.back().level, 0u);
+    EXPECT_EQ(fine.stats.last_level, 0u);
     const std::vector<float> voxels = decode_with_libzfp(volume);
     expect_same_hits(renderer.hits(),
                      render_scalar(make_frame_params(volume.info, camera, kSize, 0.5f), voxels), kSize.width);

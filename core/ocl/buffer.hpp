@@ -75,6 +75,11 @@ class Buffer : public RawBuffer {
     check_range(data.size(), offset, size());
     write_bytes(data.data(), data.size_bytes(), offset * sizeof(T), true);
   }
+  /// As write(), but returns at once: `data` must live until the queue has come so far.
+  void write_async(std::span<const T> data) {
+    check_range(data.size(), 0, size());
+    write_bytes(data.data(), data.size_bytes(), 0, false);
+  }
   /// Elements [offset, offset + out.size()) -> host. Waits.
   void read(std::span<T> out, std::size_t offset = 0) const {
     check_range(out.size(), offset, size());

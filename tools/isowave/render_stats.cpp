@@ -18,8 +18,7 @@ ordered_json vec_json(const glm::dvec3 &v) {
 }
 
 ordered_json pass_json(const PassStats &pass) {
-  ordered_json result = {{"level", pass.level},
-                         {"active_rays", pass.counts.active_count},
+  ordered_json result = {{"active_rays", pass.counts.active_count},
                          {"window_rays", pass.counts.window_count},
                          {"n_spec", pass.counts.spec_count},
                          {"ray_block_pairs", pass.counts.pair_count},
@@ -65,6 +64,7 @@ ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera, 
                            {"at", vec_json(camera.at)},
                            {"up", vec_json(camera.up)},
                            {"fovy_deg", camera.fovy_deg}}},
+                         {"levels", {stats.first_level, stats.last_level}},
                          {"passes", stats.passes.size()},
                          {"total_ms", stats.total_ms},
                          {"rays_hit", stats.rays_hit},
