@@ -57,7 +57,7 @@ void FrameRig::find_blocks() {
   cache.request(rays);
   cache.evict(rays.counts, rays);
   cache.assign(rays.counts, rays);
-  zfp_decode(stream, rays.frame, rays.counts, cache);
+  zfp_decode({stream, rays.frame}, {stream, rays.frame}, rays.counts, cache);
   group(cache, rays);
 }
 

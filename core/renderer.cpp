@@ -102,9 +102,8 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(device, last.ranges_begin + block_count(last),
                                                           last.masks_begin / 2 + num_macrocells(last));
-  Wavefront rays(device, options.size.num_pixels(), options.pipeline == PipelineKind::kBlocks,
-                 volumes.size());
-  BlockCache cache(device, ids, plan.cache_slots, options.size.num_pixels(), options.group_size, has_levels);
+  const std::uint64_t pixels = options.size.num_pixels();
+  const std::uint32_t most_requests = BlockCache::capacity_for(plan.cache_slots, block_count(ids), pixels);
   std::vector<Level> levels;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const CompressedVolume &level = *volumes[i];
@@ -112,10 +111,12 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
                               ? DeviceStream(device, level, OnHost{plan.window_blocks}, options.with_bounds)
                               : DeviceStream(device, level, options.largest_stream_part, options.with_bounds);
     Macrocells macrocells(device, grids[i], stream, buffers);
-    ZfpDecode decode(device, cache.capacity, stream.defines(), has_levels);
+    ZfpDecode decode(device, most_requests, stream.defines(), has_levels);
     levels.push_back({level.info, level.error_bound, LevelError(level, i == 0), std::move(stream),
                       std::move(macrocells), std::move(decode)});
   }
+  Wavefront rays(device, pixels, options.pipeline == PipelineKind::kBlocks, volumes.size());
+  BlockCache cache(device, ids, plan.cache_slots, pixels, options.group_size, has_levels);
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 

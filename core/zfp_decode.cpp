@@ -25,26 +25,34 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::D
   if (levels && DeviceStream::is_window(stream_defines)) places_.emplace(device, "decode places", max_blocks);
 }
 
-void ZfpDecode::operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
-                           const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
-                           ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
+bool ZfpDecode::can_join(const DeviceStream &next) const {
+  ocl::Defines in_one_part = stream_defines_;
+  in_one_part.erase("ISO_STREAM_PARTS");
+  return !DeviceStream::is_window(stream_defines_) && next.defines() == in_one_part;
+}
+
+void ZfpDecode::decode(const Source &source, const Source &next, const CountsBuffer &counts,
+                       const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
+                       ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
+  const DeviceStream &stream = source.stream;
   if (stream.defines() != stream_defines_) {
     throw std::invalid_argument("ZfpDecode was built for a stream in another number of parts");
   }
   if (!stream.window) {
-    kernel_(range_, frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3), stream.index(),
-            stream.layout, 0, std::numeric_limits<uint>::max(), counts, block_ids, block_ids, slots, values,
-            inside);
+    kernel_(range_, source.frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3),
+            stream.index(), stream.layout, next.frame, next.stream.part(0), next.stream.index(),
+            next.stream.layout, 0, std::numeric_limits<uint>::max(), counts, block_ids, block_ids, slots,
+            values, inside);
     return;
   }
   std::span<uint> granted = stream.window->read_granted(counts, block_ids);
-  if (places_) granted = granted.first(take_own(granted, frame));
-  stream.window->bring(granted,
-                       [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
-                         kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), frame, words, words,
-                                 words, words, stream.index(words), stream.layout, first, first + count,
-                                 counts, places_ ? *places_ : block_ids, block_ids, slots, values, inside);
-                       });
+  if (places_) granted = granted.first(take_own(granted, source.frame));
+  stream.window->bring(granted, [&](const ocl::Buffer<uint> &words, std::uint32_t first,
+                                    std::uint32_t count) {
+    kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), source.frame, words, words, words, words,
+            stream.index(words), stream.layout, source.frame, words, stream.index(words), stream.layout,
+            first, first + count, counts, places_ ? *places_ : block_ids, block_ids, slots, values, inside);
+  });
 }
 
 /// Keeps the first of block_ids for those of this level, as places in it, and tells the device which they were. Returns how many.

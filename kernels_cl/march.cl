@@ -258,18 +258,25 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
                               uint level, uint side, local uint *found) {
   uint state = ISO_INVALID_ID;
   for (; level + 1 < num_frames && state == ISO_INVALID_ID; ++level) {
-    const FrameParams before = frames[level], behind = frames[level + 1];
-    const Ray ray_before = make_ray(&before, pixel), ray = make_ray(&behind, pixel);
+    const FrameParams behind = frames[level + 1];
+    const Ray ray = make_ray(&behind, pixel);
     uint block_id = first_block(&behind, &ray);
     BlockCoords b;
-    if (side == ISO_SIDE_UNKNOWN && block_at_border(&before, &ray_before, before.end_t, &b))
-      side = side_of_block(&before, macrocell_masks, ranges, b);
-    if (side != ISO_SIDE_UNKNOWN && block_at_border(&behind, &ray, behind.begin_t, &b) &&
-        side_of_block(&behind, macrocell_masks, ranges, b) != side) {
-      state = block_id | side << ISO_RAY_SIDE_SHIFT;
-    } else if (block_id != ISO_INVALID_ID &&
-               find_blocks(&behind, macrocell_masks, &ray, &block_id, 1, found, 1) != 0) {
-      state = found[0];
+    if (block_id != ISO_INVALID_ID) {
+      const int is_at_border = block_at_border(&behind, &ray, behind.begin_t, &b);
+      if (is_at_border && side == ISO_SIDE_UNKNOWN) {
+        const FrameParams before = frames[level];
+        const Ray ray_before = make_ray(&before, pixel);
+        BlockCoords left;
+        if (block_at_border(&before, &ray_before, before.end_t, &left))
+          side = side_of_block(&before, macrocell_masks, ranges, left);
+      }
+      if (is_at_border && side != ISO_SIDE_UNKNOWN &&
+          side_of_block(&behind, macrocell_masks, ranges, b) != side) {
+        state = block_id | side << ISO_RAY_SIDE_SHIFT;
+      } else if (find_blocks(&behind, macrocell_masks, &ray, &block_id, 1, found, 1) != 0) {
+        state = found[0];
+      }
     }
     side = ISO_SIDE_UNKNOWN;
   }
@@ -547,7 +554,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       const LastPlanes last = last_planes(level);
       const Ray ray = make_ray(level, pixel);
       const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
-      const uint ahead = frame->per_ray_speculation ? own : counts->spec_count;
+      /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more. */
+      const uint ahead = frame->per_ray_speculation ? max(own, counts->spec_count / 2) : counts->spec_count;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
         const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,
                                                 min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
