@@ -1,6 +1,7 @@
 #include "core/pyramid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "core/parallel_for.hpp"
@@ -11,18 +12,20 @@ namespace {
 
 constexpr std::uint32_t kShortestAxis = 8;  ///< that is halved once more
 
-/// 1/4, 1/2, 1/4; products first, which are exact, so that no sum of large voxels overflows.
-float mean_of(float before, float at, float behind) {
-  return (0.25f * before + 0.25f * behind) + 0.5f * at;
+constexpr std::uint32_t kNumTaps = 5;
+
+/// The low-pass of the 5/3 wavelet, but never beyond the values themselves, so that a step does not ring and no sum overflows.
+float low_pass(const std::array<float, kNumTaps> &v) {
+  const auto [least, largest] = std::minmax({v[0], v[1], v[2], v[3], v[4]});
+  const float inner = 0.75f * v[2] + (0.25f * v[1] + 0.25f * v[3]);
+  return std::clamp(inner - (0.125f * v[0] + 0.125f * v[4]), least, largest);
 }
 
-/// Where coarse voxel k of an axis of n fine ones takes its three values.
-struct Neighbours {
-  std::uint32_t before, at, behind;
-};
-Neighbours neighbours(std::uint32_t k, std::uint32_t n) {
-  const std::uint32_t at = 2 * k, last = n - 1;
-  return {at == 0 ? 0 : std::min(at - 1, last), std::min(at, last), std::min(at + 1, last)};
+/// Where coarse voxel k of an axis of n fine ones takes its values.
+std::array<std::uint32_t, kNumTaps> taps(std::uint32_t k, std::uint32_t n) {
+  std::array<std::uint32_t, kNumTaps> at{};
+  for (std::uint32_t i = 0; i < kNumTaps; ++i) at[i] = std::min(2 * k + i - std::min(2 * k + i, 2u), n - 1);
+  return at;
 }
 
 }  // namespace
@@ -53,37 +56,40 @@ void Downsampler::add(std::span<const float> layers) {
   planes_.resize(plane * num_layers);
   parallel_for(num_layers * coarse_.y, num_threads_, [&](std::uint64_t row, std::uint32_t) {
     const float *layer = layers.data() + row / coarse_.y * fine_layer;
-    const Neighbours y = neighbours(static_cast<std::uint32_t>(row % coarse_.y), fine_.y);
-    const float *before = layer + std::size_t{y.before} * fine_.x, *at = layer + std::size_t{y.at} * fine_.x,
-                *behind = layer + std::size_t{y.behind} * fine_.x;
-    std::vector<float> mean(fine_.x);
-    for (std::uint32_t x = 0; x < fine_.x; ++x) mean[x] = mean_of(before[x], at[x], behind[x]);
+    const auto y = taps(static_cast<std::uint32_t>(row % coarse_.y), fine_.y);
+    const auto along_y = [&](std::uint32_t x) {
+      const auto value = [&](std::size_t i) { return layer[x + std::size_t{fine_.x} * y[i]]; };
+      return low_pass({value(0), value(1), value(2), value(3), value(4)});
+    };
+    std::vector<float> rows(fine_.x);
+    for (std::uint32_t x = 0; x < fine_.x; ++x) rows[x] = along_y(x);
     float *out = planes_.data() + row * coarse_.x;
     for (std::uint32_t k = 0; k < coarse_.x; ++k) {
-      const Neighbours x = neighbours(k, fine_.x);
-      out[k] = mean_of(mean[x.before], mean[x.at], mean[x.behind]);
+      const auto x = taps(k, fine_.x);
+      out[k] = low_pass({rows[x[0]], rows[x[1]], rows[x[2]], rows[x[3]], rows[x[4]]});
     }
   });
   for (std::size_t i = 0; i < num_layers; ++i) add_plane(z_++, std::span(planes_).subspan(i * plane, plane));
 }
 
 void Downsampler::add_plane(std::uint32_t z, std::span<const float> plane) {
+  recent_.emplace_back(plane.begin(), plane.end());
+  if (recent_.size() > kNumTaps) recent_.pop_front();
   const bool last = z + 1 == fine_.z;
-  if (z % 2 == 0) {
-    even_.assign(plane.begin(), plane.end());
-    if (last) emit(before_, even_, even_);
-    return;
-  }
-  emit(z == 1 ? even_ : before_, even_, plane);
-  before_.assign(plane.begin(), plane.end());
-  if (last) emit(plane, plane, plane);
+  while (num_emitted_ < coarse_.z && (last || 2 * num_emitted_ + 2 <= z)) emit(z);
 }
 
-void Downsampler::emit(std::span<const float> before, std::span<const float> at,
-                       std::span<const float> behind) {
-  const std::size_t begin = chunk_.size();
-  chunk_.resize(begin + at.size());
-  for (std::size_t i = 0; i < at.size(); ++i) chunk_[begin + i] = mean_of(before[i], at[i], behind[i]);
+/// last: the fine layer that recent_ ends with.
+void Downsampler::emit(std::uint32_t last) {
+  std::array<const float *, kNumTaps> planes{};
+  std::ranges::transform(taps(num_emitted_, fine_.z), planes.begin(),
+                         [&](std::uint32_t z) { return recent_[recent_.size() - 1 - (last - z)].data(); });
+  const std::size_t begin = chunk_.size(), size = std::size_t{coarse_.x} * coarse_.y;
+  chunk_.resize(begin + size);
+  for (std::size_t i = 0; i < size; ++i) {
+    const auto value = [&](std::size_t tap) { return planes[tap][i]; };
+    chunk_[begin + i] = low_pass({value(0), value(1), value(2), value(3), value(4)});
+  }
   ++num_emitted_;
   const std::uint32_t num_layers = num_emitted_ - chunk_begin_;
   if (num_layers < layers_per_chunk(coarse_) && num_emitted_ < coarse_.z) return;
