@@ -14,11 +14,11 @@ constexpr std::uint32_t kShortestAxis = 8;  ///< that is halved once more
 
 constexpr std::uint32_t kNumTaps = 5;
 
-/// The low-pass of the 5/3 wavelet, but never beyond the values themselves, so that a step does not ring and no sum overflows.
+/// -1/16, 1/4, 5/8, 1/4, -1/16, but never beyond the values themselves, so that a step does not ring and no sum overflows.
 float low_pass(const std::array<float, kNumTaps> &v) {
   const auto [least, largest] = std::minmax({v[0], v[1], v[2], v[3], v[4]});
-  const float inner = 0.75f * v[2] + (0.25f * v[1] + 0.25f * v[3]);
-  return std::clamp(inner - (0.125f * v[0] + 0.125f * v[4]), least, largest);
+  const float inner = 0.625f * v[2] + (0.25f * v[1] + 0.25f * v[3]);
+  return std::clamp(inner - (0.0625f * v[0] + 0.0625f * v[4]), least, largest);
 }
 
 /// Where coarse voxel k of an axis of n fine ones takes its values.

@@ -2,10 +2,9 @@
 // Levels of detail: a pyramid of grids, each with half the voxels of the one before along each axis.
 //
 // Voxel k of a level lies where voxel 2k of the level before does, so planes of a coarse grid are planes of the fine one, and a
-// ray crosses both at the same t, bit for bit. Values are the low-pass of the 5/3 wavelet [LeGall and Tabatabai 1988] along each axis,
-// -1/8, 1/4, 3/4, 1/4, -1/8, held to the least and the largest of the five: linear between such values, a smooth field is met three times as
-// closely as between means by 1/4, 1/2, 1/4. Behind the last voxel lie copies of it, and a coarse grid may end up to a voxel of
-// its own behind the fine one.
+// ray crosses both at the same t, bit for bit. Its value is a mean of five along each axis, by -1/16, 1/4, 5/8, 1/4, -1/16, held to the
+// least and the largest of them. So a field that bends evenly keeps its values there, and surfaces their place, where positive weights would
+// shrink them. Behind the last voxel lie copies of it, and a coarse grid may end up to a voxel of its own behind the fine one.
 
 #include <cstdint>
 #include <deque>
