@@ -32,19 +32,17 @@ std::array<double, 2> reach(const VolumeInfo &info, const glm::dvec3 &eye) {
   return {0.999 * std::max(0.0, nearest), 1.001 * farthest};
 }
 
-/// Lets the next level's ids, ranges and masks begin where those of the one before end.
-void place_behind(const FrameParams &before, FrameParams &frame) {
-  frame.id_blocks_x = before.id_blocks_x;
-  frame.id_blocks_y = before.id_blocks_y;
-  frame.id_begin_z = before.id_begin_z + before.blocks_z;
-  frame.ranges_begin = before.ranges_begin + static_cast<uint>(block_count(before));
-  frame.masks_begin = before.masks_begin + 2 * static_cast<uint>(num_macrocells(before));
-}
-
+/// Lets each level's ids, ranges and masks begin where those of the one before end.
 void place_levels(std::span<FrameParams> frames) {
-  frames[0].id_blocks_x = frames[0].blocks_x;
-  frames[0].id_blocks_y = frames[0].blocks_y;
-  for (std::size_t i = 1; i < frames.size(); ++i) place_behind(frames[i - 1], frames[i]);
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const FrameParams &finer = frames[i - 1];
+    FrameParams &frame = frames[i];
+    frame.id_blocks_x = finer.id_blocks_x;
+    frame.id_blocks_y = finer.id_blocks_y;
+    frame.id_begin_z = finer.id_begin_z + finer.blocks_z;
+    frame.ranges_begin = finer.ranges_begin + static_cast<uint>(block_count(finer));
+    frame.masks_begin = finer.masks_begin + 2 * static_cast<uint>(num_macrocells(finer));
+  }
 }
 
 }  // namespace
