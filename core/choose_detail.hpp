@@ -33,8 +33,8 @@ inline constexpr double kLostShare = 0.01;
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
 
 /// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so many pixels, and their bounds
-/// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, coarsest first, then bit planes: the
-/// first that loses no more than kLostShare. Full detail, where most pixels do not keep max_error even so. max_error: pixels, above 0.
+/// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, then bit planes: the
+/// coarsest that lose no more than kLostShare. Full detail, where most pixels do not keep max_error even so. max_error: pixels, above 0.
 /// Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
                            float isovalue, double max_error);

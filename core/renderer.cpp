@@ -95,8 +95,8 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   std::vector<const CompressedVolume *> volumes = {&volume};
   for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i)
     volumes.push_back(&volume.coarser[i]);
-  std::vector<VolumeInfo> infos;
-  for (const CompressedVolume *level : volumes) infos.push_back(level->info);
+  std::vector<VolumeInfo> infos(volumes.size());
+  std::ranges::transform(volumes, infos.begin(), [](const CompressedVolume *level) { return level->info; });
   const std::vector<FrameParams> grids = make_level_grids(infos);
   const FrameParams ids = make_id_grid(grids), &last = grids.back();
   const bool has_levels = volumes.size() > 1;

@@ -217,8 +217,6 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
-#if ISO_LEVELS
-
 /// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the block with this id.
 ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint block_id) {
   const uint layer = block_id / (frames[0].id_blocks_x * frames[0].id_blocks_y);
@@ -284,11 +282,13 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
 }
 
 /// `frame`: that of the level which has block block_id, as a copy of the work-item's own.
+#if ISO_LEVELS
 #define ISO_FRAME_OF(frame, block_id)                                                \
   const FrameParams frame##_params = frames[level_of(frames, num_frames, block_id)]; \
   const FrameParams *frame = &frame##_params
 #else
-#define ISO_FRAME_OF(frame, block_id) const FrameParams *frame = &frame_params
+#define ISO_FRAME_OF(frame, block_id) \
+  const FrameParams *frame = ((void)frames, (void)num_frames, &frame_params)
 #endif
 
 /// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the frame's screen
@@ -323,14 +323,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
       uint block_id = first_block(frame, &ray);
       if (block_id != ISO_INVALID_ID)
         num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
-#if ISO_LEVELS
-      if (num_found == 0) {
+      if (ISO_LEVELS && num_found == 0) {
         log_ahead = ISO_BORDER_LOG_AHEAD;
         found[item] = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0, ISO_SIDE_UNKNOWN,
                                     found + item);
         num_found = found[item] != ISO_INVALID_ID;
       }
-#endif
       if (num_found != 0) ray_block_ids[pixel] = found[item];
     }
     append_ray(num_found != 0, pixel | log_ahead << ISO_RAY_AHEAD_SHIFT, counters, &counts->next_active_count,
@@ -452,8 +450,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       if (waits_as != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
       ray_block_ids[pixel] = ISO_LEVELS && waits_as == from ? state : waits_as;
     }
-#if ISO_LEVELS
-    if (result >= ISO_RAY_ENDS || (gone && lane == 0)) {
+    if (ISO_LEVELS && (result >= ISO_RAY_ENDS || (gone && lane == 0))) {
       const uint left_on = result == ISO_RAY_ENDS       ? ISO_SIDE_OUTSIDE
                            : result == ISO_RAY_ENDS + 1 ? ISO_SIDE_INSIDE
                                                         : ISO_SIDE_UNKNOWN;
@@ -463,7 +460,6 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       if (waits) ray_block_ids[pixel] = behind;
       log_ahead = ISO_BORDER_LOG_AHEAD;
     }
-#endif
     append_ray(waits,
                pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
                counters, &counts->next_active_count, next_active_ray_ids);

@@ -7,7 +7,7 @@
 
 /// The request that is number i of this launch's.
 ISO_INLINE uint place_of(global const uint *places, uint i) {
-  return ISO_LEVELS && ISO_STREAM_PARTS == 0 ? places[i] : i;
+  return ISO_LEVELS ? ISO_STREAM_PARTS == 0 ? places[i] : i : i;
 }
 
 /// One work-item decodes one block; the work-group stores them together, so that neighbouring work-items write neighbouring
