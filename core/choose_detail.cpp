@@ -1,9 +1,9 @@
 #include "core/choose_detail.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
-#include <ranges>
 
 #include "core/error.hpp"
 
@@ -13,10 +13,12 @@ namespace {
 
 /// Of the small picture: a pixel for so many of the frame along each axis, but no fewer rows.
 constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
-/// Distances between voxels that are tried: 8 pixels, and so many times a quarter of an octave less.
-constexpr std::uint32_t kPixelErrors = 21;
-double pixel_error_at(std::uint32_t i) {
-  return std::exp2(3.0 - 0.25 * i);
+/// Distances between voxels that may be chosen: 8 pixels, and so many times a quarter of an octave less.
+constexpr std::size_t kNumPixelErrors = 21;
+std::array<double, kNumPixelErrors> pixel_errors() {
+  std::array<double, kNumPixelErrors> errors{};
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::exp2(3.0 - 0.25 * double(i));
+  return errors;
 }
 constexpr int kMaxPlaneTries = 8;
 
@@ -67,12 +69,14 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
       return choice.tries.back().certified >= best - kLostShare;
     };
     if (choice.reachable) {
-      // Nearly always, what suffices does so at any shorter distance, too: a bisection.
-      const auto distances = std::views::iota(0u, renderer.has_levels() ? kPixelErrors : 0u);
-      const auto coarsest = std::ranges::partition_point(distances, [&](std::uint32_t i) {
-        return !suffices({pixel_error_at(i), 0});
-      });
-      if (coarsest != distances.end()) choice.detail.max_pixel_error = pixel_error_at(*coarsest);
+      if (renderer.has_levels()) {
+        // Nearly always, what suffices does so at any shorter distance, too: a bisection.
+        const auto errors = pixel_errors();
+        const auto coarsest = std::ranges::partition_point(errors, [&](double pixel_error) {
+          return !suffices({pixel_error, 0});
+        });
+        if (coarsest != errors.end()) choice.detail.max_pixel_error = *coarsest;
+      }
       // Halved until it suffices, or no longer matters beside the error that the volume has anyway.
       const double range = double{volume.value_range[1]} - double{volume.value_range[0]};
       double value_error = std::exp2(std::floor(std::log2(std::max(range, 1e-30) / 8)));
