@@ -157,7 +157,7 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
   fmt::print(
       "  within {} pixels of the true surface: {:.2f} % of {} pixels (bound: median {:.3g}, p99 {:.3g}); {} "
       "uncertain\n"
-      "  with voxels up to {} pixels apart and values up to {} off; chosen in {:.0f} ms, bounded in "
+      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, bounded in "
       "{:.0f} ms\n",
       *max_error_, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
       with_commas(summary.num_uncertain), choice_.detail.max_pixel_error, choice_.detail.value_error,

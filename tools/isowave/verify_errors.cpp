@@ -47,7 +47,7 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
           judge_bounds(truth, make_frame_params(scene.volume.info, camera, scene.size, isovalue), drawn,
                        certificate.bounds);
       const Quantiles slack = quantiles(tally.slack);
-      fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9.2f} {:>10} {:>9} {:>10.2f}\n", isovalue, view,
+      fmt::print("{:>9} {:>5} {:>9.3g} {:>10} {:>10} {:>9.2f} {:>10} {:>9} {:>10.2f}\n", isovalue, view,
                  choice.detail.max_pixel_error, choice.detail.value_error, with_commas(summary.num_pixels),
                  summary.num_pixels == 0 ? 100.0
                                          : 100.0 * double(summary.num_certified) / double(summary.num_pixels),
