@@ -152,12 +152,9 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
   if (plan.stream == StreamPlace::kHost)
     plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
-  std::uint64_t num_blocks = 0, num_cells = 0;
-  for (const FrameParams &grid : grids) {
-    num_blocks += block_count(grid);
-    num_cells += num_macrocells(grid);
-  }
-  plan.buffers = {{"block ranges", 2 * num_blocks}, {"macrocell masks", 8 * num_cells}};
+  const FrameParams &last = grids.back();  // the others' ranges and masks lie before its
+  plan.buffers = {{"block ranges", 2 * (last.ranges_begin + block_count(last))},
+                  {"macrocell masks", 4 * (last.masks_begin + 2 * num_macrocells(last))}};
   add_level(plan, volume, request);
   for (std::size_t i = 0; request.with_levels && i < volume.coarser.size(); ++i)
     add_level(plan, volume.coarser[i], request);

@@ -295,8 +295,8 @@ TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
   EXPECT_NE(depth, depth_of(drawn_with(0.02)));
 }
 
-/// A band's end is not the rays', and no band waits for the one before.
-TEST_P(LevelsOnDevice, PassesAreForAllBands) {
+/// A band's end is not the rays'.
+TEST_P(LevelsOnDevice, FramesAreCompleteAfterTheLastBand) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .max_pixel_error = 3});
   const FrameStats stats = renderer.render(orbit_cameras(volume.info, 1)[0], 0.4f);
