@@ -30,6 +30,7 @@ struct Options {
   tools::CompressionOptions compression{.rate = 4};
   std::uint32_t orbit = 10, rounds = 3, max_passes = 2000;
   std::vector<std::uint32_t> size = {1280, 720};
+  std::uint32_t samples = 1;
   bool resident = true;
   tools::RendererFlags renderer;
 };
@@ -74,7 +75,8 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume, 
   report.grid.info = volume.info;
   report.grid.bits_per_block = volume.bits_per_block;
   report.isovalue = isovalue_of(options, volume);
-  report.options = tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1)});
+  report.options =
+      tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1), options.samples});
   report.num_views = options.orbit;
   report.rounds = options.rounds;
   return report;
@@ -164,6 +166,9 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("--isovalue,-i", options.isovalue, "isovalue [the middle of the volume's values]");
   tools::add_compression_options(app, options.compression);
   app.add_option("--size", options.size, "picture size WxH [1280x720]")->delimiter('x')->expected(2);
+  app.add_option("--samples", options.samples, "N: N x N rays for each pixel")
+      ->check(CLI::Range(1u, ImageSize::kMaxSamples))
+      ->capture_default_str();
   app.add_option("--orbit", options.orbit, "views around the volume")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();

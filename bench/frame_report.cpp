@@ -56,7 +56,7 @@ struct Column {
 const Column kColumns[] = {
     {"hit %", "rays_hit_percent", 1,
      [](const FrameReport &report, const FrameStats &frame) {
-       return 100.0 * double(frame.rays_hit) / double(report.options.size.num_pixels());
+       return 100.0 * double(frame.rays_hit) / double(report.options.size.num_rays());
      }},
     {"passes", "passes", 0, [](const FrameReport &, const FrameStats &frame) { return num_passes(frame); }},
     {"ms/pass", "ms_per_pass", 2,
@@ -168,8 +168,10 @@ void print_run(const FrameReport &report) {
   fmt::print("  {:<16}{} x {} x {} {}, {} blocks, rate {}, isovalue {}\n", "volume", dims.x, dims.y, dims.z,
              to_string(report.grid.info.type), report.grid.block_count(), report.grid.rate(),
              report.isovalue);
-  fmt::print("  {:<16}{} x {}, {} views, {} rounds, N_spec up to {}\n", "frames", report.options.size.width,
-             report.options.size.height, report.num_views, report.rounds, report.options.max_speculation);
+  const ImageSize &size = report.options.size;
+  fmt::print("  {:<16}{} x {}, {} rays a pixel, {} views, {} rounds, N_spec up to {}\n", "frames", size.width,
+             size.height, size.samples * size.samples, report.num_views, report.rounds,
+             report.options.max_speculation);
 }
 
 void print_floor(const FrameReport &report, const std::vector<ViewTimes> &views) {
@@ -203,6 +205,7 @@ ordered_json options_json(const FrameReport &report) {
       {"isovalue", report.isovalue},
       {"width", report.options.size.width},
       {"height", report.options.size.height},
+      {"samples", report.options.size.samples},
       {"views", report.num_views},
       {"rounds", report.rounds}};
   json.update(tools::renderer_options_json(report.options));

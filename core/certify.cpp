@@ -142,14 +142,14 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
       make_level_frames(infos, camera, options.size, isovalue, options.max_pixel_error);
   const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / options.size.height;
   certificate.bounds.assign(drawn.size(), kNotCertain);
-  constexpr std::uint32_t kRows = 8;  // of pixels, that share decoded blocks
-  parallel_for((options.size.height + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
+  constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks
+  parallel_for((options.size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
     std::vector<BlockValues> values;
     for (std::size_t i = 0; i < levels.size(); ++i)
       values.emplace_back(*levels[i], value_errors[i], offsets[i]);
-    const auto first = static_cast<std::uint32_t>(part * kRows * options.size.width);
+    const auto first = static_cast<std::uint32_t>(part * kRows * options.size.ray_columns());
     const std::uint32_t end =
-        std::min(first + kRows * options.size.width, static_cast<std::uint32_t>(drawn.size()));
+        std::min(first + kRows * options.size.ray_columns(), static_cast<std::uint32_t>(drawn.size()));
     for (std::uint32_t pixel = first; pixel < end; ++pixel) {
       const double t = double{drawn[pixel].t}, first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
                    last_t = double{std::max(lower[pixel].t, upper[pixel].t)};

@@ -15,7 +15,7 @@
 namespace isowave {
 
 struct Certificate {
-  /// [height * width]: the distance between the drawn and the true hit along the pixel's ray, at most [pixels: what a pixel covers at the
+  /// Of each ray: the distance between the drawn and the true hit along it, at most [pixels: what a pixel covers at the
   /// drawn hit's distance]; 0 where both miss for certain; infinity where nothing is certain.
   std::vector<float> bounds;
   double total_ms = 0;               ///< wall clock, of both bounds' frames and what the host makes of them

@@ -38,10 +38,15 @@ FrameParams make_grid_params(const VolumeInfo &info) {
 }
 
 void check_image_size(ImageSize size) {
-  constexpr std::uint64_t kMaxPixels = 1u << 28;
-  if (size.num_pixels() == 0 || size.num_pixels() > kMaxPixels) {
+  constexpr std::uint64_t kMaxRays = 1u << 28;
+  if (size.samples < 1 || size.samples > ImageSize::kMaxSamples) {
+    throw Error("{} x {} rays a pixel cannot be drawn: 1 to {} along each axis can", size.samples,
+                size.samples, ImageSize::kMaxSamples);
+  }
+  const std::uint64_t most = kMaxRays / (size.samples * size.samples);
+  if (size.num_pixels() == 0 || size.num_pixels() > most) {
     throw Error("an image of {} x {} pixels cannot be drawn: 1 to {} pixels can", size.width, size.height,
-                kMaxPixels);
+                most);
   }
 }
 
@@ -77,8 +82,8 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   frame.active_end_x = static_cast<int>(num_owning_blocks(info.dims.x));
   frame.active_end_y = static_cast<int>(num_owning_blocks(info.dims.y));
   frame.active_end_z = static_cast<int>(num_owning_blocks(info.dims.z));
-  frame.width = size.width;
-  frame.height = size.height;
+  frame.width = size.ray_columns();
+  frame.height = size.ray_rows();
   frame.eye_x = flush_tiny(eye.x);
   frame.eye_y = flush_tiny(eye.y);
   frame.eye_z = flush_tiny(eye.z);
@@ -91,7 +96,7 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   frame.up_x = flush_tiny(up.x);
   frame.up_y = flush_tiny(up.y);
   frame.up_z = flush_tiny(up.z);
-  frame.pixel_scale = static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.height);
+  frame.pixel_scale = static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows());
   frame.t_scale = static_cast<float>(t_scale);
   frame.isovalue = isovalue;
   frame.max_spec_count = 1;

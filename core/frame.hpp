@@ -10,12 +10,20 @@
 
 namespace isowave {
 
+/// A picture, and the grid of its rays: that of a picture with samples times as many pixels along both axes. Frames and hit buffers
+/// count rays; the picture has the mean colour of each pixel's (kernels_cl/shade.cl).
 struct ImageSize {
   std::uint32_t width = 1280, height = 720;  ///< pixels
+  std::uint32_t samples = 1;                 ///< rays of a pixel along each axis, 1..kMaxSamples
+
+  static constexpr std::uint32_t kMaxSamples = 8;
   std::uint64_t num_pixels() const { return std::uint64_t(width) * height; }
+  std::uint32_t ray_columns() const { return width * samples; }
+  std::uint32_t ray_rows() const { return height * samples; }
+  std::uint64_t num_rays() const { return num_pixels() * samples * samples; }
 };
 
-/// Throws Error: an image of 0 or more than 2^28 pixels.
+/// Throws Error: an image of 0 pixels, more than 2^28 rays, samples out of range.
 void check_image_size(ImageSize size);
 
 /// Blocks along an axis of `dim` voxels that own dual cells: all but a last one of a single voxel layer.
@@ -42,11 +50,11 @@ FrameParams make_grid_params(const VolumeInfo &info);
 void set_screen_box(FrameParams &frame);
 
 /// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume; below_index, above_index,
-/// speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, an image of 0 or more than 2^28 pixels, a
-/// NaN isovalue.
+/// speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, a size that check_image_size() refuses, a NaN
+/// isovalue.
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue);
 
-/// Depth [height * width], world units, INFINITY where nothing is hit.
+/// Depth of each hit, world units, INFINITY where nothing is hit.
 std::vector<float> depth_of(const std::vector<HitRecord> &hits);
 
 }  // namespace isowave

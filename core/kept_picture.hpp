@@ -10,10 +10,10 @@
 
 namespace isowave {
 
-/// A picture of half the pixels, so many times, along each axis, rounded up.
+/// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel.
 inline ImageSize halved(ImageSize size, unsigned times) {
-  const auto half = [times](std::uint32_t pixels) { return ((pixels - 1) >> times) + 1; };
-  return {half(size.width), half(size.height)};
+  const auto half = [times](std::uint32_t rays) { return ((rays - 1) >> times) + 1; };
+  return {half(size.ray_columns()), half(size.ray_rows())};
 }
 
 class KeptPicture {

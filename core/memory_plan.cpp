@@ -21,9 +21,9 @@ std::uint64_t ceil_div(std::uint64_t count, std::uint64_t size) {
 /// Bytes of compressed blocks that one half of a window holds: enough for a transfer at full speed, little enough that the
 /// first is soon under way.
 constexpr std::uint64_t kWindowBytes = 2u << 20;
-/// A cache of fewer slots is too small to be paid for by keeping the compressed volume on the device: one for so many pixels.
-/// A judgement, not a measurement: a cold 720p frame touches a block for every two pixels, and most again in the next frame.
-constexpr std::uint64_t kPixelsPerUsefulSlot = 8;
+/// A cache of fewer slots is too small to be paid for by keeping the compressed volume on the device: one for so many rays.
+/// A judgement, not a measurement: a cold 720p frame touches a block for every two rays, and most again in the next frame.
+constexpr std::uint64_t kRaysPerUsefulSlot = 8;
 
 std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequest &request,
                                 std::uint32_t cache_slots) {
@@ -95,23 +95,23 @@ MemoryRequest with_stream(MemoryRequest request, StreamPlace place) {
 
 /// Of what pipeline `blocks` needs beside the rays.
 void add_pairs(MemoryPlan &plan, const MemoryRequest &request) {
-  const std::uint64_t pixels = request.num_pixels;
-  const std::uint64_t visible = std::min<std::uint64_t>(pixels, plan.cache_slots);
+  const std::uint64_t rays = request.num_rays;
+  const std::uint64_t visible = std::min<std::uint64_t>(rays, plan.cache_slots);
   const std::uint64_t scan_tile = std::uint64_t{request.group_size} * ISO_SCAN_ITEMS;
-  plan.buffers.insert(plan.buffers.end(), {{"mask", 4 * pixels},
-                                           {"pair block ids", 4 * pixels},
-                                           {"pair hits", sizeof(PairHit) * pixels},
-                                           {"closest pairs", 4 * pixels},
-                                           {"scan tile sums", 4 * ceil_div(pixels, scan_tile)},
-                                           {"grouped pair ids", 4 * pixels},
-                                           {"cache slots of pairs", 4 * pixels},
+  plan.buffers.insert(plan.buffers.end(), {{"mask", 4 * rays},
+                                           {"pair block ids", 4 * rays},
+                                           {"pair hits", sizeof(PairHit) * rays},
+                                           {"closest pairs", 4 * rays},
+                                           {"scan tile sums", 4 * ceil_div(rays, scan_tile)},
+                                           {"grouped pair ids", 4 * rays},
+                                           {"cache slots of pairs", 4 * rays},
                                            {"block rays", sizeof(BlockRays) * visible}});
   if (request.grouping == Grouping::kRadix) {
     plan.buffers.insert(plan.buffers.end(),
-                        {{"sort keys, other half", 4 * pixels},
-                         {"sort values, other half", 4 * pixels},
-                         {"sort digit table", 4 * RadixSort::table_size(pixels, request.group_size)},
-                         {"group tile sums", 4 * ceil_div(pixels, scan_tile)}});
+                        {{"sort keys, other half", 4 * rays},
+                         {"sort values, other half", 4 * rays},
+                         {"sort digit table", 4 * RadixSort::table_size(rays, request.group_size)},
+                         {"group tile sums", 4 * ceil_div(rays, scan_tile)}});
   } else {
     plan.buffers.insert(plan.buffers.end(), {{"pairs by slot", 4 * std::uint64_t{plan.cache_slots}},
                                              {"pair offsets by slot", 4 * std::uint64_t{plan.cache_slots}},
@@ -143,10 +143,10 @@ std::uint64_t MemoryPlan::peak() const {
 
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots) {
-  const std::uint64_t pixels = request.num_pixels, slots = cache_slots;
+  const std::uint64_t rays = request.num_rays, slots = cache_slots;
   const std::vector<FrameParams> grids = grids_of(volume, request);
   const FrameParams ids = make_id_grid(grids);
-  const std::uint64_t listed = BlockCache::capacity_for(cache_slots, block_count(ids), pixels);
+  const std::uint64_t listed = BlockCache::capacity_for(cache_slots, block_count(ids), rays);
   MemoryPlan plan;
   plan.cache_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
@@ -164,10 +164,10 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"pass counts, next", sizeof(PassCounts)},
                        {"pass counts, read back", PassReadback::kMaxInFlight * sizeof(PassCounts)},
                        {"level frames", sizeof(FrameParams) * grids.size()},
-                       {"hits", sizeof(HitRecord) * pixels},
-                       {"ray states", 4 * pixels},
-                       {"active ray ids", 4 * pixels},
-                       {"active ray ids, next", 4 * pixels}});
+                       {"hits", sizeof(HitRecord) * rays},
+                       {"ray states", 4 * rays},
+                       {"active ray ids", 4 * rays},
+                       {"active ray ids, next", 4 * rays}});
   if (request.pipeline == PipelineKind::kBlocks) {
     add_pairs(plan, request);
   } else {  // the pairs' arrays are empty: OpenCL has no buffers of 0 bytes
@@ -187,12 +187,11 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"cache ages", 4 * std::uint64_t{ISO_AGE_BUCKETS}},
                        {"cache state", sizeof(CacheState)},
                        {"shading", sizeof(ShadeParams)},
-                       {"framebuffer", 4 * pixels}});
+                       {"framebuffer", 4 * rays}});
   if (grids.size() > 1 && plan.stream == StreamPlace::kHost) {
     for (std::size_t i = 0; i < grids.size(); ++i) plan.buffers.push_back({"decode places", 4 * listed});
   }
-  if (request.kept_pixels != 0)
-    plan.buffers.push_back({"kept hits", sizeof(HitRecord) * request.kept_pixels});
+  if (request.kept_rays != 0) plan.buffers.push_back({"kept hits", sizeof(HitRecord) * request.kept_rays});
   return plan;
 }
 
@@ -230,7 +229,7 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
   const bool may_be_on_device = request.stream == StreamPlace::kDevice ||
                                 (request.stream == StreamPlace::kAuto && fits_parts(volume, request));
   const bool may_be_on_host = request.stream != StreamPlace::kDevice;
-  const std::uint64_t useful = std::min<std::uint64_t>(max_slots, request.num_pixels / kPixelsPerUsefulSlot);
+  const std::uint64_t useful = std::min<std::uint64_t>(max_slots, request.num_rays / kRaysPerUsefulSlot);
   std::optional<MemoryPlan> plan;
   if (may_be_on_device) plan = most_slots(StreamPlace::kDevice);
   if (may_be_on_host && (!plan || plan->cache_slots < useful)) {

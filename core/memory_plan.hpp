@@ -24,7 +24,7 @@ StreamPlace stream_place_from_string(std::string_view name);
 
 /// What the memory of a renderer depends on, besides its volume.
 struct MemoryRequest {
-  std::uint64_t num_pixels = 0;
+  std::uint64_t num_rays = 0;
   PipelineKind pipeline = PipelineKind::kRays;  ///< kBlocks or kRays
   Grouping grouping = kDefaultGrouping;
   std::uint32_t group_size = 64;
@@ -33,7 +33,7 @@ struct MemoryRequest {
   std::uint32_t window_blocks = 0;        ///< see StreamWindow; 0: by the size of cache and blocks
   bool with_levels = false;               ///< the volume's coarser levels are on the device, too
   bool with_bounds = false;               ///< and the bounds of their blocks' errors
-  std::uint64_t kept_pixels = 0;          ///< of KeptPicture
+  std::uint64_t kept_rays = 0;            ///< of KeptPicture
 };
 
 struct MemoryPlan {

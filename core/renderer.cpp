@@ -61,16 +61,12 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
 /// All memory, before any is taken.
 MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options) {
-  const MemoryRequest request{options.size.num_pixels(),
-                              options.pipeline,
-                              options.grouping,
-                              options.group_size,
-                              options.stream,
-                              options.largest_stream_part,
-                              options.window_blocks,
-                              options.max_pixel_error > 0,
-                              options.with_bounds,
-                              options.with_kept_picture ? halved(options.size, 1).num_pixels() : 0};
+  const MemoryRequest request{
+      options.size.num_rays(), options.pipeline,
+      options.grouping,        options.group_size,
+      options.stream,          options.largest_stream_part,
+      options.window_blocks,   options.max_pixel_error > 0,
+      options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0};
   const std::uint64_t budget =
       options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
   std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
@@ -102,8 +98,8 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(device, last.ranges_begin + block_count(last),
                                                           last.masks_begin / 2 + num_macrocells(last));
-  const std::uint64_t pixels = options.size.num_pixels();
-  const std::uint32_t most_requests = BlockCache::capacity_for(plan.cache_slots, block_count(ids), pixels);
+  const std::uint64_t num_rays = options.size.num_rays();
+  const std::uint32_t most_requests = BlockCache::capacity_for(plan.cache_slots, block_count(ids), num_rays);
   std::vector<Level> levels;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const CompressedVolume &level = *volumes[i];
@@ -115,8 +111,8 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
     levels.push_back({level.info, level.error_bound, LevelError(level, i == 0), std::move(stream),
                       std::move(macrocells), std::move(decode)});
   }
-  Wavefront rays(device, pixels, options.pipeline == PipelineKind::kBlocks, volumes.size());
-  BlockCache cache(device, ids, plan.cache_slots, pixels, options.group_size, has_levels);
+  Wavefront rays(device, num_rays, options.pipeline == PipelineKind::kBlocks, volumes.size());
+  BlockCache cache(device, ids, plan.cache_slots, num_rays, options.group_size, has_levels);
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
@@ -131,7 +127,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
       value_range_(volume.value_range),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
-      shade_(device, options_.size.num_pixels()),
+      shade_(device, options_.size.num_rays()),
       readback_(device) {
   if (options_.with_kept_picture) kept_.emplace(device, halved(options_.size, 1));
   options_.cache_slots = plan_.cache_slots;
@@ -224,15 +220,15 @@ Renderer::Uploads Renderer::uploads() const {
 }
 
 PassStats Renderer::stats_of(const PassCounts &counts) {
-  const double pixels = static_cast<double>(options_.size.num_pixels());
+  const double rays = static_cast<double>(options_.size.num_rays());
   PassStats stats;
   stats.counts = counts;
   stats.counts.window_count = std::min(counts.window_count, counts.active_count);
   // A launch that is not needed costs more than a pass that finds slots missing now and then.
   state_.slots_are_scarce =
       state_.cache.num_slots < kSmallCache || counts.free_count < state_.cache.num_slots / 4;
-  stats.completed_percent = 100.0 * (pixels - counts.next_active_count) / pixels;
-  stats.utilization_percent = 100.0 * counts.granted_count / pixels;
+  stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
+  stats.utilization_percent = 100.0 * counts.granted_count / rays;
   stats.stage_ms = device_.timer().collect();
   return stats;
 }
@@ -290,9 +286,9 @@ void Renderer::set_max_pixel_error(double max_pixel_error) {
 
 void Renderer::set_size(ImageSize size) {
   check_image_size(size);
-  if (size.num_pixels() > state_.rays.num_pixels) {
-    throw Error("{}x{} pixels are more than the {} that the renderer was made for", size.width, size.height,
-                state_.rays.num_pixels);
+  if (size.num_rays() > state_.rays.num_pixels) {
+    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for", size.width,
+                size.height, state_.rays.num_pixels);
   }
   options_.size = size;
 }
@@ -314,7 +310,7 @@ void Renderer::clear_cache() {
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {
-  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays);
+  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, options_.size.samples);
 }
 
 }  // namespace isowave

@@ -47,8 +47,8 @@ struct RendererOptions {
 /// What one pass did: the counts of the device, and what follows from them.
 struct PassStats {
   PassCounts counts{};
-  double utilization_percent = 0;          ///< ray-block pairs that were intersected, of width * height
-  double completed_percent = 0;            ///< pixels whose rays have ended, of width * height
+  double utilization_percent = 0;          ///< ray-block pairs that were intersected, of all rays
+  double completed_percent = 0;            ///< rays that have ended, of all
   std::map<std::string, double> stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
@@ -98,7 +98,7 @@ class Renderer {
   /// Distance in pixels up to which voxels of a coarser level may be apart in further frames; options().max_pixel_error at first. Throws
   /// Error unless it is finite and at least 0, and 0 where the renderer was made for the finest level.
   void set_max_pixel_error(double max_pixel_error);
-  /// Pixels of further frames, no more than the renderer was made for: hits() and shade() are of the first so many.
+  /// Picture of further frames, with no more rays than the renderer was made for: hits() and shade() are of that size.
   void set_size(ImageSize size);
 
   /// For pictures of one frame with more and more pixels (core/time_budget.hpp). Needs options().with_kept_picture.
@@ -114,9 +114,9 @@ class Renderer {
   /// on it. Waits.
   void clear_cache();
 
-  /// The hit buffer [height * width], row 0 at the top. Waits.
+  /// The hit buffer [size.ray_rows()][size.ray_columns()], row 0 at the top. Waits.
   std::vector<HitRecord> hits() const {
-    std::vector<HitRecord> hits(options_.size.num_pixels());
+    std::vector<HitRecord> hits(options_.size.num_rays());
     state_.rays.hits.read(hits);
     return hits;
   }

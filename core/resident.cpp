@@ -33,7 +33,7 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       values_(device, "decoded volume", volume.block_count() * ISO_BLOCK_VOXELS),
       inside_(device, "voxels inside", volume.block_count()),
       changing_(device, "changing cells", volume.block_count()),
-      hits_(device, "hits", size.num_pixels()),
+      hits_(device, "hits", size.num_rays()),
       inside_kernel_(device, "resident", "resident_inside", resident_defines(solver)),
       changing_kernel_(device, "resident", "resident_changing", resident_defines(solver)),
       kernel_(device, "resident", "resident", resident_defines(solver)) {
@@ -58,7 +58,7 @@ std::optional<std::string> Resident::obstacle(const ocl::Device &device, const C
   const std::uint64_t macrocells = 2 * blocks + 10 * std::uint64_t{cells.x} * cells.y * cells.z +
                                    Macrocells::setup_scratch_bytes(volume.num_blocks());
   const std::uint64_t all = volume.word_count() * sizeof(uint) + macrocells + values +
-                            2 * blocks * sizeof(ulong) + size.num_pixels() * sizeof(HitRecord);
+                            2 * blocks * sizeof(ulong) + size.num_rays() * sizeof(HitRecord);
   const ocl::Capabilities &can = device.capabilities();
   if (values > can.largest_allocation) {
     return fmt::format("the decoded volume is {} bytes, the device's largest allocation {}", values,
@@ -82,7 +82,7 @@ double Resident::render(const Camera &camera, float isovalue) {
   }
   macrocells_.set_active_box(frame);
   selected_isovalue_ = isovalue;
-  const std::size_t tiles = std::size_t{(size_.width + 7) / 8} * ((size_.height + 3) / 4);
+  const std::size_t tiles = std::size_t{(frame.width + 7) / 8} * ((frame.height + 3) / 4);
   // One work-item per pixel: rays differ too much in length for strides over them to keep a device busy.
   kernel_(ocl::Range::covering(tiles * kTilePixels, ocl::kGroupSize), frame, macrocells_.masks(), values_,
           changing_, hits_);

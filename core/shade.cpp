@@ -19,8 +19,8 @@ void store_rows(const glm::dmat3 &m, float *rows) {
   }
 }
 
-Image8 rgb_image(const FrameParams &frame, const std::vector<uint> &packed) {
-  Image8 image{frame.width, frame.height, 3, {}};
+Image8 rgb_image(std::uint32_t columns, std::uint32_t rows, const std::vector<uint> &packed) {
+  Image8 image{columns, rows, 3, {}};
   image.pixels.reserve(3 * packed.size());
   for (const uint rgba : packed) {
     for (int shift = 0; shift < 24; shift += 8)
@@ -48,27 +48,29 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
   return params;
 }
 
-Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits) {
-  std::vector<uint> packed(hits.size());
-  for (uint pixel = 0; pixel < packed.size(); ++pixel) {
-    const HitRecord &hit = hits[pixel];
-    packed[pixel] = shade_pixel(&frame, &params, pixel, hit.t, hit.grad_x, hit.grad_y, hit.grad_z);
-  }
-  return rgb_image(frame, packed);
+Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits,
+                    std::uint32_t samples) {
+  const std::uint32_t columns = frame.width / samples, rows = frame.height / samples;
+  std::vector<uint> packed(std::size_t{columns} * rows);
+  for (uint pixel = 0; pixel < packed.size(); ++pixel)
+    packed[pixel] = shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns, hits.data());
+  return rgb_image(columns, rows, packed);
 }
 
-Shade::Shade(ocl::Device &device, std::uint64_t num_pixels)
-    : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
+Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
+    : device_(device),
       params_(device, "shading", 1),
-      image_(device, "framebuffer", num_pixels),
+      image_(device, "framebuffer", max_pixels),
       kernel_(device, "shade", "shade") {}
 
-Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays) {
+Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
+  const std::uint32_t columns = rays.frame.width / samples, rows = rays.frame.height / samples;
+  std::vector<uint> packed(std::size_t{columns} * rows);
   params_.write({&params, 1});
-  kernel_(range_, rays.frame, params_, rays.hits, image_);
-  std::vector<uint> packed(std::size_t{rays.frame.width} * rays.frame.height);
+  kernel_(ocl::Range::strided(packed.size(), ocl::kGroupSize, device_), rays.frame, params_, samples,
+          rays.hits, image_);
   image_.read(packed);
-  return rgb_image(rays.frame, packed);
+  return rgb_image(columns, rows, packed);
 }
 
 }  // namespace isowave

@@ -20,21 +20,23 @@ struct Appearance {
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
 
-/// The picture of a hit buffer [height * width] on the host: the twin's. Same bits as Shade.
-Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits);
+/// The picture of a frame's hit buffer on the host, of so many rays a pixel along each axis: the twin's. Same bits as Shade.
+Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits,
+                    std::uint32_t samples = 1);
 
 class Shade {
  public:
-  Shade(ocl::Device &device, std::uint64_t num_pixels);
+  /// max_pixels: of a picture.
+  Shade(ocl::Device &device, std::uint64_t max_pixels);
 
-  /// Shades rays.hits and waits. RGB.
-  Image8 operator()(const ShadeParams &params, Wavefront &rays);
+  /// Shades rays.hits, of so many rays a pixel along each axis, and waits. RGB.
+  Image8 operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples = 1);
 
  private:
-  ocl::Range range_;
+  ocl::Device &device_;
   ocl::Buffer<ShadeParams> params_;
   ocl::Buffer<uint> image_;
-  ocl::Kernel<FrameParams, ocl::In<ShadeParams>, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
+  ocl::Kernel<FrameParams, ocl::In<ShadeParams>, uint, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
 };
 
 }  // namespace isowave

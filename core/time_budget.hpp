@@ -25,8 +25,8 @@ struct TimedFrame {
   bool complete = false;         ///< the hit buffer holds what Renderer::render() draws
 };
 
-/// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the pixels along each axis, then all of them as the renderer was
-/// set. Where the renderer has levels of detail, smaller pictures use those whose voxels are at most one of their pixels apart.
+/// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the rays along each axis, then all of them as the renderer was
+/// set. Pictures of fewer rays have one for each pixel. Where the renderer has levels of detail, smaller pictures use those whose voxels are at most one of their pixels apart.
 class TimedFrames {
  public:
   using Clock = std::function<double()>;  ///< [ms]
@@ -42,7 +42,7 @@ class TimedFrames {
   static double steady_clock_ms();
 
  private:
-  static constexpr std::size_t kNumSteps = 4;  ///< 1/8 to 1/1; steps count down to 0, the full size
+  static constexpr std::size_t kNumSteps = 4;  ///< 1/8 to 1/1; steps count down to 0, all rays
 
   std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms, double left_ms) const;
 

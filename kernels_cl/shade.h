@@ -1,4 +1,4 @@
-/// shade.h -- one pixel's colour from its hit: a headlight at the eye, Blinn-Phong, both sides of the surface
+/// shade.h -- a pixel's colour, the mean of its rays', each from its hit: a headlight at the eye, Blinn-Phong, both sides of the surface
 /// alike. Portable: OpenCL C 1.2 and C++, so that pictures of devices and of the twin are the same files. No
 /// pow.
 #ifndef ISOWAVE_SHADE_H
@@ -18,22 +18,34 @@ typedef struct ShadeParams {
 } ShadeParams;
 ISO_CHECK_SIZE(ShadeParams, 108);
 
+typedef struct Color {
+  float r, g, b;  ///< display values, [0,1]
+} Color;
+
+ISO_INLINE float clamp_to_unit(float c) {
+  return c <= 0.0f ? 0.0f : (c >= 1.0f ? 1.0f : c);
+}
+
+ISO_INLINE Color make_color(float r, float g, float b) {
+  Color color;
+  color.r = clamp_to_unit(r);
+  color.g = clamp_to_unit(g);
+  color.b = clamp_to_unit(b);
+  return color;
+}
+
 ISO_INLINE uint to_byte(float c) {
-  return c <= 0.0f ? 0u : (c >= 1.0f ? 255u : (uint)fma(c, 255.0f, 0.5f));
+  return (uint)fma(c, 255.0f, 0.5f);
 }
 
-ISO_INLINE uint pack_rgb(float r, float g, float b) {
-  return to_byte(r) | to_byte(g) << 8 | to_byte(b) << 16 | 0xFF000000u;
-}
-
-/// RGBA, 8 bits each, red in bits 0..7.
-ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint pixel, float t,
-                            float gx, float gy, float gz) {
-  const Ray ray = make_ray(frame, pixel);
+/// Of the ray of that number.
+ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint ray_id, float t,
+                           float gx, float gy, float gz) {
+  const Ray ray = make_ray(frame, ray_id);
   float nx, ny, nz, vx, vy, vz, lengths, cosine, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
   int i;
-  if (t == INFINITY) return pack_rgb(p->background_r, p->background_g, p->background_b);
+  if (t == INFINITY) return make_color(p->background_r, p->background_g, p->background_b);
   largest = fabs(gz) > largest ? fabs(gz) : largest;
   if (largest > 0.0f) { /* only its direction counts: squares of huge or tiny values would not survive */
     gx /= largest;
@@ -53,8 +65,26 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadePa
   for (i = 0; i < 5; ++i) highlight *= highlight; /* cosine^32 */
   light = fma(p->diffuse, cosine, p->ambient);
   highlight *= p->specular;
-  return pack_rgb(fma(p->surface_r, light, highlight), fma(p->surface_g, light, highlight),
-                  fma(p->surface_b, light, highlight));
+  return make_color(fma(p->surface_r, light, highlight), fma(p->surface_g, light, highlight),
+                    fma(p->surface_b, light, highlight));
+}
+
+/// RGBA, 8 bits each, red in bits 0..7: of the pixel at a column and row of the picture, which has samples times samples rays of
+/// the frame.
+ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint samples,
+                            uint column, uint row, ISO_GLOBAL const HitRecord *hits) {
+  const float share = 1.0f / (float)(samples * samples);
+  float r = 0.0f, g = 0.0f, b = 0.0f;
+  uint i;
+  for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
+    const uint ray_id = (row * samples + i / samples) * frame->width + column * samples + i % samples;
+    const Color color = shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x, hits[ray_id].grad_y,
+                                  hits[ray_id].grad_z);
+    r += color.r;
+    g += color.g;
+    b += color.b;
+  }
+  return to_byte(r * share) | to_byte(g * share) << 8 | to_byte(b * share) << 16 | 0xFF000000u;
 }
 
 ISO_NAMESPACE_END

@@ -69,12 +69,12 @@ inline uint popcount(uint x) {
 typedef struct FrameParams {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
   uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted
-  uint width, height;                 ///< image [pixels]
-  float eye_x, eye_y, eye_z;          ///< camera position, index space
+  uint width, height;         ///< rays: those of the image, or several for each of its pixels along both axes
+  float eye_x, eye_y, eye_z;  ///< camera position, index space
   float fwd_x, fwd_y, fwd_z;  ///< camera basis mapped to index space, divided by t_scale (see make_ray)
   float right_x, right_y, right_z;
   float up_x, up_y, up_z;
-  float pixel_scale;  ///< tan(fovy / 2) / height: half a pixel's step of u and v
+  float pixel_scale;  ///< tan(fovy / 2) / height: half a ray's step of u and v
   float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
   float isovalue;
   uint below_index,

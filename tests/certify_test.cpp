@@ -328,6 +328,26 @@ TEST_P(CertifyOnDevice, SmallerPicturesAreTheTwins) {
   }
 }
 
+/// Bounds are in pixels of the picture, one for each ray.
+TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
+  const Scene scene({30, 30, 30}, test::gyroid_field(10), {.rate = 8});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  const auto bounds = [&](ImageSize size, double max_pixel_error) {
+    Renderer renderer(device_, scene.volume,
+                      {.size = size, .max_pixel_error = max_pixel_error, .with_bounds = true});
+    renderer.render(camera, 0.3f);
+    return certify(renderer, scene.volume, camera, 0.3f, renderer.hits()).bounds;
+  };
+  const std::vector<float> four = bounds({30, 20, 2}, 0.6), one = bounds({60, 40}, 1.2);
+  ASSERT_EQ(four.size(), one.size());
+  std::size_t num_bounded = 0;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_FLOAT_EQ(2 * four[i], one[i]);
+    num_bounded += one[i] > 0 && std::isfinite(one[i]);
+  }
+  EXPECT_GT(num_bounded, 200u);
+}
+
 TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];

@@ -368,6 +368,22 @@ TEST(CliRender, NegativeAndFractionalIsovalues) {
   EXPECT_EQ(run.out.find(": 0 rays hit"), std::string::npos) << run.out;
 }
 
+TEST(CliRender, SeveralRaysAPixel) {
+  const TemporaryFolder folder;
+  const std::string frame = kNucleon + " -i 80 --size 40x30 --samples 3 ";
+  render(frame + "-o " + quoted(folder / "a.png") + " --depth " + quoted(folder / "a.npy") + " --stats " +
+         quoted(folder / "a.json"));
+  const Image8 picture = read_png(folder / "a.png");
+  EXPECT_EQ(picture.width, 40u);
+  EXPECT_EQ(picture.height, 30u);
+  render(frame + "--reference -o " + quoted(folder / "r.png"));
+  EXPECT_EQ(read_png(folder / "r.png").pixels, picture.pixels);
+  render(kNucleon + " -i 80 --size 120x90 --depth " + quoted(folder / "b.npy"));
+  EXPECT_EQ(read_npy(folder / "a.npy").width, 120u);
+  EXPECT_EQ(read_npy(folder / "a.npy").pixels, read_npy(folder / "b.npy").pixels) << "depth is each ray's";
+  EXPECT_EQ(json::parse(test::read_file(folder / "a.json"))["options"]["samples"], 3);
+}
+
 TEST(CliRender, NothingHitIsABackgroundPicture) {
   const TemporaryFolder folder;
   render(kGyroid + " -i 1e9 --size 16x8 --background '#102030' -o " + quoted(folder / "a.png"));
@@ -395,6 +411,9 @@ TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
                          quoted(out / "a.json");
   expect_refused(good + "--device nosuchdevice" + to, "nosuchdevice");
   expect_refused(good + "--device 99" + to, "99");
+  expect_refused(good + "--samples 0" + to, "--samples");
+  expect_refused(good + "--samples 9" + to, "--samples");
+  expect_refused(kGyroid + " -i 128 --size 16384x8192 --samples 2" + to, "an image of 16384 x 8192");
   expect_refused(quoted(out / "missing.raw") + " -i 1" + to, "no such file");
   expect_refused(quoted(out / "missing.zfp") + " -i 1" + to, "missing.zfp");
   expect_refused(kGyroid + " -i abc --size 16x8" + to, "isovalue");

@@ -61,6 +61,21 @@ TEST(LevelFrames, BordersAreWhereVoxelsAreFarEnoughApart) {
   EXPECT_EQ(frames[last].end_t, INFINITY);
 }
 
+/// Pixels are the picture's, however many rays each has.
+TEST(LevelFrames, MoreRaysDoNotMoveBorders) {
+  const std::vector<VolumeInfo> levels = levels_of(test::grid_info({64, 64, 64}));
+  const Camera camera = orbit_cameras(levels[0], 1)[0];
+  const auto one = make_level_frames(levels, camera, {96, 64}, 0.5f, 0.7);
+  const auto nine = make_level_frames(levels, camera, {96, 64, 3}, 0.5f, 0.7);
+  EXPECT_GT(std::ranges::count_if(one, draws), 1);
+  for (std::size_t level = 0; level < one.size(); ++level) {
+    EXPECT_EQ(nine[level].begin_t, one[level].begin_t);
+    EXPECT_EQ(nine[level].end_t, one[level].end_t);
+    EXPECT_EQ(nine[level].width, 3 * one[level].width);
+    EXPECT_EQ(nine[level].height, 3 * one[level].height);
+  }
+}
+
 TEST(LevelFrames, BlockIdsCountOn) {
   const std::vector<VolumeInfo> levels = levels_of(test::grid_info({40, 33, 50}));
   const auto frames = make_level_frames(levels, orbit_cameras(levels[0], 1)[0], kMedium, 0.5f, 1.0);
@@ -153,6 +168,25 @@ std::size_t num_border_hits(const std::vector<HitRecord> &hits, const std::vecto
       count += draws(frame) && frame.begin_t > 0 && hit.t == frame.begin_t * frame.t_scale;
   }
   return count;
+}
+
+/// Root mean square difference of a picture from the mean of 4 x 4 times as many rays at the finest level.
+double error_of(const Image8 &picture, const Image8 &fine) {
+  double sum = 0;
+  for (std::uint32_t y = 0; y < picture.height; ++y) {
+    for (std::uint32_t x = 0; x < picture.width; ++x) {
+      for (std::uint32_t channel = 0; channel < 3; ++channel) {
+        double mean = 0;
+        for (std::uint32_t i = 0; i < 16; ++i) {
+          const std::size_t at = 4 * x + i % 4 + std::size_t{fine.width} * (4 * y + i / 4);
+          mean += fine.pixels[3 * at + channel] / 16.0;
+        }
+        const double off = picture.pixels[3 * (x + std::size_t{picture.width} * y) + channel] - mean;
+        sum += off * off;
+      }
+    }
+  }
+  return std::sqrt(sum / (3.0 * picture.width * picture.height));
 }
 
 class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
@@ -321,6 +355,33 @@ TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
   EXPECT_LT(3 * num_decoded(2.0), num_decoded(0));
 }
 
+/// What levels of detail are for where voxels are smaller than pixels: fewer blocks, and a better picture with the rays that they pay for.
+TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
+  const auto reader = open_volume(std::string(ISOWAVE_TEST_DATA) + "/nucleon_41x41x41_uint8.raw.gz");
+  const CompressedVolume volume = compress(*reader, CompressOptions{.rate = 16, .levels = 0});
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  struct Picture {
+    Image8 image;
+    std::uint64_t decoded = 0;
+  };
+  const auto draw = [&](ImageSize size, double max_pixel_error) {
+    Renderer renderer(device_, volume, {.size = size, .max_pixel_error = max_pixel_error});
+    Picture picture;
+    for (const PassStats &pass : renderer.render(camera, 80).passes)
+      picture.decoded += pass.counts.decoded_count;
+    picture.image = renderer.shade();
+    return picture;
+  };
+  const Image8 fine = draw({64, 48}, 0).image;
+  const Picture one = draw({16, 12}, 0), four = draw({16, 12, 2}, 0.5);
+  const double one_error = error_of(one.image, fine), four_error = error_of(four.image, fine);
+  EXPECT_LT(four.decoded, one.decoded);
+  EXPECT_LT(four_error, one_error);
+  EXPECT_LT(error_of(draw({16, 12, 4}, 0).image, fine), 1.0) << "the reference itself, but for rounding";
+  RecordProperty("one_ray", fmt::format("{:.2f}, {} blocks", one_error, one.decoded));
+  RecordProperty("four_rays", fmt::format("{:.2f}, {} blocks", four_error, four.decoded));
+}
+
 TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
   const CompressedVolume volume = pyramid_of({20, 20, 20}, test::gyroid_field(10));
   CompressedVolume flat = volume;
@@ -336,25 +397,6 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
 }
 
 // ---- what it is for
-
-/// Root mean square difference of a picture from the mean of 4 x 4 times as many rays at the finest level.
-double error_of(const Image8 &picture, const Image8 &fine) {
-  double sum = 0;
-  for (std::uint32_t y = 0; y < picture.height; ++y) {
-    for (std::uint32_t x = 0; x < picture.width; ++x) {
-      for (std::uint32_t channel = 0; channel < 3; ++channel) {
-        double mean = 0;
-        for (std::uint32_t i = 0; i < 16; ++i) {
-          const std::size_t at = 4 * x + i % 4 + std::size_t{fine.width} * (4 * y + i / 4);
-          mean += fine.pixels[3 * at + channel] / 16.0;
-        }
-        const double off = picture.pixels[3 * (x + std::size_t{picture.width} * y) + channel] - mean;
-        sum += off * off;
-      }
-    }
-  }
-  return std::sqrt(sum / (3.0 * picture.width * picture.height));
-}
 
 /// Not so of every volume (README "Levels of detail"): a rough surface is darker than the smooth one that a coarse level has.
 TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {

@@ -85,26 +85,6 @@ TEST_P(RenderOnDevice, SmallNothingToHit) {
   EXPECT_EQ(check(volume, {away}, {0.5f}, kSmall), 0u);  // no ray meets the volume
 }
 
-TEST_P(RenderOnDevice, SmallShadedPictureIsTheTwins) {
-  const TestVolume volume(test::grid_info({9, 10, 11}, {1, 2, 0.5}),
-                          test::sample({9, 10, 11}, test::gyroid_field(7)), 8);
-  const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  RendererOptions options;
-  options.size = kSmall;
-  Renderer renderer(device_, volume.compressed, options);
-  renderer.render(camera, 0.1f);
-  const FrameParams frame = make_frame_params(volume.info(), camera, kSmall, 0.1f);
-  for (const Appearance &appearance :
-       {Appearance{}, Appearance{{0.2f, 0.4f, 1.0f}, {0, 0, 0}, 0.0f, 1.0f, 2.0f}}) {
-    const Image8 expected =
-        shade_scalar(frame, make_shade_params(volume.info(), appearance), renderer.hits());
-    const Image8 got = renderer.shade(appearance);
-    EXPECT_EQ(got.width, kSmall.width);
-    EXPECT_EQ(got.height, kSmall.height);
-    EXPECT_EQ(got.pixels, expected.pixels);
-  }
-}
-
 // ---- real and synthetic volumes
 
 TEST_P(RenderOnDevice, Nucleon) {
@@ -362,8 +342,15 @@ TEST_P(RenderOnDevice, BadOptionsAreErrors) {
     SCOPED_TRACE(fmt::format("groups of {}", group));
     refused(options);
   }
-  for (const ImageSize size : {ImageSize{0, 8}, {8, 0}, {1u << 15, 1u << 14}, {0xFFFFFFFFu, 0xFFFFFFFFu}}) {
-    SCOPED_TRACE(fmt::format("{}x{}", size.width, size.height));
+  for (const ImageSize size : {ImageSize{0, 8},
+                               {8, 0},
+                               {1u << 15, 1u << 14},
+                               {0xFFFFFFFFu, 0xFFFFFFFFu},
+                               {1u << 12, 1u << 11, 6},
+                               {8, 8, 0},
+                               {8, 8, 9},
+                               {1, 1, 0xFFFFFFFFu}}) {
+    SCOPED_TRACE(fmt::format("{}x{}, {} samples", size.width, size.height, size.samples));
     refused({.size = size});
   }
   EXPECT_EQ(device_.ledger().current(), 0u) << "nothing is left behind";

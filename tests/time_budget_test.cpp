@@ -186,6 +186,24 @@ TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
   }
 }
 
+/// With several rays a pixel, steps count rays; each but the last has one for each of its pixels.
+TEST_P(TimeBudgetOnDevice, SeveralRaysAPixel) {
+  constexpr ImageSize kNine{9, 7, 3};
+  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = kNine, .with_kept_picture = true}));
+  TimedFrames frames(renderer);
+  const TimedFrame whole = frames.render(camera_, kIsovalue, 1e9);
+  EXPECT_TRUE(whole.complete);
+  EXPECT_EQ(whole.steps.back().size.samples, 3u);
+  expect_same_hits(renderer.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue), kSize.width);
+  const TimedFrame coarse = frames.render(camera_, kIsovalue, 1e-6);
+  EXPECT_EQ(coarse.steps[0].size.width, 4u);
+  EXPECT_EQ(coarse.steps[0].size.samples, 1u);
+  expect_same_hits(renderer.hits(), enlarged(picture_of({4, 3}), {4, 3}, kSize), kSize.width);
+  const Image8 shown = renderer.shade();
+  EXPECT_EQ(shown.width, kNine.width);
+  EXPECT_EQ(shown.height, kNine.height);
+}
+
 TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
   for (const double budget : {0.0, -1.0, double(NAN), double(INFINITY)}) {
     EXPECT_THAT([&] { frames_.render(camera_, kIsovalue, budget); },

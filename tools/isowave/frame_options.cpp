@@ -33,6 +33,7 @@ Scene load_scene(const std::string &path, const VolumeOptions &volume, const Fra
   if (!options.cameras.empty()) file = read_camera_file(options.cameras);
   if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
   if (!options.size.empty()) scene.size = parse_size(options.size);
+  scene.size.samples = options.samples;
   check_image_size(scene.size);
   scene.volume = load_volume(path, to_overrides(volume), options.compression, device);
   const VolumeInfo &info = scene.volume.info;

@@ -155,7 +155,7 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
   const double certified =
       summary.num_pixels == 0 ? 100.0 : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
   fmt::print(
-      "  within {} pixels of the true surface: {:.2f} % of {} pixels (bound: median {:.3g}, p99 {:.3g}); {} "
+      "  within {} pixels of the true surface: {:.2f} % of {} rays (bound: median {:.3g}, p99 {:.3g}); {} "
       "uncertain\n"
       "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, bounded in "
       "{:.0f} ms\n",
@@ -170,8 +170,9 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
         *max_error_, choice_.median, choice_.tolerance);
   }
   if (!error_map.empty())
-    write_npy({renderer_.options().size.width, renderer_.options().size.height, certificate.bounds},
-              error_map);
+    write_npy(
+        {renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(), certificate.bounds},
+        error_map);
   nlohmann::ordered_json tries = nlohmann::ordered_json::array();
   for (const DetailChoice::Try &each : choice_.tries) {
     tries.push_back(detail_json(each.detail));
@@ -211,7 +212,8 @@ class TwinFrames : public FrameSource {
   }
   std::vector<HitRecord> hits() override { return hits_; }
   Image8 shade() override {
-    return shade_scalar(frame_, make_shade_params(scene_.volume.info, appearance_), hits_);
+    return shade_scalar(frame_, make_shade_params(scene_.volume.info, appearance_), hits_,
+                        scene_.size.samples);
   }
 
  private:
@@ -229,7 +231,7 @@ void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &f
     write_png(frames.shade(), frame_path(options.image, scene, options, isovalue, view));
   }
   if (!options.depth.empty()) {
-    write_npy({scene.size.width, scene.size.height, depth_of(frames.hits())},
+    write_npy({scene.size.ray_columns(), scene.size.ray_rows(), depth_of(frames.hits())},
               frame_path(options.depth, scene, options, isovalue, view));
   }
 }
@@ -273,6 +275,7 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
 
 nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scene) {
   nlohmann::ordered_json json = {{"size", {scene.size.width, scene.size.height}},
+                                 {"samples", scene.size.samples},
                                  {"views", scene.cameras.size()},
                                  {"isovalues", options.frame.isovalues},
                                  {"value_error", options.frame.value_error},
@@ -410,6 +413,12 @@ void add_render(CLI::App &app) {
   command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))->required();
   add_volume_options(*command, options->volume);
   add_frame_options(*command, options->frame)->required();
+  command
+      ->add_option(
+          "--samples", options->frame.samples,
+          "N: a pixel is the mean of N x N rays; pixels elsewhere in this list are still the picture's")
+      ->check(CLI::Range(1u, ImageSize::kMaxSamples))
+      ->capture_default_str();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
   add_renderer_options(*command, options->renderer_flags);
@@ -419,14 +428,16 @@ void add_render(CLI::App &app) {
       ->capture_default_str();
   command->add_option("--output,-o", options->image,
                       "PNG; NAME_isoV_viewK.png when there are several frames");
-  command->add_option("--depth", options->depth,
-                      "float32 .npy [H,W]: distance from the eye, inf where nothing is hit");
+  command->add_option(
+      "--depth", options->depth,
+      "float32 .npy [H,W]: distance from the eye, inf where nothing is hit; with --samples of each ray");
   command->add_option(
       "--max-error", options->max_error,
       "choose levels of detail and bit planes for each frame, so that its surface is within so "
       "many pixels of the true one, and say for how many pixels that is certain");
-  command->add_option("--error-map", options->error_map,
-                      "float32 .npy [H,W] of --max-error: the bound of each pixel, inf where there is none");
+  command->add_option(
+      "--error-map", options->error_map,
+      "float32 .npy [H,W] of --max-error: the bound of each pixel, or ray, inf where there is none");
   command->add_option(
       "--time-budget", options->time_budget,
       "ms for each frame: draws small pictures by coarse levels of detail first, then larger ones, "
