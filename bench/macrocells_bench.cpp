@@ -47,7 +47,7 @@ struct MacrocellsInput {
       check(thresholds[range_low] <= low && thresholds[range_high] >= high, "block range");
       const std::size_t cell = bx / 4 + coarse * (by / 4 + coarse * (bz / 4));
       const std::size_t bit = bx % 4 + 4 * (by % 4) + 16 * (bz % 4);
-      const bool active = range_low < params.below_index && range_high >= params.above_index;
+      const bool active = range_low < params.isovalue_index && range_high >= params.isovalue_index;
       check((masks[2 * cell + bit / 32] >> (bit % 32) & 1u) == active, "bit of a block");
     }
   }

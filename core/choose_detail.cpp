@@ -13,11 +13,11 @@ namespace {
 
 /// Of the small picture: a pixel for so many of the frame along each axis, but no fewer rows.
 constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
-/// Distances between voxels that may be chosen: 8 pixels, and so many times a quarter of an octave less.
-constexpr std::size_t kNumPixelErrors = 21;
+/// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave less.
+constexpr std::size_t kNumPixelErrors = 41;
 std::array<double, kNumPixelErrors> pixel_errors() {
   std::array<double, kNumPixelErrors> errors{};
-  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::exp2(3.0 - 0.25 * double(i));
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::exp2(3.0 - 0.125 * double(i));
   return errors;
 }
 constexpr int kMaxPlaneTries = 8;

@@ -49,7 +49,7 @@ FrameParams make_grid_params(const VolumeInfo &info);
 /// Sets the frame's screen box: a rectangle of the pixels whose rays, as make_ray() rounds them, may meet its active box.
 void set_screen_box(FrameParams &frame);
 
-/// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume; below_index, above_index,
+/// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume; isovalue_index,
 /// speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, a size that check_image_size() refuses, a NaN
 /// isovalue.
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue);

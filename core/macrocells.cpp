@@ -134,8 +134,8 @@ void Macrocells::select(FrameParams &frame, double value_error, const DeviceStre
     return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) - thresholds_.begin());
   };
   const double isovalue = double{frame.isovalue};
-  below_index_ = above_index_ = index_of(isovalue);
-  set_indices(frame);
+  isovalue_index_ = index_of(isovalue);
+  set_index(frame);
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
   std::array<uint, ISO_BOUND_CODES> limits{};
   for (std::uint32_t code = 0; code < ISO_BOUND_CODES; ++code) {
@@ -161,11 +161,6 @@ void Macrocells::select(FrameParams &frame, double value_error, const DeviceStre
     active_box_[3 + i] = std::min(active_box_[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
   }
   set_active_box(frame);
-}
-
-void Macrocells::set_indices(FrameParams &frame) const {
-  frame.below_index = below_index_;
-  frame.above_index = above_index_;
 }
 
 void Macrocells::set_active_box(FrameParams &frame) const {

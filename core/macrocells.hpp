@@ -34,11 +34,11 @@ class Macrocells {
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of, and sets
-  /// what the frames of this isovalue need: the frame's below_index, above_index and
+  /// what the frames of this isovalue need: the frame's isovalue_index and
   /// active box. moved: the stream, if its layout raises or lowers voxels as it did not when the ranges were made. Waits.
   void select(FrameParams &frame, double value_error = 0, const DeviceStream *moved = nullptr);
-  /// Sets below_index and above_index of the isovalue selected last.
-  void set_indices(FrameParams &frame) const;
+  /// Sets the isovalue_index of the isovalue selected last.
+  void set_index(FrameParams &frame) const { frame.isovalue_index = isovalue_index_; }
   /// Sets its active box.
   void set_active_box(FrameParams &frame) const;
 
@@ -77,7 +77,7 @@ class Macrocells {
   ocl::Buffer<uint> limits_;
   ocl::Buffer<int> box_;
   std::array<int, 6> active_box_{};  ///< begin x, y, z, end x, y, z [blocks]
-  std::uint32_t below_index_ = 0, above_index_ = 0;
+  std::uint32_t isovalue_index_ = 0;
   std::vector<float> thresholds_;
   ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::In<uint>,
               uint, ocl::Out<uint>, ocl::Out<int>>

@@ -191,7 +191,7 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
       level.macrocells.select(selected, level.range_error, &level.stream);
       level.selected_isovalue = isovalue;
     }
-    level.macrocells.set_indices(frame);
+    level.macrocells.set_index(frame);
     // A ray's way begins at a border wherever it crosses that.
     if (!has_bands) level.macrocells.set_active_box(frame);
     level.frame = frame;

@@ -229,7 +229,7 @@ ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint
 ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
                               global const ushort *ranges, BlockCoords b) {
   if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
-  return ranges[frame->ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >= frame->above_index
+  return ranges[frame->ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >= frame->isovalue_index
              ? ISO_SIDE_INSIDE
              : ISO_SIDE_OUTSIDE;
 }

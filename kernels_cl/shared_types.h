@@ -77,9 +77,8 @@ typedef struct FrameParams {
   float pixel_scale;  ///< tan(fovy / 2) / height: half a ray's step of u and v
   float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
   float isovalue;
-  uint below_index,
-      above_index;      ///< the isovalue in the quantile table of macrocells.cl: the first threshold >= it
-  uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+  uint isovalue_index;                                 ///< the first threshold of macrocells.cl that is >= it
+  uint max_spec_count;                                 ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
   int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
   /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
@@ -92,7 +91,7 @@ typedef struct FrameParams {
   uint ranges_begin, masks_begin;  ///< this level's among those of all levels (macrocells.cl) [entries]
   float begin_t, end_t;            ///< the band of the rays that is drawn at this level [t of the kernels]
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 180);
+ISO_CHECK_SIZE(FrameParams, 176);
 
 /// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu

@@ -10,7 +10,7 @@
   X(width) X(height)                                                        \
   X(eye_x) X(eye_y) X(eye_z) X(fwd_x) X(fwd_y) X(fwd_z)                     \
   X(right_x) X(right_y) X(right_z) X(up_x) X(up_y) X(up_z)                  \
-  X(pixel_scale) X(t_scale) X(isovalue) X(below_index) X(above_index)     \
+  X(pixel_scale) X(t_scale) X(isovalue) X(isovalue_index)                   \
   X(max_spec_count)                                                         \
   X(active_begin_x) X(active_begin_y) X(active_begin_z)                     \
   X(active_end_x) X(active_end_y) X(active_end_z)                           \

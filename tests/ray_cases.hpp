@@ -48,7 +48,7 @@ inline std::vector<CameraCase> camera_cases(const glm::uvec3 &dims) {
   };
 }
 
-/// Frame of a camera case. Odd image size; below_index, above_index and max_spec_count are the caller's.
+/// Frame of a camera case. Odd image size; isovalue_index and max_spec_count are the caller's.
 inline FrameParams case_frame(const glm::uvec3 &dims, const CameraCase &c, ImageSize size = {23, 17},
                               float isovalue = 0) {
   VolumeInfo info;
