@@ -22,6 +22,8 @@ struct MacrocellsInput {
         stream(device, volume),
         macrocells(device, params, stream) {
     macrocells.select(params);
+    macrocells.set_index(params);
+    macrocells.set_active_box(params);
     verify();
   }
 
@@ -73,7 +75,10 @@ void select_isovalue(benchmark::State &state) {
   const auto blocks = static_cast<double>(in.volume.block_count());
   measure(
       state, {blocks, blocks * (sizeof(cl_ushort) + 1.0 / 8)}, [] {},
-      [&] { in.macrocells.select(in.params); });
+      [&] {
+        in.macrocells.select(in.params);
+        in.macrocells.set_active_box(in.params);
+      });
 }
 
 const bool kRegistered = [] {

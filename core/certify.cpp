@@ -73,8 +73,6 @@ bool starts_certainly(std::span<const FrameParams> frames, std::span<BlockValues
     const LastPlanes last = last_planes(&frame), zero{};
     RayEvent enter = border_event(frame.begin_t), exit = border_event(frame.end_t);
     if (!clip_to_box(&ray, zero, last, &enter, &exit)) continue;
-    // In a coarse level's domain only, which it has entered before this band begins.
-    if (enter.axis == ISO_AXIS_START && frame.begin_t > 0) return false;
     const glm::ivec3 cell(locate(ray.x, 0, enter, 1, 0, last.x - 1),
                           locate(ray.y, 1, enter, 1, 0, last.y - 1),
                           locate(ray.z, 2, enter, 1, 0, last.z - 1));
@@ -128,18 +126,17 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   if (options.max_pixel_error > 0) {
     for (const CompressedVolume &level : volume.coarser) levels.push_back(&level);
   }
-  std::vector<VolumeInfo> infos;
   std::vector<ValueOffset> offsets;
   std::vector<double> value_errors;
   for (const CompressedVolume *level : levels) {
-    value_errors.push_back(value_error_of(renderer.value_error(), infos.size()));
-    infos.push_back(level->info);
+    value_errors.push_back(value_error_of(renderer.value_error(), value_errors.size()));
     offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
                                    plane_error(level->error_bound, value_errors.back()),
                                    magnitude_of(volume.value_range)));
   }
   const std::vector<FrameParams> frames =
-      make_level_frames(infos, camera, options.size, isovalue, options.max_pixel_error);
+      make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size, isovalue,
+                        options.max_pixel_error);
   const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / options.size.height;
   certificate.bounds.assign(drawn.size(), kNotCertain);
   constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks

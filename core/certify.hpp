@@ -4,7 +4,8 @@
 // Where the decoded field is known to within a bound, the true surface lies between the surfaces of the lower and of the upper
 // bound (Renderer::draw_bound()): along a ray that begins outside of both, or inside of both, the first crossing of the true field is
 // not before the first crossing of one of them, and not behind that of the other. Pixels where only one is met, where a ray begins between
-// them, or where a coarse level reaches out of the volume, are not certified: any error there could make or end a surface.
+// them, or where one is met outside of the volume, which coarse levels reach a little out of, are not certified: any error there could make
+// or end a surface.
 
 #include <cstdint>
 #include <span>

@@ -4,7 +4,9 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
+#include "core/detail.hpp"
 #include "core/error.hpp"
 
 namespace isowave {
@@ -21,6 +23,23 @@ std::array<double, kNumPixelErrors> pixel_errors() {
   return errors;
 }
 constexpr int kMaxPlaneTries = 8;
+
+/// Blocks that frames of levels of detail decode for these hits, against those of the finest level alone: a pixel covers blocks by the
+/// square of its distance, and of each level a quarter as many.
+double blocks_share(std::span<const HitRecord> hits, std::span<const FrameParams> frames) {
+  double with_levels = 0, finest = 0;
+  for (const HitRecord &hit : hits) {
+    if (std::isinf(hit.t)) continue;
+    int level = 0;
+    for (std::size_t i = 1; i < frames.size(); ++i) {
+      if (draws(frames[i]) && frames[i].begin_t * frames[i].t_scale <= hit.t) level = static_cast<int>(i);
+    }
+    const double blocks = double{hit.t} * double{hit.t};
+    finest += blocks;
+    with_levels += std::ldexp(blocks, -2 * level);
+  }
+  return finest == 0 ? 1.0 : with_levels / finest;
+}
 
 }  // namespace
 
@@ -49,11 +68,13 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
   };
   const std::optional<double> error = known_max_error(volume);  // or certify() throws
   DetailChoice choice;
+  std::vector<HitRecord> hits;  // of the picture drawn last
   const auto summary_of = [&](const Detail &detail) {
     set(detail, stride);
     renderer.render(camera, isovalue);
+    hits = renderer.hits();
     const CertificateSummary summary =
-        summarize(certify(renderer, volume, camera, isovalue, renderer.hits()), max_error / stride);
+        summarize(certify(renderer, volume, camera, isovalue, hits), max_error / stride);
     const double all = std::max<double>(double(summary.num_pixels), 1);
     choice.tries.push_back({detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
     return summary;
@@ -63,6 +84,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
     choice.median = stride * summary_of({}).median;
     choice.tolerance = *error * max_error / choice.median;
     const double best = choice.tries.front().certified;
+    const std::vector<HitRecord> finest_hits = std::exchange(hits, {});
     choice.reachable = best >= 0.5;
     const auto suffices = [&](const Detail &detail) {
       summary_of(detail);
@@ -75,7 +97,10 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
         const auto coarsest = std::ranges::partition_point(errors, [&](double pixel_error) {
           return !suffices({pixel_error, 0});
         });
-        if (coarsest != errors.end()) choice.detail.max_pixel_error = *coarsest;
+        if (coarsest != errors.end() &&
+            blocks_share(finest_hits, make_level_frames(level_infos(volume, true), camera, size, isovalue,
+                                                        *coarsest)) <= kMaxBlocksShare)
+          choice.detail.max_pixel_error = *coarsest;
       }
       // Halved until it suffices, or no longer matters beside the error that the volume has anyway.
       const double range = double{volume.value_range[1]} - double{volume.value_range[0]};

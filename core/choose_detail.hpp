@@ -28,13 +28,15 @@ struct DetailChoice {
 
 /// Share of the pixels that may lose their certificate, against full detail.
 inline constexpr double kLostShare = 0.01;
+/// Coarser levels are taken where they leave at most so much of the finest level's blocks: a frame of several levels costs more beside that.
+inline constexpr double kMaxBlocksShare = 2.0 / 3;
 
 /// What a renderer must be made with for choose_detail(): bounds, and all levels of detail that the volume has.
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
 
 /// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so many pixels, and their bounds
 /// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, then bit planes: the
-/// coarsest that lose no more than kLostShare. Full detail, where most pixels do not keep max_error even so. max_error: pixels, above 0.
+/// coarsest that lose no more than kLostShare; none that spare hardly any blocks (kMaxBlocksShare). Full detail, where most pixels do not keep max_error even so. max_error: pixels, above 0.
 /// Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
                            float isovalue, double max_error);

@@ -47,6 +47,13 @@ void place_levels(std::span<FrameParams> frames) {
 
 }  // namespace
 
+std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels) {
+  std::vector<VolumeInfo> infos = {volume.info};
+  if (!with_levels) return infos;
+  for (const CompressedVolume &level : volume.coarser) infos.push_back(level.info);
+  return infos;
+}
+
 std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels) {
   std::vector<FrameParams> grids;
   for (const VolumeInfo &info : levels) grids.push_back(make_grid_params(info));

@@ -30,6 +30,9 @@ inline double value_error_of(double value_error, std::size_t level) {
   return std::ldexp(value_error, static_cast<int>(level));
 }
 
+/// Of the volume and, where levels are wanted, its coarser levels.
+std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels);
+
 /// Grid parameters of each level, with the places of its blocks, ranges and masks among those of all levels.
 std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels);
 /// All levels' ids as those of one grid: its blocks are as many along x and y as the finest level's.

@@ -129,13 +129,13 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
   return thresholds;
 }
 
-void Macrocells::select(FrameParams &frame, double value_error, const DeviceStream *moved) {
+void Macrocells::select(const FrameParams &frame, double value_error, const DeviceStream *moved) {
   const auto index_of = [&](double value) {
     return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) - thresholds_.begin());
   };
   const double isovalue = double{frame.isovalue};
   isovalue_index_ = index_of(isovalue);
-  set_index(frame);
+  active_box_.reset();
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
   std::array<uint, ISO_BOUND_CODES> limits{};
   for (std::uint32_t code = 0; code < ISO_BOUND_CODES; ++code) {
@@ -149,27 +149,23 @@ void Macrocells::select(FrameParams &frame, double value_error, const DeviceStre
   limits_.write(limits);
   const bool has_bounds = layout.bound_unit != 0;
   constexpr int kNone = std::numeric_limits<int>::max();
-  box_.write(std::array{kNone, kNone, kNone, 0, 0, 0});
+  static constexpr std::array<int, 6> kEmptyBox = {kNone, kNone, kNone, 0, 0, 0};
+  box_.write_async(kEmptyBox);
   masks_kernel_(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_, limits_,
                 has_bounds ? 1 : 0, has_bounds ? moved->index() : limits_, layout.bounds_begin,
                 buffers_->masks, box_);
-  box_.read(active_box_);
+}
+
+void Macrocells::set_active_box(FrameParams &frame) {
+  if (!active_box_) box_.read(active_box_.emplace());
+  const std::array<int *, 6> fields = {&frame.active_begin_x, &frame.active_begin_y, &frame.active_begin_z,
+                                       &frame.active_end_x,   &frame.active_end_y,   &frame.active_end_z};
   const std::array<std::uint32_t, 3> dims = {frame.dims_x, frame.dims_y, frame.dims_z};
   for (std::size_t i = 0; i < 3; ++i) {
     const int num_blocks = static_cast<int>(num_owning_blocks(dims[i]));
-    active_box_[i] = std::min(active_box_[i], num_blocks) * ISO_MACROCELL_BLOCKS;
-    active_box_[3 + i] = std::min(active_box_[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
+    *fields[i] = std::min((*active_box_)[i], num_blocks) * ISO_MACROCELL_BLOCKS;
+    *fields[3 + i] = std::min((*active_box_)[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
   }
-  set_active_box(frame);
-}
-
-void Macrocells::set_active_box(FrameParams &frame) const {
-  frame.active_begin_x = active_box_[0];
-  frame.active_begin_y = active_box_[1];
-  frame.active_begin_z = active_box_[2];
-  frame.active_end_x = active_box_[3];
-  frame.active_end_y = active_box_[4];
-  frame.active_end_z = active_box_[5];
   set_screen_box(frame);
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/device_counts.hpp"
@@ -33,14 +34,13 @@ class Macrocells {
   /// Bytes that building needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
-  /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of, and sets
-  /// what the frames of this isovalue need: the frame's isovalue_index and
-  /// active box. moved: the stream, if its layout raises or lowers voxels as it did not when the ranges were made. Waits.
-  void select(FrameParams &frame, double value_error = 0, const DeviceStream *moved = nullptr);
-  /// Sets the isovalue_index of the isovalue selected last.
+  /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of. moved: the stream, if its layout
+  /// raises or lowers voxels as it did not when the ranges were made.
+  void select(const FrameParams &frame, double value_error = 0, const DeviceStream *moved = nullptr);
+  /// Sets what a frame of the isovalue selected last needs: its isovalue_index ...
   void set_index(FrameParams &frame) const { frame.isovalue_index = isovalue_index_; }
-  /// Sets its active box.
-  void set_active_box(FrameParams &frame) const;
+  /// ... and its active box, for which the first call waits.
+  void set_active_box(FrameParams &frame);
 
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
   const ocl::Buffer<uint> &masks() const { return buffers_->masks; }
@@ -76,7 +76,8 @@ class Macrocells {
   ocl::Buffer<cl_ushort> coarse_ranges_;
   ocl::Buffer<uint> limits_;
   ocl::Buffer<int> box_;
-  std::array<int, 6> active_box_{};  ///< begin x, y, z, end x, y, z [blocks]
+  std::optional<std::array<int, 6>>
+      active_box_;  ///< begin x, y, z, end x, y, z [macrocells]; none: still on the device
   std::uint32_t isovalue_index_ = 0;
   std::vector<float> thresholds_;
   ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::In<uint>,

@@ -36,10 +36,7 @@ std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequ
 
 /// Of the volume and those of its levels of detail that are on the device.
 std::vector<FrameParams> grids_of(const CompressedVolume &volume, const MemoryRequest &request) {
-  std::vector<VolumeInfo> infos = {volume.info};
-  for (std::size_t i = 0; request.with_levels && i < volume.coarser.size(); ++i)
-    infos.push_back(volume.coarser[i].info);
-  return make_level_grids(infos);
+  return make_level_grids(level_infos(volume, request.with_levels));
 }
 
 void add_index(MemoryPlan &plan, std::uint64_t words) {

@@ -91,9 +91,7 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   std::vector<const CompressedVolume *> volumes = {&volume};
   for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i)
     volumes.push_back(&volume.coarser[i]);
-  std::vector<VolumeInfo> infos(volumes.size());
-  std::ranges::transform(volumes, infos.begin(), [](const CompressedVolume *level) { return level->info; });
-  const std::vector<FrameParams> grids = make_level_grids(infos);
+  const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.max_pixel_error > 0));
   const FrameParams ids = make_id_grid(grids), &last = grids.back();
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(device, last.ranges_begin + block_count(last),
@@ -187,13 +185,12 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
     frame.table_groups = state_.cache.table_groups;
     if (draws(frame) && level.selected_isovalue != isovalue) {
       const auto stage = device_.timer().stage("macrocells");
-      FrameParams selected = frame;
-      level.macrocells.select(selected, level.range_error, &level.stream);
+      level.macrocells.select(frame, level.range_error, &level.stream);
       level.selected_isovalue = isovalue;
     }
     level.macrocells.set_index(frame);
-    // A ray's way begins at a border wherever it crosses that.
-    if (!has_bands) level.macrocells.set_active_box(frame);
+    // Where there are several bands, a ray's way begins at a border wherever it crosses that.
+    if (draws(frame) && !has_bands) level.macrocells.set_active_box(frame);
     level.frame = frame;
   }
   level_frames_.assign(first, end);

@@ -280,12 +280,14 @@ TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
 }
 
 TEST_P(CertifyOnDevice, ChoosesLessForMore) {
-  const Scene scene({96, 96, 96}, test::gyroid_field(48), {.error_bound = ErrorBound{.min_exponent = -10}});
+  const glm::uvec3 dims(96, 96, 96);
+  const Scene scene(dims, test::sphere_field(dims), {.error_bound = ErrorBound{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
-  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  camera.eye += 0.35 * (camera.eye - camera.at);
   double pixel_error = -1, value_error = -1;
   for (const double max_error : {0.00005, 0.05, 1.0, 4.0}) {
-    const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, max_error);
+    const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.5f, max_error);
     EXPECT_GE(choice.detail.max_pixel_error, pixel_error);
     if (choice.detail.max_pixel_error == pixel_error) {
       EXPECT_GE(choice.detail.value_error, value_error);
@@ -301,16 +303,60 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
       EXPECT_EQ(pixel_error, 0);
     } else {
       EXPECT_TRUE(choice.reachable);
-      renderer.render(camera, 0.3f);
+      renderer.render(camera, 0.5f);
       const std::vector<HitRecord> drawn = renderer.hits();
       const CertificateSummary summary =
-          summarize(certify(renderer, scene.volume, camera, 0.3f, drawn), max_error);
+          summarize(certify(renderer, scene.volume, camera, 0.5f, drawn), max_error);
       EXPECT_GE(double(summary.num_certified) / double(summary.num_pixels),
                 choice.tries[0].certified - kLostShare)
           << "a picture so small is tried as it is";
     }
   }
   EXPECT_GT(pixel_error, 0);
+}
+
+/// Where coarse levels would draw only what is farthest, they spare too little for what several levels cost.
+TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
+  const Scene scene({96, 96, 96}, test::gyroid_field(48), {.error_bound = ErrorBound{.min_exponent = -10}});
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 0.05);
+  EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
+    return each.detail.max_pixel_error > 0.6 && each.certified >= choice.tries[0].certified - kLostShare;
+  })) << "the error would allow them";
+  EXPECT_EQ(choice.detail.max_pixel_error, 0);
+  EXPECT_EQ(renderer.render(camera, 0.3f).last_level, 0u);
+}
+
+/// Coarse levels reach a little out of the volume; where a ray is there at a border, on one side for certain, nothing is unknown.
+TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
+  const glm::uvec3 dims(96, 96, 96);
+  const Scene scene(dims, test::sphere_field(dims), {.error_bound = ErrorBound{.min_exponent = -10}});
+  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+  for (const double max_pixel_error :
+       {1.0, 1.4}) {  // a border among the places where rays enter, or in the surface
+    renderer.set_max_pixel_error(max_pixel_error);
+    const auto hits_of = [&](FieldBound bound) {
+      renderer.draw_bound(bound);
+      renderer.render(camera, 0.5f);
+      return renderer.hits();
+    };
+    const auto lower = hits_of(FieldBound::kLower), upper = hits_of(FieldBound::kUpper),
+               drawn = hits_of(FieldBound::kNone);
+    const Certificate certificate = certify(renderer, scene.volume, camera, 0.5f, drawn);
+    std::size_t num_hits = 0;
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+      const int met = std::isfinite(lower[i].t) + std::isfinite(upper[i].t) + std::isfinite(drawn[i].t);
+      if (met == 0) {
+        EXPECT_EQ(certificate.bounds[i], 0) << "ray " << i;
+      } else if (met == 3) {
+        EXPECT_TRUE(std::isfinite(certificate.bounds[i])) << "ray " << i;
+      }
+      num_hits += met == 3;
+    }
+    EXPECT_GT(num_hits, 500u);
+  }
 }
 
 TEST_P(CertifyOnDevice, SmallerPicturesAreTheTwins) {

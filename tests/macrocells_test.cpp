@@ -84,6 +84,7 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       SCOPED_TRACE(fmt::format("isovalue {:a}", isovalue));
       params.isovalue = isovalue;
       macrocells.select(params);
+      macrocells.set_active_box(params);
       expect_box(params, macrocells.masks().read());
       expect_mask(macrocells, params, expected, isovalue, num_selected, num_in_range);
       if (HasFatalFailure()) return;
@@ -239,6 +240,7 @@ TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
         stream.layout.value_offset = uniform;
         stream.layout.bound_unit = unit;
         macrocells.select(params, 0, &stream);
+        macrocells.set_active_box(params);
         return macrocells.masks().read();
       };
       const std::vector<uint> by_block = masks(0, offset.unit), alike = masks(sign * 0.5f, 0);

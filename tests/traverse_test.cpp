@@ -260,6 +260,7 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   Wavefront rays(device_, 40 * 30);
   Macrocells macrocells(device_, frame, stream);
   macrocells.select(frame);
+  macrocells.set_active_box(frame);
   rays.frame = frame;
   const std::vector<uint> masks = macrocells.masks().read();
   Selection selected(9 * 9 * 9);
