@@ -32,7 +32,7 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
   params.max_spec_count = setup.max_speculation;
   params.table_groups = cache.table_groups;
   macrocells.select(params);
-    macrocells.set_active_box(params);
+  macrocells.set_active_box(params);
   rays.frame = params;
 }
 
