@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Small runs of `isowave bench solvers`, `isowave bench pareto` and `frame_bench --budgets`, and tools/charts of them and of what is no such file.
+# Small runs of `isowave bench solvers`, `isowave bench pareto`, tools/detail-table and `frame_bench --budgets`, and tools/charts of them and of
+# what is no such file.
 #   charts_test.sh PROGRAM [FRAME_BENCH]
 set -euo pipefail
 program=$1 frame_bench=${2-}
@@ -38,7 +39,7 @@ for bad in "$work/none.raw:1" "$top/tests/data/fuel_64x33x32_uint8.raw.gz" "$wor
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
 
-"$program" bench pareto "$top/tests/data/fuel_64x33x32_uint8.raw.gz" -i 40 --size 96x64 --views 1 --rounds 1 \
+"$program" bench pareto generate:sphere_96x96x96_uint8 -i 128 --size 48x32 --views 1 --rounds 1 \
   --storage rate:2,tolerance:2,exact --pipeline rays --solver bernstein --max-pixel-error 0,2 --value-error 0,0.1 \
   --max-error 0.1,20 --json "$work/all.json" >"$work/out"
 "$top/tools/charts" "$work/all.json" -o "$work"
@@ -69,6 +70,23 @@ for bad in "--storage rate" "--storage full:3" "--max-pixel-error -1" "--max-err
   if "$program" bench pareto "$top/tests/data/fuel_64x33x32_uint8.raw.gz" -i 40 $bad 2>"$work/error" >/dev/null; then
     fail "$bad was accepted"
   fi
+  [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
+done
+
+fuel=$top/tests/data/fuel_64x33x32_uint8.raw.gz
+ISOWAVE=$program "$top/tools/detail-table" "$fuel:40" --size 16x12 >"$work/table"
+[ "$(wc -l <"$work/table")" -eq 3 ] || fail "a table of one volume: $(cat "$work/table")"
+/usr/bin/python3 - "$work/table" <<'EOF'
+import sys
+rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in open(sys.argv[1])]
+error, blocks = [{name: read(cell) for name, cell in list(zip(rows[0], rows[2]))[1:]}
+                 for read in (lambda cell: float(cell.split()[0]), lambda cell: int(cell.split(",")[1]))]
+assert error["4 rays, 0"] < error["1 ray, 0"], rows
+assert blocks["4 rays, 1"] < blocks["1 ray, 0"] < blocks["4 rays, 0"], rows
+EOF
+for bad in "$fuel" "$work/none.raw:1" "$fuel:40 --views 1"; do
+  # shellcheck disable=SC2086
+  if ISOWAVE=$program "$top/tools/detail-table" $bad 2>"$work/error" >/dev/null; then fail "$bad was accepted"; fi
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
 
@@ -107,6 +125,8 @@ grep -q 'more than 8 passes' "$work/out" || fail "a budget without times: $(cat 
 "$top/tools/charts" "$work/sweep.json" -o "$work"
 sweep --budgets 3MiB,1200KB
 [ "$(grep -c '^ *[0-9]* ' "$work/out")" -ge 2 ] || fail "a list of budgets: $(cat "$work/out")"
+"$frame_bench" "$volume" --size 40x30 --samples 2 --orbit 1 --rounds 1 --no-resident --json "$work/four.json" >"$work/out"
+grep -q "40 x 30, 4 rays a pixel" "$work/out" && grep -q '"samples": 2' "$work/four.json" || fail "--samples: $(cat "$work/out")"
 for bad in auto:1 auto:x auto: 1MB,x 0 1KB; do
   if sweep --budgets "$bad" 2>"$work/error"; then fail "--budgets $bad was accepted"; fi
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "--budgets $bad: $(cat "$work/error")"
