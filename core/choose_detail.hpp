@@ -36,7 +36,8 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
 
 /// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so many pixels, and their bounds
 /// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, then bit planes: the
-/// coarsest that lose no more than kLostShare; none that spare hardly any blocks (kMaxBlocksShare). Full detail, where most pixels do not keep max_error even so. max_error: pixels, above 0.
+/// coarsest that lose no more than kLostShare; no levels that spare hardly any blocks (kMaxBlocksShare). Full detail, where most pixels do not
+/// keep max_error even so. max_error: pixels, above 0.
 /// Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
                            float isovalue, double max_error);

@@ -34,8 +34,8 @@ class Macrocells {
   /// Bytes that building needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
-  /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of. moved: the stream, if its layout
-  /// raises or lowers voxels as it did not when the ranges were made.
+  /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of. moved: the stream,
+  /// if its layout raises or lowers voxels as it did not when the ranges were made.
   void select(const FrameParams &frame, double value_error = 0, const DeviceStream *moved = nullptr);
   /// Sets what a frame of the isovalue selected last needs: its isovalue_index ...
   void set_index(FrameParams &frame) const { frame.isovalue_index = isovalue_index_; }
@@ -76,8 +76,8 @@ class Macrocells {
   ocl::Buffer<cl_ushort> coarse_ranges_;
   ocl::Buffer<uint> limits_;
   ocl::Buffer<int> box_;
-  std::optional<std::array<int, 6>>
-      active_box_;  ///< begin x, y, z, end x, y, z [macrocells]; none: still on the device
+  /// begin x, y, z, end x, y, z [macrocells]; none: still on the device.
+  std::optional<std::array<int, 6>> active_box_;
   std::uint32_t isovalue_index_ = 0;
   std::vector<float> thresholds_;
   ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::In<uint>,

@@ -126,7 +126,8 @@ grep -q 'more than 8 passes' "$work/out" || fail "a budget without times: $(cat 
 sweep --budgets 3MiB,1200KB
 [ "$(grep -c '^ *[0-9]* ' "$work/out")" -ge 2 ] || fail "a list of budgets: $(cat "$work/out")"
 "$frame_bench" "$volume" --size 40x30 --samples 2 --orbit 1 --rounds 1 --no-resident --json "$work/four.json" >"$work/out"
-grep -q "40 x 30, 4 rays a pixel" "$work/out" && grep -q '"samples": 2' "$work/four.json" || fail "--samples: $(cat "$work/out")"
+grep -q "40 x 30, 4 rays a pixel" "$work/out" || fail "--samples: $(cat "$work/out")"
+grep -q '"samples": 2' "$work/four.json" || fail "--samples: $(cat "$work/four.json")"
 for bad in auto:1 auto:x auto: 1MB,x 0 1KB; do
   if sweep --budgets "$bad" 2>"$work/error"; then fail "--budgets $bad was accepted"; fi
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "--budgets $bad: $(cat "$work/error")"
