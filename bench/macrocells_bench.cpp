@@ -2,7 +2,11 @@
 
 #include <algorithm>
 
+#include <cmath>
+
+#include <cmath>
 #include "bench/harness.hpp"
+
 #include "bench/scenes.hpp"
 #include "core/frame.hpp"
 #include "core/macrocells.hpp"
@@ -76,6 +80,8 @@ void select_isovalue(benchmark::State &state) {
   measure(
       state, {blocks, blocks * (sizeof(cl_ushort) + 1.0 / 8)}, [] {},
       [&] {
+        in.params.isovalue =
+            std::nextafter(in.params.isovalue, kMixingLayerIsovalue + 1.0f);  // or nothing is done
         in.macrocells.select(in.params);
         in.macrocells.set_active_box(in.params);
       });

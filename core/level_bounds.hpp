@@ -3,6 +3,7 @@
 // frames make of it.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <glm/glm.hpp>
@@ -46,6 +47,7 @@ inline constexpr std::int32_t kMinBoundExponent = -126, kMaxBoundExponent = 127;
 
 /// A field that bounds the volume's from below or above, instead of the volume.
 enum class FieldBound { kNone, kLower, kUpper };
+inline constexpr std::size_t kNumFieldBounds = 3;
 
 /// Largest error of a volume's voxels, measured or, at fixed accuracy, as zfp promises; nothing where that is not known.
 std::optional<double> known_max_error(const CompressedVolume &volume);

@@ -35,8 +35,10 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
                        : std::make_shared<MacrocellBuffers>(device, block_count(frame), num_coarse_)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
       limits_(device, "active limits", ISO_BOUND_CODES),
-      box_(device, "active box", 6),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
+  selections_.reserve(buffers_->masks.size());
+  for (std::size_t i = 0; i < buffers_->masks.size(); ++i)
+    selections_.push_back({.box = ocl::Buffer<int>(device, "active box", 6)});
   build(device, frame, stream);
 }
 
@@ -134,9 +136,13 @@ void Macrocells::select(const FrameParams &frame, double value_error, const Devi
     return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) - thresholds_.begin());
   };
   const double isovalue = double{frame.isovalue};
-  isovalue_index_ = index_of(isovalue);
-  active_box_.reset();
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
+  const std::array of = {isovalue, value_error, double{layout.value_offset}, double{layout.bound_unit}};
+  Selection &selected = selection();
+  if (selected.of == of) return;
+  selected.of = of;
+  selected.isovalue_index = index_of(isovalue);
+  selected.active_box.reset();
   std::array<uint, ISO_BOUND_CODES> limits{};
   for (std::uint32_t code = 0; code < ISO_BOUND_CODES; ++code) {
     const double offset = double{layout.value_offset} + double{layout.bound_unit} * double{block_bound(code)};
@@ -150,21 +156,22 @@ void Macrocells::select(const FrameParams &frame, double value_error, const Devi
   const bool has_bounds = layout.bound_unit != 0;
   constexpr int kNone = std::numeric_limits<int>::max();
   static constexpr std::array<int, 6> kEmptyBox = {kNone, kNone, kNone, 0, 0, 0};
-  box_.write_async(kEmptyBox);
+  selected.box.write_async(kEmptyBox);
   masks_kernel_(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_, limits_,
                 has_bounds ? 1 : 0, has_bounds ? moved->index() : limits_, layout.bounds_begin,
-                buffers_->masks, box_);
+                buffers_->masks[buffers_->selection], selected.box);
 }
 
 void Macrocells::set_active_box(FrameParams &frame) {
-  if (!active_box_) box_.read(active_box_.emplace());
+  Selection &selected = selection();
+  if (!selected.active_box) selected.box.read(selected.active_box.emplace());
   const std::array<int *, 6> fields = {&frame.active_begin_x, &frame.active_begin_y, &frame.active_begin_z,
                                        &frame.active_end_x,   &frame.active_end_y,   &frame.active_end_z};
   const std::array<std::uint32_t, 3> dims = {frame.dims_x, frame.dims_y, frame.dims_z};
   for (std::size_t i = 0; i < 3; ++i) {
     const int num_blocks = static_cast<int>(num_owning_blocks(dims[i]));
-    *fields[i] = std::min((*active_box_)[i], num_blocks) * ISO_MACROCELL_BLOCKS;
-    *fields[3 + i] = std::min((*active_box_)[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
+    *fields[i] = std::min((*selected.active_box)[i], num_blocks) * ISO_MACROCELL_BLOCKS;
+    *fields[3 + i] = std::min((*selected.active_box)[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
   }
   set_screen_box(frame);
 }

@@ -4,6 +4,7 @@
 // kernels_cl/macrocells.cl.
 
 #include <array>
+#include <cmath>
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
@@ -17,10 +18,17 @@ namespace isowave {
 
 /// Of one level of detail or of several, one behind the other: FrameParams::ranges_begin, masks_begin.
 struct MacrocellBuffers {
-  MacrocellBuffers(ocl::Device &device, std::uint64_t num_blocks, std::uint64_t num_macrocells)
-      : ranges(device, "block ranges", num_blocks), masks(device, "macrocell masks", 2 * num_macrocells) {}
+  /// num_selections: masks are kept of so many, for whoever draws the volume, and its lower and upper bound, by turns.
+  MacrocellBuffers(ocl::Device &device, std::uint64_t num_blocks, std::uint64_t num_macrocells,
+                   std::size_t num_selections = 1)
+      : ranges(device, "block ranges", num_blocks) {
+    masks.reserve(num_selections);
+    for (std::size_t i = 0; i < num_selections; ++i)
+      masks.emplace_back(device, "macrocell masks", 2 * num_macrocells);
+  }
   ocl::Buffer<cl_ushort> ranges;
-  ocl::Buffer<uint> masks;
+  std::vector<ocl::Buffer<uint>> masks;  ///< [selections]
+  std::size_t selection = 0;             ///< the one in use, at all levels
 };
 
 class Macrocells {
@@ -35,15 +43,18 @@ class Macrocells {
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of. moved: the stream,
-  /// if its layout raises or lowers voxels as it did not when the ranges were made.
+  /// if its layout raises or lowers voxels as it did not when the ranges were made. Does nothing where the masks in use are those.
   void select(const FrameParams &frame, double value_error = 0, const DeviceStream *moved = nullptr);
   /// Sets what a frame of the isovalue selected last needs: its isovalue_index ...
-  void set_index(FrameParams &frame) const { frame.isovalue_index = isovalue_index_; }
+  void set_index(FrameParams &frame) { frame.isovalue_index = selection().isovalue_index; }
   /// ... and its active box, for which the first call waits.
   void set_active_box(FrameParams &frame);
 
+  /// Takes other masks, of all levels that share the buffers, for select() and all that follows.
+  void use(std::size_t selection) { buffers_->selection = selection; }
+
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
-  const ocl::Buffer<uint> &masks() const { return buffers_->masks; }
+  const ocl::Buffer<uint> &masks() const { return buffers_->masks[buffers_->selection]; }
   /// [blocks]: low in bits 0..7, high in bits 8..15, indices into thresholds(); low > high: owns no dual
   /// cell.
   const ocl::Buffer<cl_ushort> &ranges() const { return buffers_->ranges; }
@@ -67,6 +78,17 @@ class Macrocells {
     PartialsKernel kernel;
   };
 
+  /// What masks are made of, and what belongs to them.
+  struct Selection {
+    std::array<double, 4> of{NAN, 0, 0,
+                             0};  ///< isovalue, value_error, offsets of the layout; NaN: nothing yet
+    std::uint32_t isovalue_index = 0;
+    ocl::Buffer<int> box;
+    /// Begin x, y, z, end x, y, z [macrocells]; none: still on the device.
+    std::optional<std::array<int, 6>> active_box{};
+  };
+  Selection &selection() { return selections_[buffers_->selection]; }
+
   void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
   std::vector<float> sample_thresholds(ocl::Device &device, std::uint32_t num_blocks, Partials &decode);
 
@@ -75,10 +97,7 @@ class Macrocells {
   std::shared_ptr<MacrocellBuffers> buffers_;
   ocl::Buffer<cl_ushort> coarse_ranges_;
   ocl::Buffer<uint> limits_;
-  ocl::Buffer<int> box_;
-  /// begin x, y, z, end x, y, z [macrocells]; none: still on the device.
-  std::optional<std::array<int, 6>> active_box_;
-  std::uint32_t isovalue_index_ = 0;
+  std::vector<Selection> selections_;
   std::vector<float> thresholds_;
   ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::In<uint>,
               uint, ocl::Out<uint>, ocl::Out<int>>

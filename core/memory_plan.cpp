@@ -70,13 +70,19 @@ void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRe
   add_index(plan, (volume.is_indexed() ? block_index_words(volume.block_count()) : 0) + bounds);
 }
 
+/// Of macrocells: see MacrocellBuffers.
+std::size_t num_selections(const MemoryRequest &request) {
+  return request.with_bounds ? kNumFieldBounds : 1;
+}
+
 /// What the volume, or one of its levels of detail, needs for itself.
 void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
   add_stream(plan, volume, request);
   plan.buffers.insert(plan.buffers.end(),
                       {{"macrocell ranges", 2 * num_macrocells(make_grid_params(volume.info))},
-                       {"active limits", 4 * std::uint64_t{ISO_BOUND_CODES}},
-                       {"active box", 6 * sizeof(int)}});
+                       {"active limits", 4 * std::uint64_t{ISO_BOUND_CODES}}});
+  for (std::size_t i = 0; i < num_selections(request); ++i)
+    plan.buffers.push_back({"active box", 6 * sizeof(int)});
   plan.setup_bytes =
       std::max(plan.setup_bytes, plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
 }
@@ -150,8 +156,9 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   if (plan.stream == StreamPlace::kHost)
     plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
   const FrameParams &last = grids.back();  // the others' ranges and masks lie before its
-  plan.buffers = {{"block ranges", 2 * (last.ranges_begin + block_count(last))},
-                  {"macrocell masks", 4 * (last.masks_begin + 2 * num_macrocells(last))}};
+  plan.buffers = {{"block ranges", 2 * (last.ranges_begin + block_count(last))}};
+  for (std::size_t i = 0; i < num_selections(request); ++i)
+    plan.buffers.push_back({"macrocell masks", 4 * (last.masks_begin + 2 * num_macrocells(last))});
   add_level(plan, volume, request);
   for (std::size_t i = 0; request.with_levels && i < volume.coarser.size(); ++i)
     add_level(plan, volume.coarser[i], request);

@@ -36,9 +36,8 @@ struct Level {
   DeviceStream stream;
   Macrocells macrocells;
   ZfpDecode decode;
-  FrameParams frame{};                       ///< its part of the frame at work
-  double range_error = 0;                    ///< of voxels of fewer bit planes, at most
-  std::optional<float> selected_isovalue{};  ///< what the macrocell masks stand for
+  FrameParams frame{};     ///< its part of the frame at work
+  double range_error = 0;  ///< of voxels of fewer bit planes, at most
 };
 
 /// Levels of detail: from `first` to below `end`.

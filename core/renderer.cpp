@@ -95,7 +95,8 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   const FrameParams ids = make_id_grid(grids), &last = grids.back();
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(device, last.ranges_begin + block_count(last),
-                                                          last.masks_begin / 2 + num_macrocells(last));
+                                                          last.masks_begin / 2 + num_macrocells(last),
+                                                          options.with_bounds ? kNumFieldBounds : 1);
   const std::uint64_t num_rays = options.size.num_rays();
   const std::uint32_t most_requests = BlockCache::capacity_for(plan.cache_slots, block_count(ids), num_rays);
   std::vector<Level> levels;
@@ -183,14 +184,13 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
     frame.max_spec_count = options_.max_speculation;
     frame.per_ray_speculation = options_.per_ray_speculation;
     frame.table_groups = state_.cache.table_groups;
-    if (draws(frame) && level.selected_isovalue != isovalue) {
+    if (draws(frame)) {
       const auto stage = device_.timer().stage("macrocells");
       level.macrocells.select(frame, level.range_error, &level.stream);
-      level.selected_isovalue = isovalue;
+      level.macrocells.set_index(frame);
+      // Where there are several bands, a ray's way begins at a border wherever it crosses that.
+      if (!has_bands) level.macrocells.set_active_box(frame);
     }
-    level.macrocells.set_index(frame);
-    // Where there are several bands, a ray's way begins at a border wherever it crosses that.
-    if (draws(frame) && !has_bands) level.macrocells.set_active_box(frame);
     level.frame = frame;
   }
   level_frames_.assign(first, end);
@@ -243,6 +243,7 @@ void Renderer::draw_bound(FieldBound bound) {
     for (const Level &level : state_.levels) value_offset(level.error, bound, 0, magnitude);  // or throws
   }
   bound_ = bound;
+  if (options_.with_bounds) state_.levels[0].macrocells.use(static_cast<std::size_t>(bound));
   update_layouts();
 }
 
@@ -263,7 +264,6 @@ void Renderer::update_layouts() {
     layout.bound_unit = offset.unit;
     if (std::memcmp(&layout, &level.stream.layout, sizeof(layout)) == 0) continue;
     changes = true;
-    level.selected_isovalue.reset();
     level.stream.layout = layout;
     level.range_error = few_planes;
   }

@@ -65,8 +65,8 @@ TEST(LevelFrames, BordersAreWhereVoxelsAreFarEnoughApart) {
 TEST(LevelFrames, MoreRaysDoNotMoveBorders) {
   const std::vector<VolumeInfo> levels = levels_of(test::grid_info({64, 64, 64}));
   const Camera camera = orbit_cameras(levels[0], 1)[0];
-  const auto one = make_level_frames(levels, camera, {96, 64}, 0.5f, 0.7);
-  const auto nine = make_level_frames(levels, camera, {96, 64, 3}, 0.5f, 0.7);
+  const auto one = make_level_frames(levels, camera, {96, 64}, 0.5f, 1.2);
+  const auto nine = make_level_frames(levels, camera, {96, 64, 3}, 0.5f, 1.2);
   EXPECT_GT(std::ranges::count_if(one, draws), 1);
   for (std::size_t level = 0; level < one.size(); ++level) {
     EXPECT_EQ(nine[level].begin_t, one[level].begin_t);

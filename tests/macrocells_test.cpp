@@ -317,6 +317,44 @@ TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
   EXPECT_GT(between, 100);
 }
 
+/// Masks of a volume and of its bounds are kept side by side: whoever draws them by turns finds them as they were.
+TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
+  const glm::uvec3 dims(24, 20, 18);
+  const CompressedVolume volume = compress_with_libzfp(sphere_voxels(dims), dims, 2048);
+  const DeviceStream stream(device_, volume);
+  const auto select = [&](Macrocells &macrocells, std::size_t selection, float isovalue, double value_error) {
+    FrameParams params = grid_frame(dims);
+    params.isovalue = isovalue;
+    macrocells.use(selection);
+    macrocells.select(params, value_error, &stream);
+    macrocells.set_index(params);
+    macrocells.set_active_box(params);
+    return std::pair(
+        macrocells.masks().read(),
+        std::array{static_cast<int>(params.isovalue_index), params.active_begin_x, params.active_begin_y,
+                   params.active_begin_z, params.active_end_x, params.active_end_y, params.active_end_z});
+  };
+  const auto alone = [&](float isovalue, double value_error) {
+    Macrocells macrocells(device_, grid_frame(dims), stream);
+    return select(macrocells, 0, isovalue, value_error);
+  };
+  Macrocells macrocells(
+      device_, grid_frame(dims), stream,
+      std::make_shared<MacrocellBuffers>(device_, volume.block_count(), num_macrocells(grid_frame(dims)),
+                                         kNumFieldBounds));
+  const float first = sphere_voxels(dims)[1000], other = sphere_voxels(dims)[5000];
+  const auto expected = alone(first, 0), wider = alone(first, 0.2), another = alone(other, 0);
+  EXPECT_NE(expected, wider);
+  EXPECT_NE(expected, another);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(select(macrocells, 0, first, 0), expected);
+    EXPECT_EQ(select(macrocells, 1, first, 0.2), wider);
+    EXPECT_EQ(select(macrocells, 2, other, 0), another);
+  }
+  EXPECT_EQ(select(macrocells, 1, other, 0), another) << "another isovalue in the same place";
+  EXPECT_EQ(select(macrocells, 0, first, 0), expected);
+}
+
 /// Rows of 128 blocks and one sample for 128 blocks: were it always the first, the sample would be one face of the volume.
 TEST(Macrocells, SampleOfLongRows) {
   std::set<uint> seen;
