@@ -1,7 +1,6 @@
 #include "core/choose_detail.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -16,13 +15,27 @@ namespace {
 /// Of the small picture: a pixel for so many of the frame along each axis, but no fewer rows.
 constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
 /// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave less.
-constexpr std::size_t kNumPixelErrors = 41;
-std::array<double, kNumPixelErrors> pixel_errors() {
-  std::array<double, kNumPixelErrors> errors{};
-  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = std::exp2(3.0 - 0.125 * double(i));
+constexpr int kNumPixelErrors = 41;
+std::vector<double> pixel_errors() {
+  std::vector<double> errors;
+  errors.reserve(kNumPixelErrors);
+  for (int i = 0; i < kNumPixelErrors; ++i) errors.push_back(std::exp2(3.0 - 0.125 * i));
   return errors;
 }
-constexpr int kMaxPlaneTries = 8;
+
+/// What values may lose: an eighth of their range, and so many times half of it, as long as that matters beside the error that the volume
+/// has anyway, and leaves out bit planes.
+constexpr int kNumValueErrors = 8;
+std::vector<double> value_errors(const CompressedVolume &volume, double error) {
+  const double range = double{volume.value_range[1]} - double{volume.value_range[0]};
+  double value_error = std::exp2(std::floor(std::log2(std::max(range, 1e-30) / 8)));
+  std::vector<double> errors;
+  errors.reserve(kNumValueErrors);
+  for (int i = 0; i < kNumValueErrors && value_error > error / 2; ++i, value_error /= 2) {
+    if (plane_error(volume.error_bound, value_error) != 0) errors.push_back(value_error);
+  }
+  return errors;
+}
 
 /// Blocks that frames of levels of detail decode for these hits, against those of the finest level alone: a pixel covers blocks by the
 /// square of its distance, and of each level a quarter as many.
@@ -90,28 +103,24 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
       summary_of(detail);
       return choice.tries.back().certified >= best - kLostShare;
     };
+    // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with any less, too: a bisection.
+    const auto first_to_suffice = [&](const std::vector<double> &numbers, const auto &detail_of) {
+      const auto found =
+          std::ranges::partition_point(numbers, [&](double number) { return !suffices(detail_of(number)); });
+      return found == numbers.end() ? 0.0 : *found;
+    };
+    if (choice.reachable && renderer.has_levels()) {
+      const double coarsest = first_to_suffice(pixel_errors(), [](double pixel_error) {
+        return Detail{pixel_error, 0};
+      });
+      const std::vector<FrameParams> frames =
+          make_level_frames(level_infos(volume, true), camera, size, isovalue, coarsest);
+      if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.max_pixel_error = coarsest;
+    }
     if (choice.reachable) {
-      if (renderer.has_levels()) {
-        // Nearly always, what suffices does so at any shorter distance, too: a bisection.
-        const auto errors = pixel_errors();
-        const auto coarsest = std::ranges::partition_point(errors, [&](double pixel_error) {
-          return !suffices({pixel_error, 0});
-        });
-        if (coarsest != errors.end() &&
-            blocks_share(finest_hits, make_level_frames(level_infos(volume, true), camera, size, isovalue,
-                                                        *coarsest)) <= kMaxBlocksShare)
-          choice.detail.max_pixel_error = *coarsest;
-      }
-      // Halved until it suffices, or no longer matters beside the error that the volume has anyway.
-      const double range = double{volume.value_range[1]} - double{volume.value_range[0]};
-      double value_error = std::exp2(std::floor(std::log2(std::max(range, 1e-30) / 8)));
-      for (int i = 0; i < kMaxPlaneTries && value_error > *error / 2; ++i, value_error /= 2) {
-        if (plane_error(volume.error_bound, value_error) == 0 ||
-            !suffices({choice.detail.max_pixel_error, value_error}))
-          continue;
-        choice.detail.value_error = value_error;
-        break;
-      }
+      choice.detail.value_error = first_to_suffice(value_errors(volume, *error), [&](double value_error) {
+        return Detail{choice.detail.max_pixel_error, value_error};
+      });
     }
   } catch (...) {
     renderer.set_size(size);
