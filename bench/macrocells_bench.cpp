@@ -1,12 +1,9 @@
 // Block ranges and coarse macrocells of a volume, once per volume; the bits of an isovalue: macrocells.cl.
 
 #include <algorithm>
-
 #include <cmath>
 
-#include <cmath>
 #include "bench/harness.hpp"
-
 #include "bench/scenes.hpp"
 #include "core/frame.hpp"
 #include "core/macrocells.hpp"

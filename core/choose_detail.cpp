@@ -81,26 +81,25 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
   };
   const std::optional<double> error = known_max_error(volume);  // or certify() throws
   DetailChoice choice;
-  std::vector<HitRecord> hits;  // of the picture drawn last
-  const auto summary_of = [&](const Detail &detail) {
+  const auto try_out = [&](const Detail &detail) {
     set(detail, stride);
     renderer.render(camera, isovalue);
-    hits = renderer.hits();
+    std::vector<HitRecord> hits = renderer.hits();
     const CertificateSummary summary =
         summarize(certify(renderer, volume, camera, isovalue, hits), max_error / stride);
     const double all = std::max<double>(double(summary.num_pixels), 1);
     choice.tries.push_back({detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
-    return summary;
+    return std::pair(summary, std::move(hits));
   };
   renderer.set_size(small);
   try {
-    choice.median = stride * summary_of({}).median;
+    const auto [at_full_detail, finest_hits] = try_out({});
+    choice.median = stride * at_full_detail.median;
     choice.tolerance = *error * max_error / choice.median;
     const double best = choice.tries.front().certified;
-    const std::vector<HitRecord> finest_hits = std::exchange(hits, {});
     choice.reachable = best >= 0.5;
     const auto suffices = [&](const Detail &detail) {
-      summary_of(detail);
+      try_out(detail);
       return choice.tries.back().certified >= best - kLostShare;
     };
     // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with any less, too: a bisection.

@@ -140,7 +140,7 @@ void Macrocells::select(const FrameParams &frame, double value_error, const Devi
   const std::array of = {isovalue, value_error, double{layout.value_offset}, double{layout.bound_unit}};
   Selection &selected = selection();
   if (selected.of == of) return;
-  selected.of = of;
+  selected.of.reset();  // until the masks are there
   selected.isovalue_index = index_of(isovalue);
   selected.active_box.reset();
   std::array<uint, ISO_BOUND_CODES> limits{};
@@ -160,6 +160,7 @@ void Macrocells::select(const FrameParams &frame, double value_error, const Devi
   masks_kernel_(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_, limits_,
                 has_bounds ? 1 : 0, has_bounds ? moved->index() : limits_, layout.bounds_begin,
                 buffers_->masks[buffers_->selection], selected.box);
+  selected.of = of;
 }
 
 void Macrocells::set_active_box(FrameParams &frame) {

@@ -4,7 +4,6 @@
 // kernels_cl/macrocells.cl.
 
 #include <array>
-#include <cmath>
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
@@ -80,8 +79,8 @@ class Macrocells {
 
   /// What masks are made of, and what belongs to them.
   struct Selection {
-    std::array<double, 4> of{NAN, 0, 0,
-                             0};  ///< isovalue, value_error, offsets of the layout; NaN: nothing yet
+    /// Isovalue, value_error, uniform and per-block offset of the layout; none: nothing yet.
+    std::optional<std::array<double, 4>> of{};
     std::uint32_t isovalue_index = 0;
     ocl::Buffer<int> box;
     /// Begin x, y, z, end x, y, z [macrocells]; none: still on the device.

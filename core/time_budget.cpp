@@ -50,7 +50,7 @@ TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budg
       const double pixel_error = step == 0                ? full_error
                                  : renderer_.has_levels() ? std::max(1.0, full_error / scale)
                                                           : 0.0;
-      renderer_.set_size(step == 0 ? full : halved(full, static_cast<unsigned>(step)));
+      renderer_.set_size(halved(full, static_cast<unsigned>(step)));
       renderer_.set_max_pixel_error(pixel_error);
       const double step_begin = now_();
       double pass_begin = step_begin, first_pass_ms = 0;

@@ -25,8 +25,9 @@ struct TimedFrame {
   bool complete = false;         ///< the hit buffer holds what Renderer::render() draws
 };
 
-/// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the rays along each axis, then all of them as the renderer was
-/// set. Pictures of fewer rays have one for each pixel. Where the renderer has levels of detail, smaller pictures use those whose voxels are at most one of their pixels apart.
+/// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the rays along each axis, then all of them as the
+/// renderer was set. Pictures of fewer rays have one for each pixel. Where the renderer has levels of detail, smaller pictures use those
+/// whose voxels are at most one of their pixels apart.
 class TimedFrames {
  public:
   using Clock = std::function<double()>;  ///< [ms]

@@ -1,5 +1,5 @@
-/// shade.h -- a pixel's colour, the mean of its rays', each from its hit: a headlight at the eye, Blinn-Phong, both sides of the surface
-/// alike. Portable: OpenCL C 1.2 and C++, so that pictures of devices and of the twin are the same files. No
+/// shade.h -- a pixel's colour, the mean of its rays', each from its hit: a headlight at the eye, Blinn-Phong, both
+/// sides of the surface alike. Portable: OpenCL C 1.2 and C++, so that pictures of devices and of the twin are the same files. No
 /// pow.
 #ifndef ISOWAVE_SHADE_H
 #define ISOWAVE_SHADE_H

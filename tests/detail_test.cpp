@@ -196,8 +196,7 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                     const RendererOptions &options) {
     SCOPED_TRACE(fmt::format("{} pixels, {} slots", options.max_pixel_error, options.cache_slots));
     const Twin twin(volume, options.max_pixel_error);
-    std::vector<VolumeInfo> infos = {volume.info};
-    for (const CompressedVolume &level : volume.coarser) infos.push_back(level.info);
+    const std::vector<VolumeInfo> infos = level_infos(volume, true);
     Renderer renderer(device_, volume, options);
     std::size_t at_border = 0;
     for (const Camera &camera : cameras) {
@@ -398,7 +397,7 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
 
 // ---- what it is for
 
-/// Not so of every volume (README "Levels of detail"): a rough surface is darker than the smooth one that a coarse level has.
+/// Not so of every volume (README "Levels of detail"): where a pixel is covered in part, one ray is as wrong at any level.
 TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
   const glm::uvec3 dims(128, 128, 128);
   const CompressedVolume volume = pyramid_of(dims, [noise = test::noise_field(5)](const glm::dvec3 &p) {
