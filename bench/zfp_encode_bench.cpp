@@ -21,7 +21,7 @@ struct EncodeInput {
         encode(device),
         voxels(device, "voxels", std::size_t{kNumBlocks} * ISO_BLOCK_VOXELS),
         words(device, "words", std::size_t{kNumBlocks} * (bits_per_block / 32) + 1),
-        errors(device, "errors", 2 * std::size_t{kNumBlocks}) {
+        errors(device, "errors", ZfpEncode::kErrorsPerBlock * kNumBlocks) {
     GenerateOptions generate;
     generate.dims = kDims;
     const std::unique_ptr<VolumeReader> reader = open_generated(generate);

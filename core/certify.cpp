@@ -36,8 +36,8 @@ class BlockValues {
     for (std::uint32_t corner = 0; corner < 8; ++corner) {
       const glm::uvec3 at = glm::uvec3(cell) + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
       const std::uint32_t id = at.x / 4 + blocks.x * (at.y / 4 + blocks.y * (at.z / 4));
-      const float value = decoded(id)[at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4)];
-      const float offset = offset_of_block(upper_, volume_.bounds, id);
+      const std::uint32_t voxel = at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4);
+      const float value = decoded(id)[voxel], offset = offset_of_voxel(upper_, volume_.bounds, id, voxel);
       lower[corner] = value - offset - isovalue;
       upper[corner] = value + offset - isovalue;
     }

@@ -116,7 +116,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
           make_level_frames(level_infos(volume, true), camera, size, isovalue, coarsest);
       if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.max_pixel_error = coarsest;
     }
-    if (choice.reachable) {
+    if (choice.reachable && volume.rate() > kMinPlaneRate) {
       choice.detail.value_error = first_to_suffice(value_errors(volume, *error), [&](double value_error) {
         return Detail{choice.detail.max_pixel_error, value_error};
       });

@@ -33,12 +33,16 @@ inline constexpr double kLostShare = 0.01;
 /// took 1.19 and 1.04 (README "Levels of detail").
 inline constexpr double kMaxBlocksShare = 2.0 / 3;
 
+/// Bit planes are left out only of volumes with more bits a voxel. The others' frames would take a twentieth less at most, for a bound that is
+/// zfp's promise, ten times what a block's errors are (README "An error asked for").
+inline constexpr double kMinPlaneRate = 16;
+
 /// What a renderer must be made with for choose_detail(): bounds, and all levels of detail that the volume has.
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
 
 /// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so many pixels, and their bounds
 /// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, then bit planes: the
-/// coarsest that lose no more than kLostShare; no levels that spare hardly any blocks (kMaxBlocksShare). Full detail, where most pixels do not
+/// coarsest that lose no more than kLostShare; no levels that spare hardly any blocks (kMaxBlocksShare), nor planes of volumes of few bits (kMinPlaneRate). Full detail, where most pixels do not
 /// keep max_error even so. max_error: pixels, above 0.
 /// Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,

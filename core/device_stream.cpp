@@ -17,7 +17,8 @@ StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_p
           volume.error_bound.whole_numbers ? 1u : 0u,
           0.0f,
           0.0f,
-          0};
+          0,
+          volume.bounds.by_place ? 1u : 0u};
 }
 
 /// Uploads the volume's words from word `first` on.

@@ -173,8 +173,11 @@ ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane
   return bound == FieldBound::kUpper ? ValueOffset{uniform, error.unit} : ValueOffset{-uniform, -error.unit};
 }
 
-float offset_of_block(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block) {
-  return offset.unit == 0 ? offset.uniform : offset.uniform + offset.unit * block_bound(bounds.codes[block]);
+float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
+                      std::uint32_t voxel) {
+  if (offset.unit == 0) return offset.uniform;
+  const float share = bounds.by_place ? bound_share(bound_place(voxel)) : 1.0f;
+  return offset.uniform + offset.unit * block_bound(bounds.codes[block]) * share;
 }
 
 double magnitude_of(const std::array<float, 2> &value_range) {

@@ -65,7 +65,8 @@ float largest_bound(const BlockBounds &bounds);
 /// How far decoded values may be from those of all bit planes where coarser(bound, value_error) leaves planes out.
 double plane_error(const ErrorBound &bound, double value_error);
 
-/// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound (StreamLayout).
+/// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound, or the voxel's share of it
+/// (StreamLayout).
 struct ValueOffset {
   float uniform = 0, unit = 0;
 };
@@ -73,8 +74,9 @@ struct ValueOffset {
 /// float32 counts as error, too. Throws Error where the level's error is not known.
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error, double magnitude);
 
-/// What is added to the values of a block: as decode_block() in kernels_cl/block_stream.h adds it up.
-float offset_of_block(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block);
+/// What is added to a voxel's value, voxel: x + 4 y + 16 z in its block: as decode_block() in kernels_cl/block_stream.h adds it up.
+float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
+                      std::uint32_t voxel);
 
 /// The largest magnitude in a volume's range. Throws Error where that is not known.
 double magnitude_of(const std::array<float, 2> &value_range);

@@ -60,17 +60,18 @@ class BlockCodec {
   ZfpBits bits_;
 };
 
-/// Largest |decoded - source| of block bx of a row; with `rounded`, of the decoded values' nearest integers.
-double largest_error(const std::array<float, ISO_BLOCK_VOXELS> &decoded, const BlockRow &row,
-                     std::uint32_t bx, std::ptrdiff_t nx, std::ptrdiff_t layer, bool rounded) {
+/// Of block bx of a row; with `rounded`, of the decoded values' nearest integers.
+BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, const BlockRow &row,
+                          std::uint32_t bx, std::ptrdiff_t nx, std::ptrdiff_t layer, bool rounded) {
   const std::uint32_t num_x = std::min(kBlockEdge, static_cast<std::uint32_t>(nx) - bx * kBlockEdge);
-  double error = 0;
+  BlockError error;
   for (std::uint32_t z = 0; z < row.nz; ++z) {
     for (std::uint32_t y = 0; y < row.ny; ++y) {
       const float *source = row.voxels + z * layer + y * nx + std::ptrdiff_t{bx} * kBlockEdge;
       for (std::uint32_t x = 0; x < num_x; ++x) {
-        const float value = decoded[x + 4 * y + 16 * z];
-        error = std::max(error, std::abs(double{rounded ? std::rint(value) : value} - double{source[x]}));
+        const std::uint32_t voxel = x + 4 * y + 16 * z;
+        const float value = rounded ? std::rint(decoded[voxel]) : decoded[voxel];
+        error.add(voxel, std::abs(double{value} - double{source[x]}));
       }
     }
   }
@@ -101,7 +102,7 @@ class ErrorMeter : public ChunkCoder {
       for (std::size_t i = 0; i < kNumCandidates; ++i) {
         if (given_up_[i].load(std::memory_order_relaxed)) continue;
         const double error =
-            largest_error(codec.decode(first_ + std::int32_t(i)), row, bx, nx_, layer_, rounded_);
+            error_of_block(codec.decode(first_ + std::int32_t(i)), row, bx, nx_, layer_, rounded_).largest();
         errors_[thread][i] = std::max(errors_[thread][i], error);
         if (i > 0 && !(error <= limit_)) given_up_[i].store(true, std::memory_order_relaxed);
       }
@@ -207,12 +208,13 @@ std::uint32_t BitAppender::pad() {
   return bits;
 }
 
-ErrorBoundCoder::ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink)
-    : dims_(dims), bound_(bound), sink_(sink), errors_(!bound.max_error) {}
+ErrorBoundCoder::ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink,
+                                 std::optional<BlockErrors> errors)
+    : dims_(dims), bound_(bound), sink_(sink), errors_(std::move(errors)) {}
 
 void ErrorBoundCoder::begin_chunk(const Chunk &chunk) {
   rows_.assign(chunk.num_rows, {});
-  if (!bound_.max_error) errors_.begin(chunk.num_rows * ((dims_.x + 3) / 4));
+  if (errors_) errors_->begin(chunk.num_rows * ((dims_.x + 3) / 4));
 }
 
 void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
@@ -225,15 +227,15 @@ void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
     const std::uint32_t length = codec.encode(row, bx, dims_.x, layer);
     coded.lengths.push_back(static_cast<std::uint16_t>(length));
     coded.bits.append(codec.words(), length);
-    if (bound_.max_error) continue;
-    errors_.some()[row.index * blocks_x + bx] =
-        largest_error(codec.decode(bound_.min_exponent), row, bx, dims_.x, layer, bound_.whole_numbers);
+    if (!errors_) continue;
+    errors_->some()[row.index * blocks_x + bx] =
+        error_of_block(codec.decode(bound_.min_exponent), row, bx, dims_.x, layer, bound_.whole_numbers);
   }
   coded.bits.pad();
 }
 
 void ErrorBoundCoder::end_chunk(const Chunk &) {
-  errors_.end();
+  if (errors_) errors_->end();
   for (const CodedRow &row : rows_) {
     std::uint64_t bits = 0;
     for (const std::uint16_t length : row.lengths) {

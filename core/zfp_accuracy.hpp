@@ -1,6 +1,7 @@
 #pragma once
 // Volumes with a bound on the error: zfp's fixed-accuracy mode, where blocks are as long as the error demands.
 
+#include <optional>
 #include <vector>
 
 #include "core/block_errors.hpp"
@@ -55,15 +56,16 @@ class BitAppender {
 class ErrorBoundCoder : public ChunkCoder {
  public:
   using Sink = std::function<void(std::span<const std::byte>)>;
-  ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink);
+  /// errors: to be measured.
+  ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink,
+                  std::optional<BlockErrors> errors);
 
   void begin_chunk(const Chunk &chunk) override;
   void code_row(const BlockRow &row, std::uint32_t thread) override;
   void end_chunk(const Chunk &chunk) override;
   /// Hands over the last bits, as words of 32; returns the index.
   std::vector<std::uint32_t> finish();
-  /// Largest |decoded - source| of blocks; none where the bound says what it is of all.
-  BlockErrors &errors() { return errors_; }
+  std::optional<BlockErrors> &errors() { return errors_; }
 
  private:
   struct CodedRow {
@@ -74,7 +76,7 @@ class ErrorBoundCoder : public ChunkCoder {
   glm::uvec3 dims_;
   ErrorBound bound_;
   const Sink &sink_;
-  BlockErrors errors_;
+  std::optional<BlockErrors> errors_;
   std::vector<CodedRow> rows_;  ///< of the present chunk
   BitAppender payload_;
   BlockIndexBuilder index_;

@@ -67,9 +67,9 @@ void ZfpEncode::measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec
                                ocl::Buffer<float> &errors) {
   const std::uint64_t num_blocks = block_count(dims);
   check_sizes(voxels.size(), dims, bits_per_block, num_blocks * (bits_per_block / 32) + 1, words.size());
-  if (errors.size() < 2 * num_blocks)
-    throw std::invalid_argument(
-        fmt::format("ZfpEncode: {} errors do not fit two for each of {} blocks", errors.size(), num_blocks));
+  if (errors.size() < kErrorsPerBlock * num_blocks)
+    throw std::invalid_argument(fmt::format("ZfpEncode: {} errors do not fit {} for each of {} blocks",
+                                            errors.size(), kErrorsPerBlock, num_blocks));
   measure_(ocl::Range::strided(num_blocks, ocl::kGroupSize, device_), voxels, dims.x, dims.y, dims.z,
            bits_per_block, words, errors);
 }
@@ -85,7 +85,8 @@ LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uin
       zfp_encode_(device),
       voxels_(device, "voxels to encode", voxel_count(piece_dims_)),
       words_(device, "encoded words", block_count(piece_dims_) * (bits_per_block / 32) + 1),
-      device_errors_(device, "encoding errors", measure_error ? 2 * block_count(piece_dims_) : 0) {}
+      device_errors_(device, "encoding errors",
+                     measure_error ? ZfpEncode::kErrorsPerBlock * block_count(piece_dims_) : 0) {}
 
 LayerEncoder::~LayerEncoder() {
   try {
@@ -130,7 +131,7 @@ void LayerEncoder::enqueue_piece(const glm::uvec3 &dims) {
   current_.words.resize(num_blocks * (bits_per_block_ / 32));
   if (measure_error_) {
     zfp_encode_.measure_errors(voxels_, dims, bits_per_block_, words_, device_errors_);
-    current_.errors.resize(2 * num_blocks);
+    current_.errors.resize(ZfpEncode::kErrorsPerBlock * num_blocks);
     device_errors_.read_async(current_.errors, current_.done);
   }
   words_.read_async(current_.words, current_.done);
@@ -143,9 +144,13 @@ void LayerEncoder::hand_over(const Result &result, const Sink &sink) {
     throw Error("device '{}' failed to encode voxels: {}: {}", device_.info().name, error.what(),
                 ocl::error_name(error.err()));
   }
-  const std::span<double> errors = errors_.begin(result.errors.size() / 2);
-  for (std::size_t i = 0; i < errors.size(); ++i)
-    errors[i] = double{result.errors[2 * i]} + double{result.errors[2 * i + 1]};
+  const float *pair = result.errors.data();
+  for (BlockError &error : errors_.begin(result.errors.size() / ZfpEncode::kErrorsPerBlock)) {
+    for (double &largest : error.at_place) {
+      largest = double{pair[0]} + double{pair[1]};
+      pair += 2;
+    }
+  }
   errors_.end();
   sink(std::as_bytes(std::span<const uint>(result.words)));
 }

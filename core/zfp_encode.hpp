@@ -25,8 +25,9 @@ class ZfpEncode {
   void operator()(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims, std::uint32_t bits_per_block,
                   ocl::Buffer<uint> &words);
 
-  /// The largest |decoded - voxel| of each block b of what operator() wrote, exactly: errors[2 b] +
-  /// errors[2 b + 1]. `words` has one word behind the last block. Else as operator().
+  static constexpr std::size_t kErrorsPerBlock = 2 * ISO_BOUND_PLACES;
+  /// The largest |decoded - voxel| at each place (bound_place()) of each block b of what operator() wrote, exactly: errors[2 i] +
+  /// errors[2 i + 1], i = ISO_BOUND_PLACES b + place. `words` has one word behind the last block. Else as operator().
   void measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims, std::uint32_t bits_per_block,
                       const ocl::Buffer<uint> &words, ocl::Buffer<float> &errors);
 
@@ -47,7 +48,7 @@ class LayerEncoder {
 
   /// dims: of the whole volume. bits_per_block: a multiple of 64.
   LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block, bool measure_error,
-               BlockErrors errors = BlockErrors(false));
+               BlockErrors errors = BlockErrors(BlockErrors::Keep::kNothing));
   ~LayerEncoder();
   LayerEncoder(const LayerEncoder &) = delete;
   LayerEncoder &operator=(const LayerEncoder &) = delete;
@@ -59,7 +60,7 @@ class LayerEncoder {
   /// Hands the last piece to `sink`.
   void finish(const Sink &sink);
 
-  /// Largest |decoded - voxel| of blocks that `sink` got; none unless measured.
+  /// Of blocks that `sink` got; none unless measured.
   BlockErrors &errors() { return errors_; }
 
  private:

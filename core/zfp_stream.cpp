@@ -34,16 +34,17 @@ using Sink = std::function<void(Payload)>;
 /// Compresses the voxels of a level.
 class LevelCoder : public ChunkCoder {
  public:
-  /// After the last chunk: hands over what is left, and completes `volume`. Returns the largest error of each block, where errors
-  /// were measured.
+  /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be kept of each block's errors, where
+  /// they were measured.
   virtual std::vector<float> finish(CompressedVolume &volume) = 0;
 };
 
 /// Compresses rows of blocks by libzfp.
 class FixedRateCoder : public LevelCoder {
  public:
-  FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink)
-      : dims_(dims), options_(options), sink_(sink), errors_(options.levels != 1) {}
+  FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink,
+                 BlockErrors::Keep keep)
+      : dims_(dims), options_(options), sink_(sink), errors_(keep) {}
 
   void begin_chunk(const Chunk &chunk) override {
     words_.resize(chunk.num_rows * row_words());
@@ -71,12 +72,12 @@ class FixedRateCoder : public LevelCoder {
     if (zfp_decompress(stream.get(), copy.get()) == 0)
       throw std::logic_error("zfp: cannot decode its own blocks");
     const float *value = decoded.data();
-    double *errors = errors_.some().data() + row.index * blocks_x();
+    BlockError *errors = errors_.some().data() + row.index * blocks_x();
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y) {
         const float *source = row.voxels + z * layer_size() + std::ptrdiff_t(y) * dims_.x;
         for (std::uint32_t x = 0; x < dims_.x; ++x, ++value)
-          errors[x / 4] = std::max(errors[x / 4], std::abs(double(*value) - double(source[x])));
+          errors[x / 4].add(x % 4 + 4 * y + 16 * z, std::abs(double(*value) - double(source[x])));
       }
     }
   }
@@ -106,9 +107,9 @@ class FixedRateCoder : public LevelCoder {
 /// Has a device compress whole chunks.
 class DeviceCoder : public LevelCoder {
  public:
-  DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink)
-      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error,
-                 BlockErrors(options.levels != 1)),
+  DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink,
+              BlockErrors::Keep keep)
+      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
         measure_error_(options.measure_error),
         sink_(sink) {}
 
@@ -129,21 +130,20 @@ class DeviceCoder : public LevelCoder {
 /// Compresses blocks of lengths of their own.
 class BoundedCoder : public LevelCoder {
  public:
-  BoundedCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink)
-      : coder_(dims, bound, sink) {}
+  BoundedCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink, BlockErrors::Keep keep)
+      : coder_(dims, bound, sink,
+               bound.max_error && keep == BlockErrors::Keep::kNothing ? std::nullopt
+                                                                      : std::optional(BlockErrors(keep))) {}
   void begin_chunk(const Chunk &chunk) override { coder_.begin_chunk(chunk); }
   void code_row(const BlockRow &row, std::uint32_t thread) override { coder_.code_row(row, thread); }
   void end_chunk(const Chunk &chunk) override { coder_.end_chunk(chunk); }
   std::vector<float> finish(CompressedVolume &volume) override {
     volume.index = coder_.finish();
     volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
-    if (volume.error_bound.max_error) {  // the finest level, of which every block is about as far off
-      volume.max_error = volume.error_bound.max_error;
-      if (volume.coarser.empty()) return {};
-      return std::vector<float>(volume.block_count(), BlockErrors::rounded_up(*volume.max_error));
-    }
-    volume.max_error = volume.error_bound.max_error = coder_.errors().max();
-    return coder_.errors().take();
+    std::optional<BlockErrors> &errors = coder_.errors();
+    if (!volume.error_bound.max_error) volume.error_bound.max_error = errors->max();
+    volume.max_error = volume.error_bound.max_error;
+    return errors ? errors->take() : std::vector<float>();
   }
 
  private:
@@ -153,20 +153,21 @@ class BoundedCoder : public LevelCoder {
 /// Compresses a level, and makes the voxels of the next from its own.
 class PyramidCoder : public ChunkCoder {
  public:
-  /// volumes, sinks: of this level and all coarser ones.
+  /// volumes, sinks: of this level and all coarser ones. keep: of this level.
   PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
-               std::span<const Sink> sinks)
+               std::span<const Sink> sinks, BlockErrors::Keep keep)
       : volume_(*volumes[0]) {
     const glm::uvec3 dims = volume_.info.dims;
     if (volume_.is_indexed()) {
-      coder_ = std::make_unique<BoundedCoder>(dims, volume_.error_bound, sinks[0]);
+      coder_ = std::make_unique<BoundedCoder>(dims, volume_.error_bound, sinks[0], keep);
     } else if (options.device) {
-      coder_ = std::make_unique<DeviceCoder>(dims, options, sinks[0]);
+      coder_ = std::make_unique<DeviceCoder>(dims, options, sinks[0], keep);
     } else {
-      coder_ = std::make_unique<FixedRateCoder>(dims, options, sinks[0]);
+      coder_ = std::make_unique<FixedRateCoder>(dims, options, sinks[0], keep);
     }
     if (volumes.size() == 1) return;
-    next_ = std::make_unique<PyramidCoder>(options, volumes.subspan(1), sinks.subspan(1));
+    next_ = std::make_unique<PyramidCoder>(options, volumes.subspan(1), sinks.subspan(1),
+                                           BlockErrors::Keep::kLargest);
     const glm::uvec3 coarse_dims = next_->volume_.info.dims;
     bounds_.emplace(dims, coarse_dims, options.input.num_threads);
     downsampler_.emplace(dims, options.input.num_threads, [this, &options, coarse_dims](const Chunk &chunk) {
@@ -186,6 +187,7 @@ class PyramidCoder : public ChunkCoder {
     const std::vector<float> errors = coder_->finish(volume_);
     if (next_) {
       volume_.bounds = encode_bounds(errors);
+      volume_.bounds.by_place = true;
       next_->finish_coarser(bounds_->finish({}));
     }
   }
@@ -245,7 +247,8 @@ std::vector<CompressedVolume *> levels_of(CompressedVolume &volume) {
 /// Hands the payload of each level to its sink, in order, and completes `volume`.
 void run(VolumeReader &reader, const CompressOptions &options, std::span<const Sink> sinks,
          CompressedVolume &volume) {
-  PyramidCoder coder(options, levels_of(volume), sinks);
+  PyramidCoder coder(options, levels_of(volume), sinks,
+                     volume.coarser.empty() ? BlockErrors::Keep::kNothing : BlockErrors::Keep::kBoundByPlace);
   volume.value_range = read_in_chunks(reader, options.input, coder);
   coder.finish();
 }

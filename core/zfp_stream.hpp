@@ -54,6 +54,8 @@ struct CompressOptions {
 struct BlockBounds {
   std::vector<std::uint8_t> codes{};
   std::int32_t exponent = 0;
+  bool by_place =
+      false;  ///< a voxel is off by its share (bound_share()) at most: only where voxels are compared with the source's
 };
 
 /// Words past its last bit that a decoder reads at most.

@@ -52,11 +52,14 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
     }
   }
   if (layout.value_offset != 0.0f || layout.bound_unit != 0.0f) {
-    float offset = layout.value_offset;
+    float bound = 0.0f;
     if (layout.bound_unit != 0.0f)
-      offset += layout.bound_unit * block_bound(packed_bound_code(index + layout.bounds_begin, block_id));
+      bound = layout.bound_unit * block_bound(packed_bound_code(index + layout.bounds_begin, block_id));
     ISO_UNROLL
-    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] += offset;
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
+      const float share = layout.bounds_by_place != 0u ? bound_share(bound_place(v)) : 1.0f;
+      values[v] += layout.value_offset + bound * share;
+    }
   }
 }
 

@@ -142,12 +142,13 @@ typedef struct StreamLayout {
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
   int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES: with the block's bits
   uint whole_numbers;  ///< not 0: decoded values are rounded to integers
-  /// Added to all of a block's values, to draw a bound of the volume: value_offset + bound_unit * block_bound() of its code, of
+  /// Added to a block's values, to draw a bound of the volume: value_offset + bound_unit * block_bound() of its code, of
   /// codes that begin with word bounds_begin of the index. Both 0: nothing.
   float value_offset, bound_unit;
   uint bounds_begin;
+  uint bounds_by_place;  ///< not 0: of its block's bound, a voxel has bound_share() of its place
 } StreamLayout;
-ISO_CHECK_SIZE(StreamLayout, 28);
+ISO_CHECK_SIZE(StreamLayout, 32);
 
 #define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
 

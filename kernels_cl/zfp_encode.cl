@@ -1,4 +1,5 @@
 /// zfp_encode.cl -- voxels -> zfp blocks, and how far the blocks are from the voxels.
+#include "block_bound.h"
 #include "two_float.h"
 #include "zfp_encode.h"
 
@@ -42,8 +43,8 @@ kernel void zfp_encode(global const float *voxels, uint nx, uint ny, uint nz, ui
   }
 }
 
-/// One work-item per block of what zfp_encode wrote: the largest |decoded - voxel| is errors [2 b] +
-/// errors [2 b + 1], exactly.
+/// One work-item per block of what zfp_encode wrote: the largest |decoded - voxel| at a place (bound_place()) is
+/// errors [2 i] + errors [2 i + 1], exactly, with i = ISO_BOUND_PLACES b + place.
 /// `words` has one word behind the last block. Grid-stride over the blocks.
 kernel void zfp_encode_errors(global const float *voxels, uint nx, uint ny, uint nz, uint bits_per_block,
                               global const uint *words, global float *errors) {
@@ -51,22 +52,27 @@ kernel void zfp_encode_errors(global const float *voxels, uint nx, uint ny, uint
   for (uint b = get_global_id(0); b < count; b += get_global_size(0)) {
     const BlockPlace place = place_of(b, nx, ny, nz);
     float values[ISO_BLOCK_VOXELS];
-    TwoFloat largest = two_float(0.0f);
+    TwoFloat largest[ISO_BOUND_PLACES];
+    for (uint at = 0; at < ISO_BOUND_PLACES; ++at) largest[at] = two_float(0.0f);
     zfp_decode_block(words, (ulong)b * bits_per_block, bits_per_block, ISO_ALL_PLANES, values);
     for (uint z = 0; z < place.count_z; ++z) {
       for (uint y = 0; y < place.count_y; ++y) {
         for (uint x = 0; x < place.count_x; ++x) {
           const float voxel = voxels[((ulong)(place.z + z) * ny + place.y + y) * nx + place.x + x];
-          TwoFloat error = two_sum(values[x + 4u * y + 16u * z], -voxel);
+          const uint v = x + 4u * y + 16u * z, at = bound_place(v);
+          TwoFloat error = two_sum(values[v], -voxel);
           if (error.hi < 0.0f) {
             error.hi = -error.hi;
             error.lo = -error.lo;
           }
-          if (t_less(largest, error)) largest = error;
+          if (t_less(largest[at], error)) largest[at] = error;
         }
       }
     }
-    errors[2 * (ulong)b] = largest.hi;
-    errors[2 * (ulong)b + 1u] = largest.lo;
+    for (uint at = 0; at < ISO_BOUND_PLACES; ++at) {
+      const ulong i = ISO_BOUND_PLACES * (ulong)b + at;
+      errors[2 * i] = largest[at].hi;
+      errors[2 * i + 1] = largest[at].lo;
+    }
   }
 }

@@ -14,7 +14,7 @@ void add_offset(const CompressedVolume &level, const ValueOffset &offset, std::v
     for (std::uint32_t y = 0; y < dims.y; ++y) {
       for (std::uint32_t x = 0; x < dims.x; ++x, ++value) {
         const std::size_t block = x / 4 + blocks.x * (y / 4 + std::size_t{blocks.y} * (z / 4));
-        *value += offset_of_block(offset, level.bounds, block);
+        *value += offset_of_voxel(offset, level.bounds, block, x % 4 + 4 * (y % 4) + 16 * (z % 4));
       }
     }
   }

@@ -84,6 +84,49 @@ TEST(BlockBound, AreNeverBelow) {
   EXPECT_THAT(encode_bounds(std::array{0.0f, 0.0f}).codes, testing::Each(0));
 }
 
+TEST(BlockBound, SharesGrowTowardsOneVoxel) {
+  std::array<int, ISO_BOUND_PLACES> num_voxels{};
+  for (uint voxel = 0; voxel < ISO_BLOCK_VOXELS; ++voxel) ++num_voxels.at(bound_place(voxel));
+  EXPECT_THAT(num_voxels, testing::ElementsAre(54, 9, 1));
+  EXPECT_EQ(bound_place(1 + 4 + 16), 2u);
+  EXPECT_EQ(bound_place(3 + 4 + 16), 1u);
+  EXPECT_EQ(bound_place(3 + 4), 0u);
+  EXPECT_LT(bound_share(0), bound_share(1));
+  EXPECT_LT(bound_share(1), bound_share(2));
+  EXPECT_EQ(bound_share(2), 1.0f);
+}
+
+/// However the volume was compressed: no voxel is off by more than its share of its block's bound, and some voxel of most blocks by
+/// nearly as much.
+TEST(BlockBound, NoVoxelExceedsItsShare) {
+  const glm::uvec3 dims(37, 40, 42);
+  for (const auto &field : {test::gyroid_field(15), test::noise_field(5)}) {
+    for (const CompressOptions &options :
+         {CompressOptions{.rate = 4}, CompressOptions{.rate = 11},
+          CompressOptions{.error_bound =
+                              ErrorBound{.min_exponent = -5}},  // as of other writers; as of convert
+          CompressOptions{.error_bound = ErrorBound{.min_exponent = -5, .max_error = 0.03125}}}) {
+      const Scene scene(dims, field, options);
+      const BlockBounds &bounds = scene.volume.bounds;
+      ASSERT_TRUE(bounds.by_place);
+      const std::vector<float> decoded = decode_with_libzfp(scene.volume);
+      const ValueOffset offset{0, std::ldexp(1.0f, bounds.exponent)};
+      const glm::uvec3 blocks = scene.volume.num_blocks();
+      std::vector<double> closest(bounds.codes.size(), 0.0);
+      for (std::size_t i = 0; i < decoded.size(); ++i) {
+        const glm::uvec3 at(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y), in = at % 4u;
+        const std::size_t block = at.x / 4 + blocks.x * (at.y / 4 + std::size_t{blocks.y} * (at.z / 4));
+        const double most = double{offset_of_voxel(offset, bounds, block, in.x + 4 * in.y + 16 * in.z)};
+        const double off = std::abs(double{decoded[i]} - double{scene.source[i]});
+        ASSERT_LE(off, most) << "voxel " << i;
+        if (most > 0) closest[block] = std::max(closest[block], off / most);
+      }
+      std::ranges::sort(closest);
+      EXPECT_GT(closest[closest.size() / 10], 1 / 1.0625 - 1e-6);
+    }
+  }
+}
+
 /// The field that the bounds span, trilinear like the volume's own, against the difference at random places.
 TEST(LevelBounds, HoldBetweenVoxels) {
   for (const glm::uvec3 &dims : {glm::uvec3(33, 32, 40), glm::uvec3(17, 41, 20)}) {
@@ -239,21 +282,26 @@ TEST_P(CertifyOnDevice, RealVolumes) {
   EXPECT_GT(2 * certified, all) << "too few for a test";
 }
 
+/// The goal is that half of the pixels have a bound of at most 8 times their error.
 TEST_P(CertifyOnDevice, BoundsAreTight) {
-  const Scene scene({96, 96, 96}, test::gyroid_field(48), {.error_bound = ErrorBound{.min_exponent = -6}});
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
-  const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  for (const double max_pixel_error : {0.0, 2.0}) {
-    renderer.set_max_pixel_error(max_pixel_error);
-    renderer.render(camera, 0.3f);
-    const std::vector<HitRecord> drawn = renderer.hits();
-    const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
-    const std::vector<double> slack = expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
-    ASSERT_GT(slack.size(), 100u);
-    // The goal is 8. The error of a coarse level changes its sign between voxels: there, only the larger errors say how tight a bound is.
-    EXPECT_LT(max_pixel_error == 0 ? slack[slack.size() / 2] : slack[slack.size() / 10], 8);
-    const CertificateSummary summary = summarize(certificate, 1e9);
-    EXPECT_GT(summary.num_certified, summary.num_pixels * 7 / 10) << max_pixel_error;
+  for (const CompressOptions &options :
+       {CompressOptions{.rate = 4},
+        CompressOptions{.error_bound = ErrorBound{.min_exponent = -6, .max_error = 0.015625}}}) {
+    const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
+    Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+    const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+    for (const double max_pixel_error : {0.0, 2.0}) {
+      renderer.set_max_pixel_error(max_pixel_error);
+      renderer.render(camera, 0.3f);
+      const std::vector<HitRecord> drawn = renderer.hits();
+      const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
+      const std::vector<double> slack = expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
+      ASSERT_GT(slack.size(), 100u);
+      // The error of a coarse level changes its sign between voxels: there, only the larger errors say how tight a bound is.
+      EXPECT_LT(max_pixel_error == 0 ? slack[slack.size() / 2] : slack[slack.size() / 10], 8);
+      const CertificateSummary summary = summarize(certificate, 1e9);
+      EXPECT_GT(summary.num_certified, summary.num_pixels * 7 / 10) << max_pixel_error;
+    }
   }
 }
 
@@ -313,6 +361,17 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
     }
   }
   EXPECT_GT(pixel_error, 0);
+}
+
+TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
+  for (const std::uint32_t rate : {8u, 16u, 24u}) {
+    const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
+    Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+    const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+    const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 1);
+    EXPECT_TRUE(choice.reachable);
+    EXPECT_EQ(choice.detail.value_error > 0, rate > 16) << "rate " << rate;
+  }
 }
 
 /// Where coarse levels would draw only what is farthest, they spare too little for what several levels cost.

@@ -231,7 +231,7 @@ TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
     std::vector<float> moved = decoded;
     for (std::size_t i = 0; i < moved.size(); ++i) {
       const std::size_t x = i % dims.x / 4, y = i / dims.x % dims.y / 4, z = i / dims.x / dims.y / 4;
-      moved[i] += offset_of_block(offset, volume.bounds, x + params.blocks_x * (y + params.blocks_y * z));
+      moved[i] += offset_of_voxel(offset, volume.bounds, x + params.blocks_x * (y + params.blocks_y * z), 0);
     }
     const std::vector<Range> expected = dual_cell_ranges(dims, moved);
     for (const float isovalue : awkward_isovalues(expected, 4)) {

@@ -180,15 +180,28 @@ class PyramidFile : public testing::Test {
 TEST_F(PyramidFile, EveryLevelComesBack) {
   for (const CompressOptions &options :
        {CompressOptions{.rate = 5, .levels = 3},
+        CompressOptions{.rate = 7, .measure_error = true, .levels = 3},
         CompressOptions{.error_bound = ErrorBound{.min_exponent = -8}, .levels = 0}}) {
     const CompressedVolume expected = write(options);
+    const bool measured = options.measure_error || options.error_bound;
+    const auto check_bounds = [&](const CompressedVolume &got, const CompressedVolume &level) {
+      EXPECT_EQ(level.bounds.codes.size(), measured ? level.block_count() : 0);
+      EXPECT_EQ(got.bounds.codes, level.bounds.codes);
+      EXPECT_EQ(got.bounds.exponent, level.bounds.exponent);
+      if (measured) {
+        EXPECT_EQ(got.bounds.by_place, &level == &expected);
+        EXPECT_EQ(level.bounds.by_place, &level == &expected);
+      }
+    };
     const auto check = [&](const CompressedVolume &got, bool payload) {
       ASSERT_EQ(got.coarser.size(), expected.coarser.size());
+      if (payload) check_bounds(got, expected);
       for (std::size_t i = 0; i < got.coarser.size(); ++i) {
         const CompressedVolume &level = got.coarser[i];
         EXPECT_EQ(level.info.dims, expected.coarser[i].info.dims);
         EXPECT_EQ(level.info.spacing, expected.coarser[i].info.spacing);
         if (!payload) continue;
+        check_bounds(level, expected.coarser[i]);
         EXPECT_EQ(level.index, expected.coarser[i].index);
         EXPECT_EQ(decode_with_libzfp(level), decode_with_libzfp(expected.coarser[i]));
       }

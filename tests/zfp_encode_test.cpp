@@ -153,17 +153,19 @@ class ZfpEncodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     got[num_words] = got[num_words + 1] = 0;
     ASSERT_EQ(first_difference(got, expected.words), kNoDifference);
 
-    ocl::Buffer<float> errors(device_, "errors", 2 * num_blocks + 1);
+    ocl::Buffer<float> errors(device_, "errors", ZfpEncode::kErrorsPerBlock * num_blocks + 1);
     errors.fill(-1.0f);
     encode_.measure_errors(d_voxels, dims, bits_per_block, words, errors);
     const std::vector<float> pairs = errors.read(), decoded = decode_with_libzfp(expected);
     const glm::uvec3 blocks = expected.num_blocks();
-    std::vector<double> got_errors(num_blocks), expected_errors(num_blocks);
-    for (std::size_t b = 0; b < num_blocks; ++b)
-      got_errors[b] = double{pairs[2 * b]} + double{pairs[2 * b + 1]};
+    std::vector<double> got_errors(ISO_BOUND_PLACES * num_blocks), expected_errors(got_errors.size());
+    for (std::size_t i = 0; i < got_errors.size(); ++i)
+      got_errors[i] = double{pairs[2 * i]} + double{pairs[2 * i + 1]};
     for (std::size_t i = 0; i < voxels.size(); ++i) {
       const std::size_t x = i % dims.x, y = i / dims.x % dims.y, z = i / dims.x / dims.y;
-      double &largest = expected_errors[x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))];
+      const std::size_t ones = (x % 4 == 1) + (y % 4 == 1) + (z % 4 == 1), place = ones < 2 ? 0 : ones - 1;
+      double &largest =
+          expected_errors[ISO_BOUND_PLACES * (x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))) + place];
       largest = std::max(largest, std::abs(double{decoded[i]} - double{voxels[i]}));
     }
     EXPECT_EQ(first_difference(got_errors, expected_errors), kNoDifference);
@@ -234,6 +236,7 @@ class CompressOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     EXPECT_EQ(first_difference(device.words, host.words), kNoDifference);
     EXPECT_EQ(device.value_range, host.value_range);
     EXPECT_EQ(device.max_error, host.max_error);
+    EXPECT_EQ(device.bounds.codes, host.bounds.codes);
     EXPECT_TRUE(test::read_file(folder / "device.zfp") == test::read_file(folder / "host.zfp"));
     EXPECT_EQ(device_.ledger().current(), 0u);
   }
@@ -260,6 +263,13 @@ TEST_P(CompressOnDevice, EveryKindAsOnTheHost) {
       expect_same_as_host(dims, make_voxels(kind, dims, 21), options);
     }
   }
+}
+
+TEST_P(CompressOnDevice, LevelsAndBoundsAsOnTheHost) {
+  const glm::uvec3 dims(40, 33, 27);
+  for (const std::uint32_t rate : {4u, 12u})
+    expect_same_as_host(dims, random_voxels(dims, -1, 1, 23),
+                        {.rate = rate, .measure_error = true, .levels = 0});
 }
 
 /// Several pieces of whole slabs, and slabs that are cut into rows of blocks.
