@@ -37,8 +37,8 @@ struct BlockError {
 /// Errors of blocks, a few at a time, in order.
 class BlockErrors {
  public:
-  enum class Keep { kNothing, kLargest, kBoundByPlace };  ///< of each block, in 4 bytes
-  explicit BlockErrors(Keep keep) : keep_(keep) {}
+  /// keep: bound_by_place() of each block, in 4 bytes; else only the largest of all.
+  explicit BlockErrors(bool keep) : keep_(keep) {}
 
   /// Zeros for the next blocks, to be filled in before end().
   std::span<BlockError> begin(std::size_t num_blocks) {
@@ -48,10 +48,8 @@ class BlockErrors {
   std::span<BlockError> some() { return some_; }
   void end() {
     for (const BlockError &error : some_) {
-      const double largest = error.largest();
-      max_ = std::max(max_, largest);
-      if (keep_ == Keep::kLargest) kept_.push_back(rounded_up(largest));
-      if (keep_ == Keep::kBoundByPlace) kept_.push_back(rounded_up(error.bound_by_place()));
+      max_ = std::max(max_, error.largest());
+      if (keep_) kept_.push_back(rounded_up(error.bound_by_place()));
     }
   }
 
@@ -65,7 +63,7 @@ class BlockErrors {
                                    : nearest;
   }
 
-  Keep keep_;
+  bool keep_;
   double max_ = 0;
   std::vector<BlockError> some_;
   std::vector<float> kept_;

@@ -33,7 +33,7 @@ LevelBounds::LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_d
       coarse_(coarse_dims),
       blocks_((coarse_dims + 3u) / 4u),
       num_threads_(num_threads),
-      bounds_(std::size_t{blocks_.x} * blocks_.y * blocks_.z) {}
+      off_{std::vector<float>(std::size_t{blocks_.x} * blocks_.y * blocks_.z), off_.made} {}
 
 void LevelBounds::add_fine(std::span<const float> layers) {
   const std::size_t size = std::size_t{fine_.x} * fine_.y;
@@ -42,10 +42,13 @@ void LevelBounds::add_fine(std::span<const float> layers) {
   compare_ready_layers();
 }
 
-void LevelBounds::add_coarse(std::span<const float> layers) {
+void LevelBounds::add_coarse(std::span<const float> layers, std::span<const float> decoded) {
   const std::size_t size = std::size_t{coarse_.x} * coarse_.y;
-  for (; !layers.empty(); layers = layers.subspan(size))
-    coarse_layers_.emplace_back(layers.begin(), layers.begin() + std::ptrdiff_t(size));
+  const auto layer = [size](std::span<const float> from) {
+    return std::vector<float>(from.begin(), from.begin() + std::ptrdiff_t(size));
+  };
+  for (; !layers.empty(); layers = layers.subspan(size), decoded = decoded.subspan(size))
+    coarse_layers_.push_back({layer(layers), layer(decoded)});
   compare_ready_layers();
 }
 
@@ -60,37 +63,45 @@ void LevelBounds::compare_ready_layers() {
 }
 
 void LevelBounds::compare_layer(std::uint32_t z, const std::vector<float> &layer) {
-  const std::vector<float> &below = coarse_layers_[0], &above = coarse_layers_[z % 2];
+  const CoarseLayer &below = coarse_layers_[0], &above = coarse_layers_[z % 2];
   parallel_for(blocks_.y, num_threads_, [&](std::uint64_t by, std::uint32_t) {
-    const Reach ys = reach_of(static_cast<std::uint32_t>(by), fine_.y);
-    std::vector<float> coarse(coarse_.x), largest(blocks_.x);
-    for (std::uint32_t y = ys.begin; y < ys.end; ++y) {
-      const std::size_t row = std::size_t{y / 2} * coarse_.x, next = row + (y % 2) * coarse_.x;
-      for (std::uint32_t x = 0; x < coarse_.x; ++x) {
-        coarse[x] = (0.25f * below[row + x] + 0.25f * above[row + x]) +
-                    (0.25f * below[next + x] + 0.25f * above[next + x]);
-      }
-      const float *fine = layer.data() + std::size_t{y} * fine_.x;
-      for (std::uint32_t bx = 0; bx < blocks_.x; ++bx) {
-        const Reach xs = reach_of(bx, fine_.x);
-        for (std::uint32_t x = xs.begin; x < xs.end; ++x) {
-          const float at = 0.5f * coarse[x / 2] + 0.5f * coarse[(x + 1) / 2];
-          largest[bx] = std::max(largest[bx], std::abs(at - fine[x]));
-        }
-      }
-    }
-    for (std::uint32_t bz = 0; bz < blocks_.z; ++bz) {
-      const Reach zs = reach_of(bz, fine_.z);
-      if (z < zs.begin || z >= zs.end) continue;
-      float *bounds = bounds_.data() + blocks_.x * (by + std::size_t{blocks_.y} * bz);
-      for (std::uint32_t bx = 0; bx < blocks_.x; ++bx) bounds[bx] = std::max(bounds[bx], largest[bx]);
-    }
+    compare_rows(z, by, layer, below.made, above.made, off_.made);
+    compare_rows(z, by, layer, below.decoded, above.decoded, off_.decoded);
   });
 }
 
-std::vector<float> LevelBounds::finish(std::span<const float> finer) const {
-  std::vector<float> bounds = bounds_;
-  if (finer.empty()) return bounds;
+void LevelBounds::compare_rows(std::uint32_t z, std::uint64_t by, const std::vector<float> &layer,
+                               const std::vector<float> &below, const std::vector<float> &above,
+                               std::vector<float> &off) {
+  const Reach ys = reach_of(static_cast<std::uint32_t>(by), fine_.y);
+  std::vector<float> coarse(coarse_.x), largest(fine_.x);
+  for (std::uint32_t y = ys.begin; y < ys.end; ++y) {
+    const std::size_t row = std::size_t{y / 2} * coarse_.x, next = row + (y % 2) * coarse_.x;
+    for (std::uint32_t x = 0; x < coarse_.x; ++x) {
+      coarse[x] = (0.25f * below[row + x] + 0.25f * above[row + x]) +
+                  (0.25f * below[next + x] + 0.25f * above[next + x]);
+    }
+    const float *fine = layer.data() + std::size_t{y} * fine_.x;
+    for (std::uint32_t x = 0; x < fine_.x; ++x) {
+      const float at = 0.5f * coarse[x / 2] + 0.5f * coarse[(x + 1) / 2];
+      largest[x] = std::max(largest[x], std::abs(at - fine[x]));
+    }
+  }
+  for (std::uint32_t bx = 0; bx < blocks_.x; ++bx) {
+    const Reach xs = reach_of(bx, fine_.x);
+    const float most = *std::max_element(largest.begin() + xs.begin, largest.begin() + xs.end);
+    for (std::uint32_t bz = 0; bz < blocks_.z; ++bz) {
+      const Reach zs = reach_of(bz, fine_.z);
+      if (z < zs.begin || z >= zs.end) continue;
+      float &bound = off[bx + blocks_.x * (by + std::size_t{blocks_.y} * bz)];
+      bound = std::max(bound, most);
+    }
+  }
+}
+
+LevelBounds::Off LevelBounds::finish(std::span<const float> finer) const {
+  Off off = off_;
+  if (finer.empty()) return off;
   const glm::uvec3 finer_blocks = (fine_ + 3u) / 4u;
   for (std::uint32_t z = 0; z < blocks_.z; ++z) {
     for (std::uint32_t y = 0; y < blocks_.y; ++y) {
@@ -105,11 +116,13 @@ std::vector<float> LevelBounds::finish(std::span<const float> finer) const {
               most = std::max(most, finer[fx + finer_blocks.x * (fy + std::size_t{finer_blocks.y} * fz)]);
           }
         }
-        bounds[x + blocks_.x * (y + std::size_t{blocks_.y} * z)] += most;
+        const std::size_t block = x + blocks_.x * (y + std::size_t{blocks_.y} * z);
+        off.made[block] += most;
+        off.decoded[block] += most;
       }
     }
   }
-  return bounds;
+  return off;
 }
 
 BlockBounds encode_bounds(std::span<const float> bounds) {

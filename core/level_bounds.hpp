@@ -15,9 +15,10 @@
 
 namespace isowave {
 
-/// Compares a level's field with that of the next coarser level, in memory of a few layers and 4 bytes per coarse block.
+/// Compares a level's field with that of the next coarser level, as it is made and as it is decoded, in memory of a few layers and 8
+/// bytes per coarse block. (One after the other, as it is made and what compression does to it, would be a fifth more at rate 4.)
 ///
-/// Both fields are trilinear, and planes of the coarse grid are planes of the fine one: in a fine cell their difference is trilinear,
+/// The fields are trilinear, and planes of the coarse grid are planes of the fine one: in a fine cell their difference is trilinear,
 /// too, and largest at a voxel. The bound of a coarse block is the largest one in all cells that touch a voxel of it. So the field that
 /// has these bounds at its voxels, piecewise constant there, trilinear between, is at least the difference everywhere.
 class LevelBounds {
@@ -25,19 +26,33 @@ class LevelBounds {
   LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims, std::uint32_t num_threads);
   /// The next layers [n][ny][nx] of each.
   void add_fine(std::span<const float> layers);
-  void add_coarse(std::span<const float> layers);
-  /// The bounds of the coarse level's blocks against the finest level: finer are those of the fine level's; none: it is the finest.
-  std::vector<float> finish(std::span<const float> finer) const;
+  void add_coarse(std::span<const float> layers, std::span<const float> decoded);
+
+  /// Of blocks, against the finest level.
+  struct Off {
+    std::vector<float> made, decoded;
+  };
+  /// The coarse level's; finer: those of the fine level as it was made; none: it is the finest.
+  Off finish(std::span<const float> finer) const;
 
  private:
+  struct CoarseLayer {
+    std::vector<float> made, decoded;
+  };
+
   void compare_ready_layers();
   void compare_layer(std::uint32_t z, const std::vector<float> &layer);
+  /// Fine layer z with the coarse field that two coarse layers make there, for a row of coarse blocks.
+  void compare_rows(std::uint32_t z, std::uint64_t by, const std::vector<float> &layer,
+                    const std::vector<float> &below, const std::vector<float> &above,
+                    std::vector<float> &off);
 
   glm::uvec3 fine_, coarse_, blocks_;
   std::uint32_t num_threads_;
-  std::deque<std::vector<float>> fine_layers_, coarse_layers_;
+  std::deque<std::vector<float>> fine_layers_;
+  std::deque<CoarseLayer> coarse_layers_;
   std::uint32_t fine_z_ = 0, coarse_z_ = 0;  ///< of the first that are kept
-  std::vector<float> bounds_;                ///< [coarse blocks]
+  Off off_;                                  ///< against the fine level
 };
 
 /// Never below.

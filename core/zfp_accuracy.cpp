@@ -214,7 +214,10 @@ ErrorBoundCoder::ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound
 
 void ErrorBoundCoder::begin_chunk(const Chunk &chunk) {
   rows_.assign(chunk.num_rows, {});
-  if (errors_) errors_->begin(chunk.num_rows * ((dims_.x + 3) / 4));
+  if (!errors_) return;
+  errors_->begin(chunk.num_rows * ((dims_.x + 3) / 4));
+  chunk_ = chunk.voxels;
+  decoded_.resize(chunk_.size());
 }
 
 void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
@@ -228,8 +231,15 @@ void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
     coded.lengths.push_back(static_cast<std::uint16_t>(length));
     coded.bits.append(codec.words(), length);
     if (!errors_) continue;
+    const auto &decoded = codec.decode(bound_.min_exponent);
     errors_->some()[row.index * blocks_x + bx] =
-        error_of_block(codec.decode(bound_.min_exponent), row, bx, dims_.x, layer, bound_.whole_numbers);
+        error_of_block(decoded, row, bx, dims_.x, layer, bound_.whole_numbers);
+    float *out = decoded_.data() + (row.voxels - chunk_.data()) + std::ptrdiff_t{bx} * kBlockEdge;
+    const std::uint32_t num_x = std::min(kBlockEdge, dims_.x - bx * kBlockEdge);
+    for (std::uint32_t z = 0; z < row.nz; ++z) {
+      for (std::uint32_t y = 0; y < row.ny; ++y)
+        std::copy_n(decoded.data() + 4 * y + 16 * z, num_x, out + z * layer + std::ptrdiff_t(y) * dims_.x);
+    }
   }
   coded.bits.pad();
 }

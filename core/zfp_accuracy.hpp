@@ -2,6 +2,7 @@
 // Volumes with a bound on the error: zfp's fixed-accuracy mode, where blocks are as long as the error demands.
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/block_errors.hpp"
@@ -66,6 +67,8 @@ class ErrorBoundCoder : public ChunkCoder {
   /// Hands over the last bits, as words of 32; returns the index.
   std::vector<std::uint32_t> finish();
   std::optional<BlockErrors> &errors() { return errors_; }
+  /// Of the last chunk, in its layout, where errors are measured.
+  std::span<const float> decoded() const { return decoded_; }
 
  private:
   struct CodedRow {
@@ -77,7 +80,9 @@ class ErrorBoundCoder : public ChunkCoder {
   ErrorBound bound_;
   const Sink &sink_;
   std::optional<BlockErrors> errors_;
-  std::vector<CodedRow> rows_;  ///< of the present chunk
+  std::span<const float> chunk_{};  ///< the present one's voxels
+  std::vector<float> decoded_{};    ///< and what becomes of them
+  std::vector<CodedRow> rows_;      ///< of the present chunk
   BitAppender payload_;
   BlockIndexBuilder index_;
 };

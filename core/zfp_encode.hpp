@@ -48,7 +48,7 @@ class LayerEncoder {
 
   /// dims: of the whole volume. bits_per_block: a multiple of 64.
   LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block, bool measure_error,
-               BlockErrors errors = BlockErrors(BlockErrors::Keep::kNothing));
+               BlockErrors errors = BlockErrors(false));
   ~LayerEncoder();
   LayerEncoder(const LayerEncoder &) = delete;
   LayerEncoder &operator=(const LayerEncoder &) = delete;

@@ -37,18 +37,22 @@ class LevelCoder : public ChunkCoder {
   /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be kept of each block's errors, where
   /// they were measured.
   virtual std::vector<float> finish(CompressedVolume &volume) = 0;
+  /// The last chunk's voxels as they are decoded, where errors are measured.
+  virtual std::span<const float> decoded() const = 0;
 };
 
 /// Compresses rows of blocks by libzfp.
 class FixedRateCoder : public LevelCoder {
  public:
-  FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink,
-                 BlockErrors::Keep keep)
+  FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink, bool keep)
       : dims_(dims), options_(options), sink_(sink), errors_(keep) {}
 
   void begin_chunk(const Chunk &chunk) override {
     words_.resize(chunk.num_rows * row_words());
-    if (options_.measure_error) errors_.begin(chunk.num_rows * blocks_x());
+    if (!options_.measure_error) return;
+    errors_.begin(chunk.num_rows * blocks_x());
+    chunk_ = chunk.voxels;
+    decoded_.resize(chunk_.size());
   }
 
   void code_row(const BlockRow &row, std::uint32_t) override {
@@ -65,19 +69,19 @@ class FixedRateCoder : public LevelCoder {
     }
     if (!options_.measure_error) return;
 
-    std::vector<float> decoded(std::size_t(dims_.x) * row.ny * row.nz);
-    const ZfpField copy(zfp_field_3d(decoded.data(), zfp_type_float, dims_.x, row.ny, row.nz),
-                        &zfp_field_free);
+    float *decoded = decoded_.data() + (row.voxels - chunk_.data());
+    const ZfpField copy(zfp_field_3d(decoded, zfp_type_float, dims_.x, row.ny, row.nz), &zfp_field_free);
+    zfp_field_set_stride_3d(copy.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
     zfp_stream_rewind(stream.get());
     if (zfp_decompress(stream.get(), copy.get()) == 0)
       throw std::logic_error("zfp: cannot decode its own blocks");
-    const float *value = decoded.data();
     BlockError *errors = errors_.some().data() + row.index * blocks_x();
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y) {
-        const float *source = row.voxels + z * layer_size() + std::ptrdiff_t(y) * dims_.x;
-        for (std::uint32_t x = 0; x < dims_.x; ++x, ++value)
-          errors[x / 4].add(x % 4 + 4 * y + 16 * z, std::abs(double(*value) - double(source[x])));
+        const std::ptrdiff_t begin = z * layer_size() + std::ptrdiff_t(y) * dims_.x;
+        const float *source = row.voxels + begin, *value = decoded + begin;
+        for (std::uint32_t x = 0; x < dims_.x; ++x)
+          errors[x / 4].add(x % 4 + 4 * y + 16 * z, std::abs(double(value[x]) - double(source[x])));
       }
     }
   }
@@ -92,6 +96,8 @@ class FixedRateCoder : public LevelCoder {
     return errors_.take();
   }
 
+  std::span<const float> decoded() const override { return decoded_; }
+
  private:
   std::uint32_t blocks_x() const { return (dims_.x + 3u) / 4u; }
   std::uint64_t row_words() const { return std::uint64_t{blocks_x()} * options_.rate; }
@@ -101,14 +107,15 @@ class FixedRateCoder : public LevelCoder {
   const CompressOptions &options_;
   const Sink &sink_;
   std::vector<std::uint64_t> words_;  ///< of the present chunk
+  std::span<const float> chunk_{};    ///< its voxels
+  std::vector<float> decoded_{};      ///< and what becomes of them
   BlockErrors errors_;
 };
 
-/// Has a device compress whole chunks.
+/// Has a device compress whole chunks; what they become is not read back.
 class DeviceCoder : public LevelCoder {
  public:
-  DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink,
-              BlockErrors::Keep keep)
+  DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink, bool keep)
       : encoder_(*options.device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
         measure_error_(options.measure_error),
         sink_(sink) {}
@@ -121,6 +128,8 @@ class DeviceCoder : public LevelCoder {
     return encoder_.errors().take();
   }
 
+  std::span<const float> decoded() const override { return {}; }
+
  private:
   LayerEncoder encoder_;
   bool measure_error_;
@@ -130,10 +139,9 @@ class DeviceCoder : public LevelCoder {
 /// Compresses blocks of lengths of their own.
 class BoundedCoder : public LevelCoder {
  public:
-  BoundedCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink, BlockErrors::Keep keep)
+  BoundedCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink, bool keep)
       : coder_(dims, bound, sink,
-               bound.max_error && keep == BlockErrors::Keep::kNothing ? std::nullopt
-                                                                      : std::optional(BlockErrors(keep))) {}
+               keep || !bound.max_error ? std::optional(BlockErrors(keep)) : std::nullopt) {}
   void begin_chunk(const Chunk &chunk) override { coder_.begin_chunk(chunk); }
   void code_row(const BlockRow &row, std::uint32_t thread) override { coder_.code_row(row, thread); }
   void end_chunk(const Chunk &chunk) override { coder_.end_chunk(chunk); }
@@ -145,6 +153,7 @@ class BoundedCoder : public LevelCoder {
     volume.max_error = volume.error_bound.max_error;
     return errors ? errors->take() : std::vector<float>();
   }
+  std::span<const float> decoded() const override { return coder_.decoded(); }
 
  private:
   ErrorBoundCoder coder_;
@@ -153,26 +162,28 @@ class BoundedCoder : public LevelCoder {
 /// Compresses a level, and makes the voxels of the next from its own.
 class PyramidCoder : public ChunkCoder {
  public:
-  /// volumes, sinks: of this level and all coarser ones. keep: of this level.
+  /// volumes, sinks: of this level and all coarser ones. Those are compressed on the host, since they are needed as they are decoded, and
+  /// are a seventh.
   PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
-               std::span<const Sink> sinks, BlockErrors::Keep keep)
+               std::span<const Sink> sinks, bool is_finest = true)
       : volume_(*volumes[0]) {
     const glm::uvec3 dims = volume_.info.dims;
+    const bool keep = is_finest && volumes.size() > 1;
     if (volume_.is_indexed()) {
       coder_ = std::make_unique<BoundedCoder>(dims, volume_.error_bound, sinks[0], keep);
-    } else if (options.device) {
+    } else if (options.device && is_finest) {
       coder_ = std::make_unique<DeviceCoder>(dims, options, sinks[0], keep);
     } else {
       coder_ = std::make_unique<FixedRateCoder>(dims, options, sinks[0], keep);
     }
     if (volumes.size() == 1) return;
-    next_ = std::make_unique<PyramidCoder>(options, volumes.subspan(1), sinks.subspan(1),
-                                           BlockErrors::Keep::kLargest);
+    next_ = std::make_unique<PyramidCoder>(options, volumes.subspan(1), sinks.subspan(1), false);
     const glm::uvec3 coarse_dims = next_->volume_.info.dims;
-    bounds_.emplace(dims, coarse_dims, options.input.num_threads);
+    if (options.measure_error || volume_.is_indexed())
+      bounds_.emplace(dims, coarse_dims, options.input.num_threads);
     downsampler_.emplace(dims, options.input.num_threads, [this, &options, coarse_dims](const Chunk &chunk) {
       code_chunk(chunk, coarse_dims, options.input, *next_);
-      bounds_->add_coarse(chunk.voxels);
+      if (bounds_) bounds_->add_coarse(chunk.voxels, next_->coder_->decoded());
     });
   }
   void begin_chunk(const Chunk &chunk) override { coder_->begin_chunk(chunk); }
@@ -180,27 +191,18 @@ class PyramidCoder : public ChunkCoder {
   void end_chunk(const Chunk &chunk) override {
     coder_->end_chunk(chunk);
     if (!next_) return;
-    bounds_->add_fine(chunk.voxels);
+    if (bounds_) bounds_->add_fine(chunk.voxels);
     downsampler_->add(chunk.voxels);
   }
-  void finish() {
+  /// off: how far a coarser level's blocks are from the finest level.
+  void finish(const LevelBounds::Off &off = {}) {
     const std::vector<float> errors = coder_->finish(volume_);
-    if (next_) {
-      volume_.bounds = encode_bounds(errors);
-      volume_.bounds.by_place = true;
-      next_->finish_coarser(bounds_->finish({}));
-    }
+    volume_.bounds = encode_bounds(errors.empty() ? off.decoded : errors);
+    volume_.bounds.by_place = !errors.empty();
+    if (next_) next_->finish(bounds_ ? bounds_->finish(off.made) : LevelBounds::Off{});
   }
 
  private:
-  /// off: how far this level's blocks are from the finest level, before they are compressed.
-  void finish_coarser(const std::vector<float> &off) {
-    std::vector<float> bounds = coder_->finish(volume_);
-    std::ranges::transform(bounds, off, bounds.begin(), std::plus());
-    volume_.bounds = encode_bounds(bounds);
-    if (next_) next_->finish_coarser(bounds_->finish(off));
-  }
-
   CompressedVolume &volume_;
   std::unique_ptr<LevelCoder> coder_;
   std::unique_ptr<PyramidCoder> next_;
@@ -247,8 +249,7 @@ std::vector<CompressedVolume *> levels_of(CompressedVolume &volume) {
 /// Hands the payload of each level to its sink, in order, and completes `volume`.
 void run(VolumeReader &reader, const CompressOptions &options, std::span<const Sink> sinks,
          CompressedVolume &volume) {
-  PyramidCoder coder(options, levels_of(volume), sinks,
-                     volume.coarser.empty() ? BlockErrors::Keep::kNothing : BlockErrors::Keep::kBoundByPlace);
+  PyramidCoder coder(options, levels_of(volume), sinks);
   volume.value_range = read_in_chunks(reader, options.input, coder);
   coder.finish();
 }

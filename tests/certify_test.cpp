@@ -129,8 +129,10 @@ TEST(BlockBound, NoVoxelExceedsItsShare) {
 
 /// The field that the bounds span, trilinear like the volume's own, against the difference at random places.
 TEST(LevelBounds, HoldBetweenVoxels) {
-  for (const glm::uvec3 &dims : {glm::uvec3(33, 32, 40), glm::uvec3(17, 41, 20)}) {
-    const Scene scene(dims, test::noise_field(3), {.rate = 16});
+  for (const auto &[dims, rate] :
+       {std::pair(glm::uvec3(33, 32, 40), 16u), std::pair(glm::uvec3(17, 41, 20), 16u),
+        std::pair(glm::uvec3(33, 32, 40), 4u)}) {
+    const Scene scene(dims, test::noise_field(3), {.rate = rate});
     const CellOracle truth(scene.source, {dims.x, dims.y, dims.z}, 0.5f);
     std::mt19937 random(5);
     for (std::size_t level = 0; level < scene.volume.coarser.size(); ++level) {
