@@ -29,11 +29,10 @@ constexpr double kRounding = 0x1p-18;
 
 LevelBounds::LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims,
                          std::uint32_t num_threads)
-    : fine_(fine_dims),
-      coarse_(coarse_dims),
-      blocks_((coarse_dims + 3u) / 4u),
-      num_threads_(num_threads),
-      off_{std::vector<float>(std::size_t{blocks_.x} * blocks_.y * blocks_.z), off_.made} {}
+    : fine_(fine_dims), coarse_(coarse_dims), blocks_((coarse_dims + 3u) / 4u), num_threads_(num_threads) {
+  off_.made.resize(std::size_t{blocks_.x} * blocks_.y * blocks_.z);
+  off_.decoded.resize(off_.made.size());
+}
 
 void LevelBounds::add_fine(std::span<const float> layers) {
   const std::size_t size = std::size_t{fine_.x} * fine_.y;

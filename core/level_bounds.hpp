@@ -16,7 +16,7 @@
 namespace isowave {
 
 /// Compares a level's field with that of the next coarser level, as it is made and as it is decoded, in memory of a few layers and 8
-/// bytes per coarse block. (One after the other, as it is made and what compression does to it, would be a fifth more at rate 4.)
+/// bytes per coarse block: at once, since what is lost in making it and what is lost in compressing it add up to less than the largest of each.
 ///
 /// The fields are trilinear, and planes of the coarse grid are planes of the fine one: in a fine cell their difference is trilinear,
 /// too, and largest at a voxel. The bound of a coarse block is the largest one in all cells that touch a voxel of it. So the field that

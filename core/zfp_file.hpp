@@ -8,7 +8,7 @@
 //                  only with levels of detail: a whole such file for each coarser level
 //                  JSON text: spacing, origin, direction, type, value_range, max_error; at fixed accuracy also payload_bits,
 //                  index_bytes (deflated), whole_numbers; with bounds also
-//                  bounds_bytes (deflated), bounds_exponent; with levels also level_bytes, a list
+//                  bounds_bytes (deflated), bounds_exponent, bounds_by_place; with levels also level_bytes, a list
 //         the last 24 bytes, little endian:
 //                  uint32 version (1; 2 at fixed accuracy; 4 with levels, or 3, without bounds) | uint32 length of the JSON text | uint32 CRC-32 of all before the
 //                  JSON text | uint32 CRC-32 of the JSON text and the three numbers before | magic "ISOWAVE\n"
