@@ -353,7 +353,7 @@ ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *ma
 /// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel], an
 /// active block. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait, and in ray_block_ids the
 /// block they wait at; *next, opened. macrocell_masks: as traverse(). frame_params, frames, ranges: as start_rays; a ray that leaves
-/// the band of its level waits behind the border.
+/// the band of its level goes on behind the border.
 ///
 /// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so few that a device would
 /// wait for the longest of them, each has more work-items, up to one for each block of a round; the first block in which anything
@@ -386,83 +386,98 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const uint i = (begin + item) / lanes, lane = item % lanes;
     const int is_ray = i < num_rays;
     const uint entry = is_ray ? active_ray_ids[i] : 0, pixel = entry & ISO_RAY_PIXEL;
-    const uint state = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
-    const uint from = ISO_LEVELS && is_ray ? state & ISO_RAY_BLOCK : state;
-    const uint side = ISO_LEVELS && is_ray ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
-    ISO_FRAME_OF(level, from);
-    const LastPlanes last = last_planes(level);
-    const Ray ray = make_ray(level, pixel);
-    uint next = from, at = lane, more = 1, waits_as = 0, decides_at = 0;
-    int result = ISO_RAY_LEFT, going = is_ray, gone = 0, first = 1;
-    BlockChange change;
-    while (more != 0) {
-      uint num_passed = 0;
-      if (lane == 0) deciding[item / lanes] = ISO_INVALID_ID;
-      if (item == 0) num_going = 0;
-      barrier(CLK_LOCAL_MEM_FENCE);
-      if (going) {
-        uint num_found = 1;
-        if (first && lanes == 1) { /* most rays of a cold frame wait right there */
-          found[item] = from;
-          next = block_behind(level, &ray, block_coords(level, from), last);
-        } else {
-          num_found = find_blocks_from(level, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
-                                       ISO_BLOCKS_AT_ONCE, found + item);
-        }
-        for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
-          const int stands_here = first && at == 0;
-          result = march_block(level, table, inside, cache_values, &ray,
-                               block_coords(level, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
-                               stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
-                               stands_here ? side : ISO_SIDE_UNKNOWN, &change);
-          if (result == ISO_RAY_LEFT) {
-            ++num_passed;
+    uint state = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
+    uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u, doubt = entry & ISO_RAY_IN_DOUBT, turns = 1;
+    int on = is_ray, waits = 0;
+    while (turns != 0) { /* one for each level of detail that a ray comes through */
+      const uint from = ISO_LEVELS && on ? state & ISO_RAY_BLOCK : state;
+      const uint side = ISO_LEVELS && on ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
+      ISO_FRAME_OF(level, from);
+      const LastPlanes last = last_planes(level);
+      const Ray ray = make_ray(level, pixel);
+      uint next = from, at = lane, more = 1, waits_as = 0, decides_at = 0;
+      int result = ISO_RAY_LEFT, going = on, gone = 0, first = 1;
+      BlockChange change;
+      while (more != 0) {
+        uint num_passed = 0;
+        if (lane == 0) deciding[item / lanes] = ISO_INVALID_ID;
+        if (item == 0) num_going = 0;
+        barrier(CLK_LOCAL_MEM_FENCE);
+        if (going) {
+          uint num_found = 1;
+          if (first && lanes == 1) { /* most rays of a cold frame wait right there */
+            found[item] = from;
+            next = block_behind(level, &ray, block_coords(level, from), last);
           } else {
-            atomic_min(&deciding[item / lanes], at);
-            decides_at = at;
-            waits_as = found[at * ISO_GROUP_SIZE + item];
+            num_found = find_blocks_from(level, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
+                                         ISO_BLOCKS_AT_ONCE, found + item);
+          }
+          for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
+            const int stands_here = first && at == 0;
+            result = march_block(level, table, inside, cache_values, &ray,
+                                 block_coords(level, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
+                                 stands_here && doubt != 0, stands_here ? side : ISO_SIDE_UNKNOWN, &change);
+            if (result == ISO_RAY_LEFT) {
+              ++num_passed;
+            } else {
+              atomic_min(&deciding[item / lanes], at);
+              decides_at = at;
+              waits_as = found[at * ISO_GROUP_SIZE + item];
+            }
           }
         }
+        barrier(CLK_LOCAL_MEM_FENCE);
+        if (going) {
+          const uint place = deciding[item / lanes];
+          if (lane < place) num_blocks += min(num_passed, (place - lane - 1) / lanes + 1);
+          if (decides_at != place) result = ISO_RAY_LEFT;
+          going = place == ISO_INVALID_ID && next != ISO_INVALID_ID;
+          gone = place == ISO_INVALID_ID && next == ISO_INVALID_ID;
+          if (going) atomic_inc(&num_going);
+        }
+        first = 0;
+        barrier(CLK_LOCAL_MEM_FENCE |
+                CLK_GLOBAL_MEM_FENCE); /* all know where their ray stood: one may say where it is */
+        more = num_going;
+        barrier(CLK_LOCAL_MEM_FENCE);
       }
-      barrier(CLK_LOCAL_MEM_FENCE);
-      if (going) {
-        const uint place = deciding[item / lanes];
-        if (lane < place) num_blocks += min(num_passed, (place - lane - 1) / lanes + 1);
-        if (decides_at != place) result = ISO_RAY_LEFT;
-        going = place == ISO_INVALID_ID && next != ISO_INVALID_ID;
-        gone = place == ISO_INVALID_ID && next == ISO_INVALID_ID;
-        if (going) atomic_inc(&num_going);
+      if (result == ISO_RAY_HIT) {
+        hits[pixel] = hit_of(level, &ray, &change);
+        ++num_hits;
+        ++num_blocks;
       }
-      first = 0;
-      barrier(CLK_LOCAL_MEM_FENCE |
-              CLK_GLOBAL_MEM_FENCE); /* all know where their ray stood: one may say where it is */
-      more = num_going;
-      barrier(CLK_LOCAL_MEM_FENCE);
+      if (result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS) {
+        waits = 1;
+        doubt = result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0;
+        if (waits_as != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
+        ray_block_ids[pixel] = ISO_LEVELS && waits_as == from ? state : waits_as;
+      }
+      turns = 0;
+      if (ISO_LEVELS) {
+        if (lane == 0) deciding[item / lanes] = ISO_INVALID_ID;
+        barrier(CLK_LOCAL_MEM_FENCE);
+        if (result >= ISO_RAY_ENDS || (gone && lane == 0)) {
+          const uint left_on = result == ISO_RAY_ENDS       ? ISO_SIDE_OUTSIDE
+                               : result == ISO_RAY_ENDS + 1 ? ISO_SIDE_INSIDE
+                                                            : ISO_SIDE_UNKNOWN;
+          state = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel,
+                                level_of(frames, num_frames, from), left_on, found + item);
+          deciding[item / lanes] = state;
+          if (state != ISO_INVALID_ID) atomic_inc(&num_going);
+        }
+        barrier(CLK_LOCAL_MEM_FENCE);
+        state = deciding[item / lanes];
+        turns = num_going;
+        on = state != ISO_INVALID_ID;
+        if (on) {
+          log_ahead = ISO_BORDER_LOG_AHEAD;
+          doubt = 0;
+        }
+        barrier(CLK_LOCAL_MEM_FENCE);
+      }
     }
-    if (result == ISO_RAY_HIT) {
-      hits[pixel] = hit_of(level, &ray, &change);
-      ++num_hits;
-      ++num_blocks;
-    }
-    int waits = result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS;
-    uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
-    if (waits) {
-      if (waits_as != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
-      ray_block_ids[pixel] = ISO_LEVELS && waits_as == from ? state : waits_as;
-    }
-    if (ISO_LEVELS && (result >= ISO_RAY_ENDS || (gone && lane == 0))) {
-      const uint left_on = result == ISO_RAY_ENDS       ? ISO_SIDE_OUTSIDE
-                           : result == ISO_RAY_ENDS + 1 ? ISO_SIDE_INSIDE
-                                                        : ISO_SIDE_UNKNOWN;
-      const uint behind = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel,
-                                        level_of(frames, num_frames, from), left_on, found + item);
-      waits = behind != ISO_INVALID_ID;
-      if (waits) ray_block_ids[pixel] = behind;
-      log_ahead = ISO_BORDER_LOG_AHEAD;
-    }
-    append_ray(waits,
-               pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
-               counters, &counts->next_active_count, next_active_ray_ids);
+    append_ray(waits, pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | doubt, counters, &counts->next_active_count,
+               next_active_ray_ids);
   }
   if (num_hits != 0) atomic_add(&group_hits, num_hits);
   if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);
@@ -526,9 +541,10 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
 /// more work-items, which share its blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
-    global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,
-    global const uint *active_ray_ids, global const uint *ray_block_ids, global uint *slot_stamps,
-    global uint *requested_bits, global uint *request_block_ids, uint capacity, global CacheState *cache) {
+    global const uint *macrocell_masks, global const ushort *ranges, global const BlockEntry *table,
+    global PassCounts *counts, global const uint *active_ray_ids, global const uint *ray_block_ids,
+    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids, uint capacity,
+    global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin;
@@ -543,30 +559,38 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
     const uint i = (begin + item) / lanes, lane = (begin + item) % lanes;
     if (i < num_rays) {
       const uint entry = active_ray_ids[i], pixel = entry & ISO_RAY_PIXEL;
-      const uint state = ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
-      uint next = ISO_LEVELS ? state & ISO_RAY_BLOCK : state,
-           side = ISO_LEVELS ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
-      ISO_FRAME_OF(level, next);
-      const LastPlanes last = last_planes(level);
-      const Ray ray = make_ray(level, pixel);
+      uint state = ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
+      /* A new ray does not look behind the border: most hit before it. */
+      const int has_moved_on = (entry >> ISO_RAY_AHEAD_SHIFT & 7u) > ISO_FIRST_LOG_AHEAD;
       const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
       /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more. */
       const uint ahead = frame->per_ray_speculation ? max(own, counts->spec_count / 2) : counts->spec_count;
-      for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
-        const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,
-                                                min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
-        side = ISO_SIDE_UNKNOWN;
-        for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
-          const uint block_id = found[at * ISO_GROUP_SIZE + item];
-          const BlockCoords b = block_coords(level, block_id);
-          const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
-          request_touched(level, table, slot_stamps, counts->pass, b, touched, requests);
-          if (i == 0 && asked + at == 0) {
-            cache->first_block_id = block_id;
-            cache->first_touched = touched;
+      for (uint asked = 0; asked < ahead && state != ISO_INVALID_ID;) { /* level by level */
+        const uint from = ISO_LEVELS ? state & ISO_RAY_BLOCK : state;
+        uint next = from, side = ISO_LEVELS ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
+        ISO_FRAME_OF(level, from);
+        const LastPlanes last = last_planes(level);
+        const Ray ray = make_ray(level, pixel);
+        while (asked < ahead && next != ISO_INVALID_ID) {
+          const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,
+                                                  min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
+          side = ISO_SIDE_UNKNOWN;
+          for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
+            const uint block_id = found[at * ISO_GROUP_SIZE + item];
+            const BlockCoords b = block_coords(level, block_id);
+            const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
+            request_touched(level, table, slot_stamps, counts->pass, b, touched, requests);
+            if (i == 0 && asked + at == 0) {
+              cache->first_block_id = block_id;
+              cache->first_touched = touched;
+            }
           }
+          asked += num_found;
         }
-        asked += num_found;
+        state = ISO_INVALID_ID;
+        if (ISO_LEVELS && asked < ahead && has_moved_on)
+          state = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel,
+                                level_of(frames, num_frames, from), ISO_SIDE_UNKNOWN, found + item);
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);

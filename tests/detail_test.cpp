@@ -341,6 +341,23 @@ TEST_P(LevelsOnDevice, FramesAreCompleteAfterTheLastBand) {
   EXPECT_EQ(stats.passes.back().completed_percent, 100.0);
 }
 
+/// Where all blocks are cached, a ray waits for nothing: neither within a level nor at a border.
+TEST_P(LevelsOnDevice, CachedRaysDoNotWaitAtBorders) {
+  const CompressedVolume volume = pyramid_of({64, 60, 56}, test::gyroid_field(16));
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  const auto passes_when_cached = [&](double max_pixel_error) {
+    Renderer renderer(device_, volume, {.size = kMedium, .max_pixel_error = max_pixel_error});
+    renderer.render(camera, 0.4f);
+    const FrameStats stats = renderer.render(camera, 0.4f);
+    if (max_pixel_error > 0) {
+      EXPECT_LT(stats.first_level, stats.last_level);
+    }
+    return stats.passes.size();
+  };
+  const std::size_t finest = passes_when_cached(0);
+  for (const double max_pixel_error : {2.0, 3.0, 4.0}) EXPECT_LE(passes_when_cached(max_pixel_error), finest);
+}
+
 TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
   const CompressedVolume volume = pyramid_of({64, 64, 64}, test::gyroid_field(16));
   const Camera camera = camera_along({32, 32, -200}, {0, 0, 1}, {0, 1, 0}, 30);
