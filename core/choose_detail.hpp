@@ -33,8 +33,8 @@ inline constexpr double kLostShare = 0.01;
 /// took 1.19 and 1.04 (README "Levels of detail").
 inline constexpr double kMaxBlocksShare = 2.0 / 3;
 
-/// Bit planes are left out only of volumes with more bits a voxel. The others' frames would take a twentieth less at most, for a bound that is
-/// zfp's promise, ten times what a block's errors are (README "An error asked for").
+/// Bit planes are left out only of volumes with more bits a voxel. The others' frames would take about a twentieth less, for a bound that is
+/// zfp's promise instead of what was measured block by block (README "An error asked for").
 inline constexpr double kMinPlaneRate = 16;
 
 /// What a renderer must be made with for choose_detail(): bounds, and all levels of detail that the volume has.

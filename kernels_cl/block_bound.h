@@ -22,9 +22,9 @@ ISO_INLINE uint packed_bound_code(ISO_GLOBAL const uint *codes, uint block) {
 }
 
 /// zfp is not as far off everywhere in a block. Bit planes left out of negabinary coefficients leave errors whose mean is not 0; at voxel
-/// (1,1,1), where all basis functions are positive, they add up to about twice what they are elsewhere, and on the lines
-/// through it along the axes to a little more. Of a block's bound, voxels of the finest level have these shares: about the quotients
-/// of their errors, while the bound is made so that no voxel exceeds its share.
+/// (1,1,1), where all basis functions are positive, they add up, and on the lines through it along the axes a
+/// little. Of a block's bound, voxels of the finest level have these shares, and the bound is made so that no voxel exceeds its own: what
+/// they are decides how tight it is, never whether it holds.
 #define ISO_BOUND_PLACES 3u
 
 /// 0: most voxels; 1: on one of the lines; 2: voxel (1,1,1). voxel: x + 4 y + 16 z.

@@ -103,8 +103,8 @@ TEST(BlockBound, NoVoxelExceedsItsShare) {
   for (const auto &field : {test::gyroid_field(15), test::noise_field(5)}) {
     for (const CompressOptions &options :
          {CompressOptions{.rate = 4}, CompressOptions{.rate = 11},
-          CompressOptions{.error_bound =
-                              ErrorBound{.min_exponent = -5}},  // as of other writers; as of convert
+          // The largest error not known, and known, as to convert.
+          CompressOptions{.error_bound = ErrorBound{.min_exponent = -5}},
           CompressOptions{.error_bound = ErrorBound{.min_exponent = -5, .max_error = 0.03125}}}) {
       const Scene scene(dims, field, options);
       const BlockBounds &bounds = scene.volume.bounds;
