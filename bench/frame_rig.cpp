@@ -33,6 +33,7 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
   params.table_groups = cache.table_groups;
   macrocells.select(params);
   macrocells.set_active_box(params);
+  set_screen_box(params);
   rays.frame = params;
 }
 

@@ -174,7 +174,6 @@ void Macrocells::set_active_box(FrameParams &frame) {
     *fields[i] = std::min((*selected.active_box)[i], num_blocks) * ISO_MACROCELL_BLOCKS;
     *fields[3 + i] = std::min((*selected.active_box)[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
   }
-  set_screen_box(frame);
 }
 
 }  // namespace isowave

@@ -45,9 +45,9 @@ void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefron
 
 void March::request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
   kernels_for(rays).request_ahead(range_, rays.frame, rays.level_frames, rays.num_level_frames,
-                                  macrocells.masks(), macrocells.ranges(), cache.table, rays.counts,
-                                  rays.next_active_ray_ids, rays.ray_block_ids, cache.slot_stamps,
-                                  cache.requested_bits, cache.request_block_ids, cache.capacity, cache.state);
+                                  macrocells.masks(), cache.table, rays.counts, rays.next_active_ray_ids,
+                                  rays.ray_block_ids, cache.slot_stamps, cache.requested_bits,
+                                  cache.request_block_ids, cache.capacity, cache.state);
 }
 
 }  // namespace isowave

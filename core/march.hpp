@@ -43,9 +43,9 @@ class March {
                 ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
                 ocl::Out<HitRecord>, ocl::Out<CacheState>>
         march;
-    ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
-                ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>,
-                ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
+    ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>,
+                ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
+                ocl::Out<uint>, uint, ocl::Out<CacheState>>
         request_ahead;
   };
   Kernels &kernels_for(const Wavefront &rays);

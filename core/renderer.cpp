@@ -188,8 +188,9 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
       const auto stage = device_.timer().stage("macrocells");
       level.macrocells.select(frame, level.range_error, &level.stream);
       level.macrocells.set_index(frame);
-      // Where there are several bands, a ray's way begins at a border wherever it crosses that.
-      if (!has_bands) level.macrocells.set_active_box(frame);
+      level.macrocells.set_active_box(frame);
+      // Where there are several bands, a ray stands at a border wherever it crosses that.
+      if (!has_bands) set_screen_box(frame);
     }
     level.frame = frame;
   }
@@ -197,11 +198,11 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
   state_.rays.frame = level_frames_.front();
   state_.rays.num_level_frames = static_cast<std::uint32_t>(level_frames_.size());
   if (has_levels()) state_.rays.level_frames.write_async(level_frames_);
-  if (classified_isovalue_ != isovalue) {
+  if (cached_isovalue_.value_or(isovalue) != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
     state_.cache.classify(state_.rays);
-    classified_isovalue_ = isovalue;
   }
+  cached_isovalue_ = isovalue;
   pipeline_->begin_frame();
 }
 
@@ -267,9 +268,7 @@ void Renderer::update_layouts() {
     level.stream.layout = layout;
     level.range_error = few_planes;
   }
-  if (!changes) return;
-  classified_isovalue_.reset();
-  clear_cache();
+  if (changes) clear_cache();
 }
 
 void Renderer::set_max_pixel_error(double max_pixel_error) {
@@ -304,6 +303,7 @@ void Renderer::enlarge_kept(const Camera &camera, float isovalue) {
 void Renderer::clear_cache() {
   state_.cache.clear();
   device_.finish();
+  cached_isovalue_.reset();
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {

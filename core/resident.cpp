@@ -81,6 +81,7 @@ double Resident::render(const Camera &camera, float isovalue) {
     changing_kernel_(blocks, frame, num_blocks_, inside_, changing_);
   }
   macrocells_.set_active_box(frame);
+  set_screen_box(frame);
   selected_isovalue_ = isovalue;
   const std::size_t tiles = std::size_t{(frame.width + 7) / 8} * ((frame.height + 3) / 4);
   // One work-item per pixel: rays differ too much in length for strides over them to keep a device busy.
