@@ -20,8 +20,9 @@ namespace isowave {
 namespace {
 
 constexpr float kNotCertain = std::numeric_limits<float>::infinity();
-/// Of a distance: what t may have lost in float32.
-constexpr double kDistanceRounding = 0x1p-20;
+/// What the t of a drawn hit and that of a bound's may have lost in float32 (make_hit()): each half an ulp of itself, and eight roundings of
+/// the ray's length in the cell: two of the step between its faces, one of the sum, and those of the root (ISO_ROOT_STEP).
+constexpr double kDistanceRounding = 2 * 0x1p-24, kCellRounding = 2 * 0x1p-21;
 
 /// A level's decoded voxels, block by block as they are asked for. Not thread-safe.
 class BlockValues {
@@ -137,6 +138,9 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   const std::vector<FrameParams> frames =
       make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size, isovalue,
                         options.max_pixel_error);
+  const glm::dmat3 voxel = levels.back()->info.index_to_world();
+  const double cell_rounding =
+      kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
   const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / options.size.height;
   certificate.bounds.assign(drawn.size(), kNotCertain);
   constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks
@@ -156,8 +160,8 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
         if (way[0] > way[1] || starts_certainly(frames, values, pixel)) bound = 0;
       } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] && last_t <= way[1] &&
                  starts_certainly(frames, values, pixel)) {
-        const double distance =
-            std::max(std::abs(t - first_t), std::abs(last_t - t)) + kDistanceRounding * last_t;
+        const double rounding = kDistanceRounding * last_t + cell_rounding;
+        const double distance = std::max(t - first_t, last_t - t) + rounding;
         bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
       }
     }

@@ -284,6 +284,22 @@ TEST_P(CertifyOnDevice, RealVolumes) {
   EXPECT_GT(2 * certified, all) << "too few for a test";
 }
 
+/// From so far that most of an error is what t loses in float32.
+TEST_P(CertifyOnDevice, FarAway) {
+  const Scene scene("nucleon_41x41x41_uint8.raw.gz",
+                    {.error_bound = ErrorBound{.min_exponent = -16, .max_error = 0x1p-16}});
+  Camera camera = orbit_cameras(scene.volume.info, 1)[0];
+  camera.eye = camera.at + 700.0 * (camera.eye - camera.at);
+  camera.fovy_deg /= 700;
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  renderer.render(camera, 80);
+  const std::vector<HitRecord> drawn = renderer.hits();
+  const std::vector<double> slack =
+      expect_kept(certify(renderer, scene.volume, camera, 80, drawn), drawn, scene, camera, kMedium, 80);
+  ASSERT_GT(slack.size(), 500u);
+  EXPECT_LT(slack[0], 3) << "farther off than rounding explains";
+}
+
 /// The goal is that half of the pixels have a bound of at most 8 times their error.
 TEST_P(CertifyOnDevice, BoundsAreTight) {
   for (const CompressOptions &options :
