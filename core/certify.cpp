@@ -123,10 +123,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   }
   renderer.draw_bound(FieldBound::kNone);
 
-  std::vector<const CompressedVolume *> levels = {&volume};
-  if (options.max_pixel_error > 0) {
-    for (const CompressedVolume &level : volume.coarser) levels.push_back(&level);
-  }
+  const std::vector<const CompressedVolume *> levels = levels_of(volume, options.max_pixel_error > 0);
   std::vector<ValueOffset> offsets;
   std::vector<double> value_errors;
   for (const CompressedVolume *level : levels) {
@@ -138,7 +135,9 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   const std::vector<FrameParams> frames =
       make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size, isovalue,
                         options.max_pixel_error);
-  const glm::dmat3 voxel = levels.back()->info.index_to_world();
+  std::size_t coarsest = levels.size() - 1;
+  while (!draws(frames[coarsest])) --coarsest;
+  const glm::dmat3 voxel = levels[coarsest]->info.index_to_world();
   const double cell_rounding =
       kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
   const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / options.size.height;

@@ -47,10 +47,15 @@ void place_levels(std::span<FrameParams> frames) {
 
 }  // namespace
 
+std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels) {
+  std::vector<const CompressedVolume *> levels = {&volume};
+  for (std::size_t i = 0; with_levels && i < volume.coarser.size(); ++i) levels.push_back(&volume.coarser[i]);
+  return levels;
+}
+
 std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels) {
-  std::vector<VolumeInfo> infos = {volume.info};
-  if (!with_levels) return infos;
-  for (const CompressedVolume &level : volume.coarser) infos.push_back(level.info);
+  std::vector<VolumeInfo> infos;
+  for (const CompressedVolume *level : levels_of(volume, with_levels)) infos.push_back(level->info);
   return infos;
 }
 

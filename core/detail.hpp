@@ -30,7 +30,8 @@ inline double value_error_of(double value_error, std::size_t level) {
   return std::ldexp(value_error, static_cast<int>(level));
 }
 
-/// Of the volume and, where levels are wanted, its coarser levels.
+/// The volume and, where levels are wanted, its coarser levels.
+std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels);
 std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels);
 
 /// Grid parameters of each level, with the places of its blocks, ranges and masks among those of all levels.

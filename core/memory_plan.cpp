@@ -159,9 +159,8 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   plan.buffers = {{"block ranges", 2 * (last.ranges_begin + block_count(last))}};
   for (std::size_t i = 0; i < num_selections(request); ++i)
     plan.buffers.push_back({"macrocell masks", 4 * (last.masks_begin + 2 * num_macrocells(last))});
-  add_level(plan, volume, request);
-  for (std::size_t i = 0; request.with_levels && i < volume.coarser.size(); ++i)
-    add_level(plan, volume.coarser[i], request);
+  for (const CompressedVolume *level : levels_of(volume, request.with_levels))
+    add_level(plan, *level, request);
   plan.buffers.insert(plan.buffers.end(),
                       {{"pass counts", sizeof(PassCounts)},
                        {"pass counts, previous", sizeof(PassCounts)},

@@ -27,13 +27,13 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   check_volume_info(volume.info, "the volume");
   check_image_size(options.size);
   check_levels(volume, options.max_pixel_error);
-  std::uint64_t num_ids = volume.block_count();
-  if (options.max_pixel_error > 0) {
-    if (options.pipeline == PipelineKind::kBlocks)
-      throw Error("pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
-    const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
-    for (const CompressedVolume &level : volume.coarser) num_ids += layer_ids * level.num_blocks().z;
-  }
+  const bool with_levels = options.max_pixel_error > 0;
+  if (with_levels && options.pipeline == PipelineKind::kBlocks)
+    throw Error("pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
+  const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
+  std::uint64_t num_ids = 0;  // see make_id_grid()
+  for (const CompressedVolume *level : levels_of(volume, with_levels))
+    num_ids += layer_ids * level->num_blocks().z;
   if (num_ids >= ISO_MAX_CACHE_SLOTS) {
     throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids, ISO_MAX_CACHE_SLOTS);
   }
@@ -69,8 +69,9 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
       options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0};
   const std::uint64_t budget =
       options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
-  std::uint64_t all = std::max<std::uint64_t>(volume.block_count(), kMinCacheSlots);
-  for (const CompressedVolume &level : volume.coarser) all += request.with_levels ? level.block_count() : 0;
+  std::uint64_t num_blocks = 0;
+  for (const CompressedVolume *level : levels_of(volume, request.with_levels))
+    num_blocks += level->block_count();
   if (options.cache_slots != 0) {
     MemoryPlan plan = plan_with_slots(volume, request, budget, options.cache_slots);
     if (options.memory_budget != 0 && plan.peak() > budget) {
@@ -83,14 +84,13 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
   }
   const std::uint64_t most =
       options.memory_budget != 0 ? std::uint64_t{ISO_MAX_CACHE_SLOTS} : kAmpleCacheSlots;
-  return plan_within(device, volume, request, budget, static_cast<std::uint32_t>(std::min(all, most)));
+  return plan_within(device, volume, request, budget,
+                     static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most)));
 }
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
                       const MemoryPlan &plan) {
-  std::vector<const CompressedVolume *> volumes = {&volume};
-  for (std::size_t i = 0; options.max_pixel_error > 0 && i < volume.coarser.size(); ++i)
-    volumes.push_back(&volume.coarser[i]);
+  const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.max_pixel_error > 0);
   const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.max_pixel_error > 0));
   const FrameParams ids = make_id_grid(grids), &last = grids.back();
   const bool has_levels = volumes.size() > 1;

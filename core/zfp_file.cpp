@@ -20,6 +20,7 @@
 #include "core/libzfp.hpp"
 #include "core/pyramid.hpp"
 #include "core/zfp_accuracy.hpp"
+#include "kernels_cl/block_bound.h"
 
 namespace isowave {
 namespace fs = std::filesystem;
@@ -76,7 +77,7 @@ json to_json(const CompressedVolume &volume, const PartSizes &sizes,
   if (sizes.bounds != 0) {
     trailer["bounds_bytes"] = sizes.bounds;
     trailer["bounds_exponent"] = volume.bounds.exponent;
-    if (volume.bounds.by_place) trailer["bounds_by_place"] = true;
+    if (volume.bounds.by_place) trailer["bounds_by_place"] = ISO_BOUND_PLACES_RULE;
   }
   if (!level_bytes.empty()) trailer["level_bytes"] = level_bytes;
   return trailer;
@@ -105,7 +106,8 @@ PartSizes apply_json(const std::string &text, CompressedVolume &volume,
   if (trailer.contains("bounds_bytes")) {
     sizes.bounds = trailer["bounds_bytes"].get<std::uint64_t>();
     volume.bounds.exponent = trailer.at("bounds_exponent").get<std::int32_t>();
-    volume.bounds.by_place = trailer.value("bounds_by_place", false);
+    // Of another rule, all voxels of a block have its whole bound.
+    volume.bounds.by_place = trailer.value("bounds_by_place", json(0)) == ISO_BOUND_PLACES_RULE;
   }
   if (!volume.is_indexed()) return sizes;
   volume.indexed_bits = trailer.at("payload_bits").get<std::uint64_t>();

@@ -240,7 +240,7 @@ CompressedVolume describe(const VolumeReader &reader, const CompressOptions &opt
 }
 
 /// The volume and its coarser levels.
-std::vector<CompressedVolume *> levels_of(CompressedVolume &volume) {
+std::vector<CompressedVolume *> all_levels(CompressedVolume &volume) {
   std::vector<CompressedVolume *> levels = {&volume};
   for (CompressedVolume &level : volume.coarser) levels.push_back(&level);
   return levels;
@@ -249,7 +249,7 @@ std::vector<CompressedVolume *> levels_of(CompressedVolume &volume) {
 /// Hands the payload of each level to its sink, in order, and completes `volume`.
 void run(VolumeReader &reader, const CompressOptions &options, std::span<const Sink> sinks,
          CompressedVolume &volume) {
-  PyramidCoder coder(options, levels_of(volume), sinks);
+  PyramidCoder coder(options, all_levels(volume), sinks);
   volume.value_range = read_in_chunks(reader, options.input, coder);
   coder.finish();
 }
@@ -314,7 +314,7 @@ void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing) {
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) {
   CompressedVolume volume = describe(reader, options);
   std::vector<Sink> sinks;
-  for (CompressedVolume *level : levels_of(volume)) {
+  for (CompressedVolume *level : all_levels(volume)) {
     level->words.reserve(level->is_indexed() ? 0 : level->word_count());
     sinks.emplace_back([&words = level->words](Payload payload) {
       const std::size_t begin = words.size();
@@ -323,7 +323,7 @@ CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) 
     });
   }
   run(reader, options, sinks, volume);
-  for (CompressedVolume *level : levels_of(volume))
+  for (CompressedVolume *level : all_levels(volume))
     level->words.resize((level->payload_bits() + 31) / 32 + kDecoderAhead);
   return volume;
 }

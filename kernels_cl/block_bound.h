@@ -22,19 +22,23 @@ ISO_INLINE uint packed_bound_code(ISO_GLOBAL const uint *codes, uint block) {
 }
 
 /// zfp is not as far off everywhere in a block. Bit planes left out of negabinary coefficients leave errors whose mean is not 0; at voxel
-/// (1,1,1), where all basis functions are positive, they add up, and on the lines through it along the axes a
-/// little. Of a block's bound, voxels of the finest level have these shares, and the bound is made so that no voxel exceeds its own: what
-/// they are decides how tight it is, never whether it holds.
+/// (1,1,1), where all basis functions are positive, they add up, and on the lines through it along the axes, at voxel (2,2,2) and at
+/// corners a little. Of a block's bound, voxels of the finest level have these shares, and the bound is made so that no voxel exceeds its
+/// own: what they are decides how tight it is, never whether it holds. Files name the number of this rule.
 #define ISO_BOUND_PLACES 3u
+#define ISO_BOUND_PLACES_RULE 2u
 
-/// 0: most voxels; 1: on one of the lines; 2: voxel (1,1,1). voxel: x + 4 y + 16 z.
+/// 0: most voxels; 1: those little ones; 2: voxel (1,1,1). voxel: x + 4 y + 16 z.
 ISO_INLINE uint bound_place(uint voxel) {
-  const uint ones = (uint)((voxel & 3u) == 1u) + (uint)((voxel >> 2 & 3u) == 1u) + (uint)(voxel >> 4 == 1u);
-  return ones <= 1u ? 0u : ones - 1u;
+  const uint x = voxel & 3u, y = voxel >> 2 & 3u, z = voxel >> 4;
+  const uint ones = (uint)(x == 1u) + (uint)(y == 1u) + (uint)(z == 1u);
+  const int is_corner = x % 3u == 0u && y % 3u == 0u && z % 3u == 0u;
+  if (ones == 3u) return 2u;
+  return ones == 2u || is_corner || (x == 2u && y == 2u && z == 2u) ? 1u : 0u;
 }
 
 ISO_INLINE float bound_share(uint place) {
-  return place == 0u ? 0.5f : place == 1u ? 0.625f : 1.0f;
+  return place == 0u ? 0.5625f : place == 1u ? 0.625f : 1.0f;
 }
 
 ISO_NAMESPACE_END

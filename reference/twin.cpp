@@ -25,19 +25,16 @@ void add_offset(const CompressedVolume &level, const ValueOffset &offset, std::v
 Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_error, FieldBound bound)
     : max_pixel_error_(max_pixel_error) {
   check_levels(volume, max_pixel_error);
-  const auto add = [&](const CompressedVolume &level) {
+  for (const CompressedVolume *level : levels_of(volume, max_pixel_error > 0)) {
     const double level_error = value_error_of(value_error, levels_.size());
-    levels_.push_back(level.info);
-    voxels_.push_back(decode_with_libzfp(level, level_error));
-    if (bound == FieldBound::kNone) return;
+    levels_.push_back(level->info);
+    voxels_.push_back(decode_with_libzfp(*level, level_error));
+    if (bound == FieldBound::kNone) continue;
     const ValueOffset offset =
-        value_offset({level, &level == &volume}, bound, plane_error(level.error_bound, level_error),
+        value_offset({*level, level == &volume}, bound, plane_error(level->error_bound, level_error),
                      magnitude_of(volume.value_range));
-    add_offset(level, offset, voxels_.back());
-  };
-  add(volume);
-  if (max_pixel_error == 0) return;
-  for (const CompressedVolume &level : volume.coarser) add(level);
+    add_offset(*level, offset, voxels_.back());
+  }
 }
 
 std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float isovalue,

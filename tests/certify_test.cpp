@@ -87,9 +87,11 @@ TEST(BlockBound, AreNeverBelow) {
 TEST(BlockBound, SharesGrowTowardsOneVoxel) {
   std::array<int, ISO_BOUND_PLACES> num_voxels{};
   for (uint voxel = 0; voxel < ISO_BLOCK_VOXELS; ++voxel) ++num_voxels.at(bound_place(voxel));
-  EXPECT_THAT(num_voxels, testing::ElementsAre(54, 9, 1));
+  EXPECT_THAT(num_voxels, testing::ElementsAre(45, 18, 1));
   EXPECT_EQ(bound_place(1 + 4 + 16), 2u);
   EXPECT_EQ(bound_place(3 + 4 + 16), 1u);
+  EXPECT_EQ(bound_place(3 + 48), 1u);
+  EXPECT_EQ(bound_place(2 + 8 + 32), 1u);
   EXPECT_EQ(bound_place(3 + 4), 0u);
   EXPECT_LT(bound_share(0), bound_share(1));
   EXPECT_LT(bound_share(1), bound_share(2));

@@ -4,10 +4,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include "core/error.hpp"
 #include "core/io/mapped_file.hpp"
@@ -213,6 +215,27 @@ TEST_F(PyramidFile, EveryLevelComesBack) {
     set_spacing(respaced, {5, 6, 7});
     EXPECT_EQ(respaced.coarser.at(1).info.spacing, glm::dvec3(20, 24, 28));
   }
+}
+
+/// Bounds whose shares this program does not know are those of whole blocks, which hold as well.
+TEST_F(PyramidFile, BoundsByAnotherRuleAreOfBlocks) {
+  const CompressedVolume volume = write({.rate = 7, .measure_error = true, .levels = 2});
+  std::string bytes = test::read_file(folder_ / "a.zfp");
+  EXPECT_TRUE(read_zfp_file(folder_ / "a.zfp").bounds.by_place);
+  const std::string field = "\"bounds_by_place\":";
+  const std::size_t at = bytes.rfind(field) + field.size(), footer = bytes.size() - 24;
+  ASSERT_EQ(bytes.at(at), '2');
+  bytes[at] = '3';
+  std::uint32_t json_bytes = 0;
+  std::memcpy(&json_bytes, &bytes[footer + 4], 4);
+  const auto crc =
+      static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef *>(&bytes[footer - json_bytes]),
+                                       json_bytes + 12));  // and three numbers
+  std::memcpy(&bytes[footer + 12], &crc, 4);
+  test::write_file(folder_ / "b.zfp", bytes);
+  const CompressedVolume got = read_zfp_file(folder_ / "b.zfp");
+  EXPECT_FALSE(got.bounds.by_place);
+  EXPECT_EQ(got.bounds.codes, volume.bounds.codes);
 }
 
 TEST_F(PyramidFile, BeginsAsTheVolumeWithoutLevels) {

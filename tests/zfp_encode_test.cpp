@@ -163,7 +163,7 @@ class ZfpEncodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       got_errors[i] = double{pairs[2 * i]} + double{pairs[2 * i + 1]};
     for (std::size_t i = 0; i < voxels.size(); ++i) {
       const std::size_t x = i % dims.x, y = i / dims.x % dims.y, z = i / dims.x / dims.y;
-      const std::size_t ones = (x % 4 == 1) + (y % 4 == 1) + (z % 4 == 1), place = ones < 2 ? 0 : ones - 1;
+      const uint place = bound_place(static_cast<uint>(x % 4 + 4 * (y % 4) + 16 * (z % 4)));
       double &largest =
           expected_errors[ISO_BOUND_PLACES * (x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))) + place];
       largest = std::max(largest, std::abs(double{decoded[i]} - double{voxels[i]}));
