@@ -129,8 +129,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   for (const CompressedVolume *level : levels) {
     value_errors.push_back(value_error_of(renderer.value_error(), value_errors.size()));
     offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
-                                   plane_error(level->error_bound, value_errors.back()),
-                                   magnitude_of(volume.value_range)));
+                                   plane_error(level->error_bound, value_errors.back()), volume.value_range));
   }
   const std::vector<FrameParams> frames =
       make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size, isovalue,

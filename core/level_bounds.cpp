@@ -22,8 +22,10 @@ Reach reach_of(std::uint32_t block, std::uint32_t fine_dim) {
   return {first - std::min(first, 2u), std::min(first + 9, fine_dim)};
 }
 
-/// Of a magnitude: 64 roundings of a float32, more than values at a crossing and its position go through.
-constexpr double kRounding = 0x1p-18;
+/// What float32 may lose between voxels and the field at a hit, in roundings: of values, when they are raised or lowered; of their
+/// differences from the isovalue, when these are taken (1), where lerps of three axes (6), positions on two (2), sums and thirds (4) make
+/// a cubic of them (segment_cubic()), and where three more (6) evaluate that. 19, and some for what is left out here.
+constexpr double kValueRounding = 2 * 0x1p-24, kDifferenceRounding = 24 * 0x1p-24;
 
 }  // namespace
 
@@ -153,8 +155,10 @@ LevelError::LevelError(const CompressedVolume &level, bool finest) {
   if (!bounds.codes.empty()) {
     uniform = 0;
     unit = std::ldexp(1.0f, bounds.exponent);
+    largest = double{largest_bound(bounds)};
   } else if (finest) {
     uniform = known_max_error(level);
+    largest = uniform.value_or(0);
   }
 }
 
@@ -170,18 +174,24 @@ double plane_error(const ErrorBound &bound, double value_error) {
   return std::ldexp(1.0, fewer.min_exponent) + (bound.whole_numbers ? 0.5 : 0.0);
 }
 
-ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error, double magnitude) {
+ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,
+                         const std::array<float, 2> &value_range) {
   if (bound == FieldBound::kNone) return {};
+  const double lowest = double{value_range[0]}, highest = double{value_range[1]};
+  if (!std::isfinite(lowest) || !std::isfinite(highest))
+    throw Error("the volume's range of values is not known: convert it again");
   if (!error.uniform) {
     throw Error(
         "the volume's error is not known, or not that of its levels of detail: convert it again, with "
         "--levels and without "
         "--no-verify");
   }
-  const double value_error = *error.uniform + plane_error;
-  const float uniform =
-      std::nextafter(static_cast<float>(value_error + kRounding * (magnitude + value_error)),
-                     std::numeric_limits<float>::infinity());
+  const double beyond = 2 * (error.largest + plane_error);  // the range, as decoded, raised and lowered
+  const double magnitude = std::max(std::abs(lowest), std::abs(highest)) + beyond,
+               difference = highest - lowest + 2 * beyond;
+  const double rounding = kValueRounding * magnitude + kDifferenceRounding * difference;
+  const float uniform = std::nextafter(static_cast<float>(*error.uniform + plane_error + rounding),
+                                       std::numeric_limits<float>::infinity());
   return bound == FieldBound::kUpper ? ValueOffset{uniform, error.unit} : ValueOffset{-uniform, -error.unit};
 }
 
@@ -190,12 +200,6 @@ float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std:
   if (offset.unit == 0) return offset.uniform;
   const float share = bounds.by_place ? bound_share(bound_place(voxel)) : 1.0f;
   return offset.uniform + offset.unit * block_bound(bounds.codes[block]) * share;
-}
-
-double magnitude_of(const std::array<float, 2> &value_range) {
-  const double magnitude = std::max(std::abs(double{value_range[0]}), std::abs(double{value_range[1]}));
-  if (!std::isfinite(magnitude)) throw Error("the volume's range of values is not known: convert it again");
-  return magnitude;
 }
 
 }  // namespace isowave

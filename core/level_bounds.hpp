@@ -74,6 +74,7 @@ struct LevelError {
 
   std::optional<double> uniform;  ///< of every value; nothing is known without it
   float unit = 0;                 ///< and of its block's bound besides
+  double largest = 0;             ///< of all values
 };
 float largest_bound(const BlockBounds &bounds);
 
@@ -85,15 +86,13 @@ double plane_error(const ErrorBound &bound, double value_error);
 struct ValueOffset {
   float uniform = 0, unit = 0;
 };
-/// plane_error: of values of fewer bit planes, against those of all. magnitude: of the values that occur, of which what sums lose in
-/// float32 counts as error, too. Throws Error where the level's error is not known.
-ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error, double magnitude);
+/// plane_error: of values of fewer bit planes, against those of all. value_range: of the volume before compression, of which what sums lose
+/// in float32 counts as error, too. Throws Error where that range or the level's error is not known.
+ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,
+                         const std::array<float, 2> &value_range);
 
 /// What is added to a voxel's value, voxel: x + 4 y + 16 z in its block: as decode_block() in kernels_cl/block_stream.h adds it up.
 float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
                       std::uint32_t voxel);
-
-/// The largest magnitude in a volume's range. Throws Error where that is not known.
-double magnitude_of(const std::array<float, 2> &value_range);
 
 }  // namespace isowave

@@ -240,8 +240,7 @@ void Renderer::set_value_error(double value_error) {
 void Renderer::draw_bound(FieldBound bound) {
   if (bound != FieldBound::kNone) {
     if (!options_.with_bounds) throw std::logic_error("the renderer was made without bounds");
-    const double magnitude = magnitude_of(value_range_);
-    for (const Level &level : state_.levels) value_offset(level.error, bound, 0, magnitude);  // or throws
+    for (const Level &level : state_.levels) value_offset(level.error, bound, 0, value_range_);  // or throws
   }
   bound_ = bound;
   if (options_.with_bounds) state_.levels[0].macrocells.use(static_cast<std::size_t>(bound));
@@ -259,8 +258,7 @@ void Renderer::update_layouts() {
     StreamLayout layout = level.stream.layout;
     layout.min_exponent = planes.min_exponent;
     layout.whole_numbers = planes.whole_numbers ? 1 : 0;
-    const double magnitude = bound_ == FieldBound::kNone ? 0.0 : magnitude_of(value_range_);
-    const ValueOffset offset = value_offset(level.error, bound_, few_planes, magnitude);
+    const ValueOffset offset = value_offset(level.error, bound_, few_planes, value_range_);
     layout.value_offset = offset.uniform;
     layout.bound_unit = offset.unit;
     if (std::memcmp(&layout, &level.stream.layout, sizeof(layout)) == 0) continue;

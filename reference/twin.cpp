@@ -30,9 +30,8 @@ Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_
     levels_.push_back(level->info);
     voxels_.push_back(decode_with_libzfp(*level, level_error));
     if (bound == FieldBound::kNone) continue;
-    const ValueOffset offset =
-        value_offset({*level, level == &volume}, bound, plane_error(level->error_bound, level_error),
-                     magnitude_of(volume.value_range));
+    const ValueOffset offset = value_offset({*level, level == &volume}, bound,
+                                            plane_error(level->error_bound, level_error), volume.value_range);
     add_offset(*level, offset, voxels_.back());
   }
 }

@@ -302,6 +302,33 @@ TEST_P(CertifyOnDevice, FarAway) {
   EXPECT_LT(slack[0], 3) << "farther off than rounding explains";
 }
 
+/// Voxels are exact, and the eye is among them: what is left is mostly what float32 loses of values.
+TEST_P(CertifyOnDevice, ExactVolumes) {
+  const auto noise = [field = test::noise_field(3)](const glm::dvec3 &at) mutable {
+    return std::rint(127.5 + 127.5 * field(at));
+  };
+  const Scene scene({40, 40, 40}, noise,
+                    {.error_bound = ErrorBound{.min_exponent = -6, .whole_numbers = true, .max_error = 0}});
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  std::uint64_t certified = 0, all = 0;
+  for (const double x : {12.0, 19.0, 26.0}) {
+    for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
+      const Camera camera = camera_along({x, 20, 21}, direction);
+      for (const float isovalue : {60.0f, 120.5f}) {
+        renderer.render(camera, isovalue);
+        const std::vector<HitRecord> drawn = renderer.hits();
+        const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
+        expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
+        const CertificateSummary summary = summarize(certificate, 0.01);
+        certified += summary.num_certified;
+        all += summary.num_pixels;
+      }
+    }
+  }
+  EXPECT_GT(all, 10000u);
+  EXPECT_GT(20 * certified, 19 * all);
+}
+
 /// The goal is that half of the pixels have a bound of at most 8 times their error.
 TEST_P(CertifyOnDevice, BoundsAreTight) {
   for (const CompressOptions &options :
