@@ -8,15 +8,16 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/choose_detail.hpp"
 #include "core/compare.hpp"
 #include "core/error.hpp"
 #include "core/flip.hpp"
+#include "core/parallel_for.hpp"
 #include "core/renderer.hpp"
 #include "reference/accuracy.hpp"
 #include "tools/isowave/frame_options.hpp"
@@ -108,19 +109,38 @@ struct Errors {
   double flip = 0;
   double psnr_db = std::numeric_limits<double>::infinity();  ///< infinite: the same pictures
 
-  void add(const Truth &truth, const View &view, double voxel) {
-    const DepthComparison depth = compare_depth(truth.depth, view.depth);
-    pixels += depth.num_pixels;
-    missed += depth.false_negatives;
-    false_hits += depth.false_positives;
-    if (depth.error) depth_p99 = std::max(depth_p99, depth.error->p99 / voxel);
-    normal_p99 = std::max(normal_p99, normal_error(truth, view));
-    const std::optional<double> psnr = compare_colour(truth.picture, view.picture).psnr_db;
-    if (!psnr) return;
-    psnr_db = std::min(psnr_db, *psnr);
-    flip = std::max(flip, truth.flip.error(view.picture));
+  double wrong_pixels() const { return double(missed + false_hits) / double(pixels); }
+
+  bool no_worse_than(const Errors &other) const {
+    return wrong_pixels() <= other.wrong_pixels() && depth_p99 <= other.depth_p99 &&
+           normal_p99 <= other.normal_p99 && flip <= other.flip;
+  }
+
+  void add(const Errors &other) {
+    pixels += other.pixels;
+    missed += other.missed;
+    false_hits += other.false_hits;
+    depth_p99 = std::max(depth_p99, other.depth_p99);
+    normal_p99 = std::max(normal_p99, other.normal_p99);
+    flip = std::max(flip, other.flip);
+    psnr_db = std::min(psnr_db, other.psnr_db);
   }
 };
+
+Errors errors_of(const Truth &truth, const View &view, double voxel) {
+  Errors errors;
+  const DepthComparison depth = compare_depth(truth.depth, view.depth);
+  errors.pixels = depth.num_pixels;
+  errors.missed = depth.false_negatives;
+  errors.false_hits = depth.false_positives;
+  if (depth.error) errors.depth_p99 = depth.error->p99 / voxel;
+  errors.normal_p99 = normal_error(truth, view);
+  const std::optional<double> psnr = compare_colour(truth.picture, view.picture).psnr_db;
+  if (!psnr) return errors;
+  errors.psnr_db = *psnr;
+  errors.flip = truth.flip.error(view.picture);
+  return errors;
+}
 
 /// One volume, its views, and what they should show.
 struct ParetoSubject {
@@ -128,35 +148,92 @@ struct ParetoSubject {
   ImageSize size;
   double voxel = 0;        ///< longest of its spacings [world units]
   double value_range = 0;  ///< largest minus smallest value
-  std::vector<Truth> truth;
+  float isovalue = 0;
+  std::uint32_t rounds = 0;  ///< times that each view is drawn
+  std::vector<Truth> truth;  ///< of each view
 };
 
-/// Draws every view `rounds` times from an empty cache. prepare: called before each view.
-ordered_json measure(Renderer &renderer, const ParetoSubject &subject, const BenchParetoArgs &options,
-                     const std::function<void(const Camera &)> &prepare = {}) {
+/// A volume as it is stored.
+struct Stored {
+  std::string name;  ///< as parse_storage() reads it
+  CompressedVolume volume;
+};
+
+/// One way to draw all views, and what it costs.
+struct Point {
+  const Stored *stored = nullptr;
+  std::string pipeline = "rays";
+  std::string solver{to_string(kDefaultSolver)};
+  std::vector<Detail> details;       ///< of each view
+  std::optional<double> max_error;   ///< [pixels], for which they were chosen
+  std::vector<bool> reachable;       ///< DetailChoice::reachable, of each view
+  double ms = 0;                     ///< median of all cold frames
+  std::uint64_t decoded_blocks = 0;  ///< mean of the views
+  Errors errors;
+  std::optional<double> over_front;  ///< see compare_choices()
+};
+
+/// Whether the levels of detail must be there for it.
+bool has_levels(const Point &point) {
+  return point.max_error || point.details.front().max_pixel_error > 0;
+}
+
+Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const Point &point) {
+  RendererFlags flags{.pipeline = point.pipeline, .solver = point.solver, .values = {}};
+  if (!point.max_error) flags.values.max_pixel_error = point.details.front().max_pixel_error;
+  const RendererOptions options = to_renderer_options(flags, subject.size);
+  const CompressedVolume &volume = point.stored->volume;
+  return Renderer(device, volume, point.max_error ? with_choices(options, volume) : options);
+}
+
+/// Sets the renderer to one view of the point, and draws it once: the first frame of an isovalue, or of a precision, does more.
+void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point, std::size_t view) {
+  renderer.set_max_pixel_error(point.details[view].max_pixel_error);
+  renderer.set_value_error(point.details[view].value_error);
+  renderer.render(subject.cameras[view], subject.isovalue);
+}
+
+FrameStats draw_cold(Renderer &renderer, const ParetoSubject &subject, std::size_t view) {
+  renderer.clear_cache();
+  return renderer.render(subject.cameras[view], subject.isovalue);
+}
+
+/// Draws every view `rounds` times from an empty cache.
+void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
   std::vector<double> times;
   std::uint64_t decoded = 0;
-  Errors errors;
-  renderer.render(subject.cameras.front(), options.isovalue);  // the first frame of an isovalue does more
+  std::vector<View> views;
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
-    if (prepare) prepare(subject.cameras[view]);
-    for (std::uint32_t round = 0; round < options.rounds; ++round) {
-      renderer.clear_cache();
-      const FrameStats stats = renderer.render(subject.cameras[view], options.isovalue);
+    warm_up(renderer, subject, point, view);
+    for (std::uint32_t round = 0; round < subject.rounds; ++round) {
+      const FrameStats stats = draw_cold(renderer, subject, view);
       times.push_back(stats.total_ms);
       for (const PassStats &pass : stats.passes) decoded += round == 0 ? pass.counts.decoded_count : 0;
     }
-    errors.add(subject.truth[view], view_of(renderer), subject.voxel);
+    views.push_back(view_of(renderer));
   }
-  return {{"ms", quantiles(times).p50},
-          {"decoded_blocks", decoded / subject.cameras.size()},
-          {"wrong_pixels", double(errors.missed + errors.false_hits) / double(errors.pixels)},
-          {"missed", errors.missed},
-          {"false", errors.false_hits},
-          {"depth_p99", errors.depth_p99},
-          {"normal_p99", errors.normal_p99},
-          {"flip", errors.flip},
-          {"psnr_db", std::isfinite(errors.psnr_db) ? ordered_json(errors.psnr_db) : ordered_json()}};
+  std::vector<Errors> errors(views.size());
+  parallel_for(views.size(), 0, [&](std::uint64_t view, std::uint32_t) {
+    errors[view] = errors_of(subject.truth[view], views[view], subject.voxel);
+  });
+  for (const Errors &of_view : errors) point.errors.add(of_view);
+  point.ms = quantiles(std::move(times)).p50;
+  point.decoded_blocks = decoded / subject.cameras.size();
+}
+
+/// How many times as long as the other one takes: the median of cold frames drawn in turn.
+double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point &point, const Point &other) {
+  Renderer renderer = make_renderer(device, subject, point), others = make_renderer(device, subject, other);
+  std::vector<double> ratios;
+  for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
+    warm_up(renderer, subject, point, view);
+    warm_up(others, subject, other, view);
+    for (std::uint32_t round = 0; round < subject.rounds; ++round) {
+      const double ms = draw_cold(renderer, subject, view).total_ms;
+      ratios.push_back(ms / draw_cold(others, subject, view).total_ms);
+    }
+  }
+  return quantiles(std::move(ratios)).p50;
 }
 
 /// The source as exactly as it can be stored: the truth.
@@ -177,6 +254,8 @@ std::uint64_t stored_bytes(const CompressedVolume &volume, bool with_levels) {
 ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) {
   ParetoSubject subject;
   subject.size = parse_size(options.size);
+  subject.isovalue = options.isovalue;
+  subject.rounds = options.rounds;
   check_image_size(subject.size);
   const RawOverrides overrides = to_overrides(options.volume);
   const CompressedVolume finest = load_volume(
@@ -193,6 +272,10 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   return subject;
 }
 
+std::uint64_t stored_bytes(const Point &point) {
+  return stored_bytes(point.stored->volume, has_levels(point));
+}
+
 constexpr const char *kRowFormat =
     "{:<26} {:<6} {:<9} {:>6} {:>6} {:>11} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>6}\n";
 
@@ -201,45 +284,78 @@ void print_header() {
              "depth p99", "normal", "FLIP", "PSNR");
 }
 
-void add_point(ordered_json &points, ordered_json point, const ordered_json &measured) {
-  point.update(measured);
-  const auto text = [&](const char *name) {
-    return point[name].is_null() ? std::string("by view") : fmt::format("{}", point[name].get<double>());
+void print(const Point &point, double value_range) {
+  const auto text = [&](double number) {
+    return point.max_error ? "by view" : fmt::format("{:.4g}", number);
   };
-  const auto number = [&](const char *name) { return point[name].get<double>(); };
-  fmt::print(kRowFormat, point["storage"].get<std::string>(), point["pipeline"].get<std::string>(),
-             point["max_error"].is_null() ? point["solver"].get<std::string>()
-                                          : fmt::format("error {}", number("max_error")),
-             text("max_pixel_error"), text("value_error"), with_commas(point["bytes"].get<std::uint64_t>()),
-             fmt::format("{:.3f}", number("ms")), with_commas(point["decoded_blocks"].get<std::uint64_t>()),
-             fmt::format("{:.2e}", number("wrong_pixels")), fmt::format("{:.2e}", number("depth_p99")),
-             fmt::format("{:.2f}", number("normal_p99")), fmt::format("{:.4f}", number("flip")),
-             point["psnr_db"].is_null() ? "same" : fmt::format("{:.1f}", number("psnr_db")));
-  points.push_back(std::move(point));
+  const Errors &errors = point.errors;
+  fmt::print(kRowFormat, point.stored->name, point.pipeline,
+             point.max_error ? fmt::format("error {}", *point.max_error) : point.solver,
+             text(point.details.front().max_pixel_error),
+             text(point.details.front().value_error / value_range), with_commas(stored_bytes(point)),
+             fmt::format("{:.3f}", point.ms), with_commas(point.decoded_blocks),
+             fmt::format("{:.2e}", errors.wrong_pixels()), fmt::format("{:.2e}", errors.depth_p99),
+             fmt::format("{:.2f}", errors.normal_p99), fmt::format("{:.4f}", errors.flip),
+             std::isfinite(errors.psnr_db) ? fmt::format("{:.1f}", errors.psnr_db) : "same");
+}
+
+ordered_json to_json(const Point &point, double value_range) {
+  const auto or_null = [](const std::optional<double> &number) {
+    return number ? ordered_json(*number) : ordered_json();
+  };
+  const auto detail_json = [&](const Detail &detail) -> ordered_json {
+    return {{"max_pixel_error", detail.max_pixel_error}, {"value_error", detail.value_error / value_range}};
+  };
+  const Errors &errors = point.errors;
+  ordered_json json = {
+      {"storage", point.stored->name},
+      {"bytes", stored_bytes(point)},
+      {"rate", point.stored->volume.rate()},
+      {"pipeline", point.pipeline},
+      {"solver", point.solver},
+      {"max_pixel_error", nullptr},
+      {"value_error", nullptr},
+      {"max_error", or_null(point.max_error)},
+      {"ms", point.ms},
+      {"decoded_blocks", point.decoded_blocks},
+      {"wrong_pixels", errors.wrong_pixels()},
+      {"missed", errors.missed},
+      {"false", errors.false_hits},
+      {"depth_p99", errors.depth_p99},
+      {"normal_p99", errors.normal_p99},
+      {"flip", errors.flip},
+      {"psnr_db", std::isfinite(errors.psnr_db) ? ordered_json(errors.psnr_db) : ordered_json()}};
+  if (!point.max_error) {
+    json.update(detail_json(point.details.front()));
+    return json;
+  }
+  json["chosen"] = ordered_json::array();
+  for (std::size_t view = 0; view < point.details.size(); ++view) {
+    json["chosen"].push_back(detail_json(point.details[view]));
+    json["chosen"].back()["reachable"] = bool{point.reachable[view]};
+  }
+  json["over_front"] = or_null(point.over_front);
+  return json;
 }
 
 /// Every pipeline, solver, level of detail and precision of one stored volume.
 void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
-           const std::string &storage, const CompressedVolume &volume, ordered_json &points) {
+           const Stored &stored, std::vector<Point> &points) {
   for (const std::string &pipeline : options.pipelines) {
     for (const std::string &solver : options.solvers) {
       for (const double max_pixel_error : options.max_pixel_errors) {
         if (pipeline == "blocks" && max_pixel_error > 0) continue;
-        RendererFlags flags{.pipeline = pipeline, .solver = solver, .values = {}};
-        flags.values.max_pixel_error = max_pixel_error;
-        Renderer renderer(device, volume, to_renderer_options(flags, subject.size));
+        Point point;
+        point.stored = &stored;
+        point.pipeline = pipeline;
+        point.solver = solver;
+        point.details.resize(subject.cameras.size(), Detail{.max_pixel_error = max_pixel_error});
+        Renderer renderer = make_renderer(device, subject, point);
         for (const double value_error : options.value_errors) {
-          renderer.set_value_error(value_error * subject.value_range);
-          add_point(points,
-                    {{"storage", storage},
-                     {"bytes", stored_bytes(volume, max_pixel_error > 0)},
-                     {"rate", volume.rate()},
-                     {"pipeline", pipeline},
-                     {"solver", solver},
-                     {"max_pixel_error", max_pixel_error},
-                     {"value_error", value_error},
-                     {"max_error", nullptr}},
-                    measure(renderer, subject, options));
+          for (Detail &detail : point.details) detail.value_error = value_error * subject.value_range;
+          points.push_back(point);
+          measure(renderer, subject, points.back());
+          print(points.back(), subject.value_range);
         }
       }
     }
@@ -248,52 +364,39 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
 
 /// What render --max-error chooses for each view.
 void choose(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
-            const std::string &storage, const CompressedVolume &volume, ordered_json &points) {
-  if (options.max_errors.empty()) return;
-  Renderer renderer(device, volume, with_choices({.size = subject.size}, volume));
+            const Stored &stored, std::vector<Point> &points) {
   for (const double max_error : options.max_errors) {
-    ordered_json chosen = ordered_json::array();
-    const auto prepare = [&](const Camera &camera) {
-      const DetailChoice choice = choose_detail(renderer, volume, camera, options.isovalue, max_error);
-      chosen.push_back({{"max_pixel_error", choice.detail.max_pixel_error},
-                        {"value_error", choice.detail.value_error / subject.value_range},
-                        {"reachable", choice.reachable}});
-    };
-    const ordered_json measured = measure(renderer, subject, options, prepare);
-    add_point(points,
-              {{"storage", storage},
-               {"bytes", stored_bytes(volume, true)},
-               {"rate", volume.rate()},
-               {"pipeline", "rays"},
-               {"solver", to_string(renderer.options().solver)},
-               {"max_pixel_error", nullptr},
-               {"value_error", nullptr},
-               {"max_error", max_error},
-               {"chosen", chosen}},
-              measured);
+    Point point;
+    point.stored = &stored;
+    point.max_error = max_error;
+    Renderer renderer = make_renderer(device, subject, point);
+    for (const Camera &camera : subject.cameras) {
+      const DetailChoice choice = choose_detail(renderer, stored.volume, camera, subject.isovalue, max_error);
+      point.details.push_back(choice.detail);
+      point.reachable.push_back(choice.reachable);
+    }
+    measure(renderer, subject, point);
+    print(point, subject.value_range);
+    points.push_back(std::move(point));
   }
 }
 
-/// For each choice of --max-error: its time over that of the fastest point of the sweep that is no worse in any error; null where there
-/// is none.
-void compare_choices(ordered_json &points) {
-  for (ordered_json &choice : points) {
-    if (choice["max_error"].is_null()) continue;
-    const auto is_as_good = [&](const ordered_json &point) {
-      return point["max_error"].is_null() &&
-             std::ranges::all_of(std::array{"wrong_pixels", "depth_p99", "normal_p99", "flip"},
-                                 [&](const char *error) { return point[error] <= choice[error]; });
-    };
-    choice["over_front"] = nullptr;
-    double fastest = std::numeric_limits<double>::infinity();
-    for (const ordered_json &point : points) {
-      if (is_as_good(point)) fastest = std::min(fastest, point["ms"].get<double>());
+/// Sets Point::over_front of the choices of --max-error: how many times as long they take as the fastest point of the sweep that is no
+/// worse in any error; none, where all are worse. The two are drawn in turn, once more: of many points that take as long, the one
+/// that seemed to be the fastest mostly was lucky.
+void compare_choices(ocl::Device &device, const ParetoSubject &subject, std::vector<Point> &points) {
+  for (Point &choice : points) {
+    if (!choice.max_error) continue;
+    const Point *fastest = nullptr;
+    for (const Point &point : points) {
+      if (!point.max_error && point.errors.no_worse_than(choice.errors) &&
+          (!fastest || point.ms < fastest->ms))
+        fastest = &point;
     }
-    if (!std::isfinite(fastest)) continue;
-    choice["over_front"] = choice["ms"].get<double>() / fastest;
+    if (!fastest) continue;
+    choice.over_front = time_ratio(device, subject, choice, *fastest);
     fmt::print("{}, --max-error {}: {:.2f} times the time of the fastest point that is no worse\n",
-               choice["storage"].get<std::string>(), choice["max_error"].get<double>(),
-               choice["over_front"].get<double>());
+               choice.stored->name, *choice.max_error, *choice.over_front);
   }
 }
 
@@ -310,20 +413,25 @@ void run_bench_pareto(BenchParetoArgs options) {
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   ocl::Device device(info);
   const ParetoSubject subject = make_subject(device, options);
-  ordered_json points = ordered_json::array();
-  print_header();
+  std::vector<Stored> stored;
   for (const std::string &storage : options.storages) {
     CompressionOptions compression = parse_storage(storage);
-    const bool has_levels = !options.max_errors.empty() ||
-                            std::ranges::any_of(options.max_pixel_errors, [](double e) { return e > 0; });
-    compression.levels = has_levels ? 0 : 1;
+    const bool with_levels = !options.max_errors.empty() ||
+                             std::ranges::any_of(options.max_pixel_errors, [](double e) { return e > 0; });
+    compression.levels = with_levels ? 0 : 1;
     compression.measure_error = !options.max_errors.empty();
-    const CompressedVolume volume = load_volume(options.input, to_overrides(options.volume), compression);
-    sweep(device, subject, options, storage, volume, points);
-    choose(device, subject, options, storage, volume, points);
+    stored.push_back({storage, load_volume(options.input, to_overrides(options.volume), compression)});
   }
-  compare_choices(points);
+  std::vector<Point> points;
+  print_header();
+  for (const Stored &volume : stored) {
+    sweep(device, subject, options, volume, points);
+    choose(device, subject, options, volume, points);
+  }
+  compare_choices(device, subject, points);
   if (options.json.empty()) return;
+  ordered_json json = ordered_json::array();
+  for (const Point &point : points) json.push_back(to_json(point, subject.value_range));
   write_json({{"schema", kChartsSchema},
               {"benchmark", "pareto"},
               {"device", device_json(info)},
@@ -333,7 +441,7 @@ void run_bench_pareto(BenchParetoArgs options) {
               {"size", {subject.size.width, subject.size.height}},
               {"views", options.views},
               {"rounds", options.rounds},
-              {"points", points}},
+              {"points", json}},
              options.json);
 }
 
