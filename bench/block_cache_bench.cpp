@@ -49,7 +49,7 @@ class CacheInput {
     settle();
     if (other_pairs) turn_ = 1 - turn_;
     rays_.pair_block_ids.write(sets_[turn_].pair_block_ids);
-    const PassCounts counts = pair_counts(rays_.num_pixels, ++pass_);
+    const PassCounts counts = pair_counts(rays_.num_rays, ++pass_);
     rays_.counts.write({&counts, 1});
   }
   void request() {

@@ -49,9 +49,9 @@ FrameParams cube_params(std::uint32_t key_bits) {
 
 PassCounts pair_counts(std::size_t num_pairs, std::uint32_t pass) {
   PassCounts counts{};
-  counts.pixel_count = static_cast<uint>(num_pairs);
+  counts.ray_count = static_cast<uint>(num_pairs);
   counts.pass = pass;
-  counts.active_count = counts.window_count = counts.pair_slot_count = counts.pair_count = counts.pixel_count;
+  counts.active_count = counts.window_count = counts.pair_slot_count = counts.pair_count = counts.ray_count;
   counts.spec_count = 1;
   return counts;
 }

@@ -16,7 +16,7 @@ struct CompositeInput : FrameRig {
       : FrameRig(device, mixing_layer(kEdge),
                  mixing_layer_setup(kEdge, image_of_width(width), static_cast<std::uint32_t>(spec_count))),
         closest(how),
-        composite(device, rays.num_pixels, how) {
+        composite(device, rays.num_rays, how) {
     start();
     thin_wavefront(params.max_spec_count);
     begin_pass();

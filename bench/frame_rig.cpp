@@ -20,15 +20,15 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
       stream(device, volume),
       rays(device, setup.size.num_pixels()),
       macrocells(device, params, stream),
-      cache(device, params, slots_of(volume, setup), rays.num_pixels, kGroupSize),
-      compaction(device, rays.num_pixels, kGroupSize),
-      initial_rays(device, rays.num_pixels),
+      cache(device, params, slots_of(volume, setup), rays.num_rays, kGroupSize),
+      compaction(device, rays.num_rays, kGroupSize),
+      initial_rays(device, rays.num_rays),
       speculation(device),
-      traverse(device, rays.num_pixels, kGroupSize),
+      traverse(device, rays.num_rays, kGroupSize),
       zfp_decode(device, cache.num_slots),
-      group(device, rays.num_pixels, cache.num_slots, kGroupSize),
-      intersect(device, rays.num_pixels, kGroupSize),
-      composite(device, rays.num_pixels) {
+      group(device, rays.num_rays, cache.num_slots, kGroupSize),
+      intersect(device, rays.num_rays, kGroupSize),
+      composite(device, rays.num_rays) {
   params.max_spec_count = setup.max_speculation;
   params.table_groups = cache.table_groups;
   macrocells.select(params);
@@ -45,7 +45,7 @@ void FrameRig::thin_wavefront(std::uint32_t spec_count) {
   PassCounts counts = read_counts();
   std::vector<uint> ray_ids(counts.next_active_count);
   rays.next_active_ray_ids.read(ray_ids);
-  const std::size_t wanted = rays.num_pixels / spec_count;
+  const std::size_t wanted = rays.num_rays / spec_count;
   const std::size_t stride = std::max<std::size_t>(1, (ray_ids.size() + wanted - 1) / wanted);
   std::vector<uint> kept;
   for (std::size_t i = 0; i < ray_ids.size(); i += stride) kept.push_back(ray_ids[i]);

@@ -31,7 +31,7 @@ struct InitialRaysInput : FrameRig {
 
 void make_rays(benchmark::State &state) {
   auto &in = input<InitialRaysInput>(state.range(0));
-  const auto pixels = static_cast<double>(in.rays.num_pixels);
+  const auto pixels = static_cast<double>(in.rays.num_rays);
   const double bytes = pixels * (sizeof(HitRecord) + sizeof(uint)) + in.num_active * sizeof(uint);
   measure(
       state, {pixels, bytes}, [] {}, [&] { in.start(); });

@@ -26,7 +26,7 @@ struct SortInput {
     if (distribution == Distribution::kSorted) std::sort(host_keys.begin(), host_keys.end());
     for (std::size_t i = 0; i < host_values.size(); ++i) host_values[i] = static_cast<uint>(i);
     PassCounts start{};
-    start.pixel_count = static_cast<uint>(num_pairs);
+    start.ray_count = static_cast<uint>(num_pairs);
     counts.write({&start, 1});
     reset();
     run();
@@ -36,7 +36,7 @@ struct SortInput {
     keys.write(host_keys);
     values.write(host_values);
   }
-  void run() { sort_pairs(keys, values, counts, ISO_COUNT_FIELD(pixel_count), bits); }
+  void run() { sort_pairs(keys, values, counts, ISO_COUNT_FIELD(ray_count), bits); }
   void verify() {
     std::vector<uint> order = host_values;
     std::stable_sort(order.begin(), order.end(),

@@ -17,7 +17,7 @@ struct ScanInput {
     Random random;
     for (std::int64_t i = 0; i < entries; ++i) host.push_back(random.below(10));
     PassCounts start{};
-    start.pixel_count = static_cast<uint>(entries);
+    start.ray_count = static_cast<uint>(entries);
     counts.write({&start, 1});
     reset();
     run();
@@ -27,7 +27,7 @@ struct ScanInput {
     check(counts.read()[0].hit_count == expected.back() + host.back(), "total of the scan");
   }
   void reset() { values.write(host); }
-  void run() { scan(values, counts, ISO_COUNT_FIELD(pixel_count), 1, ISO_COUNT_FIELD(hit_count)); }
+  void run() { scan(values, counts, ISO_COUNT_FIELD(ray_count), 1, ISO_COUNT_FIELD(hit_count)); }
 
   std::vector<uint> host;
   ExclusiveScan scan;
@@ -61,7 +61,7 @@ struct CompactionInput {
     mask.write(kept);
     values.write(numbers);
     PassCounts start{};
-    start.pixel_count = static_cast<uint>(entries);
+    start.ray_count = static_cast<uint>(entries);
     counts.write({&start, 1});
 
     std::vector<uint> expected;
@@ -75,7 +75,7 @@ struct CompactionInput {
     check(got == expected, "kept values");
   }
   void run() {
-    compaction(mask, values, counts, ISO_COUNT_FIELD(pixel_count), out, ISO_COUNT_FIELD(hit_count));
+    compaction(mask, values, counts, ISO_COUNT_FIELD(ray_count), out, ISO_COUNT_FIELD(hit_count));
   }
 
   std::size_t num_kept = 0;

@@ -13,7 +13,7 @@ struct ShadeInput : FrameRig {
   ShadeInput(ocl::Device &device, std::int64_t width)
       : FrameRig(device, mixing_layer(kEdge), mixing_layer_setup(kEdge, image_of_width(width), 64)),
         appearance(make_shade_params(mixing_layer(kEdge).info, {})),
-        shade(device, rays.num_pixels) {
+        shade(device, rays.num_rays) {
     start();
     while (run_pass().next_active_count != 0) {
     }
@@ -27,7 +27,7 @@ struct ShadeInput : FrameRig {
 
 void shade_hits(benchmark::State &state) {
   auto &in = input<ShadeInput>(state.range(0));
-  const auto pixels = static_cast<double>(in.rays.num_pixels);
+  const auto pixels = static_cast<double>(in.rays.num_rays);
   measure(
       state, {pixels, pixels * (4 * sizeof(float) + 2 * sizeof(uint))}, [] {},
       [&] { benchmark::DoNotOptimize(in.run()); });

@@ -28,16 +28,16 @@ std::uint32_t BlockCache::table_groups_for(std::uint32_t num_slots) {
 
 /// No more than can be granted; a ray's block asks for at most 8, and a block is listed once.
 std::uint32_t BlockCache::capacity_for(std::uint32_t num_slots, std::uint64_t num_blocks,
-                                       std::uint64_t num_pixels) {
+                                       std::uint64_t num_rays) {
   return static_cast<std::uint32_t>(
-      std::min<std::uint64_t>({num_slots, num_blocks, 8 * ISO_MAX_SPECULATION * num_pixels}));
+      std::min<std::uint64_t>({num_slots, num_blocks, 8 * ISO_MAX_SPECULATION * num_rays}));
 }
 
 BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t slots,
-                       std::uint64_t num_pixels, std::uint32_t group_size, bool levels)
+                       std::uint64_t num_rays, std::uint32_t group_size, bool levels)
     : num_slots(checked_slots(slots)),
       table_groups(table_groups_for(slots)),
-      capacity(capacity_for(slots, block_count(grid), num_pixels)),
+      capacity(capacity_for(slots, block_count(grid), num_rays)),
       table(device, "block table", 8 * std::size_t{table_groups}),
       values(device, "block cache", std::size_t{slots} * ISO_BLOCK_VOXELS),
       inside(device, "voxels inside", slots),
@@ -48,7 +48,7 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       decode_slots(device, "decode slots", capacity),
       state(device, "cache state", 1),
       group_size_(group_size),
-      pairs_range_(ocl::Range::strided(num_pixels, group_size, device)),
+      pairs_range_(ocl::Range::strided(num_rays, group_size, device)),
       slots_range_(ocl::Range::strided(slots, group_size, device)),
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
       free_slots_(device, "free slots", slots),

@@ -13,9 +13,9 @@ inline constexpr std::uint32_t kMinCacheSlots = 8;
 
 /// What the stages of one pass read of the cache, and add to its requests.
 struct BlockCache {
-  /// num_slots is at least kMinCacheSlots; num_pixels bounds a pass's pairs. `grid`: its blocks are used, those of the finest
+  /// num_slots is at least kMinCacheSlots; num_rays bounds a pass's pairs. `grid`: its blocks are used, those of the finest
   /// level where frames may have several levels of detail. Throws Error when there are too few slots, or more than 2^30.
-  BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots, std::uint64_t num_pixels,
+  BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots, std::uint64_t num_rays,
              std::uint32_t group_size, bool levels = false);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones. Out:
@@ -38,7 +38,7 @@ struct BlockCache {
   static std::uint32_t table_groups_for(std::uint32_t num_slots);
   /// The most requests that are listed.
   static std::uint32_t capacity_for(std::uint32_t num_slots, std::uint64_t num_blocks,
-                                    std::uint64_t num_pixels);
+                                    std::uint64_t num_rays);
 
   std::uint32_t num_slots;
   std::uint32_t table_groups;           ///< FrameParams::table_groups

@@ -15,8 +15,8 @@ ClosestHit closest_hit_from_string(std::string_view name) {
   throw Error("no way to the closest hit is called '{}'; there are: scan, atomic-min", name);
 }
 
-Composite::Composite(ocl::Device &device, std::uint64_t num_pixels, ClosestHit closest)
-    : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
+Composite::Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest)
+    : range_(ocl::Range::strided(num_rays, ocl::kGroupSize, device)),
       kernel_(device, "composite", "composite", closest_defines(closest)) {}
 
 void Composite::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction) {

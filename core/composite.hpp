@@ -11,7 +11,7 @@ namespace isowave {
 
 class Composite {
  public:
-  Composite(ocl::Device &device, std::uint64_t num_pixels, ClosestHit closest = kDefaultClosestHit);
+  Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest = kDefaultClosestHit);
 
   /// Out: rays.hits, rays.ray_block_ids (where rays without slots wait), rays.next_active_ray_ids,
   /// counts.hit_count and counts.next_active_count. Asynchronous.

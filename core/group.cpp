@@ -10,8 +10,8 @@ namespace isowave {
 namespace {
 
 /// Distinct blocks that a pass's pairs can belong to.
-std::uint64_t max_visible(std::uint64_t num_pixels, std::uint32_t num_slots) {
-  return std::min<std::uint64_t>(num_pixels, num_slots);
+std::uint64_t max_visible(std::uint64_t num_rays, std::uint32_t num_slots) {
+  return std::min<std::uint64_t>(num_rays, num_slots);
 }
 
 /// Tiles of group_size * items entries.
@@ -45,27 +45,27 @@ Grouping grouping_from_string(std::string_view name) {
   throw Error("no grouping is called '{}'; there are: radix, counting", name);
 }
 
-Group::Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size,
+Group::Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
              Grouping grouping, ClosestHit closest)
-    : groups_{{device, "grouped pair ids", num_pixels},
-              {device, "block rays", max_visible(num_pixels, num_slots)}},
-      pair_slots_(device, "cache slots of pairs", num_pixels),
-      gather_(grouping == Grouping::kRadix ? decltype(gather_)(std::in_place_type<ByRadix>, device,
-                                                               num_pixels, num_slots, group_size, closest)
+    : groups_{{device, "grouped pair ids", num_rays},
+              {device, "block rays", max_visible(num_rays, num_slots)}},
+      pair_slots_(device, "cache slots of pairs", num_rays),
+      gather_(grouping == Grouping::kRadix ? decltype(gather_)(std::in_place_type<ByRadix>, device, num_rays,
+                                                               num_slots, group_size, closest)
                                            : decltype(gather_)(std::in_place_type<ByCounting>, device,
-                                                               num_pixels, num_slots, group_size, closest)) {}
+                                                               num_rays, num_slots, group_size, closest)) {}
 
 void Group::operator()(const BlockCache &cache, Wavefront &rays) {
   std::visit([&](auto &gather) { gather(cache, rays, pair_slots_, groups_); }, gather_);
 }
 
-Group::ByRadix::ByRadix(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots,
+Group::ByRadix::ByRadix(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
                         std::uint32_t group_size, ClosestHit closest)
-    : pair_tiles_range(tiles_range(num_pixels, group_size, ISO_GROUP_ITEMS, device)),
-      key_tiles_range(tiles_range(num_pixels, group_size, ISO_SCAN_ITEMS, device)),
+    : pair_tiles_range(tiles_range(num_rays, group_size, ISO_GROUP_ITEMS, device)),
+      key_tiles_range(tiles_range(num_rays, group_size, ISO_SCAN_ITEMS, device)),
       key_bits(std::max(1, static_cast<int>(std::bit_width(num_slots - 1)))),
-      sort(device, num_pixels, group_size),
-      tile_sums(device, "group tile sums", num_tiles(num_pixels, group_size, ISO_SCAN_ITEMS)),
+      sort(device, num_rays, group_size),
+      tile_sums(device, "group tile sums", num_tiles(num_rays, group_size, ISO_SCAN_ITEMS)),
       select(device, "group", "group_select", group_stage_defines(group_size, closest)),
       head_sums(device, "group", "group_head_sums", group_stage_defines(group_size, closest)),
       heads(device, "group", "group_heads", group_stage_defines(group_size, closest)) {}
@@ -79,11 +79,11 @@ void Group::ByRadix::operator()(const BlockCache &cache, Wavefront &rays, ocl::B
   heads(key_tiles_range, rays.counts, keys, tile_sums, groups.block_rays);
 }
 
-Group::ByCounting::ByCounting(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots,
+Group::ByCounting::ByCounting(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
                               std::uint32_t group_size, ClosestHit closest)
-    : pair_tiles_range(tiles_range(num_pixels, group_size, ISO_GROUP_ITEMS, device)),
-      candidates_range(ocl::Range::strided(max_visible(num_pixels, num_slots), group_size, device)),
-      pairs_range(ocl::Range::strided(num_pixels, ocl::kGroupSize, device, 2)),
+    : pair_tiles_range(tiles_range(num_rays, group_size, ISO_GROUP_ITEMS, device)),
+      candidates_range(ocl::Range::strided(max_visible(num_rays, num_slots), group_size, device)),
+      pairs_range(ocl::Range::strided(num_rays, ocl::kGroupSize, device, 2)),
       slot_counts(device, "pairs by slot", num_slots),
       slot_offsets(device, "pair offsets by slot", num_slots),
       candidate_count(device, "group candidates", 1),

@@ -31,7 +31,7 @@ struct BlockGroups {
 
 class Group {
  public:
-  Group(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size,
+  Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
         Grouping grouping = kDefaultGrouping, ClosestHit closest = kDefaultClosestHit);
 
   /// In: counts.granted_count and counts.visible_count are 0, as begin_pass leaves them.
@@ -43,7 +43,7 @@ class Group {
 
  private:
   struct ByRadix {
-    ByRadix(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots, std::uint32_t group_size,
+    ByRadix(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
             ClosestHit closest);
     void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &keys, BlockGroups &groups);
 
@@ -59,8 +59,8 @@ class Group {
   };
 
   struct ByCounting {
-    ByCounting(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t num_slots,
-               std::uint32_t group_size, ClosestHit closest);
+    ByCounting(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
+               ClosestHit closest);
     void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &pair_slots,
                     BlockGroups &groups);
 

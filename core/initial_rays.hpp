@@ -9,7 +9,7 @@ namespace isowave {
 
 class InitialRays {
  public:
-  explicit InitialRays(ocl::Device &device, std::uint64_t num_pixels);
+  explicit InitialRays(ocl::Device &device, std::uint64_t num_rays);
 
   /// In: rays.frame. Out: hits (none), ray_block_ids, next_active_ray_ids and counts.next_active_count.
   /// Asynchronous.

@@ -13,9 +13,9 @@ ocl::Defines intersect_defines(std::uint32_t group_size, Solver solver, ClosestH
 
 }  // namespace
 
-Intersect::Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
+Intersect::Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size, Solver solver,
                      ClosestHit closest)
-    : range_(ocl::Range::strided(num_pixels, group_size, device)),
+    : range_(ocl::Range::strided(num_rays, group_size, device)),
       kernel_(device, "intersect", "intersect", intersect_defines(group_size, solver, closest)) {
   if (solver.kind == ISO_SOLVER_BERNSTEIN) {
     settle_doubts_.emplace(device, "intersect", "settle_doubts",

@@ -12,7 +12,7 @@ namespace isowave {
 
 class Intersect {
  public:
-  Intersect(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
+  Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size,
             Solver solver = kDefaultSolver, ClosestHit closest = kDefaultClosestHit);
 
   /// Out: rays.pair_hits of every pair in `groups`; rays.closest_pairs. Asynchronous.

@@ -17,13 +17,13 @@ class BlocksPipeline : public Pipeline {
   BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping,
                  ClosestHit closest)
       : state_(state),
-        compaction_(state.device, state.rays.num_pixels, group_size),
-        initial_rays_(state.device, state.rays.num_pixels),
+        compaction_(state.device, state.rays.num_rays, group_size),
+        initial_rays_(state.device, state.rays.num_rays),
         speculation_(state.device),
-        traverse_(state.device, state.rays.num_pixels, group_size),
-        group_(state.device, state.rays.num_pixels, state.cache.num_slots, group_size, grouping, closest),
-        intersect_(state.device, state.rays.num_pixels, group_size, solver, closest),
-        composite_(state.device, state.rays.num_pixels, closest) {}
+        traverse_(state.device, state.rays.num_rays, group_size),
+        group_(state.device, state.rays.num_rays, state.cache.num_slots, group_size, grouping, closest),
+        intersect_(state.device, state.rays.num_rays, group_size, solver, closest),
+        composite_(state.device, state.rays.num_rays, closest) {}
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("initial_rays");
@@ -72,7 +72,7 @@ class RaysPipeline : public Pipeline {
  public:
   RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
       : state_(state),
-        march_(state.device, state.rays.num_pixels, group_size, solver, state.levels.size() > 1) {}
+        march_(state.device, state.rays.num_rays, group_size, solver, state.levels.size() > 1) {}
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("start_rays");

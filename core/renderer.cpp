@@ -280,9 +280,9 @@ void Renderer::set_max_pixel_error(double max_pixel_error) {
 
 void Renderer::set_size(ImageSize size) {
   check_image_size(size);
-  if (size.num_rays() > state_.rays.num_pixels) {
+  if (size.num_rays() > state_.rays.num_rays) {
     throw Error("{}x{} pixels have more than the {} rays that the renderer was made for", size.width,
-                size.height, state_.rays.num_pixels);
+                size.height, state_.rays.num_rays);
   }
   options_.size = size;
 }

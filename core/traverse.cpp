@@ -2,8 +2,8 @@
 
 namespace isowave {
 
-Traverse::Traverse(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size)
-    : range_(ocl::Range::strided(num_pixels, group_size, device)),
+Traverse::Traverse(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size)
+    : range_(ocl::Range::strided(num_rays, group_size, device)),
       kernel_(device, "traverse", "traverse", group_defines(group_size)) {}
 
 void Traverse::operator()(const Macrocells &macrocells, Wavefront &rays) {

@@ -9,7 +9,7 @@ namespace isowave {
 
 class Traverse {
  public:
-  Traverse(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size);
+  Traverse(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size);
 
   /// In: active_ray_ids, ray_block_ids (where each ray goes on from), counts.spec_count. Out: pair_block_ids,
   /// ray_block_ids (the first block not looked at), counts.pair_count. Asynchronous.

@@ -1,5 +1,5 @@
 #pragma once
-// The rays of a frame on the device and the arrays of one pass. R = pixels; nothing here grows with the
+// The rays of a frame on the device and the arrays of one pass. R = rays; nothing here grows with the
 // volume.
 
 #include <string_view>
@@ -29,24 +29,23 @@ inline ocl::Defines closest_defines(ClosestHit closest) {
 
 struct Wavefront {
   /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not. levels: of detail.
-  explicit Wavefront(ocl::Device &device, std::uint64_t pixels, bool with_pairs = true,
-                     std::size_t levels = 1)
-      : num_pixels(pixels),
+  explicit Wavefront(ocl::Device &device, std::uint64_t rays, bool with_pairs = true, std::size_t levels = 1)
+      : num_rays(rays),
         level_frames(device, "level frames", levels),
         counts(device, "pass counts", 1),
         previous_counts(device, "pass counts, previous", 1),
         next_counts(device, "pass counts, next", 1),
-        hits(device, "hits", pixels),
-        ray_block_ids(device, "ray states", pixels),
-        active_ray_ids(device, "active ray ids", pixels),
-        next_active_ray_ids(device, "active ray ids, next", pixels),
-        mask(device, "mask", with_pairs ? pixels : 0),
-        pair_block_ids(device, "pair block ids", with_pairs ? pixels : 0),
-        pair_hits(device, "pair hits", with_pairs ? pixels : 0),
-        closest_pairs(device, "closest pairs", with_pairs ? pixels : 0) {
+        hits(device, "hits", rays),
+        ray_block_ids(device, "ray states", rays),
+        active_ray_ids(device, "active ray ids", rays),
+        next_active_ray_ids(device, "active ray ids, next", rays),
+        mask(device, "mask", with_pairs ? rays : 0),
+        pair_block_ids(device, "pair block ids", with_pairs ? rays : 0),
+        pair_hits(device, "pair hits", with_pairs ? rays : 0),
+        closest_pairs(device, "closest pairs", with_pairs ? rays : 0) {
     PassCounts start{};
-    start.pixel_count = static_cast<uint>(pixels);
-    start.window_count = start.pixel_count;
+    start.ray_count = static_cast<uint>(rays);
+    start.window_count = start.ray_count;
     start.pass = ISO_AGE_BUCKETS;  // so that slots never used, stamped 0, are the oldest
     counts.write({&start, 1});
     previous_counts.write({&start, 1});
@@ -67,8 +66,8 @@ struct Wavefront {
     std::swap(active_ray_ids, next_active_ray_ids);
   }
 
-  std::uint64_t num_pixels;  ///< R
-  FrameParams frame{};       ///< of the frame at work; of several levels of detail, the finest that draws
+  std::uint64_t num_rays;  ///< R
+  FrameParams frame{};     ///< of the frame at work; of several levels of detail, the finest that draws
   ocl::Buffer<FrameParams>
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;

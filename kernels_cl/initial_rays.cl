@@ -9,7 +9,7 @@ kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
                          global uint *ray_ids, global uint *ray_active_mask, global PassCounts *counts) {
   const FrameParams *frame = &frame_params;
   /* The first pass is for all. */
-  if (get_global_id(0) == 0) counts->window_count = counts->pixel_count = frame->width * frame->height;
+  if (get_global_id(0) == 0) counts->window_count = counts->ray_count = frame->width * frame->height;
   for (uint pixel = get_global_id(0); pixel < frame->width * frame->height; pixel += get_global_size(0)) {
     const Ray ray = make_ray(frame, pixel);
     const uint block_id = first_block(frame, &ray);

@@ -31,7 +31,7 @@ ISO_INLINE uint lanes_per_ray(uint num_rays) {
   return lanes;
 }
 
-ISO_INLINE uint num_pixels(const FrameParams *frame) {
+ISO_INLINE uint frame_rays(const FrameParams *frame) {
   return frame->width * frame->height;
 }
 
@@ -40,10 +40,10 @@ ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCoun
                                  global const PassCounts *counts, global PassCounts *next) {
   uint window = counts->window_count; /* see begin_pass() in speculation.cl */
   window = prev->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
-  next->pixel_count = num_pixels(frame);
+  next->ray_count = frame_rays(frame);
   next->pass = counts->pass + 1;
   next->active_count = next->spec_count = next->pair_slot_count = next->pair_count = 0;
-  next->window_count = clamp(window, 1u, num_pixels(frame));
+  next->window_count = clamp(window, 1u, frame_rays(frame));
   next->granted_count = next->visible_count = next->requested_count = next->decoded_count = 0;
   next->hit_count = next->next_active_count = 0;
   next->free_count = counts->free_count;
@@ -85,10 +85,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
                         frame->screen_end_y};
   const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
-  if (get_global_id(0) == 0) next->window_count = num_pixels(frame);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_pixels(frame);
+  if (get_global_id(0) == 0) next->window_count = frame_rays(frame);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < frame_rays(frame);
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    clear_hits(hit_words + begin * ISO_HIT_WORDS, min((uint)ISO_GROUP_SIZE, num_pixels(frame) - begin));
+    clear_hits(hit_words + begin * ISO_HIT_WORDS, min((uint)ISO_GROUP_SIZE, frame_rays(frame) - begin));
     barrier(CLK_LOCAL_MEM_FENCE); /* or each of a CPU's work-items, one by one, would go through all memory */
   }
   if (item == 0) counters[0] = 0;
@@ -142,7 +142,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     open_requests(cache);
     cache->first_block_id = ISO_INVALID_ID;
     counts->active_count = num_rays;
-    counts->spec_count = num_rays == 0 ? 0 : clamp(num_pixels(frame) / num_rays, 1u, frame->max_spec_count);
+    counts->spec_count = num_rays == 0 ? 0 : clamp(frame_rays(frame) / num_rays, 1u, frame->max_spec_count);
   }
   if (item == 0) counters[0] = group_hits = group_blocks = 0;
   barrier(CLK_LOCAL_MEM_FENCE);

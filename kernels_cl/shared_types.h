@@ -155,7 +155,7 @@ ISO_CHECK_SIZE(StreamLayout, 32);
 /// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input is "the
 /// first n entries" take n from a field of this struct, so that no launch waits for the host.
 typedef struct PassCounts {
-  uint pixel_count;        ///< width * height of the frame
+  uint ray_count;          ///< width * height of the frame
   uint pass;               ///< number of the pass since the cache was made, from 1: the LRU's clock
   uint active_count;       ///< N_Act: rays at work at the start of the pass
   uint spec_count;         ///< N_Spec of the pass; 0 when no ray is active

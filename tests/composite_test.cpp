@@ -113,7 +113,7 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// What grouping and intersection leave in closest_pairs.
   static void offer_results(StageWorld &world, const std::vector<uint> &pairs,
                             const std::vector<PairHit> &results, uint spec_count) {
-    std::vector<uint> closest(world.rays.num_pixels, ISO_INVALID_ID);
+    std::vector<uint> closest(world.rays.num_rays, ISO_INVALID_ID);
     for (uint pair = 0; pair < pairs.size(); ++pair) {
       if (pairs[pair] == ISO_INVALID_ID || results[pair].cell == ISO_NO_HIT) continue;
       closest[pair / spec_count] = std::min(closest[pair / spec_count], pair);
@@ -123,7 +123,7 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// A pass that asks for every block.
   static void fill_cache(StageWorld &world, const std::vector<float> &voxels) {
-    const uint num_pixels = static_cast<uint>(world.rays.num_pixels);
+    const uint num_pixels = static_cast<uint>(world.rays.num_rays);
     for (uint first = 0; first < 4 * 4 * 3; first += num_pixels) {
       std::vector<uint> pairs;
       for (uint b = first; b < std::min(first + num_pixels, 4u * 4 * 3); ++b) pairs.push_back(b);

@@ -92,7 +92,7 @@ class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
     }
     /* The other pairs are not tested, and each ray knows its first. */
     const std::vector<PairHit> hits = world.rays.pair_hits.read();
-    std::vector<uint> closest(world.rays.num_pixels, ISO_INVALID_ID);
+    std::vector<uint> closest(world.rays.num_rays, ISO_INVALID_ID);
     for (uint pair = 0; pair < pairs.size(); ++pair) {
       if (pairs[pair] == ISO_INVALID_ID || granted(pair)) continue;
       ASSERT_EQ(hits[pair].cell, ISO_NOT_TESTED) << pair;

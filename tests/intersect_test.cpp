@@ -128,8 +128,8 @@ ClosedForm closed_form(const FrameParams &frame, Field field, const Ray &ray) {
 struct Stages {
   Stages(ocl::Device &device, const FrameParams &frame, uint num_slots, uint group_size)
       : world(device, frame, num_slots, group_size),
-        group(device, world.rays.num_pixels, num_slots, group_size),
-        intersect(device, world.rays.num_pixels, group_size) {}
+        group(device, world.rays.num_rays, num_slots, group_size),
+        intersect(device, world.rays.num_rays, group_size) {}
 
   StageWorld world;
   Group group;
@@ -198,7 +198,7 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const std::vector<PairHit> got = world.rays.pair_hits.read();
     const std::vector<uint> table = world.slots_by_block();
     const auto cached = [&](uint block) { return table[block] < num_slots; };
-    std::vector<uint> closest(world.rays.num_pixels, ISO_INVALID_ID);
+    std::vector<uint> closest(world.rays.num_rays, ISO_INVALID_ID);
     for (uint pair = 0; pair < pairs.size(); ++pair) {
       const uint pixel = world.active_ray_ids[pair / spec_count];
       if (pairs[pair] == ISO_INVALID_ID) continue;

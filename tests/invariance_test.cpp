@@ -53,7 +53,7 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       SCOPED_TRACE(fmt::format("pass {}", i));
       const PassStats &pass = stats.passes[i];
       const PassCounts &c = pass.counts;
-      EXPECT_EQ(c.pixel_count, pixels);
+      EXPECT_EQ(c.ray_count, pixels);
       EXPECT_LE(c.active_count, pixels);
       if (c.active_count != 0) {
         EXPECT_EQ(c.spec_count, std::min<std::uint64_t>(options.max_speculation, pixels / c.active_count));

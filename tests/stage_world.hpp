@@ -36,10 +36,10 @@ struct StageWorld {
   StageWorld(ocl::Device &device, const FrameParams &frame_params, uint num_slots, uint group_size)
       : frame(frame_params),
         rays(device, frame.width * frame.height),
-        cache(device, frame, num_slots, rays.num_pixels, group_size),
-        compaction(device, rays.num_pixels, group_size) {
+        cache(device, frame, num_slots, rays.num_rays, group_size),
+        compaction(device, rays.num_rays, group_size) {
     set_frame(frame_params);
-    std::vector<uint> ids(rays.num_pixels);
+    std::vector<uint> ids(rays.num_rays);
     for (uint i = 0; i < ids.size(); ++i) ids[i] = i;
     set_active(ids);
   }
@@ -63,7 +63,7 @@ struct StageWorld {
     PassCounts counts = rays.counts.read().front();
     const uint pass = counts.pass + 1;
     counts = {};
-    counts.pixel_count = static_cast<uint>(rays.num_pixels);
+    counts.ray_count = static_cast<uint>(rays.num_rays);
     counts.pass = pass;
     counts.active_count = static_cast<uint>(pair_block_ids.size()) / spec_count;
     counts.window_count = counts.active_count;

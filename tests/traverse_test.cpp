@@ -104,7 +104,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     ocl::Buffer<uint> pairs(device_, "pairs", std::size_t{num_pixels} * spec_count);
     rays.frame = frame;
     PassCounts start{};
-    start.pixel_count = num_pixels;
+    start.ray_count = num_pixels;
     rays.counts.write({&start, 1});
     stages.initial_rays(rays, stages.compaction);
     std::vector<uint> active = rays.next_active_ray_ids.read();
@@ -118,7 +118,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       pairs.fill(0xABCDEF01u);
       std::vector<uint> entries = active;  // each looks ahead by its own number, where the frame says so
       for (uint &entry : entries) entry |= entry % 7 << ISO_RAY_AHEAD_SHIFT;
-      entries.resize(rays.num_pixels);  // whole: see README "Devices", Oclgrind
+      entries.resize(rays.num_rays);  // whole: see README "Devices", Oclgrind
       rays.active_ray_ids.write(entries);
       rays.closest_pairs.fill(0);
       PassCounts counts = distinct_counts();
