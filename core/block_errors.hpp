@@ -15,6 +15,12 @@
 
 namespace isowave {
 
+/// The smallest float32 that is not below.
+inline float rounded_up(double error) {
+  const float nearest = static_cast<float>(error);
+  return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
+}
+
 /// Largest |decoded - source| of a block's voxels, at each place (bound_place()).
 struct BlockError {
   std::array<double, ISO_BOUND_PLACES> at_place{};
@@ -57,12 +63,6 @@ class BlockErrors {
   std::vector<float> take() { return std::move(kept_); }
 
  private:
-  static float rounded_up(double error) {
-    const float nearest = static_cast<float>(error);
-    return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
-                                   : nearest;
-  }
-
   bool keep_;
   double max_ = 0;
   std::vector<BlockError> some_;

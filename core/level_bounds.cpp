@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/block_errors.hpp"
 #include "core/error.hpp"
 #include "core/parallel_for.hpp"
 #include "kernels_cl/block_bound.h"
@@ -75,22 +76,23 @@ void LevelBounds::compare_rows(std::uint32_t z, std::uint64_t by, const std::vec
                                const std::vector<float> &below, const std::vector<float> &above,
                                std::vector<float> &off) {
   const Reach ys = reach_of(static_cast<std::uint32_t>(by), fine_.y);
-  std::vector<float> coarse(coarse_.x), largest(fine_.x);
+  // In double precision: where values are large and their differences are not, those would be lost in float32.
+  std::vector<double> coarse(coarse_.x), largest(fine_.x);
   for (std::uint32_t y = ys.begin; y < ys.end; ++y) {
     const std::size_t row = std::size_t{y / 2} * coarse_.x, next = row + (y % 2) * coarse_.x;
     for (std::uint32_t x = 0; x < coarse_.x; ++x) {
-      coarse[x] = (0.25f * below[row + x] + 0.25f * above[row + x]) +
-                  (0.25f * below[next + x] + 0.25f * above[next + x]);
+      coarse[x] = 0.25 * ((double{below[row + x]} + double{above[row + x]}) +
+                          (double{below[next + x]} + double{above[next + x]}));
     }
     const float *fine = layer.data() + std::size_t{y} * fine_.x;
     for (std::uint32_t x = 0; x < fine_.x; ++x) {
-      const float at = 0.5f * coarse[x / 2] + 0.5f * coarse[(x + 1) / 2];
-      largest[x] = std::max(largest[x], std::abs(at - fine[x]));
+      const double at = 0.5 * (coarse[x / 2] + coarse[(x + 1) / 2]);
+      largest[x] = std::max(largest[x], std::abs(at - double{fine[x]}));
     }
   }
   for (std::uint32_t bx = 0; bx < blocks_.x; ++bx) {
     const Reach xs = reach_of(bx, fine_.x);
-    const float most = *std::max_element(largest.begin() + xs.begin, largest.begin() + xs.end);
+    const float most = rounded_up(*std::max_element(largest.begin() + xs.begin, largest.begin() + xs.end));
     for (std::uint32_t bz = 0; bz < blocks_.z; ++bz) {
       const Reach zs = reach_of(bz, fine_.z);
       if (z < zs.begin || z >= zs.end) continue;
@@ -118,8 +120,8 @@ LevelBounds::Off LevelBounds::finish(std::span<const float> finer) const {
           }
         }
         const std::size_t block = x + blocks_.x * (y + std::size_t{blocks_.y} * z);
-        off.made[block] += most;
-        off.decoded[block] += most;
+        for (std::vector<float> *of : {&off.made, &off.decoded})
+          (*of)[block] = rounded_up(double{(*of)[block]} + double{most});
       }
     }
   }
