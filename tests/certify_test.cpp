@@ -209,7 +209,21 @@ std::vector<double> expect_kept(const Certificate &certificate, std::span<const 
 
 class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
+  /// Draws a frame, checks its bounds, and counts the pixels that keep max_error. Returns the hits.
+  std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene, const Camera &camera,
+                                       float isovalue, double max_error) {
+    renderer.render(camera, isovalue);
+    std::vector<HitRecord> drawn = renderer.hits();
+    const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
+    expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
+    const CertificateSummary summary = summarize(certificate, max_error);
+    certified_ += summary.num_certified;
+    all_ += summary.num_pixels;
+    return drawn;
+  }
+
   ocl::Device device_{GetParam()};
+  std::uint64_t certified_ = 0, all_ = 0;  ///< pixels of certify_frame()
 };
 INSTANTIATE_TEST_SUITE_P(Devices, CertifyOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
 
@@ -253,7 +267,6 @@ TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
 }
 
 TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
-  std::uint64_t certified = 0, all = 0;
   for (const glm::uvec3 &dims : {glm::uvec3(64, 60, 56), glm::uvec3(33, 48, 40)}) {
     for (const auto &field : {test::gyroid_field(24), test::sphere_field(dims), test::noise_field(7)}) {
       for (const CompressOptions &options :
@@ -267,13 +280,7 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
           for (const Detail &detail : {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
             renderer.set_max_pixel_error(detail.max_pixel_error);
             renderer.set_value_error(detail.value_error);
-            renderer.render(camera, 0.3f);
-            const std::vector<HitRecord> drawn = renderer.hits();
-            const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
-            expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
-            const CertificateSummary summary = summarize(certificate, 10);
-            certified += summary.num_certified;
-            all += summary.num_pixels;
+            const std::vector<HitRecord> drawn = certify_frame(renderer, scene, camera, 0.3f, 10);
             renderer.render(camera, 0.3f);  // and the volume is drawn again
             expect_same_hits(renderer.hits(), drawn, kMedium.width);
           }
@@ -281,11 +288,10 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
       }
     }
   }
-  EXPECT_GT(2 * certified, all) << "too few for a test";
+  EXPECT_GT(2 * certified_, all_) << "too few for a test";
 }
 
 TEST_P(CertifyOnDevice, RealVolumes) {
-  std::uint64_t certified = 0, all = 0;
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
     Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
@@ -293,18 +299,12 @@ TEST_P(CertifyOnDevice, RealVolumes) {
       for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
         for (const double max_pixel_error : {0.0, 2.0}) {
           renderer.set_max_pixel_error(max_pixel_error);
-          renderer.render(camera, isovalue);
-          const std::vector<HitRecord> drawn = renderer.hits();
-          const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
-          expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
-          const CertificateSummary summary = summarize(certificate, 4);
-          certified += summary.num_certified;
-          all += summary.num_pixels;
+          certify_frame(renderer, scene, camera, isovalue, 4);
         }
       }
     }
   }
-  EXPECT_GT(2 * certified, all) << "too few for a test";
+  EXPECT_GT(2 * certified_, all_) << "too few for a test";
 }
 
 /// From so far that most of an error is what t loses in float32.
@@ -331,23 +331,14 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
   const Scene scene({40, 40, 40}, noise,
                     {.error_bound = ErrorBound{.min_exponent = -6, .whole_numbers = true, .max_error = 0}});
   Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
-  std::uint64_t certified = 0, all = 0;
   for (const double x : {12.0, 19.0, 26.0}) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
       const Camera camera = camera_along({x, 20, 21}, direction);
-      for (const float isovalue : {60.0f, 120.5f}) {
-        renderer.render(camera, isovalue);
-        const std::vector<HitRecord> drawn = renderer.hits();
-        const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
-        expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
-        const CertificateSummary summary = summarize(certificate, 0.01);
-        certified += summary.num_certified;
-        all += summary.num_pixels;
-      }
+      for (const float isovalue : {60.0f, 120.5f}) certify_frame(renderer, scene, camera, isovalue, 0.01);
     }
   }
-  EXPECT_GT(all, 10000u);
-  EXPECT_GT(20 * certified, 19 * all);
+  EXPECT_GT(all_, 10000u);
+  EXPECT_GT(20 * certified_, 19 * all_);
 }
 
 /// The goal is that half of the pixels have a bound of at most 8 times their error.

@@ -123,10 +123,10 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// A pass that asks for every block.
   static void fill_cache(StageWorld &world, const std::vector<float> &voxels) {
-    const uint num_pixels = static_cast<uint>(world.rays.num_rays);
-    for (uint first = 0; first < 4 * 4 * 3; first += num_pixels) {
+    const uint num_rays = static_cast<uint>(world.rays.num_rays);
+    for (uint first = 0; first < 4 * 4 * 3; first += num_rays) {
       std::vector<uint> pairs;
-      for (uint b = first; b < std::min(first + num_pixels, 4u * 4 * 3); ++b) pairs.push_back(b);
+      for (uint b = first; b < std::min(first + num_rays, 4u * 4 * 3); ++b) pairs.push_back(b);
       world.begin_pass(pairs, 1);
       world.cache.request(world.rays);
       world.assign_slots();

@@ -284,6 +284,11 @@ void print_header() {
              "depth p99", "normal", "FLIP", "PSNR");
 }
 
+/// Of the range of values, which may be none.
+double part_of(double value_range, double value_error) {
+  return value_error == 0 ? 0 : value_error / value_range;
+}
+
 void print(const Point &point, double value_range) {
   const auto text = [&](double number) {
     return point.max_error ? "by view" : fmt::format("{:.4g}", number);
@@ -292,7 +297,7 @@ void print(const Point &point, double value_range) {
   fmt::print(kRowFormat, point.stored->name, point.pipeline,
              point.max_error ? fmt::format("error {}", *point.max_error) : point.solver,
              text(point.details.front().max_pixel_error),
-             text(point.details.front().value_error / value_range), with_commas(stored_bytes(point)),
+             text(part_of(value_range, point.details.front().value_error)), with_commas(stored_bytes(point)),
              fmt::format("{:.3f}", point.ms), with_commas(point.decoded_blocks),
              fmt::format("{:.2e}", errors.wrong_pixels()), fmt::format("{:.2e}", errors.depth_p99),
              fmt::format("{:.2f}", errors.normal_p99), fmt::format("{:.4f}", errors.flip),
@@ -304,7 +309,8 @@ ordered_json to_json(const Point &point, double value_range) {
     return number ? ordered_json(*number) : ordered_json();
   };
   const auto detail_json = [&](const Detail &detail) -> ordered_json {
-    return {{"max_pixel_error", detail.max_pixel_error}, {"value_error", detail.value_error / value_range}};
+    return {{"max_pixel_error", detail.max_pixel_error},
+            {"value_error", part_of(value_range, detail.value_error)}};
   };
   const Errors &errors = point.errors;
   ordered_json json = {
@@ -365,11 +371,14 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
 /// What render --max-error chooses for each view.
 void choose(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
             const Stored &stored, std::vector<Point> &points) {
+  if (options.max_errors.empty()) return;
+  Point any;
+  any.stored = &stored;
+  any.max_error = options.max_errors.front();
+  Renderer renderer = make_renderer(device, subject, any);
   for (const double max_error : options.max_errors) {
-    Point point;
-    point.stored = &stored;
+    Point point = any;
     point.max_error = max_error;
-    Renderer renderer = make_renderer(device, subject, point);
     for (const Camera &camera : subject.cameras) {
       const DetailChoice choice = choose_detail(renderer, stored.volume, camera, subject.isovalue, max_error);
       point.details.push_back(choice.detail);
