@@ -84,7 +84,7 @@ class CacheInput {
   Wavefront rays_;
   BlockCache cache_;
   int turn_ = 0;
-  std::uint32_t pass_ = ISO_AGE_BUCKETS;
+  std::uint32_t pass_ = 1;
   bool requested_ = false;
 };
 

@@ -50,7 +50,7 @@ FrameParams cube_params(std::uint32_t key_bits) {
 PassCounts pair_counts(std::size_t num_pairs, std::uint32_t pass) {
   PassCounts counts{};
   counts.ray_count = static_cast<uint>(num_pairs);
-  counts.pass = pass;
+  counts.pass = counts.frame_pass = pass;
   counts.active_count = counts.window_count = counts.pair_slot_count = counts.pair_count = counts.ray_count;
   counts.spec_count = 1;
   return counts;

@@ -36,7 +36,7 @@ struct GroupInput {
     }
   }
   void open_pass() {
-    const PassCounts counts = pair_counts(rays.num_rays, ISO_AGE_BUCKETS + 1);
+    const PassCounts counts = pair_counts(rays.num_rays, 1);
     rays.counts.write({&counts, 1});
   }
   void run() { group(cache, rays); }

@@ -52,9 +52,9 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       slots_range_(ocl::Range::strided(slots, group_size, device)),
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
       free_slots_(device, "free slots", slots),
-      age_histogram_(device, "cache ages", ISO_AGE_BUCKETS),
+      rank_histogram_(device, "eviction ranks", ISO_EVICTION_RANKS),
       request_(device, "block_cache", "cache_request", with_levels(group_defines(group_size), levels)),
-      age_histogram_kernel_(device, "block_cache", "cache_age_histogram",
+      rank_histogram_kernel_(device, "block_cache", "cache_rank_histogram",
                             with_levels(group_defines(group_size), levels)),
       select_(device, "block_cache", "cache_select", with_levels(group_defines(group_size), levels)),
       evict_(device, "block_cache", "cache_evict", with_levels(group_defines(group_size), levels)),
@@ -79,10 +79,10 @@ void BlockCache::request(Wavefront &rays) {
 }
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
-  age_histogram_kernel_(slots_range_, asked, num_slots, capacity, state, slot_block_ids, slot_stamps,
-                        age_histogram_);
+  rank_histogram_kernel_(slots_range_, asked, num_slots, capacity, state, slot_block_ids, slot_stamps,
+                        rank_histogram_);
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
-          request_block_ids, capacity, age_histogram_, state);
+          request_block_ids, capacity, rank_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, table, state, free_slots_);
   rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, state, table);
 }

@@ -56,13 +56,13 @@ struct BlockCache {
  private:
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
-  ocl::Buffer<uint> free_slots_, age_histogram_;
+  ocl::Buffer<uint> free_slots_, rank_histogram_;
   ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_;
   ocl::Kernel<ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>, ocl::In<uint>, ocl::In<uint>,
               ocl::Out<uint>>
-      age_histogram_kernel_;
+      rank_histogram_kernel_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
       select_;

@@ -40,7 +40,7 @@ void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefron
   kernels_for(rays).march(range_, rays.frame, rays.level_frames, rays.num_level_frames, macrocells.masks(),
                           macrocells.ranges(), cache.table, cache.inside, cache.values, rays.previous_counts,
                           rays.counts, rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids,
-                          rays.ray_block_ids, rays.hits, cache.state);
+                          rays.ray_block_ids, rays.hits, cache.slot_stamps, cache.state);
 }
 
 void March::request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {

@@ -41,7 +41,7 @@ class March {
     ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
                 ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>, ocl::In<PassCounts>,
                 ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-                ocl::Out<HitRecord>, ocl::Out<CacheState>>
+                ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<CacheState>>
         march;
     ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>,
                 ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,

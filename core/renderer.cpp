@@ -115,6 +115,13 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
+/// Frames for which slots count as scarce after one that needed more blocks than there are slots.
+constexpr std::uint32_t kScarceFrames = 8;
+
+bool needed_more_than_slots(const std::vector<PassStats> &passes) {
+  return std::ranges::any_of(passes, [](const PassStats &pass) { return pass.counts.recycled_count > 0; });
+}
+
 }  // namespace
 
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options)
@@ -157,6 +164,11 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
     stats.cancelled = on_pass && !on_pass(pass) && !finished;
     guard.check(pass.counts);
   }
+  if (needed_more_than_slots(stats.passes)) {
+    scarce_frames_ = kScarceFrames;
+  } else if (scarce_frames_ > 0) {
+    --scarce_frames_;
+  }
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
   if (!stats.cancelled) pipeline_->end_frame();
   state_.rays.frame = state_.levels[0].frame;  // for shading
@@ -182,6 +194,7 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
     Level &level = state_.levels[i];
     FrameParams &frame = frames[i];
     frame.max_spec_count = options_.max_speculation;
+    frame.slots_are_scarce = scarce_frames_ > 0 ? 1 : 0;
     frame.per_ray_speculation = options_.per_ray_speculation;
     frame.table_groups = state_.cache.table_groups;
     if (draws(frame)) {
@@ -300,6 +313,7 @@ void Renderer::enlarge_kept(const Camera &camera, float isovalue) {
 
 void Renderer::clear_cache() {
   state_.cache.clear();
+  scarce_frames_ = 0;
   device_.finish();
   cached_isovalue_.reset();
 }

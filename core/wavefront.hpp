@@ -46,7 +46,7 @@ struct Wavefront {
     PassCounts start{};
     start.ray_count = static_cast<uint>(rays);
     start.window_count = start.ray_count;
-    start.pass = ISO_AGE_BUCKETS;  // so that slots never used, stamped 0, are the oldest
+    start.pass = 1;
     counts.write({&start, 1});
     previous_counts.write({&start, 1});
     next_counts.write({&start, 1});

@@ -1,11 +1,11 @@
 /// block_cache.cl -- gives cache slots to the blocks that a pass needs (Sec. 3.4, 3.5).
 ///
 /// table: block -> slot (block_table.h). slot_block_ids [slots]: the block in each slot, or ISO_INVALID_ID. slot_stamps
-/// [slots]: pass that used it last. free_slots [slots]: the first cache.free_count hold no block. requested_bits: one
+/// [slots]: when it was used last (slot_stamps.h). free_slots [slots]: the first cache.free_count hold no block. requested_bits: one
 /// per block, 0 between passes.
 ///
 /// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may not
-/// suffice: cache_age_histogram -> cache_select (how many, how old) -> cache_evict -> cache_rebuild -> then cache_assign. All
+/// suffice: cache_rank_histogram -> cache_select (how many, which) -> cache_evict -> cache_rebuild -> then cache_assign. All
 /// cost O(slots) or O(requests), never O(blocks). Which block gets which slot is left to chance; no hit depends on it.
 ///
 /// Progress is certain: the first block of the first active ray is served before all others. If old slots are too few even
@@ -14,11 +14,6 @@
 #include "block_requests.h"
 
 #define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
-
-/// A slot that holds blocks of the ray served first is stamped with the next pass: younger than all.
-ISO_INLINE uint slot_age(uint stamp, uint pass) {
-  return min(pass - stamp, ISO_AGE_BUCKETS - 1);
-}
 
 ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
@@ -83,38 +78,44 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
   }
 }
 
-/// Counts the slots in use by age, unless free ones suffice. age_histogram [ISO_AGE_BUCKETS]: zero before. Grid-stride over
+/// Counts the slots with blocks by eviction_rank(), unless free ones suffice. rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over
 /// slots.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_age_histogram(
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank_histogram(
     global const PassCounts *counts, uint num_slots, uint capacity, global const CacheState *cache,
-    global const uint *slot_block_ids, global const uint *slot_stamps, global uint *age_histogram) {
-  local uint histogram[ISO_AGE_BUCKETS];
-  const uint pass = counts->pass;
+    global const uint *slot_block_ids, global const uint *slot_stamps, global uint *rank_histogram) {
+  local uint histogram[ISO_EVICTION_RANKS];
   /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
   const uint counted_slots = listed_count(counts, capacity) <= cache->free_count ? 0 : num_slots;
-  for (uint age = get_local_id(0); age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) histogram[age] = 0;
+  for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE) histogram[rank] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
-    if (slot_block_ids[slot] != ISO_INVALID_ID) atomic_inc(&histogram[slot_age(slot_stamps[slot], pass)]);
+    if (slot_block_ids[slot] != ISO_INVALID_ID)
+      atomic_inc(&histogram[eviction_rank(slot_stamps[slot], counts)]);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint age = get_local_id(0); age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) {
-    if (histogram[age] != 0) atomic_add(&age_histogram[age], histogram[age]);
+  for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE) {
+    if (histogram[rank] != 0) atomic_add(&rank_histogram[rank], histogram[rank]);
   }
 }
 
-/// Decides how many slots are freed and which ages pay for it. One work-group. age_histogram is zeroed
+/// Decides how many slots are freed and of which ranks they are. One work-group. rank_histogram is zeroed
 /// again.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
     global const BlockEntry *table, global uint *slot_stamps, global uint *requested_bits,
-    global uint *request_block_ids, uint capacity, global uint *age_histogram, global CacheState *cache) {
+    global uint *request_block_ids, uint capacity, global uint *rank_histogram, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint first_missing[8]; /* blocks served first that are not cached */
   local uint places[8];        /* where they stand on the request list */
-  local uint num_first_missing;
+  local uint num_first_missing, histogram[ISO_EVICTION_RANKS];
   const uint requested = listed_count(counts, capacity), num_free = cache->free_count;
-  const uint in_use = age_histogram[0], item = get_local_id(0);
+  const uint item = get_local_id(0);
+  for (uint rank = item; rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE) {
+    histogram[rank] = rank_histogram[rank];
+    rank_histogram[rank] = 0;
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  const uint in_use = histogram[0];
   const int scarce = counts->requested_count > min(num_slots - in_use, capacity);
   const uint searched = scarce ? requested : 0;
   if (item == 0) {
@@ -128,7 +129,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
       if ((cache->first_touched >> corner & exists) != 0) {
         const uint slot = cached_slot(frame, table, x, y, z);
         if (slot != ISO_BLOCK_ABSENT) {
-          slot_stamps[slot] = counts->pass + 1;
+          slot_stamps[slot] = needed_stamp(counts->pass + 1);
         } else {
           places[num_first_missing] = ISO_INVALID_ID;
           first_missing[num_first_missing++] = block_id_at(frame, x, y, z);
@@ -145,7 +146,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   }
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   if (item == 0) {
-    uint granted, evicted, age, older = 0;
+    uint granted, evicted, rank, before = 0, before_own = 0;
     /* Swap each to place j; where the list ended too early, put it there. */
     for (uint j = 0; j < num_first_missing; ++j) {
       const uint displaced = request_block_ids[j];
@@ -163,23 +164,25 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     granted = min(requested, max(num_slots - in_use, num_first_missing));
     evicted = granted > num_free ? granted - num_free : 0;
     if (evicted != 0) { /* some more that are out of use, so that the next passes need not count again */
-      const uint unused = age_histogram[ISO_AGE_BUCKETS - 1];
-      evicted += min(num_slots / ISO_SPARE_PART, unused - min(unused, evicted));
+      uint unread = 0;  /* in earlier frames */
+      for (rank = ISO_EVICTION_RANKS - ISO_RANKS_PER_CLASS; rank < ISO_EVICTION_RANKS; ++rank)
+        unread += histogram[rank];
+      evicted += min(num_slots / ISO_SPARE_PART, unread - min(unread, evicted));
     }
-    for (age = ISO_AGE_BUCKETS - 1; age > 0 && older + age_histogram[age] < evicted; --age) {
-      older += age_histogram[age];
+    for (rank = ISO_EVICTION_RANKS - 1; rank > 0 && before + histogram[rank] < evicted; --rank) {
+      before += histogram[rank];
+      if (rank >= ISO_RANKS_OF_FRAME) before_own = before;
     }
     cache->free_before = num_free;
-    cache->cutoff_age = evicted == 0 ? ISO_AGE_BUCKETS : age;
-    cache->cutoff_count = evicted - older;
+    cache->cutoff_rank = evicted == 0 ? ISO_EVICTION_RANKS : rank;
+    cache->cutoff_count = evicted - before;
+    cache->recycled = rank < ISO_RANKS_OF_FRAME ? evicted - before_own : 0;
     cache->num_evicted = 0;
     cache->num_cutoff = 0;
     cache->free_count = num_free + evicted;
     cache->rebuild = requested != 0 && cache->table_count + granted > 6 * frame->table_groups; /* of 8 */
     if (cache->rebuild) cache->table_count = num_slots - cache->free_count;
   }
-  barrier(CLK_GLOBAL_MEM_FENCE); /* the histogram has been read */
-  for (uint age = item; age < ISO_AGE_BUCKETS; age += ISO_GROUP_SIZE) age_histogram[age] = 0;
 }
 
 /// Frees the slots selected; empties the table where it is to be rebuilt. Grid-stride over slots.
@@ -187,18 +190,19 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
                         global uint *slot_block_ids, global const uint *slot_stamps, global BlockEntry *table,
                         global CacheState *cache, global uint *free_slots) {
   const FrameParams *frame = &frame_params;
-  const uint pass = counts->pass, cutoff_age = cache->cutoff_age, rebuild = cache->rebuild;
+  const uint cutoff_rank = cache->cutoff_rank, rebuild = cache->rebuild;
   if (counts->requested_count == 0) return;
   for (uint i = get_global_id(0); rebuild && i < 8 * frame->table_groups; i += get_global_size(0)) {
     table[i].block_id = ISO_INVALID_ID;
     table[i].slot = ISO_BLOCK_ABSENT;
   }
-  for (uint slot = get_global_id(0); cutoff_age < ISO_AGE_BUCKETS && slot < num_slots;
+  for (uint slot = get_global_id(0); cutoff_rank < ISO_EVICTION_RANKS && slot < num_slots;
        slot += get_global_size(0)) {
     const uint stamp = slot_stamps[slot], block_id = slot_block_ids[slot];
-    const uint age = slot_age(stamp, pass);
-    int is_victim = block_id != ISO_INVALID_ID && stamp != pass + 1 && age >= cutoff_age;
-    if (is_victim && age == cutoff_age) is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;
+    const uint rank = eviction_rank(stamp, counts);
+    int is_victim =
+        block_id != ISO_INVALID_ID && stamp != needed_stamp(counts->pass + 1) && rank >= cutoff_rank;
+    if (is_victim && rank == cutoff_rank) is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;
     if (is_victim) {
       if (!rebuild) table_evict(frame, table, block_id);
       slot_block_ids[slot] = ISO_INVALID_ID;
@@ -253,6 +257,7 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
     cache->granted = granted;
     counts->decoded_count = granted;
     counts->free_count = num_free - granted;
+    counts->recycled_count = cache->recycled;
   }
   for (uint i = get_global_id(0); i < listed; i += get_global_size(0)) {
     const uint block_id = request_block_ids[i];
@@ -262,7 +267,7 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
       const uint slot = free_slots[num_free - 1 - i];
       table_insert(frame, table, block_id, slot);
       slot_block_ids[slot] = block_id;
-      slot_stamps[slot] = asked->pass;
+      slot_stamps[slot] = needed_stamp(asked->pass);
       decode_slots[i] = slot;
     }
   }
@@ -274,7 +279,7 @@ kernel void cache_clear(uint num_slots, uint table_size, global BlockEntry *tabl
                         global CacheState *cache) {
   if (get_global_id(0) == 0) {
     cache->free_count = num_slots;
-    cache->granted = 0;
+    cache->granted = cache->recycled = 0;
     cache->table_count = 0;
   }
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {

@@ -3,12 +3,13 @@
 #define ISOWAVE_BLOCK_REQUESTS_H
 
 #include "block_table.h"
+#include "slot_stamps.h"
 
 /// Begins a pass. One work-item, in a kernel that reads none of this.
 ISO_INLINE void open_requests(global CacheState *cache) {
   cache->free_count -= cache->granted;
   cache->table_count += cache->granted;
-  cache->granted = 0;
+  cache->granted = cache->recycled = 0;
 }
 
 /// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks, with several levels of detail
@@ -30,13 +31,13 @@ ISO_INLINE int mark_request(const FrameParams *frame, volatile global uint *requ
   return (atomic_or(&requested_bits[request_word(frame, x, y, z)], bit) & bit) == 0;
 }
 
-/// Stamps block (x,y,z) with the pass if it is cached. Returns 1 if it is not, and this is the first to ask for it.
+/// Stamps block (x,y,z) as needed if it is cached. Returns 1 if it is not, and this is the first to ask for it.
 ISO_INLINE int request_block(const FrameParams *frame, global const BlockEntry *table,
                              global uint *slot_stamps, uint pass, volatile global uint *requested_bits,
                              uint x, uint y, uint z) {
   const uint slot = cached_slot(frame, table, x, y, z);
   if (slot == ISO_BLOCK_ABSENT) return mark_request(frame, requested_bits, x, y, z);
-  slot_stamps[slot] = pass;
+  slot_stamps[slot] = needed_stamp(pass);
   return 0;
 }
 

@@ -32,10 +32,11 @@ typedef struct CacheState {
       table_count;  ///< at least the keys in the table before the pass's grants, those of evicted blocks included
   /* The outcome of cache_select: */
   uint free_before;   ///< free slots before eviction
-  uint cutoff_age;    ///< all slots older than this are victims ...
-  uint cutoff_count;  ///< ... and this many of just this age
+  uint cutoff_rank;   ///< all slots of higher ranks are victims (slot_stamps.h) ...
+  uint cutoff_count;  ///< ... and this many of just this rank
   uint num_evicted;   ///< so far
-  uint num_cutoff;    ///< tickets drawn by slots of the cutoff age
+  uint num_cutoff;    ///< tickets drawn by slots of the cutoff rank
+  uint recycled;      ///< of the victims, those that their own frame had used
   uint rebuild;       ///< the table has too many keys of evicted blocks
 } CacheState;
 

@@ -8,8 +8,10 @@
 kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits, global uint *ray_block_ids,
                          global uint *ray_ids, global uint *ray_active_mask, global PassCounts *counts) {
   const FrameParams *frame = &frame_params;
-  /* The first pass is for all. */
-  if (get_global_id(0) == 0) counts->window_count = counts->ray_count = frame->width * frame->height;
+  if (get_global_id(0) == 0) {
+    counts->frame_pass = counts->pass + 1;
+    counts->window_count = counts->ray_count = frame->width * frame->height; /* the first pass is for all */
+  }
   for (uint pixel = get_global_id(0); pixel < frame->width * frame->height; pixel += get_global_size(0)) {
     const Ray ray = make_ray(frame, pixel);
     const uint block_id = first_block(frame, &ray);

@@ -35,17 +35,29 @@ ISO_INLINE uint frame_rays(const FrameParams *frame) {
   return frame->width * frame->height;
 }
 
+/// How many of the rays that wait ask for blocks in this pass; why, see begin_pass() in speculation.cl.
+ISO_INLINE uint open_window(const FrameParams *frame, global const PassCounts *prev,
+                            global const PassCounts *counts) {
+  const uint asked = min(prev->window_count, prev->next_active_count);
+  uint window = frame_rays(frame);
+  if (counts->pass != counts->frame_pass) {
+    window = prev->requested_count > counts->decoded_count
+                 ? (uint)((ulong)asked * counts->decoded_count / prev->requested_count)
+                 : prev->window_count + prev->window_count / 4 + 1;
+  }
+  return clamp(window, 1u, frame_rays(frame));
+}
+
 /// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
-ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCounts *prev,
-                                 global const PassCounts *counts, global PassCounts *next) {
-  uint window = counts->window_count; /* see begin_pass() in speculation.cl */
-  window = prev->requested_count > counts->decoded_count ? window / 2 : window + window / 4 + 1;
+ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCounts *counts,
+                                 global PassCounts *next) {
   next->ray_count = frame_rays(frame);
   next->pass = counts->pass + 1;
-  next->active_count = next->spec_count = next->pair_slot_count = next->pair_count = 0;
-  next->window_count = clamp(window, 1u, frame_rays(frame));
+  next->frame_pass = counts->frame_pass;
+  next->active_count = next->spec_count = next->window_count = 0;
+  next->pair_slot_count = next->pair_count = next->ahead_count = 0;
   next->granted_count = next->visible_count = next->requested_count = next->decoded_count = 0;
-  next->hit_count = next->next_active_count = 0;
+  next->recycled_count = next->hit_count = next->next_active_count = 0;
   next->free_count = counts->free_count;
 }
 
@@ -72,7 +84,7 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 
 /// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the frame's screen
 /// box, the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last
-/// pass, next_active_count 0 before; *next: the first pass of this frame is for all rays. frames [num_frames]: with levels of detail, those
+/// pass, next_active_count 0 before; *next: of the first pass of this frame. frames [num_frames]: with levels of detail, those
 /// that draw, the finest first; frame_params is the first of them. ranges: of their blocks. A kernel of its own, since it is so much leaner than march
 /// that far more of its work-items fit a device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
@@ -85,7 +97,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
                         frame->screen_end_y};
   const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
-  if (get_global_id(0) == 0) next->window_count = frame_rays(frame);
+  if (get_global_id(0) == 0) next->frame_pass = next->pass;
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < frame_rays(frame);
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     clear_hits(hit_words + begin * ISO_HIT_WORDS, min((uint)ISO_GROUP_SIZE, frame_rays(frame) - begin));
@@ -129,20 +141,21 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     global const ulong *inside, global const float *cache_values, global const PassCounts *prev,
     global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
-    global CacheState *cache) {
+    global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
   local uint counters[2], group_hits, group_blocks, num_going;
   volatile local uint deciding[ISO_GROUP_SIZE]; /* of each ray's blocks of the round */
   const uint item = get_local_id(0), num_rays = prev->next_active_count;
   const uint lanes = lanes_per_ray(num_rays);
+  const uint stamp = read_stamp(counts->pass);
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
-    open_next_counts(frame, prev, counts, next_counts);
+    open_next_counts(frame, counts, next_counts);
     open_requests(cache);
     cache->first_block_id = ISO_INVALID_ID;
     counts->active_count = num_rays;
-    counts->spec_count = num_rays == 0 ? 0 : clamp(frame_rays(frame) / num_rays, 1u, frame->max_spec_count);
+    counts->window_count = open_window(frame, prev, counts);
   }
   if (item == 0) counters[0] = group_hits = group_blocks = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -179,7 +192,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
           const int may_end = ISO_LEVELS && next == ISO_INVALID_ID && at + 1 == num_found;
           result = march_block(level, table, inside, cache_values, &ray,
                                block_coords(level, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
-                               stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
+                               slot_stamps, stamp, stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
                                stands_here ? side : ISO_SIDE_UNKNOWN, may_end, &change);
           if (result == ISO_RAY_LEFT) {
             ++num_passed;
@@ -252,7 +265,7 @@ typedef struct Requests {
 /// corners, so that a GPU waits for memory twice, not sixteen times. Most have been asked for by another ray: their bits tell,
 /// and cost neither a search in the table nor an atomic, for whose result one would wait.
 ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
-                                global uint *slot_stamps, uint pass, BlockCoords b, uint touched,
+                                global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
                                 Requests requests) {
   BlockEntry entries[8];
   uint missing = touched; /* of the corners: nobody is known to have asked for them */
@@ -268,7 +281,7 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
     if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
-      slot_stamps[entries[corner].slot] = pass;
+      slot_stamps[entries[corner].slot] = stamp;
       missing &= ~(1u << corner);
     }
   }
@@ -297,12 +310,19 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
     global uint *requested_bits, global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
-  local uint num_staged, list_begin;
+  local uint num_staged, list_begin, group_pairs, group_ahead;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
                              staged,         &num_staged};
-  const uint item = get_local_id(0), num_rays = min(counts->next_active_count, counts->window_count);
-  const uint lanes = lanes_per_ray(num_rays);
-  if (item == 0) num_staged = 0;
+  const uint item = get_local_id(0), num_waiting = counts->next_active_count;
+  const uint num_rays = min(num_waiting, counts->window_count), lanes = lanes_per_ray(num_rays);
+  const uint stamp = needed_stamp(counts->pass);
+  const uint spec_count =
+      num_waiting == 0 ? 0 : clamp(frame_rays(frame) / num_waiting, 1u, frame->max_spec_count);
+  const int is_scarce = frame->slots_are_scarce != 0 || counts->window_count < frame_rays(frame);
+  const uint most = is_scarce ? scarce_speculation(frame, num_rays) : ISO_MAX_SPECULATION;
+  uint num_pairs = 0, num_ahead = 0;
+  if (get_global_id(0) == 0) counts->spec_count = spec_count;
+  if (item == 0) num_staged = group_pairs = group_ahead = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays * lanes;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
@@ -317,7 +337,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       const Ray ray = make_ray(level, pixel);
       const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
       /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more. */
-      const uint ahead = frame->per_ray_speculation ? max(own, counts->spec_count / 2) : counts->spec_count;
+      const uint ahead = min(frame->per_ray_speculation ? max(own, spec_count / 2) : spec_count, most);
+      if (lane == 0) num_ahead += ahead;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
         const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,
                                                 min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
@@ -326,7 +347,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
           const uint block_id = found[at * ISO_GROUP_SIZE + item];
           const BlockCoords b = block_coords(level, block_id);
           const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
-          request_touched(level, table, slot_stamps, counts->pass, b, touched, requests);
+          request_touched(level, table, slot_stamps, stamp, b, touched, requests);
+          ++num_pairs;
           if (i == 0 && asked + at == 0) {
             cache->first_block_id = block_id;
             cache->first_touched = touched;
@@ -345,4 +367,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
     if (item == 0) num_staged = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
   }
+  if (num_pairs != 0) atomic_add(&group_pairs, num_pairs);
+  if (num_ahead != 0) atomic_add(&group_ahead, num_ahead);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0 && group_pairs != 0) atomic_add(&counts->pair_count, group_pairs);
+  if (item == 0 && group_ahead != 0) atomic_add(&counts->ahead_count, group_ahead);
 }

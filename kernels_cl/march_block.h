@@ -89,16 +89,18 @@ ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
 
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a block of
 /// the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
-/// precise: settle doubts on the spot. side: where the ray was before the border at which its band begins in this block. may_end: its
+/// slot_stamps: those of the blocks that are read become `stamp`. precise: settle doubts on the spot. side: where the ray was before the border at which its band begins in this block. may_end: its
 /// band may end in this one.
 ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
                            global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
-                           local uint *slots, int precise, uint side, int may_end, BlockChange *found) {
+                           local uint *slots, global uint *slot_stamps, uint stamp, int precise, uint side,
+                           int may_end, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  uint have;
+  uint have, read = 0; /* corners of the dual grid */
   int result = ISO_RAY_LEFT, left = 0;
   const ulong cells = open_block(frame, table, inside, b, slots, &have);
   if ((have & 1u) == 0) return ISO_RAY_WAITS;
+  slot_stamps[slots[0]] = stamp;
   if (cells == 0 && side == ISO_SIDE_UNKNOWN && !may_end) return ISO_RAY_LEFT;
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const int ends = may_end && ends_band(frame, walk_exit(&block, ray));
@@ -116,6 +118,7 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
       if ((needed & ~have) != 0) {
         result = ISO_RAY_WAITS;
       } else {
+        read |= needed;
         for (int corner = 0; corner < 8; ++corner) {
           const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
           const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
@@ -142,6 +145,9 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
       found->enter = cell_exit;
       side = ISO_SIDE_UNKNOWN;
     }
+  }
+  for (uint corner = 1; read >> corner != 0; ++corner) {
+    if ((read >> corner & 1u) != 0) slot_stamps[slots[corner * ISO_GROUP_SIZE]] = stamp;
   }
   return result;
 }

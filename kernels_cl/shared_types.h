@@ -53,7 +53,7 @@ inline uint popcount(uint x) {
 #define ISO_DUAL_GRID_VERTICES 125u  ///< 5^3
 #define ISO_SCAN_ITEMS 8u            ///< entries per work-item and tile in scan.cl
 #define ISO_GROUP_ITEMS 4u           ///< pairs per work-item and tile in group.cl
-#define ISO_AGE_BUCKETS 64u          ///< ages the LRU tells apart [passes]; older ones count as the oldest
+#define ISO_EVICTION_RANKS 256u      ///< orders of eviction that the cache tells apart (slot_stamps.h)
 
 #ifndef ISO_CHECK_RACES /* by -D, from tests/run_under_oclgrind.sh */
 #define ISO_CHECK_RACES \
@@ -84,14 +84,23 @@ typedef struct FrameParams {
   /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
   uint screen_begin_x, screen_begin_y, screen_end_x, screen_end_y;
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
-  uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
+  uint
+      slots_are_scarce;  ///< frames before needed more blocks than there are cache slots (scarce_speculation())
+  uint table_groups;     ///< entries / 8 of the block cache's table (block_table.h)
   /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z) of this one is number x +
   /// id_blocks_x (y + id_blocks_y (id_begin_z + z)).
   uint id_blocks_x, id_blocks_y, id_begin_z;
   uint ranges_begin, masks_begin;  ///< this level's among those of all levels (macrocells.cl) [entries]
   float begin_t, end_t;            ///< the band of the rays that is drawn at this level [t of the kernels]
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 176);
+ISO_CHECK_SIZE(FrameParams, 180);
+
+/// Most blocks that a ray looks ahead while cache slots are scarce, where num_rays rays do: for all together half as many as
+/// there are slots, but for each one. Not in the paper. What rays look at in vain costs slots whose blocks other rays would read.
+ISO_INLINE uint scarce_speculation(const FrameParams *frame, uint num_rays) {
+  const uint each = 2 * frame->table_groups / (num_rays + 1);
+  return each < 1 ? 1 : each;
+}
 
 /// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu
@@ -155,22 +164,26 @@ ISO_CHECK_SIZE(StreamLayout, 32);
 /// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input is "the
 /// first n entries" take n from a field of this struct, so that no launch waits for the host.
 typedef struct PassCounts {
-  uint ray_count;          ///< width * height of the frame
-  uint pass;               ///< number of the pass since the cache was made, from 1: the LRU's clock
-  uint active_count;       ///< N_Act: rays at work at the start of the pass
-  uint spec_count;         ///< N_Spec of the pass; 0 when no ray is active
-  uint window_count;       ///< of the active rays, the first so many take part in the pass
-  uint pair_slot_count;    ///< window_count * spec_count: entries of the pair arrays in use
-  uint pair_count;         ///< ray-block pairs made by traversal
-  uint granted_count;      ///< of those, pairs whose dual grid was in the cache and were intersected
-  uint visible_count;      ///< distinct blocks those belong to
-  uint requested_count;    ///< blocks asked for that were not cached
-  uint decoded_count;      ///< of those, blocks that got a slot
+  uint ray_count;        ///< width * height of the frame
+  uint pass;             ///< number of the pass since the cache was made: the clock of its slots' stamps
+  uint frame_pass;       ///< number of the frame's first pass
+  uint active_count;     ///< N_Act: rays at work at the start of the pass
+  uint spec_count;       ///< N_Spec of the pass; 0 when no ray is active
+  uint window_count;     ///< of the active rays, the first so many take part in the pass
+  uint pair_slot_count;  ///< window_count * spec_count: entries of the pair arrays in use
+  uint pair_count;       ///< ray-block pairs: blocks that rays looked ahead at, summed over the rays
+  uint ahead_count;      ///< blocks that rays were to look ahead at, summed over the rays of the window
+  uint granted_count;    ///< of those, pairs whose dual grid was in the cache and were intersected
+  uint visible_count;    ///< distinct blocks those belong to
+  uint requested_count;  ///< blocks asked for that were not cached
+  uint decoded_count;    ///< of those, blocks that got a slot
+  uint
+      recycled_count;  ///< blocks freed for them that this frame had asked for, too: it needs more than there are slots
   uint hit_count;          ///< rays that hit in this pass
   uint next_active_count;  ///< rays left for the next pass
   uint free_count;         ///< cache slots left without a block
 } PassCounts;
-ISO_CHECK_SIZE(PassCounts, 56);
+ISO_CHECK_SIZE(PassCounts, 68);
 
 ISO_NAMESPACE_END
 

@@ -15,7 +15,7 @@
   X(active_begin_x) X(active_begin_y) X(active_begin_z)                     \
   X(active_end_x) X(active_end_y) X(active_end_z)                           \
   X(screen_begin_x) X(screen_begin_y) X(screen_end_x) X(screen_end_y)       \
-  X(per_ray_speculation) X(table_groups)                                    \
+  X(per_ray_speculation) X(slots_are_scarce) X(table_groups)                                    \
   X(id_blocks_x) X(id_blocks_y) X(id_begin_z)                               \
   X(ranges_begin) X(masks_begin) X(begin_t) X(end_t)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
@@ -24,10 +24,10 @@
 #define ISO_STREAM_LAYOUT_FIELDS(X) X(bits_per_block) X(words_per_part) X(min_exponent) X(whole_numbers) \
   X(value_offset) X(bound_unit) X(bounds_begin) X(bounds_by_place)
 #define ISO_PASS_COUNTS_FIELDS(X)                                           \
-  X(ray_count) X(pass) X(active_count) X(spec_count) X(window_count)      \
-  X(pair_slot_count) X(pair_count)                                          \
+  X(ray_count) X(pass) X(frame_pass) X(active_count) X(spec_count) X(window_count)      \
+  X(pair_slot_count) X(pair_count) X(ahead_count)                           \
   X(granted_count) X(visible_count) X(requested_count) X(decoded_count)     \
-  X(hit_count) X(next_active_count) X(free_count)
+  X(recycled_count) X(hit_count) X(next_active_count) X(free_count)
 
 // clang-format on
 #endif

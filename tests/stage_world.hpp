@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "core/block_cache.hpp"
@@ -58,13 +59,18 @@ struct StageWorld {
     rays.active_ray_ids.write(ray_ids);
   }
 
+  /// The next pass is the first of a frame.
+  void begin_frame() { frame_begins_ = true; }
+
   /// Opens a pass by hand: these pairs, entries a * spec_count + k for active ray a.
   void begin_pass(const std::vector<uint> &pair_block_ids, uint spec_count) {
     PassCounts counts = rays.counts.read().front();
-    const uint pass = counts.pass + 1;
+    const uint pass = counts.pass + 1,
+               frame_pass = std::exchange(frame_begins_, false) ? pass : counts.frame_pass;
     counts = {};
     counts.ray_count = static_cast<uint>(rays.num_rays);
     counts.pass = pass;
+    counts.frame_pass = frame_pass;
     counts.active_count = static_cast<uint>(pair_block_ids.size()) / spec_count;
     counts.window_count = counts.active_count;
     counts.spec_count = spec_count;
@@ -115,6 +121,9 @@ struct StageWorld {
   BlockCache cache;
   Compaction compaction;
   std::vector<uint> active_ray_ids;
+
+ private:
+  bool frame_begins_ = false;
 };
 
 /// A camera-less frame: only grid and number of pixels matter.
