@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <set>
 
 #include "bench/run_info.hpp"
@@ -33,10 +35,26 @@ double sum_of(const FrameStats &frame, uint PassCounts::*count) {
   return sum;
 }
 
-double median_spec_count(const FrameStats &frame) {
+/// Of the passes in which rays looked ahead.
+double median_n_spec(const FrameStats &frame) {
   std::vector<double> counts;
-  for (const PassStats &pass : frame.passes) counts.push_back(pass.counts.spec_count);
-  return median(std::move(counts));
+  for (const PassStats &pass : frame.passes) {
+    if (pass.n_spec > 0) counts.push_back(pass.n_spec);
+  }
+  return counts.empty() ? 0.0 : median(std::move(counts));
+}
+
+/// NaN where they are not counted.
+double sum_of_visible(const FrameStats &frame) {
+  double sum = 0;
+  for (const PassStats &pass : frame.passes)
+    sum += pass.visible_blocks ? *pass.visible_blocks : std::numeric_limits<double>::quiet_NaN();
+  return sum;
+}
+
+/// "-" for NaN.
+std::string cell_text(double value, int precision) {
+  return std::isnan(value) ? "-" : fmt::format("{:.{}f}", value, precision);
 }
 
 double mean_utilization(const FrameStats &frame) {
@@ -63,12 +81,12 @@ const Column kColumns[] = {
      [](const FrameReport &, const FrameStats &frame) { return frame.total_ms / num_passes(frame); }},
     {"visible %", "visible_blocks_percent", 2,
      [](const FrameReport &report, const FrameStats &frame) {
-       return 100.0 * sum_of(frame, &PassCounts::visible_count) / double(report.grid.block_count());
+       return 100.0 * sum_of_visible(frame) / double(report.grid.block_count());
      }},
     {"decoded", "decoded_blocks", 0,
      [](const FrameReport &, const FrameStats &frame) { return sum_of(frame, &PassCounts::decoded_count); }},
     {"N_spec", "median_n_spec", 1,
-     [](const FrameReport &, const FrameStats &frame) { return median_spec_count(frame); }},
+     [](const FrameReport &, const FrameStats &frame) { return median_n_spec(frame); }},
     {"util %", "utilization_percent", 1,
      [](const FrameReport &, const FrameStats &frame) { return mean_utilization(frame); }},
 };
@@ -106,7 +124,7 @@ void print_views(const FrameReport &report) {
     }
     for (std::size_t c = 0; c < columns.size(); ++c) {
       columns[c].push_back(column_of(report, view, kColumns[c]));
-      cells.push_back(fmt::format("{:.{}f}", columns[c].back(), kColumns[c].precision));
+      cells.push_back(cell_text(columns[c].back(), kColumns[c].precision));
     }
     print_row(std::to_string(v), cells);
   }
@@ -114,7 +132,7 @@ void print_views(const FrameReport &report) {
   for (const auto &[kind, member] : kKinds)
     cells.push_back(spread_text(spread_of(all_times(report.views, member))));
   for (std::size_t c = 0; c < columns.size(); ++c) {
-    cells.push_back(fmt::format("{:.{}f}", median(columns[c]), kColumns[c].precision));
+    cells.push_back(cell_text(median(columns[c]), kColumns[c].precision));
   }
   print_row("median", cells);
 }

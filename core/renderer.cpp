@@ -235,6 +235,12 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   PassStats stats;
   stats.counts = counts;
   stats.counts.window_count = std::min(counts.window_count, counts.active_count);
+  const bool is_blocks = options_.pipeline == PipelineKind::kBlocks;
+  // Pipeline `rays` looks ahead at the end of a pass, for the rays that are left.
+  const uint rays_looking =
+      std::min(counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
+  if (rays_looking != 0) stats.n_spec = static_cast<double>(counts.ahead_count) / rays_looking;
+  if (is_blocks) stats.visible_blocks = counts.visible_count;
   // A launch that is not needed costs more than a pass that finds slots missing now and then.
   state_.slots_are_scarce =
       state_.cache.num_slots < kSmallCache || counts.free_count < state_.cache.num_slots / 4;

@@ -47,6 +47,10 @@ struct RendererOptions {
 /// What one pass did: the counts of the device, and what follows from them.
 struct PassStats {
   PassCounts counts{};
+  double n_spec =
+      0;  ///< blocks that the pass's rays were to look ahead at, mean over the rays; 0 where none looked
+  /// Distinct blocks that rays were intersected in; not counted in pipeline `rays`, which does not gather rays by block.
+  std::optional<std::uint32_t> visible_blocks{};
   double utilization_percent = 0;          ///< ray-block pairs that were intersected, of all rays
   double completed_percent = 0;            ///< rays that have ended, of all
   std::map<std::string, double> stage_ms;  ///< by stage; empty unless the device was opened with profiling

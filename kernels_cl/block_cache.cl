@@ -164,10 +164,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     granted = min(requested, max(num_slots - in_use, num_first_missing));
     evicted = granted > num_free ? granted - num_free : 0;
     if (evicted != 0) { /* some more that are out of use, so that the next passes need not count again */
-      uint unread = 0;  /* in earlier frames */
-      for (rank = ISO_EVICTION_RANKS - ISO_RANKS_PER_CLASS; rank < ISO_EVICTION_RANKS; ++rank)
-        unread += histogram[rank];
-      evicted += min(num_slots / ISO_SPARE_PART, unread - min(unread, evicted));
+      const uint unused = histogram[ISO_EVICTION_RANKS - 1];
+      evicted += min(num_slots / ISO_SPARE_PART, unused - min(unused, evicted));
     }
     for (rank = ISO_EVICTION_RANKS - 1; rank > 0 && before + histogram[rank] < evicted; --rank) {
       before += histogram[rank];

@@ -9,6 +9,7 @@ kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
                          global uint *ray_ids, global uint *ray_active_mask, global PassCounts *counts) {
   const FrameParams *frame = &frame_params;
   if (get_global_id(0) == 0) {
+    counts->last_frame_pass = counts->frame_pass;
     counts->frame_pass = counts->pass + 1;
     counts->window_count = counts->ray_count = frame->width * frame->height; /* the first pass is for all */
   }

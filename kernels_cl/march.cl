@@ -54,6 +54,7 @@ ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCoun
   next->ray_count = frame_rays(frame);
   next->pass = counts->pass + 1;
   next->frame_pass = counts->frame_pass;
+  next->last_frame_pass = counts->last_frame_pass;
   next->active_count = next->spec_count = next->window_count = 0;
   next->pair_slot_count = next->pair_count = next->ahead_count = 0;
   next->granted_count = next->visible_count = next->requested_count = next->decoded_count = 0;
@@ -97,7 +98,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
                         frame->screen_end_y};
   const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
-  if (get_global_id(0) == 0) next->frame_pass = next->pass;
+  if (get_global_id(0) == 0) {
+    next->last_frame_pass = counts->frame_pass;
+    next->frame_pass = next->pass;
+  }
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < frame_rays(frame);
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     clear_hits(hit_words + begin * ISO_HIT_WORDS, min((uint)ISO_GROUP_SIZE, frame_rays(frame) - begin));

@@ -167,6 +167,7 @@ typedef struct PassCounts {
   uint ray_count;        ///< width * height of the frame
   uint pass;             ///< number of the pass since the cache was made: the clock of its slots' stamps
   uint frame_pass;       ///< number of the frame's first pass
+  uint last_frame_pass;  ///< and of the first pass of the frame before
   uint active_count;     ///< N_Act: rays at work at the start of the pass
   uint spec_count;       ///< N_Spec of the pass; 0 when no ray is active
   uint window_count;     ///< of the active rays, the first so many take part in the pass
@@ -183,7 +184,7 @@ typedef struct PassCounts {
   uint next_active_count;  ///< rays left for the next pass
   uint free_count;         ///< cache slots left without a block
 } PassCounts;
-ISO_CHECK_SIZE(PassCounts, 68);
+ISO_CHECK_SIZE(PassCounts, 72);
 
 ISO_NAMESPACE_END
 

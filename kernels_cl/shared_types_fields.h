@@ -24,7 +24,7 @@
 #define ISO_STREAM_LAYOUT_FIELDS(X) X(bits_per_block) X(words_per_part) X(min_exponent) X(whole_numbers) \
   X(value_offset) X(bound_unit) X(bounds_begin) X(bounds_by_place)
 #define ISO_PASS_COUNTS_FIELDS(X)                                           \
-  X(ray_count) X(pass) X(frame_pass) X(active_count) X(spec_count) X(window_count)      \
+  X(ray_count) X(pass) X(frame_pass) X(last_frame_pass) X(active_count) X(spec_count) X(window_count)      \
   X(pair_slot_count) X(pair_count) X(ahead_count)                           \
   X(granted_count) X(visible_count) X(requested_count) X(decoded_count)     \
   X(recycled_count) X(hit_count) X(next_active_count) X(free_count)

@@ -14,29 +14,33 @@ ISO_INLINE uint needed_stamp(uint pass) {
   return 2 * pass + 1;
 }
 
-#define ISO_RANKS_PER_CLASS (ISO_EVICTION_RANKS / 4)
+#define ISO_CLASS_RANKS (ISO_EVICTION_RANKS / 8)
 #define ISO_RANKS_OF_FRAME \
-  (ISO_EVICTION_RANKS / 2)  ///< those below are of slots that the frame at work has used
+  (2 * ISO_CLASS_RANKS)  ///< those below are of slots that the frame at work has used
 
 /// Slots are freed from rank ISO_EVICTION_RANKS - 1 down. Rank 0: needed at the end of the pass that `counts` are of, or later.
-/// Not in the paper, whose cache is strictly LRU. There are four classes, freed in this order:
-///   unread, and last used in an earlier frame: the least recently used first
-///   read in an earlier frame: the least recently used first
-///   unread, of this frame: the least recently used first
-///   read in this frame: the most recently used first
-/// The last class goes only when the frame needs more blocks than there are slots. Least recently used first, each of its
-/// blocks would be freed shortly before the next frame reads it; so the first ones stay.
+/// Not in the paper, whose cache is strictly LRU. There are five classes, freed in this order:
+///   not used in this frame nor the last: the least recently used first
+///   of the last frame, unread: the least recently used first
+///   of the last frame, read: the least recently used first
+///   of this frame, unread: the least recently used first
+///   of this frame, read: the most recently used first
+/// So a view whose blocks fit is decoded once. Slots of this frame go only when it needs more blocks than there are slots. Of
+/// those that it has read, the least recently used would be freed shortly before the next frame reads them; so the first stay.
 ISO_INLINE uint eviction_rank(uint stamp, global const PassCounts *counts) {
-  const uint now = needed_stamp(counts->pass), begin = read_stamp(counts->frame_pass);
-  const uint oldest = ISO_RANKS_PER_CLASS - 1; /* older ones count as this old */
+  const uint now = needed_stamp(counts->pass), begin = read_stamp(counts->frame_pass),
+             last_begin = read_stamp(counts->last_frame_pass);
+  const uint oldest = ISO_CLASS_RANKS - 1; /* greater ages count as this */
   const int is_unread = (stamp & 1u) != 0;
   uint rank = 0;
-  /* Differences, since the stamps' clock wraps. */
-  if ((int)(stamp - begin) < 0) {
-    rank = (is_unread ? 3 : 2) * ISO_RANKS_PER_CLASS + min((begin - stamp) / 2, oldest);
+  /* Differences, since the clock of the stamps wraps. */
+  if ((int)(stamp - last_begin) < 0) {
+    rank = 4 * ISO_CLASS_RANKS + min((last_begin - stamp) / 2, 4 * ISO_CLASS_RANKS - 1);
+  } else if ((int)(stamp - begin) < 0) {
+    rank = (is_unread ? 3 : 2) * ISO_CLASS_RANKS + min((begin - stamp) / 2, oldest);
   } else if ((int)(stamp - now) < 0) {
     const uint age = min((now - stamp) / 2, oldest - 1);
-    rank = is_unread ? ISO_RANKS_PER_CLASS + age : oldest - age;
+    rank = is_unread ? ISO_CLASS_RANKS + age : oldest - age;
   }
   return rank;
 }

@@ -12,10 +12,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
     global const uint *active_ray_ids, global uint *ray_block_ids, global uint *pair_block_ids,
     global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
-  local uint group_pairs;
+  local uint group_pairs, group_ahead;
   const uint window = counts->window_count, spec_count = counts->spec_count;
-  uint pairs = 0;
-  if (get_local_id(0) == 0) group_pairs = 0;
+  uint pairs = 0, sum_ahead = 0;
+  if (get_local_id(0) == 0) group_pairs = group_ahead = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
     const uint entry = active_ray_ids[a], ray_id = entry & ISO_RAY_PIXEL;
@@ -29,8 +29,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
     ray_block_ids[ray_id] = block_id;
     closest_pairs[a] = ISO_INVALID_ID;
     pairs += found;
+    sum_ahead += ahead;
   }
   if (pairs != 0) atomic_add(&group_pairs, pairs);
+  if (sum_ahead != 0) atomic_add(&group_ahead, sum_ahead);
   barrier(CLK_LOCAL_MEM_FENCE);
   if (get_local_id(0) == 0 && group_pairs != 0) atomic_add(&counts->pair_count, group_pairs);
+  if (get_local_id(0) == 0 && group_ahead != 0) atomic_add(&counts->ahead_count, group_ahead);
 }

@@ -32,7 +32,7 @@ class CacheModel {
   void pass(StageWorld &world, const std::vector<uint> &pairs, uint spec_count) {
     world.begin_pass(pairs, spec_count);
     const uint pass = world.counts().pass;
-    if (world.counts().frame_pass == pass) frame_begin_ = 2 * pass;
+    if (world.counts().frame_pass == pass) last_begin_ = std::exchange(frame_begin_, 2 * pass);
     now_ = 2 * pass + 1;
     world.cache.request(world.rays);
     check_requests(world, pairs);
@@ -103,7 +103,7 @@ class CacheModel {
     ASSERT_EQ(blocks.size(), decoded);
     ASSERT_EQ(into.size(), decoded);
     ASSERT_TRUE(std::ranges::includes(wanted_, blocks));
-    Order last_evicted{kFirst, std::numeric_limits<int>::min()}, first_kept{kNever, 0};
+    Order last_evicted{kEarlier, std::numeric_limits<int>::min()}, first_kept{kNever, 0};
     uint spared = 0, recycled = 0;
     bool stole = false;
     for (uint slot = 0; slot < num_slots; ++slot) {
@@ -113,7 +113,8 @@ class CacheModel {
         ASSERT_FALSE(first_grid.contains(slots_[slot])) << "a block of the first pair was evicted";
         if (slots_[slot] != ISO_INVALID_ID) last_evicted = std::max(last_evicted, order(slot));
       } else if (slots[slot] == ISO_INVALID_ID && slots_[slot] != ISO_INVALID_ID) {
-        ASSERT_EQ(order(slot).first, kFirst) << "freed without need, though still of use";
+        ASSERT_EQ(order(slot), Order(kEarlier, -static_cast<int>(kOldest)))
+            << "freed without need, though still of use";
         slots_[slot] = ISO_INVALID_ID;
         ++spared;
       } else {
@@ -156,24 +157,26 @@ class CacheModel {
     num_stolen += stole;
   }
 
-  /// What is evicted first is less. Ages beyond some 60 passes are one.
-  enum Class { kFirst, kReadEarlier, kUnreadInFrame, kReadInFrame, kNeeded, kNever };
+  /// What is evicted first is less. Greater ages than this count as it; in this frame and the last one, as about a fourth.
+  static constexpr uint kOldest = 127;
+  enum Class { kEarlier, kUnreadInLast, kReadInLast, kUnreadInFrame, kReadInFrame, kNeeded, kNever };
   using Order = std::pair<Class, int>;
   Order order(uint slot) const {
     const uint used = used_[slot];
     const bool is_unread = used % 2 == 1;
     if (used >= now_) return {kNeeded, 0};
-    if (used < frame_begin_) {
-      const int age = static_cast<int>(std::min((frame_begin_ - used) / 2, 63u));
-      return {is_unread ? kFirst : kReadEarlier, -age};
-    }
-    const int age = static_cast<int>(std::min((now_ - used) / 2, 62u));
+    const auto age_at = [used](uint time, uint oldest) {
+      return static_cast<int>(std::min((time - used) / 2, oldest));
+    };
+    if (used < last_begin_) return {kEarlier, -age_at(last_begin_, kOldest)};
+    if (used < frame_begin_) return {is_unread ? kUnreadInLast : kReadInLast, -age_at(frame_begin_, 31)};
+    const int age = age_at(now_, 30);
     return is_unread ? Order{kUnreadInFrame, -age} : Order{kReadInFrame, age};
   }
 
   FrameParams frame_;
   std::vector<uint> slots_, used_;
-  uint now_ = 0, frame_begin_ = 0;
+  uint now_ = 0, last_begin_ = 0, frame_begin_ = 0;
   std::set<uint> wanted_;
 };
 
@@ -255,14 +258,14 @@ TEST_P(BlockCacheOnDevice, OneDualGridOfSlotsServesEveryBlock) {
   }
 }
 
-/// Ages of more passes than there are ranks. Blocks that nobody has read go ahead of need.
+/// Ages of more passes than there are ranks.
 TEST_P(BlockCacheOnDevice, AgesBeyondTheLastRank) {
   const FrameParams frame = plain_frame(kDims, 2);
   StageWorld world(device_, frame, 40, 64);
   CacheModel model(frame, 40);
   world.begin_frame();
   model.pass(world, {0, 5}, 1);
-  for (uint pass = 0; pass < ISO_EVICTION_RANKS / 4 + 10; ++pass) {
+  for (uint pass = 0; pass < ISO_EVICTION_RANKS / 2 + 10; ++pass) {
     world.begin_frame();
     model.pass(world, {100, 100}, 1);
   }

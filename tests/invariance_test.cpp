@@ -55,9 +55,17 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       const PassCounts &c = pass.counts;
       EXPECT_EQ(c.ray_count, pixels);
       EXPECT_LE(c.active_count, pixels);
-      if (c.active_count != 0) {
-        EXPECT_EQ(c.spec_count, std::min<std::uint64_t>(options.max_speculation, pixels / c.active_count));
+      /* Pipeline `rays` looks ahead at the end of a pass, for the rays that are left. */
+      const bool is_blocks = options.pipeline == PipelineKind::kBlocks;
+      const uint looking = is_blocks ? c.active_count : c.next_active_count;
+      if (looking != 0) {
+        EXPECT_EQ(c.spec_count, std::min<std::uint64_t>(options.max_speculation, pixels / looking));
+        EXPECT_GE(pass.n_spec, 1);
+        EXPECT_LE(pass.n_spec, options.max_speculation);
+        EXPECT_LE(pass.n_spec, options.per_ray_speculation ? options.max_speculation : c.spec_count);
       }
+      EXPECT_LE(c.pair_count, c.ahead_count);
+      EXPECT_EQ(pass.visible_blocks.has_value(), is_blocks);
       EXPECT_LE(c.window_count, c.active_count);
       EXPECT_EQ(c.window_count == 0, c.active_count == 0);
       EXPECT_LE(c.decoded_count, options.cache_slots);

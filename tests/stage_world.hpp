@@ -65,12 +65,13 @@ struct StageWorld {
   /// Opens a pass by hand: these pairs, entries a * spec_count + k for active ray a.
   void begin_pass(const std::vector<uint> &pair_block_ids, uint spec_count) {
     PassCounts counts = rays.counts.read().front();
-    const uint pass = counts.pass + 1,
-               frame_pass = std::exchange(frame_begins_, false) ? pass : counts.frame_pass;
+    const PassCounts last = counts;
+    const bool begins = std::exchange(frame_begins_, false);
     counts = {};
     counts.ray_count = static_cast<uint>(rays.num_rays);
-    counts.pass = pass;
-    counts.frame_pass = frame_pass;
+    counts.pass = last.pass + 1;
+    counts.frame_pass = begins ? counts.pass : last.frame_pass;
+    counts.last_frame_pass = begins ? last.frame_pass : last.last_frame_pass;
     counts.active_count = static_cast<uint>(pair_block_ids.size()) / spec_count;
     counts.window_count = counts.active_count;
     counts.spec_count = spec_count;

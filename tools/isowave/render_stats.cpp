@@ -18,17 +18,19 @@ ordered_json vec_json(const glm::dvec3 &v) {
 }
 
 ordered_json pass_json(const PassStats &pass) {
-  ordered_json result = {{"active_rays", pass.counts.active_count},
-                         {"window_rays", pass.counts.window_count},
-                         {"n_spec", pass.counts.spec_count},
-                         {"ray_block_pairs", pass.counts.pair_count},
-                         {"intersected_pairs", pass.counts.granted_count},
-                         {"visible_blocks", pass.counts.visible_count},
-                         {"requested_blocks", pass.counts.requested_count},
-                         {"decoded_blocks", pass.counts.decoded_count},
-                         {"rays_hit", pass.counts.hit_count},
-                         {"utilization_percent", pass.utilization_percent},
-                         {"completed_percent", pass.completed_percent}};
+  ordered_json result = {
+      {"active_rays", pass.counts.active_count},
+      {"window_rays", pass.counts.window_count},
+      {"n_spec", pass.n_spec},
+      {"ray_block_pairs", pass.counts.pair_count},
+      {"intersected_pairs", pass.counts.granted_count},
+      {"visible_blocks", pass.visible_blocks ? ordered_json(*pass.visible_blocks) : ordered_json()},
+      {"requested_blocks", pass.counts.requested_count},
+      {"decoded_blocks", pass.counts.decoded_count},
+      {"recycled_blocks", pass.counts.recycled_count},
+      {"rays_hit", pass.counts.hit_count},
+      {"utilization_percent", pass.utilization_percent},
+      {"completed_percent", pass.completed_percent}};
   if (!pass.stage_ms.empty()) result["stage_ms"] = pass.stage_ms;
   return result;
 }

@@ -1,0 +1,128 @@
+// The block cache over frames, as whoever moves a camera meets it: which views need no decoding when they come again, in every
+// pipeline. (tests/block_cache_test.cpp has the order of eviction, slot by slot.)
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <set>
+
+#include "core/renderer.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/stage_support.hpp"
+#include "tests/test_pipelines.hpp"
+
+namespace isowave {
+namespace {
+
+using test::TestVolume;
+
+constexpr float kIsovalue = 0.1f;
+
+std::uint32_t num_decoded(const FrameStats &stats) {
+  return std::accumulate(
+      stats.passes.begin(), stats.passes.end(), 0u,
+      [](std::uint32_t sum, const PassStats &pass) { return sum + pass.counts.decoded_count; });
+}
+
+/// Close-ups of what lies behind the faces of the volume: hardly any block is in two of them.
+std::vector<Camera> close_ups(const glm::dvec3 &dims) {
+  std::vector<Camera> cameras;
+  const glm::dvec3 centre = 0.5 * (dims - 1.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      glm::dvec3 out(0.0);
+      out[axis] = side;
+      const glm::dvec3 eye = centre + out * (0.5 * dims[axis] + 4.0);
+      cameras.push_back(
+          test::camera_along(eye, -out, axis == 1 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0), 40.0));
+    }
+  }
+  return cameras;
+}
+
+class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
+ protected:
+  Renderer renderer_of(const TestVolume &volume, ImageSize size, std::uint32_t slots,
+                       std::uint32_t max_speculation = ISO_MAX_SPECULATION) {
+    return {device_, volume.compressed,
+            GetParam().with({.size = size, .cache_slots = slots, .max_speculation = max_speculation})};
+  }
+
+  ocl::Device device_{GetParam().device};
+};
+
+/// Views in a random order. If the cache can hold the blocks of all views since a view was drawn last, it decodes nothing. Without
+/// speculation, since a view needs the same blocks then, whatever is cached.
+TEST_P(FrameCacheOnDevice, ViewsThatFitAreDecodedOnce) {
+  const glm::uvec3 dims(60, 62, 58);
+  const ImageSize size{40, 32};
+  const TestVolume volume(dims, test::gyroid_field(14));
+  const std::vector<Camera> cameras = close_ups(dims);
+  std::vector<std::uint32_t> needs;
+  {
+    Renderer ample =
+        renderer_of(volume, size, static_cast<std::uint32_t>(volume.compressed.block_count()), 1);
+    for (const Camera &camera : cameras) {
+      ample.clear_cache();
+      needs.push_back(num_decoded(ample.render(camera, kIsovalue)));
+    }
+  }
+  const std::uint32_t most = *std::ranges::max_element(needs);
+  ASSERT_GT(most, 40u);
+  for (const std::uint32_t slots : {most + most / 2, 2 * most + most / 2}) {
+    Renderer renderer = renderer_of(volume, size, slots, 1);
+    Random random(slots);
+    std::vector<std::size_t> drawn;
+    std::size_t num_fitting = 0, num_decoding = 0;
+    for (int frame = 0; frame < 60; ++frame) {
+      // Often one of the last views, as when somebody looks to and fro.
+      const std::size_t view = drawn.size() > 2 && random() % 2 != 0 ? drawn[drawn.size() - 1 - random() % 3]
+                                                                     : random() % cameras.size();
+      SCOPED_TRACE(fmt::format("{} slots, frame {}, view {}", slots, frame, view));
+      std::set<std::size_t> since{view};
+      const auto last = std::find(drawn.rbegin(), drawn.rend(), view);
+      for (auto it = drawn.rbegin(); it != last; ++it) since.insert(*it);
+      const std::uint32_t needed = std::accumulate(
+          since.begin(), since.end(), 0u, [&](std::uint32_t sum, std::size_t v) { return sum + needs[v]; });
+      const std::uint32_t decoded = num_decoded(renderer.render(cameras[view], kIsovalue));
+      if (last != drawn.rend() && needed <= slots) {
+        EXPECT_EQ(decoded, 0u) << "all views since, this one included, need " << needed << " blocks";
+        ++num_fitting;
+      }
+      num_decoding += decoded != 0;
+      drawn.push_back(view);
+    }
+    EXPECT_GT(num_fitting, 10u) << "else this tests too little";
+    EXPECT_GT(num_decoding, 10u) << "else nothing was ever evicted";
+  }
+}
+
+/// What the rays of a view read stays, though speculation has asked for more blocks since than there are slots.
+TEST_P(FrameCacheOnDevice, WarmFramesDecodeLessThanColdOnes) {
+  const glm::uvec3 dims(96, 90, 84);
+  const ImageSize size{96, 72};
+  const TestVolume volume(dims, test::gyroid_field(24));
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  const auto expected = test::twin_hits(volume, camera, size, kIsovalue);
+  std::uint32_t needed = 0;
+  {
+    Renderer ample = renderer_of(volume, size, static_cast<std::uint32_t>(volume.compressed.block_count()));
+    needed = num_decoded(ample.render(camera, kIsovalue));
+  }
+  for (const double share : {0.9, 0.75, 0.6}) {
+    const auto slots = static_cast<std::uint32_t>(share * needed);
+    SCOPED_TRACE(fmt::format("{} slots, {} blocks needed", slots, needed));
+    Renderer renderer = renderer_of(volume, size, slots);
+    const std::uint32_t cold = num_decoded(renderer.render(camera, kIsovalue));
+    for (int frame = 0; frame < 4; ++frame) {
+      EXPECT_LT(num_decoded(renderer.render(camera, kIsovalue)), cold) << "warm frame " << frame;
+      test::expect_same_hits(renderer.hits(), expected, size.width);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Pipelines, FrameCacheOnDevice, testing::ValuesIn(pipelines_under_test()),
+                         pipeline_test_name);
+
+}  // namespace
+}  // namespace isowave
