@@ -7,6 +7,10 @@ KeptPicture::KeptPicture(ocl::Device &device, ImageSize largest)
       hits_(device, "kept hits", largest.num_rays()),
       show_(device, "kept_picture", "show_kept") {}
 
+void KeptPicture::compile(Wavefront &rays) {
+  show_({1, ocl::kGroupSize}, FrameParams{}, 1, 1, hits_, 0u, rays.hits);
+}
+
 void KeptPicture::keep(const Wavefront &rays, ImageSize size) {
   hits_.copy(rays.hits, size.num_rays());
   size_ = size;
