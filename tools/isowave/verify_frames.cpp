@@ -16,6 +16,7 @@
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
 #include "tools/isowave/accuracy_report.hpp"
+#include "tools/isowave/compile_report.hpp"
 
 namespace isowave::tools {
 
@@ -73,10 +74,13 @@ class FrameDrawer {
     const ocl::DeviceInfo info = ocl::choose_device(device);
     fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
     device_ = std::make_unique<ocl::Device>(info);
+    CompileReport compiling(*device_);
     RendererOptions options;
     options.size = scene.size;
     options.solver = solver;
+    options.with_shading = false;
     renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
+    compiling.finish();
     renderer_->set_value_error(value_error);
   }
 
