@@ -191,9 +191,10 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
       "--max-error", options.max_error,
       "judge what render --max-error promises instead: each pixel's bound against the volume before "
       "compression");
-  command.add_option(
-      "--device", options.device,
-      "who draws frames: index, cpu, gpu, or a part of a device's name [the scalar reference]");
+  command.add_option("--device", options.device,
+                     "who draws frames, or is tested for leaks beside the scalar reference: index, cpu, gpu, "
+                     "or a part of its name "
+                     "[frames: the scalar reference; leaks: as render]");
 }
 
 }  // namespace isowave::tools
