@@ -190,7 +190,7 @@ TEST(KernelCache, NewFilesAreNewKernelsButForBookkeeping) {
   const ocl::KernelCache cache(info);
   EXPECT_FALSE(cache.has_new_kernels());
   fs::create_directories(folder / "a" / "b");
-  test::write_file(folder / "a" / "last_accessed", "");
+  for (const char *name : {"last_accessed", "tempfile_x", "index"}) test::write_file(folder / "a" / name, "");
   EXPECT_FALSE(cache.has_new_kernels());
   test::write_file(folder / "a" / "b" / "new.so", "");
   EXPECT_TRUE(cache.has_new_kernels());

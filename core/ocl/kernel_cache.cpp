@@ -60,9 +60,11 @@ std::optional<fs::path> folder_of(const DeviceInfo &device) {
   return {};
 }
 
-/// Else it is written to whenever a kernel is looked up.
+/// Others are written whenever a kernel is looked up: PoCL's last_accessed and tempfile_*, NVIDIA's index, Mesa's index and *.idx.
 bool holds_kernels(const fs::path &file) {
-  return file.filename() != "index" && file.filename() != "last_accessed" && file.extension() != ".idx";
+  const std::string name = file.filename().string();
+  return name != "index" && name != "last_accessed" && !name.starts_with("tempfile_") &&
+         file.extension() != ".idx";
 }
 
 }  // namespace
