@@ -41,7 +41,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
                 ISO_MAX_SPECULATION);
   }
-  // Measured faster by a CPU and by a GPU, in all cases but one (README "Results").
   if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
   const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
   if (!std::has_single_bit(options.group_size) || options.group_size < 8 || options.group_size > largest) {
