@@ -53,8 +53,8 @@ void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildK
   kernels.partials(range, no_blocks, limits_, limits_, limits_, limits_, limits_, stream.layout, 0, 0, 0, 0,
                    partials);
   kernels.ranges(range, no_blocks, 0, partials, partials, thresholds, buffers_->ranges);
-  kernels.coarse_ranges(range, no_blocks, 0, buffers_->ranges, coarse_ranges_);
-  masks_kernel_(range, no_blocks, 0, buffers_->ranges, coarse_ranges_, limits_, 0, limits_, 0,
+  kernels.coarse_ranges(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_);
+  masks_kernel_(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_, limits_, 0, limits_, 0,
                 buffers_->masks[0], selections_[0].box);
 }
 

@@ -139,7 +139,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
 }
 
 /// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first, PoCL for each work-group
-/// size. So the passes themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ from what frames launch,
+/// size, and anew for more than 65,535 work-items. So the passes themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ from what frames launch,
 /// and all kernels leave by the exits they have for empty lists. Costs no time that grows with the volume; all that it leaves is
 /// one hit, which every frame clears.
 void Renderer::compile_kernels() {

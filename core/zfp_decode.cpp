@@ -28,8 +28,10 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::D
 void ZfpDecode::compile(const DeviceStream &stream, const CountsBuffer &counts, BlockCache &cache) {
   const ocl::Buffer<uint> &words = cache.request_block_ids;  // stands in for what is not read
   const FrameParams frame{};
-  kernel_({1, ocl::kGroupSize}, frame, words, words, words, words, words, stream.layout, frame, words, words,
-          stream.layout, 0, 0, counts, words, words, cache.decode_slots, cache.values, cache.inside);
+  for (const ocl::Range &range : {ocl::Range{1, ocl::kGroupSize}, range_}) {  // PoCL compiles large ones anew
+    kernel_(range, frame, words, words, words, words, words, stream.layout, frame, words, words,
+            stream.layout, 0, 0, counts, words, words, cache.decode_slots, cache.values, cache.inside);
+  }
 }
 
 bool ZfpDecode::can_join(const DeviceStream &next) const {
