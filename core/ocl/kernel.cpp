@@ -25,6 +25,7 @@ void RawKernel::make(std::size_t num_params) {
     cl::Kernel kernel(program, name_.c_str());
     num_args = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
     if (num_args == num_params) kernel_ = std::move(kernel);
+    is_new_ = true;
   } catch (const cl::Error &error) {
     throw Error("{}.cl gives no kernel '{}': {}: {}", stem_, name_, error.what(), error_name(error.err()));
   }
@@ -35,6 +36,10 @@ void RawKernel::make(std::size_t num_params) {
 }
 
 void RawKernel::launch(const Range &range) {
+  if (std::exchange(is_new_, false)) {  // many drivers compile it now
+    const Device::Compiling compiling = device_->compiling();
+    return launch(range);
+  }
   try {
     device_->queue().enqueueNDRangeKernel(
         kernel_, cl::NullRange, cl::NDRange(range.num_groups * range.group_size),

@@ -4,8 +4,8 @@
 //   Kernel<In<uint>, uint, Out<uint>> scale_{device, "scale", "scale_values"};
 //   scale_(Range::strided(count, 64, device), input, factor, output);
 //
-// Its program is built when it is first launched, so that what is not used is not built. Whoever times launches does one before,
-// that has nothing to do, while a Device::Compiling lives.
+// Its program is built when it is first launched, so that what is not used is not built. Whoever times launches does one before
+// that has nothing to do.
 
 #include <CL/opencl.hpp>
 #include <cstddef>
@@ -64,7 +64,7 @@ class RawKernel {
   /// Makes the kernel, unless that has been done; its program, too. Throws Error when there is none of that name,
   /// std::invalid_argument when it has another number of parameters.
   void make(std::size_t num_params);
-  /// Enqueues; waits only while a Device::Compiling lives. Throws Error naming kernel and OpenCL error.
+  /// Enqueues; waits at the first launch, and while a Device::Compiling lives. Throws Error naming kernel and OpenCL error.
   void launch(const Range &range);
   template <class T>
   void set(cl_uint index, const In<T> &arg) {
@@ -90,6 +90,7 @@ class RawKernel {
   std::string stem_, name_;
   Defines defines_;
   cl::Kernel kernel_;
+  bool is_new_ = false;  ///< never launched
 };
 
 /// Params are In<T>, Out<T>, Local<T> or plain scalars, in the order of the kernel's signature. The
@@ -100,7 +101,7 @@ class Kernel : public RawKernel {
   Kernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines = {})
       : RawKernel(device, stem, kernel_name, defines) {}
 
-  /// Enqueues one launch in queue order; does not wait, but for the compiler. A range of 0 groups does nothing.
+  /// Enqueues one launch in queue order; does not wait but at the first one, which counts as compiling. A range of 0 groups does nothing.
   void operator()(const Range &range, const std::type_identity_t<Params> &...args) {
     if (range.num_groups == 0) return;
     make(sizeof...(Params));
