@@ -22,6 +22,8 @@ class KeptPicture {
   /// Largest size of a picture that can be kept.
   KeptPicture(ocl::Device &device, ImageSize largest);
 
+  /// Launches the kernel without a pixel to show, see Device::Compiling.
+  void compile(Wavefront &rays);
   /// Copies the hit buffer, a picture of that size. Asynchronous. Throws std::invalid_argument: a larger picture.
   void keep(const Wavefront &rays, ImageSize size);
   /// The hit buffer, a picture as large as rays.frame says, takes the kept hits: where it has none, or everywhere. Asynchronous.

@@ -42,16 +42,31 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
   build(device, frame, stream);
 }
 
+/// Launches every kernel without a block to work on.
+void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels) {
+  const auto compiling = device.compiling();
+  const FrameParams no_blocks{};
+  const ocl::Range range{1, ocl::kGroupSize};
+  ocl::Buffer<ValueRange> partials(device, "range samples", 8);
+  const ocl::Buffer<float> thresholds(device, "range thresholds", kNumThresholds);
+  // limits_ stands in for words that are not read.
+  kernels.partials(range, no_blocks, limits_, limits_, limits_, limits_, limits_, stream.layout, 0, 0, 0, 0,
+                   partials);
+  kernels.ranges(range, no_blocks, 0, partials, partials, thresholds, buffers_->ranges);
+  kernels.coarse_ranges(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_);
+  masks_kernel_(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_, limits_, 0, limits_, 0,
+                buffers_->masks[0], selections_[0].box);
+}
+
 void Macrocells::build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream) {
   const auto stage = device.timer().stage("macrocells");
-  Partials decode{device, frame, stream, {device, "macrocells", "macrocell_partials", stream.defines()}};
+  BuildKernels kernels{{device, "macrocells", "macrocell_partials", stream.defines()},
+                       {device, "macrocells", "macrocell_ranges", stream.defines()},
+                       {device, "macrocells", "macrocell_coarse_ranges", stream.defines()}};
+  compile(device, stream, kernels);
+  Partials decode{device, frame, stream, kernels.partials};
   thresholds_ = sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame)), decode);
 
-  ocl::Kernel<FrameParams, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
-              ocl::Out<cl_ushort>>
-      ranges_kernel(device, "macrocells", "macrocell_ranges", stream.defines());
-  ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_kernel(
-      device, "macrocells", "macrocell_coarse_ranges", stream.defines());
   const ocl::Buffer<float> thresholds(device, "range thresholds", std::span<const float>(thresholds_));
   const std::uint32_t layer_blocks = frame.blocks_x * frame.blocks_y;
   ocl::Buffer<ValueRange> below(device, "range partials, layer below", 8 * std::size_t{layer_blocks});
@@ -61,10 +76,10 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
   decode(0, 1, layer_blocks, below);
   for (std::uint32_t layer = 0; layer < frame.blocks_z; ++layer) {
     if (layer + 1 < frame.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
-    ranges_kernel(layer_range, frame, layer, below, above, thresholds, buffers_->ranges);
+    kernels.ranges(layer_range, frame, layer, below, above, thresholds, buffers_->ranges);
     std::swap(below, above);
   }
-  coarse_kernel(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_);
+  kernels.coarse_ranges(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_);
   device.finish();
 }
 

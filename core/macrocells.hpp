@@ -74,7 +74,7 @@ class Macrocells {
     ocl::Device &device;
     const FrameParams &frame;
     const DeviceStream &stream;
-    PartialsKernel kernel;
+    PartialsKernel &kernel;
   };
 
   /// What masks are made of, and what belongs to them.
@@ -88,6 +88,14 @@ class Macrocells {
   };
   Selection &selection() { return selections_[buffers_->selection]; }
 
+  struct BuildKernels {
+    PartialsKernel partials;
+    ocl::Kernel<FrameParams, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
+                ocl::Out<cl_ushort>>
+        ranges;
+    ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_ranges;
+  };
+  void compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels);
   void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
   std::vector<float> sample_thresholds(ocl::Device &device, std::uint32_t num_blocks, Partials &decode);
 

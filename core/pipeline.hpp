@@ -22,7 +22,7 @@
 namespace isowave {
 
 enum class PipelineKind {
-  kAuto,  ///< by what was measured for the kind of device
+  kAuto,  ///< kRays, which was faster in nearly all that was measured (README "Results")
   kBlocks,
   kRays
 };

@@ -41,7 +41,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
                 ISO_MAX_SPECULATION);
   }
-  // Measured faster by a CPU and by a GPU, in all cases but one (README "Results").
   if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
   const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
   if (!std::has_single_bit(options.group_size) || options.group_size < 8 || options.group_size > largest) {
@@ -127,6 +126,7 @@ bool needed_more_than_slots(const std::vector<PassStats> &passes) {
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options)
     : device_(device),
       setup_begin_(std::chrono::steady_clock::now()),
+      compile_ms_before_(device.compile_ms()),
       options_(checked(options, volume, device)),
       plan_(make_plan(device, volume, options_)),
       state_(make_state(device, volume, options_, plan_)),
@@ -139,8 +139,35 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
   options_.cache_slots = plan_.cache_slots;
   options_.stream = plan_.stream;
   options_.window_blocks = plan_.window_blocks;
+  compile_kernels();
+  device.timer().collect();  // what was launched so far belongs to no frame; waits
   device.finish();
-  setup_ms_ = ms_since(setup_begin_);
+  setup_ms_ = ms_since(setup_begin_) - (device.compile_ms() - compile_ms_before_);
+}
+
+/// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first, PoCL for each work-group
+/// size, and anew for more than 65,535 work-items. So the passes themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ from what frames launch,
+/// and all kernels leave by the exits they have for empty lists. Costs no time that grows with the volume; all that it leaves is
+/// one hit, which every frame clears.
+void Renderer::compile_kernels() {
+  const auto compiling = device_.compiling();
+  Wavefront &rays = state_.rays;
+  rays.frame = FrameParams{};
+  rays.frame.width = rays.frame.height = rays.frame.max_spec_count = 1;
+  rays.frame.table_groups = state_.cache.table_groups;
+  // Frames of one level of detail and of several have kernels of their own.
+  for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, state_.levels.size());
+       ++num_levels) {
+    rays.num_level_frames = num_levels;
+    pipeline_->begin_frame();
+    for (int pass = 0; pass < 2; ++pass) pipeline_->enqueue_pass();  // the first has nothing to decode
+    pipeline_->end_frame();
+  }
+  state_.cache.classify(rays);
+  for (Level &level : state_.levels) level.decode.compile(level.stream, rays.counts, state_.cache);
+  if (options_.with_shading) shade_.compile(rays);
+  if (kept_) kept_->compile(rays);
+  rays.reset_counts();
 }
 
 FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &on_pass) {

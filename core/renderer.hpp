@@ -42,6 +42,7 @@ struct RendererOptions {
   double max_pixel_error = 0;
   bool with_bounds = false;        ///< draw_bound() will be called
   bool with_kept_picture = false;  ///< keep_picture() will be called
+  bool with_shading = true;        ///< shade() will be called: else its kernel is not built before that is
 };
 
 /// What one pass did: the counts of the device, and what follows from them.
@@ -76,8 +77,8 @@ inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 
 class Renderer {
  public:
-  /// Uploads the volume, builds its macrocell ranges and every buffer of the frame; nothing is allocated
-  /// later. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
+  /// Uploads the volume, builds its macrocell ranges and every buffer of the frame, and has the kernels compiled; nothing is
+  /// allocated or compiled later. Throws Error when options are out of range or memory does not suffice. `device` must outlive the
   /// renderer; `volume` need not, unless it stays on the host (memory_plan().stream).
   Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
 
@@ -130,9 +131,10 @@ class Renderer {
   const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
   const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that was made
   const Macrocells &macrocells() const { return state_.levels[0].macrocells; }  ///< of the finest level
-  double setup_ms() const { return setup_ms_; }  ///< upload, kernel builds, macrocell ranges
+  double setup_ms() const { return setup_ms_; }  ///< upload, macrocell ranges; without Device::compile_ms()
 
  private:
+  void compile_kernels();
   void begin_frame(const Camera &camera, float isovalue);
   void update_layouts();
   struct Uploads {
@@ -143,6 +145,7 @@ class Renderer {
 
   ocl::Device &device_;
   std::chrono::steady_clock::time_point setup_begin_;
+  double compile_ms_before_;
   RendererOptions options_;
   MemoryPlan plan_;
   FrameState state_;

@@ -63,6 +63,13 @@ Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
       image_(device, "framebuffer", max_pixels),
       kernel_(device, "shade", "shade") {}
 
+void Shade::compile(Wavefront &rays) {
+  for (const std::size_t num_pixels : {std::size_t{1}, image_.size()}) {  // PoCL compiles large ones anew
+    kernel_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device_), FrameParams{}, params_, 1, rays.hits,
+            image_);
+  }
+}
+
 Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
   const std::uint32_t columns = rays.frame.width / samples, rows = rays.frame.height / samples;
   std::vector<uint> packed(std::size_t{columns} * rows);

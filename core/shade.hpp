@@ -29,6 +29,9 @@ class Shade {
   /// max_pixels: of a picture.
   Shade(ocl::Device &device, std::uint64_t max_pixels);
 
+  /// Launches the kernel without a pixel to shade, see Device::Compiling.
+  void compile(Wavefront &rays);
+
   /// Shades rays.hits, of so many rays a pixel along each axis, and waits. RGB.
   Image8 operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples = 1);
 

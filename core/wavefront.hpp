@@ -43,8 +43,13 @@ struct Wavefront {
         pair_block_ids(device, "pair block ids", with_pairs ? rays : 0),
         pair_hits(device, "pair hits", with_pairs ? rays : 0),
         closest_pairs(device, "closest pairs", with_pairs ? rays : 0) {
+    reset_counts();
+  }
+
+  /// As before the first pass of all. Waits.
+  void reset_counts() {
     PassCounts start{};
-    start.ray_count = static_cast<uint>(rays);
+    start.ray_count = static_cast<uint>(num_rays);
     start.window_count = start.ray_count;
     start.pass = 1;
     counts.write({&start, 1});

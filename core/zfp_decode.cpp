@@ -25,6 +25,15 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::D
   if (levels && DeviceStream::is_window(stream_defines)) places_.emplace(device, "decode places", max_blocks);
 }
 
+void ZfpDecode::compile(const DeviceStream &stream, const CountsBuffer &counts, BlockCache &cache) {
+  const ocl::Buffer<uint> &words = cache.request_block_ids;  // stands in for what is not read
+  const FrameParams frame{};
+  for (const ocl::Range &range : {ocl::Range{1, ocl::kGroupSize}, range_}) {  // PoCL compiles large ones anew
+    kernel_(range, frame, words, words, words, words, words, stream.layout, frame, words, words,
+            stream.layout, 0, 0, counts, words, words, cache.decode_slots, cache.values, cache.inside);
+  }
+}
+
 bool ZfpDecode::can_join(const DeviceStream &next) const {
   ocl::Defines in_one_part = stream_defines_;
   in_one_part.erase("ISO_STREAM_PARTS");

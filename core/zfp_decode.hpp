@@ -18,6 +18,9 @@ class ZfpDecode {
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
             bool levels = false);
 
+  /// Launches the kernel without a block to decode, see Device::Compiling.
+  void compile(const DeviceStream &stream, const CountsBuffer &counts, BlockCache &cache);
+
   /// A level's compressed blocks, and the frame whose part it draws.
   struct Source {
     const DeviceStream &stream;

@@ -54,6 +54,13 @@ ZfpEncode::ZfpEncode(ocl::Device &device)
       encode_(device, "zfp_encode", "zfp_encode"),
       measure_(device, "zfp_encode", "zfp_encode_errors") {}
 
+void ZfpEncode::compile(const ocl::Buffer<float> &voxels, ocl::Buffer<uint> &words,
+                        ocl::Buffer<float> *errors) {
+  const auto compiling = device_.compiling();
+  encode_({1, ocl::kGroupSize}, voxels, 0, 0, 0, 0, words);
+  if (errors != nullptr) measure_({1, ocl::kGroupSize}, voxels, 0, 0, 0, 0, words, *errors);
+}
+
 void ZfpEncode::operator()(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims,
                            std::uint32_t bits_per_block, ocl::Buffer<uint> &words) {
   const std::uint64_t num_blocks = block_count(dims);
@@ -86,7 +93,9 @@ LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uin
       voxels_(device, "voxels to encode", voxel_count(piece_dims_)),
       words_(device, "encoded words", block_count(piece_dims_) * (bits_per_block / 32) + 1),
       device_errors_(device, "encoding errors",
-                     measure_error ? ZfpEncode::kErrorsPerBlock * block_count(piece_dims_) : 0) {}
+                     measure_error ? ZfpEncode::kErrorsPerBlock * block_count(piece_dims_) : 0) {
+  zfp_encode_.compile(voxels_, words_, measure_error ? &device_errors_ : nullptr);
+}
 
 LayerEncoder::~LayerEncoder() {
   try {

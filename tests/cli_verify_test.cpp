@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -82,6 +83,25 @@ TEST(CliVerify, JudgesBoundsOfErrors) {
   test::expect_one_line_error("verify --max-error 1", "give a VOLUME");
   test::expect_one_line_error("verify none.zfp -i 80 --max-error 1",
                               "the volume before compression is needed");
+}
+
+TEST(CliVerify, TracesRaysAtClosedSurfacesByTwinAndDevice) {
+  const TemporaryFolder folder;
+  const auto run = run_isowave("verify --solver bernstein --rays 50 --watertight 20000 --device cpu --json " +
+                               quoted(folder / "v.json"));
+  EXPECT_EQ(run.status, 0) << run.out << run.err;
+  const json document = json::parse(test::read_file(folder / "v.json"));
+  EXPECT_EQ(document.at("device").at("type"), "cpu");
+  std::map<std::string, int> surfaces;
+  for (const json &surface : document.at("solvers").at(0).at("watertight")) {
+    ++surfaces[surface.at("by")];
+    EXPECT_GE(surface.at("rays"), 20000);
+    EXPECT_EQ(surface.at("leaks"), 0);
+  }
+  EXPECT_EQ(surfaces,
+            (std::map<std::string, int>{{"twin", 6}, {"pipeline rays", 6}, {"pipeline blocks", 3}}));
+  EXPECT_EQ(run_isowave("verify --rays 50 --watertight 0 --solver bernstein").out.find("device"),
+            std::string::npos);
 }
 
 TEST(CliVerify, RefusesWhatItCannotDo) {

@@ -1,24 +1,31 @@
-# Planted bugs. Each mutant is the scalar twin built from a copy of the portable headers with one line changed; its test
-# succeeds when the stability suite or the watertight test notices. A change that no longer applies stops the configuring.
+# Planted bugs. A mutant is the scalar twin built from a copy of the portable headers with one line changed; its test
+# succeeds when the stability suite or the watertight test notices. A device mutant is the program of the watertight test of devices
+# with a changed copy of all kernels; its test succeeds when each pipeline that has the bug leaks. A change that no longer applies stops the
+# configuring.
 
 add_library(mutant_main OBJECT mutant_main.cpp)
 target_link_libraries(mutant_main PRIVATE isowave_reference)
 target_compile_options(mutant_main PRIVATE -w $<$<CONFIG:Release>:-O1>)  # what a bug leaves unused is no matter
 target_precompile_headers(mutant_main PRIVATE <CL/opencl.hpp> <algorithm> <fmt/format.h> <glm/glm.hpp> <thread> <vector>)
 
-# add_mutant(<name> <header> <line as it stands> <line with the bug>)
-function(add_mutant name header from to)
+# copy_with_bug(<name> <files> <file> <line as it stands> <line with the bug>): into mutants/<name>/kernels_cl.
+function(copy_with_bug name files file from to)
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name}/kernels_cl)
-  file(GLOB headers ${CMAKE_SOURCE_DIR}/kernels_cl/*.h)
-  file(COPY ${headers} DESTINATION ${folder})
-  file(READ ${CMAKE_SOURCE_DIR}/kernels_cl/${header} text)
+  file(COPY ${files} DESTINATION ${folder})
+  file(READ ${CMAKE_SOURCE_DIR}/kernels_cl/${file} text)
   string(FIND "${text}" "${from}" place)
   if(place EQUAL -1)
-    message(FATAL_ERROR "mutant ${name}: ${header} no longer has the line\n${from}")
+    message(FATAL_ERROR "mutant ${name}: ${file} no longer has the line\n${from}")
   endif()
   string(REPLACE "${from}" "${to}" text "${text}")
-  file(CONFIGURE OUTPUT ${folder}/${header} CONTENT "${text}" @ONLY)
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/kernels_cl/${header})
+  file(CONFIGURE OUTPUT ${folder}/${file} CONTENT "${text}" @ONLY)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${files})
+endfunction()
+
+# add_mutant(<name> <header> <line as it stands> <line with the bug>)
+function(add_mutant name header from to)
+  file(GLOB headers ${CMAKE_SOURCE_DIR}/kernels_cl/*.h)
+  copy_with_bug(${name} "${headers}" ${header} "${from}" "${to}")
   add_executable(mutant_${name} $<TARGET_OBJECTS:mutant_main> ${CMAKE_SOURCE_DIR}/reference/scalar_renderer.cpp)
   target_include_directories(mutant_${name} BEFORE PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name})
   target_link_libraries(mutant_${name} PRIVATE isowave_reference)
@@ -55,3 +62,34 @@ add_mutant(unbracketed_newton solve_bernstein.h "if (!(next > lo && next < hi))"
 add_mutant(stops_early solve_bernstein.h "#define ISO_ROOT_STEP 0x1p-23f" "#define ISO_ROOT_STEP 0x1p-4f")
 add_mutant(last_corner cell_intersect.h "(w[7] >= 0.0f) != in;" "0;")
 add_mutant(entry_for_exit cell_intersect.h "c.b2 = (lerp(a.z, bb0, bb1)" "c.b2 = (lerp(b.z, bb0, bb1)")
+
+# What only devices have: each line is for the watertight test of devices.
+add_library(device_mutant_main OBJECT device_mutant_main.cpp)
+target_link_libraries(device_mutant_main PRIVATE isowave_reference)
+
+# add_device_mutant(<name> <pipelines that leak> <file> <line as it stands> <line with the bug>)
+function(add_device_mutant name pipelines file from to)
+  set(mutant device_${name})
+  set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${mutant})
+  file(GLOB kernel_sources ${CMAKE_SOURCE_DIR}/kernels_cl/*.h ${CMAKE_SOURCE_DIR}/kernels_cl/*.cl)
+  copy_with_bug(${mutant} "${kernel_sources}" ${file} "${from}" "${to}")
+  file(GLOB kernels ${folder}/kernels_cl/*.cl)
+  add_custom_command(
+    OUTPUT ${folder}/kernels.cpp
+    COMMAND ${CMAKE_COMMAND} -D "output=${folder}/kernels.cpp" -D "kernels=${kernels}" -P ${embed_kernels_script}
+    DEPENDS ${kernels} ${folder}/kernels_cl/${file} ${embed_kernels_script} VERBATIM)
+  # The linker takes these kernels, and not those of isowave_kernels behind them.
+  add_executable(mutant_${mutant} $<TARGET_OBJECTS:device_mutant_main> ${folder}/kernels.cpp)
+  target_link_libraries(mutant_${mutant} PRIVATE isowave_reference)
+  set_target_properties(mutant_${mutant} PROPERTIES EXPORT_COMPILE_COMMANDS OFF)
+  add_test(NAME mutant.${mutant} COMMAND mutant_${mutant} ${pipelines})
+  set_tests_properties(mutant.${mutant} PROPERTIES ENVIRONMENT ISOWAVE_DEVICE=cpu TIMEOUT 300)
+endfunction()
+
+add_device_mutant(none_at_all "rays;blocks" macrocells.cl "/// macrocells.cl" "/// macrocells.cl")
+set_tests_properties(mutant.device_none_at_all PROPERTIES WILL_FAIL TRUE)
+add_device_mutant(own_voxels_only "rays;blocks" macrocells.cl "    range = join(range, (corner & 4 ?"
+  "    if (corner == 0) range = join(range, (corner & 4 ?")
+add_device_mutant(half_of_macrocells "rays;blocks" block_walk.h
+  "(bit < 32 ? low >> bit : high >> (bit - 32)) & 1u" "(bit < 32 ? low >> bit : 0u) & 1u")
+add_device_mutant(lost_results blocks closest_pair.h "atomic_min(" "atomic_max(")

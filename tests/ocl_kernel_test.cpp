@@ -95,7 +95,8 @@ TEST_P(OclKernelOnDevice, NoGroupsEnqueueNothing) {
 
 TEST_P(OclKernelOnDevice, WrongArityIsAnInvalidArgument) {
   try {
-    ocl::Kernel<In<uint>, uint>(device_, "launch_probe", "scale_values");
+    ocl::Buffer<uint> buffer(device_, "input", 1);
+    ocl::Kernel<In<uint>, uint>(device_, "launch_probe", "scale_values")({1, 1}, buffer, 1);
     FAIL() << "two of four parameters were accepted";
   } catch (const std::invalid_argument &error) {
     EXPECT_STREQ(error.what(), "kernel 'scale_values' takes 4 arguments, its C++ type names 2");
@@ -104,7 +105,7 @@ TEST_P(OclKernelOnDevice, WrongArityIsAnInvalidArgument) {
 
 TEST_P(OclKernelOnDevice, MissingKernelIsAnError) {
   try {
-    ocl::Kernel<>(device_, "launch_probe", "no_such_kernel");
+    ocl::Kernel<>(device_, "launch_probe", "no_such_kernel")({1, 1});
     FAIL() << "a missing kernel was made";
   } catch (const Error &error) {
     EXPECT_THAT(error.what(),

@@ -103,6 +103,7 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
 
   const std::string options = build_options(info_, defines);
+  const Compiling now = compiling();
   try {
     cl::Program program(context_, std::string(kernel_text(stem)));
     program.build(device_, options.c_str());
@@ -116,6 +117,25 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
     throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info_.name, options, error.what(),
                 error_name(error.err()));
   }
+}
+
+std::vector<std::string> Device::built_programs() const {
+  std::vector<std::string> names;
+  for (const auto &[key, program] : programs_) {
+    names.push_back(key.first);
+    for (const auto &[name, value] : key.second) names.back() += fmt::format(" -D {}={}", name, value);
+  }
+  return names;
+}
+
+Device::Compiling::Compiling(Device &device) : device_(device), begin_(std::chrono::steady_clock::now()) {
+  ++device_.compiling_depth_;
+}
+
+Device::Compiling::~Compiling() {
+  if (--device_.compiling_depth_ > 0) return;
+  device_.compile_ms_ +=
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
 }
 
 std::uint32_t Device::max_resident_groups() const {

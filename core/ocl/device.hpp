@@ -5,7 +5,9 @@
 // buffers and kernels. Not thread-safe: one thread drives one Device.
 
 #include <CL/opencl.hpp>
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -79,6 +81,34 @@ class Device {
   /// defines). Throws Error with the whole compiler log when it does not build.
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
 
+  /// The programs built so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".
+  std::vector<std::string> built_programs() const;
+
+  /// While one lives, all that happens counts as compiling. For launches that do nothing but make the driver compile: many
+  /// compile a kernel when it is first launched. Each launch is waited for.
+  class Compiling {
+   public:
+    ~Compiling();
+    Compiling(const Compiling &) = delete;
+    Compiling &operator=(const Compiling &) = delete;
+
+   private:
+    friend class Device;
+    explicit Compiling(Device &device);
+    Device &device_;
+    std::chrono::steady_clock::time_point begin_;
+  };
+  [[nodiscard]] Compiling compiling() { return Compiling(*this); }
+  bool is_compiling() const { return compiling_depth_ > 0; }
+  /// Wall clock spent on compiling so far: programs that were built, and while a Compiling lived.
+  double compile_ms() const { return compile_ms_; }
+
+  /// Will be told the name of each kernel before it is made for the first time.
+  void on_new_kernel(std::function<void(std::string_view)> callback) { on_new_kernel_ = std::move(callback); }
+  void announce_kernel(std::string_view name) {
+    if (on_new_kernel_) on_new_kernel_(name);
+  }
+
   /// Work-groups that keep the device busy: what a grid-stride kernel should launch at most.
   std::uint32_t max_resident_groups() const;
 
@@ -93,6 +123,9 @@ class Device {
   MemoryLedger ledger_;
   StageTimer timer_;
   std::map<std::pair<std::string, Defines>, cl::Program> programs_;
+  std::function<void(std::string_view)> on_new_kernel_;
+  double compile_ms_ = 0;
+  int compiling_depth_ = 0;
 };
 
 /// "CL_OUT_OF_RESOURCES (-5)".

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "core/error.hpp"
 
@@ -14,25 +15,31 @@ Range Range::strided(std::size_t max_count, std::size_t group_size, const Device
   return range;
 }
 
-RawKernel::RawKernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines)
-    : device_(&device), name_(kernel_name) {
-  const cl::Program &program = device.program(stem, defines);
+void RawKernel::make(std::size_t num_params) {
+  if (kernel_() != nullptr) return;
+  device_->announce_kernel(name_);
+  const cl::Program &program = device_->program(stem_, defines_);
+  const Device::Compiling compiling = device_->compiling();  // Mesa compiles some of it here
+  std::size_t num_args = 0;
   try {
-    kernel_ = cl::Kernel(program, kernel_name);
-    num_args_ = kernel_.getInfo<CL_KERNEL_NUM_ARGS>();
+    cl::Kernel kernel(program, name_.c_str());
+    num_args = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
+    if (num_args == num_params) kernel_ = std::move(kernel);
+    is_new_ = true;
   } catch (const cl::Error &error) {
-    throw Error("{}.cl gives no kernel '{}': {}: {}", stem, name_, error.what(), error_name(error.err()));
+    throw Error("{}.cl gives no kernel '{}': {}: {}", stem_, name_, error.what(), error_name(error.err()));
+  }
+  if (num_args != num_params) {
+    throw std::invalid_argument(
+        fmt::format("kernel '{}' takes {} arguments, its C++ type names {}", name_, num_args, num_params));
   }
 }
 
-void RawKernel::check_arity(std::size_t num_params) const {
-  if (num_args_ == num_params) return;
-  throw std::invalid_argument(
-      fmt::format("kernel '{}' takes {} arguments, its C++ type names {}", name_, num_args_, num_params));
-}
-
 void RawKernel::launch(const Range &range) {
-  if (range.num_groups == 0) return;
+  if (std::exchange(is_new_, false)) {  // many drivers compile it now
+    const Device::Compiling compiling = device_->compiling();
+    return launch(range);
+  }
   try {
     device_->queue().enqueueNDRangeKernel(
         kernel_, cl::NullRange, cl::NDRange(range.num_groups * range.group_size),
@@ -41,6 +48,7 @@ void RawKernel::launch(const Range &range) {
     throw Error("kernel '{}' does not start with {} groups of {}: {}: {}", name_, range.num_groups,
                 range.group_size, error.what(), error_name(error.err()));
   }
+  if (device_->is_compiling()) device_->finish();
 }
 
 void RawKernel::set_mem(cl_uint index, const cl::Buffer &mem) {

@@ -3,6 +3,9 @@
 //
 //   Kernel<In<uint>, uint, Out<uint>> scale_{device, "scale", "scale_values"};
 //   scale_(Range::strided(count, 64, device), input, factor, output);
+//
+// Its program is built when it is first launched, so that what is not used is not built. Whoever times launches does one before
+// that has nothing to do.
 
 #include <CL/opencl.hpp>
 #include <cstddef>
@@ -54,12 +57,14 @@ struct Range {
 
 class RawKernel {
  public:
-  RawKernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines);
+  RawKernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines)
+      : device_(&device), stem_(stem), name_(kernel_name), defines_(defines) {}
 
  protected:
-  void check_arity(std::size_t num_params) const;
-  /// Enqueues and does not wait. A range of 0 groups enqueues nothing. Throws Error naming kernel and OpenCL
-  /// error.
+  /// Makes the kernel, unless that has been done; its program, too. Throws Error when there is none of that name,
+  /// std::invalid_argument when it has another number of parameters.
+  void make(std::size_t num_params);
+  /// Enqueues; waits at the first launch, and while a Device::Compiling lives. Throws Error naming kernel and OpenCL error.
   void launch(const Range &range);
   template <class T>
   void set(cl_uint index, const In<T> &arg) {
@@ -82,23 +87,24 @@ class RawKernel {
   void set_bytes(cl_uint index, std::size_t bytes, const void *data);
 
   Device *device_;
-  std::string name_;
+  std::string stem_, name_;
+  Defines defines_;
   cl::Kernel kernel_;
-  std::size_t num_args_ = 0;
+  bool is_new_ = false;  ///< never launched
 };
 
 /// Params are In<T>, Out<T>, Local<T> or plain scalars, in the order of the kernel's signature. The
-/// constructor checks their number against the built kernel.
+/// first launch checks their number against the built kernel.
 template <class... Params>
 class Kernel : public RawKernel {
  public:
   Kernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines = {})
-      : RawKernel(device, stem, kernel_name, defines) {
-    check_arity(sizeof...(Params));
-  }
+      : RawKernel(device, stem, kernel_name, defines) {}
 
-  /// Enqueues one launch in queue order; does not wait.
+  /// Enqueues one launch in queue order; does not wait but at the first one, which counts as compiling. A range of 0 groups does nothing.
   void operator()(const Range &range, const std::type_identity_t<Params> &...args) {
+    if (range.num_groups == 0) return;
+    make(sizeof...(Params));
     [[maybe_unused]] cl_uint index = 0;  // a kernel may have no parameters
     (this->set(index++, args), ...);
     launch(range);

@@ -11,6 +11,7 @@
 #include "core/ocl/device.hpp"
 #include "core/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {
@@ -39,9 +40,12 @@ void run(const ConvertArgs &options) {
                            .input = options.input};
   std::optional<ocl::Device> device;
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
+  std::optional<CompileReport> compiling;
+  if (device) compiling.emplace(*device);
   compress.error_bound = find_error_bound(options.path, overrides, options.compression, options.input);
   compress.input.progress = make_progress_bar("compressing");
   const CompressedVolume volume = compress_to_file(*reader, compress, options.output);
+  if (compiling) compiling->finish();
 
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);

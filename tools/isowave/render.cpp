@@ -18,6 +18,7 @@
 #include "core/time_budget.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
@@ -372,10 +373,13 @@ void run_render(RenderArgs options) {
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
   const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
+  std::optional<CompileReport> compiling;
+  if (device) compiling.emplace(*device);
   RendererOptions &wanted = options.renderer_flags.values;
   options.frame.compression.measure_error |= options.max_error.has_value();
   wanted.with_bounds = options.max_error.has_value();
   wanted.with_kept_picture = options.time_budget.has_value();
+  wanted.with_shading = !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
   // Whoever chooses has levels of detail to choose from.
   const bool chooses_levels =
       options.max_error || (options.time_budget && options.renderer_flags.pipeline != "blocks");
@@ -392,11 +396,13 @@ void run_render(RenderArgs options) {
     document["frames"] = draw_frames(options, scene, frames);
   } else {
     DeviceFrames frames(*device, scene, appearance, options);
+    compiling->finish();
     options.renderer = frames.renderer().options();
     if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());
     document["options"] = options_json(options, scene);
     document["setup_ms"] = frames.renderer().setup_ms();
+    document["compile_ms"] = device->compile_ms();
     document["frames"] = draw_frames(options, scene, frames);
     document["memory"] = memory_json(device->ledger());
     fmt::print("setup {:.0f} ms; device memory: peak {:.1f} MiB\n", frames.renderer().setup_ms(),

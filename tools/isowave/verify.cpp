@@ -7,10 +7,13 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.hpp"
+#include "core/renderer.hpp"
 #include "reference/stability_suite.hpp"
 #include "reference/watertight.hpp"
+#include "reference/watertight_device.hpp"
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/verify_errors.hpp"
 #include "tools/isowave/verify_frames.hpp"
@@ -29,8 +32,54 @@ struct VerifyArgs {
   std::string json;
 };
 
-/// Returns the failures of the solver: rays missed, false, wrong or leaked.
-std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, ordered_json &document) {
+/// Prints and adds the surfaces of one watertight test. Returns its leaks.
+std::uint64_t report_watertight(std::string_view by, const std::vector<WatertightResult> &results,
+                                ordered_json &surfaces) {
+  std::uint64_t leaks = 0;
+  for (const WatertightResult &result : results) {
+    fmt::print("watertight, {:<16} {:<20} {:>9} rays, {} leaks\n", by, result.surface, result.rays,
+               result.leaks);
+    leaks += result.leaks;
+    surfaces.push_back(
+        {{"by", by}, {"surface", result.surface}, {"rays", result.rays}, {"leaks", result.leaks}});
+  }
+  return leaks;
+}
+
+/// By the twin, and where there is a device by each of its pipelines. Returns the leaks.
+std::uint64_t verify_watertight(const VerifyArgs &options, Solver solver, ocl::Device *device,
+                                ordered_json &surfaces) {
+  std::uint64_t leaks = 0;
+  for (const RayBands bands : {RayBands::kOne, RayBands::kLevels}) {
+    leaks +=
+        report_watertight("twin", run_watertight(options.watertight, options.seed, solver, bands), surfaces);
+    for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+      if (device == nullptr || (bands == RayBands::kLevels && pipeline == PipelineKind::kBlocks)) continue;
+      CompileReport compiling(*device);
+      const auto results =
+          run_watertight_on(*device, pipeline, options.watertight, options.seed, solver, bands);
+      compiling.finish();
+      leaks += report_watertight(fmt::format("pipeline {}", to_string(pipeline)), results, surfaces);
+    }
+  }
+  return leaks;
+}
+
+/// The device that the watertight test is for; none where there is none.
+std::unique_ptr<ocl::Device> open_device(const VerifyArgs &options) {
+  if (options.watertight == 0) return nullptr;
+  if (options.frames.device.empty() && ocl::list_devices().empty()) {
+    fmt::print("no OpenCL device: the watertight test is the twin's alone\n");
+    return nullptr;
+  }
+  const ocl::DeviceInfo info = ocl::choose_device(options.frames.device);
+  fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
+  return std::make_unique<ocl::Device>(info);
+}
+
+/// Returns the failures of the solver: rays missed, false, wrong or leaked. device: for the watertight test, or none.
+std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, ocl::Device *device,
+                            ordered_json &document) {
   const Solver solver = solver_from_string(name);
   fmt::print("solver {}\n", name);
   std::uint64_t failures = 0;
@@ -48,13 +97,7 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, or
     cases.push_back(std::move(entry));
   }
   ordered_json surfaces = ordered_json::array();
-  for (const RayBands bands : {RayBands::kOne, RayBands::kLevels}) {
-    for (const WatertightResult &result : run_watertight(options.watertight, options.seed, solver, bands)) {
-      fmt::print("watertight {:<20} {:>9} rays, {} leaks\n", result.surface, result.rays, result.leaks);
-      failures += result.leaks;
-      surfaces.push_back({{"surface", result.surface}, {"rays", result.rays}, {"leaks", result.leaks}});
-    }
-  }
+  failures += verify_watertight(options, solver, device, surfaces);
   document["solvers"].push_back({{"solver", name},
                                  {"cases", std::move(cases)},
                                  {"watertight", std::move(surfaces)},
@@ -76,11 +119,13 @@ void run_verify(VerifyArgs options) {
     if (all) options.solvers = {std::string(judged)};
     failures = verify_frames(options.frames, options.solvers, document);
   } else {
-    if (!options.frames.oracles.empty() || !options.frames.device.empty()) {
-      throw Error("--oracle and --device are for frames: give a VOLUME");
-    }
+    if (!options.frames.oracles.empty()) throw Error("--oracle is for frames: give a VOLUME");
+    const std::unique_ptr<ocl::Device> device = open_device(options);
+    if (device) document["device"] = device_json(device->info());
     for (const std::string &name : options.solvers) {
-      const std::uint64_t found = verify_solver(options, name, document);
+      // Solvers that are expected to leak are not compiled for that.
+      ocl::Device *const tested = judged.empty() || name == judged ? device.get() : nullptr;
+      const std::uint64_t found = verify_solver(options, name, tested, document);
       if (judged.empty() || name == judged)
         failures += found;  // the others are expected to fail: that is shown
     }
@@ -102,7 +147,10 @@ void add_verify(CLI::App &app) {
       "--solver", options->solvers,
       "linear, marmitt, analytic, bernstein; repeat it [suite: all; frames: the default one]");
   command->add_option("--rays", options->rays, "rays per case of the suite")->capture_default_str();
-  command->add_option("--watertight", options->watertight, "rays per surface of the watertight test")
+  command
+      ->add_option(
+          "--watertight", options->watertight,
+          "rays per surface of the watertight test, for the twin and for each pipeline of the device")
       ->capture_default_str();
   command->add_option("--seed", options->seed, "of the suite's fields and rays")->capture_default_str();
   command->add_option("--json", options->json, "write the results as JSON");

@@ -8,6 +8,7 @@
 #include "reference/bound_check.hpp"
 #include "reference/cell_oracle.hpp"
 #include "tools/isowave/accuracy_report.hpp"
+#include "tools/isowave/compile_report.hpp"
 
 namespace isowave::tools {
 
@@ -26,11 +27,13 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   ocl::Device device(info);
+  CompileReport compiling(device);
   const Scene scene = load_scene(options.input, options.volume, frame_options);
   const glm::uvec3 dims = scene.volume.info.dims;
   std::vector<float> source(scene.volume.info.num_voxels());
   open_any_volume(options.input, to_overrides(options.volume))->read_layers(0, dims.z, source);
   Renderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
+  compiling.finish();
   fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view", "px chosen",
              "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");
   std::uint64_t exceeded = 0;

@@ -16,6 +16,7 @@
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
 #include "tools/isowave/accuracy_report.hpp"
+#include "tools/isowave/compile_report.hpp"
 
 namespace isowave::tools {
 
@@ -73,10 +74,13 @@ class FrameDrawer {
     const ocl::DeviceInfo info = ocl::choose_device(device);
     fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
     device_ = std::make_unique<ocl::Device>(info);
+    CompileReport compiling(*device_);
     RendererOptions options;
     options.size = scene.size;
     options.solver = solver;
+    options.with_shading = false;
     renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
+    compiling.finish();
     renderer_->set_value_error(value_error);
   }
 
@@ -187,9 +191,10 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
       "--max-error", options.max_error,
       "judge what render --max-error promises instead: each pixel's bound against the volume before "
       "compression");
-  command.add_option(
-      "--device", options.device,
-      "who draws frames: index, cpu, gpu, or a part of a device's name [the scalar reference]");
+  command.add_option("--device", options.device,
+                     "who draws frames, or is tested for leaks beside the scalar reference: index, cpu, gpu, "
+                     "or a part of its name "
+                     "[frames: the scalar reference; leaks: as render]");
 }
 
 }  // namespace isowave::tools

@@ -1,0 +1,236 @@
+// Kernels are compiled when a renderer is made, those that it launches and no others; core/ocl/kernel_cache, and what the program
+// says of it.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/ocl/kernel_cache.hpp"
+#include "core/renderer.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/run_program.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+constexpr ImageSize kSize{40, 30};
+
+CompressedVolume levelled_volume() {
+  const glm::uvec3 dims(33, 30, 31);
+  test::ArrayVolume reader(test::grid_info(dims), test::sample(dims, test::gyroid_field(12)));
+  return compress(reader, CompressOptions{.rate = 8, .levels = 0});
+}
+
+/// Stems, and how often each was built.
+std::vector<std::string> stems_of(const ocl::Device &device) {
+  std::map<std::string, int> counts;
+  for (const std::string &program : device.built_programs()) ++counts[program.substr(0, program.find(' '))];
+  std::vector<std::string> stems;
+  for (const auto &[stem, count] : counts)
+    stems.push_back(count == 1 ? stem : fmt::format("{} x{}", stem, count));
+  return stems;
+}
+
+class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  ocl::Device device_{GetParam()};
+  const CompressedVolume volume_ = levelled_volume();
+  const std::vector<Camera> cameras_ = orbit_cameras(volume_.info, 2);
+
+  /// Draws in every way that the options allow. Nothing may be left to compile.
+  void expect_all_compiled(const RendererOptions &options) {
+    Renderer renderer(device_, volume_, options);
+    EXPECT_GT(device_.compile_ms(), 0);
+    const std::vector<std::string> programs = device_.built_programs();
+    std::vector<std::string> late;
+    device_.on_new_kernel([&](std::string_view kernel) { late.emplace_back(kernel); });
+    for (const double pixels : {options.max_pixel_error, 0.0}) {
+      renderer.set_max_pixel_error(pixels);
+      for (const float isovalue : {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
+        renderer.render(cameras_[0], isovalue);
+        EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.size.num_pixels());
+      }
+    }
+    if (options.with_kept_picture) {
+      renderer.set_size(halved(kSize, 1));
+      renderer.render(cameras_[0], 0.1f);
+      renderer.keep_picture();
+      renderer.set_size(kSize);
+      renderer.enlarge_kept(cameras_[0], 0.1f);
+      renderer.fill_from_kept();
+    }
+    device_.on_new_kernel({});
+    EXPECT_THAT(late, IsEmpty());
+    EXPECT_EQ(device_.built_programs(), programs);
+  }
+};
+
+TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
+  for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+    for (const StreamPlace stream : {StreamPlace::kDevice, StreamPlace::kHost}) {
+      expect_all_compiled({.size = kSize, .pipeline = pipeline, .stream = stream});
+      expect_all_compiled({.size = {20, 15, 2}, .pipeline = pipeline, .cache_slots = 8, .stream = stream});
+    }
+  }
+  expect_all_compiled({.size = kSize, .max_pixel_error = 2});
+  expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .max_pixel_error = 2});
+  expect_all_compiled({.size = kSize, .with_kept_picture = true});
+}
+
+TEST_P(CompileOnDevice, EverySolverAndGroupingIsCompiled) {
+  for (const std::string_view solver : kSolverNames)
+    expect_all_compiled({.size = kSize, .solver = solver_from_string(solver)});
+  expect_all_compiled({.size = kSize,
+                       .pipeline = PipelineKind::kBlocks,
+                       .group_size = 32,
+                       .grouping = Grouping::kRadix,
+                       .closest = ClosestHit::kScan});
+}
+
+TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
+  const auto stems = [&](RendererOptions options, bool shading = false) {
+    ocl::Device device(GetParam());
+    options.with_shading = shading;
+    Renderer renderer(device, volume_, options);
+    renderer.render(cameras_[0], 0.1f);
+    return stems_of(device);
+  };
+  EXPECT_THAT(stems({.size = kSize}), ElementsAre("block_cache", "macrocells", "march", "zfp_decode"));
+  EXPECT_THAT(stems({.size = kSize}, true),
+              ElementsAre("block_cache", "macrocells", "march", "shade", "zfp_decode"));
+  EXPECT_THAT(stems({.size = kSize, .with_kept_picture = true}),
+              ElementsAre("block_cache", "kept_picture", "macrocells", "march", "zfp_decode"));
+  // One for frames that the finest level draws alone, one for others.
+  EXPECT_THAT(stems({.size = kSize, .max_pixel_error = 2}),
+              ElementsAre("block_cache", "macrocells", "march x2", "zfp_decode"));
+  // Where one work-group scans alone, a GPU gives it more work-items.
+  const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";
+  EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks}),
+              ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect", "macrocells",
+                          scan, "speculation", "traverse", "zfp_decode"));
+  EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks, .grouping = Grouping::kRadix}),
+              ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect", "macrocells",
+                          "radix_sort", scan, "speculation", "traverse", "zfp_decode"));
+}
+
+/// What compiling leaves behind must not show.
+TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
+  for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+    ocl::Device device(GetParam(), true);
+    Renderer renderer(device, volume_, {.size = kSize, .pipeline = pipeline});
+    EXPECT_THAT(device.timer().collect(), IsEmpty());
+    EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
+    const FrameStats first = renderer.render(cameras_[0], 0.1f);
+    EXPECT_EQ(first.passes.front().counts.pass,
+              ISO_AGE_BUCKETS + (pipeline == PipelineKind::kBlocks ? 1u : 0u));
+    renderer.clear_cache();
+    const FrameStats again = renderer.render(cameras_[0], 0.1f);
+    ASSERT_EQ(first.passes.size(), again.passes.size());
+    for (std::size_t i = 0; i < first.passes.size(); ++i) {
+      EXPECT_EQ(first.passes[i].counts.decoded_count, again.passes[i].counts.decoded_count) << i;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, CompileOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+
+/// Sets an environment variable for as long as it lives.
+class Setting {
+ public:
+  Setting(const char *name, const std::string &value) : name_(name) {
+    if (const char *before = std::getenv(name)) before_ = before;
+    ::setenv(name, value.c_str(), 1);
+  }
+  ~Setting() { before_ ? ::setenv(name_, before_->c_str(), 1) : ::unsetenv(name_); }
+  Setting(const Setting &) = delete;
+  Setting &operator=(const Setting &) = delete;
+
+ private:
+  const char *name_;
+  std::optional<std::string> before_;
+};
+
+TEST(KernelCache, FolderIsTheDrivers) {
+  const Setting home("HOME", "/home/someone"), cache("XDG_CACHE_HOME", ""), pocl("POCL_CACHE_DIR", ""),
+      mesa("MESA_SHADER_CACHE_DIR", ""), nvidia("CUDA_CACHE_PATH", "");
+  const auto folder = [](const char *platform) {
+    ocl::DeviceInfo info;
+    info.platform = platform;
+    return ocl::KernelCache(info).folder();
+  };
+  EXPECT_EQ(folder("Portable Computing Language"), "/home/someone/.cache/pocl/kcache");
+  EXPECT_EQ(folder("rusticl"), "/home/someone/.cache/mesa_shader_cache");
+  EXPECT_EQ(folder("NVIDIA CUDA"), "/home/someone/.nv/ComputeCache");
+  EXPECT_EQ(folder("Some other platform"), std::nullopt);
+  const Setting own("POCL_CACHE_DIR", "/elsewhere"), none("CUDA_CACHE_DISABLE", "1"),
+      xdg("XDG_CACHE_HOME", "/x");
+  EXPECT_EQ(folder("Portable Computing Language"), "/elsewhere");
+  EXPECT_EQ(folder("rusticl"), "/x/mesa_shader_cache");
+  EXPECT_EQ(folder("NVIDIA CUDA"), std::nullopt);
+}
+
+TEST(KernelCache, NewFilesAreNewKernelsButForBookkeeping) {
+  const test::TemporaryFolder folder;
+  const Setting own("POCL_CACHE_DIR", folder.path().string());
+  ocl::DeviceInfo info;
+  info.platform = "Portable Computing Language";
+  test::write_file(folder / "old.so", "");
+  fs::last_write_time(folder / "old.so", fs::file_time_type::clock::now() - std::chrono::hours(1));
+  const ocl::KernelCache cache(info);
+  EXPECT_FALSE(cache.has_new_kernels());
+  fs::create_directories(folder / "a" / "b");
+  for (const char *name : {"last_accessed", "tempfile_x", "index"}) test::write_file(folder / "a" / name, "");
+  EXPECT_FALSE(cache.has_new_kernels());
+  test::write_file(folder / "a" / "b" / "new.so", "");
+  EXPECT_TRUE(cache.has_new_kernels());
+  fs::remove_all(folder.path() / "a");
+  EXPECT_FALSE(cache.has_new_kernels());
+}
+
+std::size_t num_libraries(const fs::path &folder) {
+  std::size_t count = 0;
+  for (const auto &file : fs::recursive_directory_iterator(folder)) count += file.path().extension() == ".so";
+  return count;
+}
+
+/// PoCL compiles a kernel when it is launched first, and leaves a library for each. A frame that meets no block launches few;
+/// so whatever the second run adds had been left to its frames.
+TEST(CompileCommand, TheFirstOpeningSaysSoAndLeavesNothingToFrames) {
+  const test::TemporaryFolder folder, cache;
+  const Setting own("POCL_CACHE_DIR", cache.path().string());
+  const std::string raw = test::quoted(folder / "shell_20x20x20_uint8.raw");
+  ASSERT_EQ(test::run_isowave("generate shell --dims 20 --type uint8 -o " + raw).status, 0);
+  const auto render = [&](const std::string &options) {
+    const test::ProgramResult result = test::run_isowave(
+        "render " + raw + " --device Portable --size 32x24 --no-stage-times --stats " +
+        test::quoted(folder / "stats.json") + " -o " + test::quoted(folder / "a.png") + options);
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    return result.out;
+  };
+  for (const std::string pipeline : {" --pipeline rays", " --pipeline blocks"}) {
+    EXPECT_THAT(render(pipeline + " -i 1e6"),
+                testing::AllOf(HasSubstr("compiling kernels for"), HasSubstr(cache.path().string())));
+    const nlohmann::json stats = nlohmann::json::parse(test::read_file(folder / "stats.json"));
+    EXPECT_GT(stats.at("compile_ms").get<double>(), 0);
+    EXPECT_GE(stats.at("setup_ms").get<double>(), 0);
+    const std::size_t libraries = num_libraries(cache.path());
+    EXPECT_GT(libraries, 0u);
+    EXPECT_THAT(render(pipeline + " -i 100"), Not(HasSubstr("compiling")));
+    EXPECT_EQ(num_libraries(cache.path()), libraries) << pipeline;
+  }
+}
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,45 @@
+#include "tools/isowave/compile_report.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace isowave::tools {
+
+namespace {
+
+/// Below, nobody has waited, and looking through the driver's folder is not worth it.
+constexpr double kWorthSayingMs = 250;
+
+}  // namespace
+
+CompileReport::CompileReport(ocl::Device &device) : device_(device), cache_(device.info()) {
+  if (::isatty(STDERR_FILENO) == 0) return;
+  device_.on_new_kernel([this](std::string_view kernel) {
+    fmt::print(stderr, "\r\x1b[Kcompiling kernels for {}: {}, {}", device_.info().name, ++num_kernels_,
+               kernel);
+    std::fflush(stderr);
+  });
+}
+
+CompileReport::~CompileReport() {
+  device_.on_new_kernel({});
+  if (num_kernels_ != 0) fmt::print(stderr, "\r\x1b[K");  // after an error
+}
+
+void CompileReport::finish() {
+  if (std::exchange(num_kernels_, 0) != 0) fmt::print(stderr, "\r\x1b[K");
+  const double ms = device_.compile_ms() - std::exchange(reported_ms_, device_.compile_ms());
+  if (ms < kWorthSayingMs) return;
+  if (!cache_.folder()) {
+    fmt::print("compiling kernels for {}: {:.1f} s\n", device_.info().name, ms / 1000);
+  } else if (cache_.has_new_kernels()) {
+    fmt::print("compiling kernels for {}: {:.1f} s; its driver keeps them for the next time in {}\n",
+               device_.info().name, ms / 1000, cache_.folder()->string());
+  }
+  cache_ = ocl::KernelCache(device_.info());
+}
+
+}  // namespace isowave::tools
