@@ -11,7 +11,9 @@
 #include "reference/watertight.hpp"
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/outputs.hpp"
 #include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/verify_errors.hpp"
 #include "tools/isowave/verify_frames.hpp"
 
@@ -62,7 +64,30 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, or
   return failures;
 }
 
-void run_verify(VerifyArgs options) {
+/// What can be told from the options alone.
+void check_options(const CLI::App &command, const VerifyArgs &options) {
+  for (const std::string &name : options.solvers) solver_from_string(name);
+  if (options.frames.input.empty()) {
+    refuse_options(
+        command,
+        {"--oracle", "--device", "--isovalue", "--value-error", "--size", "--orbit", "--cameras", "--dims",
+         "--type", "--spacing", "--rate", "--tolerance", "--tolerance-relative", "--exact"},
+        "is for frames: give a VOLUME");
+  } else {
+    refuse_options(command, {"--rays", "--watertight", "--seed"}, "is for the suite: leave out VOLUME");
+    if (options.frames.frame.isovalues.empty()) throw Error("{}: give --isovalue", options.frames.input);
+  }
+  refuse_options(
+      command, {"--levels"},
+      options.frames.max_error ? "--max-error has all levels of detail" : "the finest level alone is judged");
+  Outputs outputs;
+  outputs.read_volume(options.frames.input);
+  if (!options.frames.frame.cameras.empty()) outputs.read(options.frames.frame.cameras);
+  outputs.write("--json", options.json);
+}
+
+void run_verify(const CLI::App &command, VerifyArgs options) {
+  check_options(command, options);
   const bool all = options.solvers.empty();
   if (all) options.solvers.assign(kSolverNames.begin(), kSolverNames.end());
   ordered_json document = {{"program", "isowave 0.1.0"}, {"seed", options.seed}};
@@ -76,9 +101,6 @@ void run_verify(VerifyArgs options) {
     if (all) options.solvers = {std::string(judged)};
     failures = verify_frames(options.frames, options.solvers, document);
   } else {
-    if (!options.frames.oracles.empty() || !options.frames.device.empty()) {
-      throw Error("--oracle and --device are for frames: give a VOLUME");
-    }
     for (const std::string &name : options.solvers) {
       const std::uint64_t found = verify_solver(options, name, document);
       if (judged.empty() || name == judged)
@@ -101,12 +123,15 @@ void add_verify(CLI::App &app) {
   command->add_option(
       "--solver", options->solvers,
       "linear, marmitt, analytic, bernstein; repeat it [suite: all; frames: the default one]");
-  command->add_option("--rays", options->rays, "rays per case of the suite")->capture_default_str();
+  command->add_option("--rays", options->rays, "rays per case of the suite")
+      ->check(CLI::Range(1u, 100'000'000u))
+      ->capture_default_str();
   command->add_option("--watertight", options->watertight, "rays per surface of the watertight test")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000}))
       ->capture_default_str();
   command->add_option("--seed", options->seed, "of the suite's fields and rays")->capture_default_str();
   command->add_option("--json", options->json, "write the results as JSON");
-  command->callback([options] { run_verify(*options); });
+  command->callback([command, options] { run_verify(*command, *options); });
 }
 
 }  // namespace isowave::tools
