@@ -170,7 +170,8 @@ TEST_P(OclDeviceOnDevice, BuildErrorsNameFileAndLine) {
     try {
       device.program("shared_types", {{define, "1+"}});
     } catch (const BuildError &error) {
-      EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos) << "one line, and the log apart";
+      EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos)
+          << "one line, and the log apart";
       return error.what() + ("\n" + error.log());
     }
     return std::string("it builds");

@@ -94,6 +94,14 @@ std::optional<std::string> finish_output() {
   return "cannot write to standard output" + (errno != 0 ? fmt::format(": {}", std::strerror(errno)) : "");
 }
 
+/// Of a subcommand that is missing: CLI11 does not say that there is one of another name.
+std::string text_of(const CLI::RequiredError &error, const CLI::App &app) {
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (unknown.empty() || app.get_subcommands([](const CLI::App *) { return true; }).empty())
+    return error.what();
+  return fmt::format("{}; '{}' is none: see --help", error.what(), unknown.front());
+}
+
 /// The program and the subcommand that was asked for: "isowave bench pareto".
 std::string command_name(const CLI::App &app) {
   std::string name = app.get_name();
@@ -126,6 +134,8 @@ int run_program(CLI::App &app, int argc, char **argv) {
     std::fputs(text.str().c_str(), stdout);
   } catch (const CLI::RuntimeError &result) {
     status = result.get_exit_code();
+  } catch (const CLI::RequiredError &error) {
+    message = text_of(error, app);
   } catch (...) {
     message = text_of_current_exception(command_name(app));
   }
