@@ -240,6 +240,10 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
     EXPECT_NE(run.err.find("compiled kernels go to " + temporary.path().string()), std::string::npos)
         << run.err;
   }
+  const auto no_path =
+      run_command("env PATH= POCL_CACHE_DIR=" + quoted(temporary / "new") + " OCL_ICD_VENDORS=pocl.icd " +
+                  isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
+  EXPECT_EQ(no_path.status, 0) << no_path.err;
   const auto given = render("HOME=" + quoted(folder.path()));
   EXPECT_EQ(given.status, 0) << given.err;
   EXPECT_EQ(given.err, "") << "nothing is said where it works as usual";

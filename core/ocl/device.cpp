@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "core/error.hpp"
-#include "core/ocl/cache_folder.hpp"
 #include "core/ocl/device_list.hpp"
 #include "core/ocl/kernel_sources.hpp"
+#include "core/ocl/pocl_environment.hpp"
 
 namespace isowave::ocl {
 

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "core/error.hpp"
-#include "core/ocl/cache_folder.hpp"
+#include "core/ocl/pocl_environment.hpp"
 
 namespace isowave::ocl {
 
@@ -118,7 +118,7 @@ void append_devices(const cl::Platform &platform, std::vector<ListedDevice> &res
 
 std::vector<ListedDevice> enumerate() {
   std::vector<cl::Platform> platforms;
-  use_writable_cache_folder();  // before a driver is loaded
+  prepare_for_pocl();  // before a driver is loaded
   try {
     cl::Platform::get(&platforms);
   } catch (const cl::Error &) {

@@ -16,8 +16,8 @@
 #include <system_error>
 
 #include "core/error.hpp"
-#include "core/ocl/cache_folder.hpp"
 #include "core/ocl/device.hpp"
+#include "core/ocl/pocl_environment.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {

@@ -1,9 +1,10 @@
-#include "core/ocl/cache_folder.hpp"
+#include "core/ocl/pocl_environment.hpp"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <mutex>
@@ -90,6 +91,17 @@ CacheState choose_folder() {
                           usual.string())};
 }
 
+/// PoCL 3.1 runs the linker, and ends the process where PATH, empty for some services, does not lead to it.
+void complete_path() {
+  const std::string path = environment("PATH");
+  for (std::size_t begin = 0; begin < path.size();) {
+    const std::size_t end = std::min(path.find(':', begin), path.size());
+    if (::access((path.substr(begin, end - begin) + "/ld").c_str(), X_OK) == 0) return;
+    begin = end + 1;
+  }
+  ::setenv("PATH", (path + (path.empty() ? "" : ":") + "/usr/local/bin:/usr/bin:/bin").c_str(), 1);
+}
+
 CacheState &state() {
   static CacheState chosen;
   return chosen;
@@ -97,9 +109,12 @@ CacheState &state() {
 
 }  // namespace
 
-void use_writable_cache_folder() {
+void prepare_for_pocl() {
   static std::once_flag once;
-  std::call_once(once, [] { state() = choose_folder(); });
+  std::call_once(once, [] {
+    complete_path();
+    state() = choose_folder();
+  });
 }
 
 void note_pocl() {
