@@ -107,6 +107,9 @@ TEST_F(CliOutputs, NeverTakeEachOthersPlace) {
   fs::create_directory(folder_ / "p");
   expect_refused("render " + raw() + " -i 40 --progress-dir " + name("p") + " -o " + name("p/pass0001.png"),
                  "--progress-dir");
+  for (const char *inside : {"new", "new/", "new/er"})
+    expect_refused("render " + raw() + " -i 40 --progress-dir " + name(inside) + " -o " + name("new"),
+                   "--progress-dir");
   fs::create_symlink("b", folder_ / "l1");
   fs::create_symlink("b", folder_ / "l2");
   expect_refused(render(raw()) + "--depth " + name("l1") + " --stats " + name("l2"), "take the place of");

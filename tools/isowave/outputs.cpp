@@ -85,17 +85,23 @@ void Outputs::write(const std::string &option, const fs::path &path) {
 void Outputs::write_pictures(const std::string &option, const fs::path &folder, const std::string &prefix) {
   if (folder.empty()) return;
   std::error_code failure;
-  fs::path existing = folder;
+  fs::path existing = folder, made;  // the deepest folder that is there, and the one that will be made in it
   while (!fs::exists(existing, failure) && existing.has_relative_path()) {
-    new_folders_.insert(folder);
+    if (!existing.filename().empty()) made = existing;
     existing = existing.has_parent_path() ? existing.parent_path() : fs::path(".");
   }
   if (!fs::is_directory(existing, failure))
     throw Error("cannot make the folder {}: {} is no folder", folder.string(), existing.string());
   if (::access(existing.c_str(), W_OK | X_OK) != 0)
     throw Error("cannot make or fill the folder {}: {}", folder.string(), std::strerror(errno));
+  if (!made.empty()) {
+    new_folder_ = folder;
+    if (const auto user = users_.find(key_of(made)); user != users_.end())
+      throw Error("{} {}: it would take the place of {}", option, folder.string(), user->second);
+    return;
+  }
   struct stat status {};
-  if (existing != folder || ::stat(folder.c_str(), &status) != 0) return;
+  if (::stat(folder.c_str(), &status) != 0) return;
   for (const auto &entry : fs::directory_iterator(folder, failure)) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(prefix) || !name.ends_with(".png") || !fs::exists(entry.path(), failure)) continue;
@@ -109,12 +115,10 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder, 
   }
 }
 
-void Outputs::make_folders() const {
-  for (const fs::path &folder : new_folders_) {
-    std::error_code failure;
-    fs::create_directories(folder, failure);
-    if (failure) throw Error("cannot make the folder {}: {}", folder.string(), failure.message());
-  }
+void Outputs::make_folder() const {
+  std::error_code failure;
+  if (!new_folder_.empty()) fs::create_directories(new_folder_, failure);
+  if (failure) throw Error("cannot make the folder {}: {}", new_folder_.string(), failure.message());
 }
 
 }  // namespace isowave::tools

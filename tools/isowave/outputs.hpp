@@ -19,17 +19,17 @@ class Outputs {
   /// A file that will be written, as `option` says; empty: none. Throws Error where it cannot be written, or is a file that read() or
   /// write() was called with: by any name, also through symbolic and hard links.
   void write(const std::string &option, const std::filesystem::path &path);
-  /// A folder for files PREFIX*.png whose number nobody knows yet. It is made by make_folders() where it is missing. After all read()
+  /// A folder for files PREFIX*.png whose number nobody knows yet. It is made by make_folder() where it is missing. After all read()
   /// and write(): throws Error also where one of those files has such a name.
   void write_pictures(const std::string &option, const std::filesystem::path &folder,
                       const std::string &prefix);
   /// Throws Error.
-  void make_folders() const;
+  void make_folder() const;
 
  private:
   std::map<std::string, std::string> users_;  ///< key of a file -> who uses it: "the input NAME", "--depth"
-  std::set<std::filesystem::path> probed_,
-      new_folders_;  ///< folders that were written to, to see whether it works; to be made
+  std::set<std::filesystem::path> probed_;    ///< folders that were written to, to see whether it works
+  std::filesystem::path new_folder_;          ///< to be made
 };
 
 }  // namespace isowave::tools

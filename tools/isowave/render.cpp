@@ -394,7 +394,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   if (chooses_levels) wanted.max_pixel_error = 1;
   want_levels(options.renderer_flags, options.frame.compression);
   const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
-  outputs.make_folders();
+  outputs.make_folder();
   if (chooses_levels && scene.volume.coarser.empty()) wanted.max_pixel_error = options.max_pixel_error;
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
