@@ -219,6 +219,33 @@ TEST(CliOptions, OutOfMemoryIsOneLine) {
   EXPECT_EQ(result.err.find("bad_alloc"), std::string::npos) << result.err;
 }
 
+/// A limit on open files stands in for a compiler that fails.
+TEST(CliOptions, KernelsThatDoNotBuildAreOneLineAndALog) {
+  const TemporaryFolder folder;
+  bool failed = false;
+  for (int files = 4; files < 10 && !failed; ++files) {
+    const auto run =
+        run_command("env OCL_ICD_VENDORS=pocl.icd POCL_CACHE_DIR=" + quoted(folder / "cache") +
+                    " TMPDIR=" + quoted(folder.path()) + " prlimit --nofile=" + std::to_string(files) + " " +
+                    isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
+    if (run.err.find("does not build") == std::string::npos) continue;
+    failed = true;
+    EXPECT_EQ(run.status, 1);
+    const std::size_t begin =
+        run.err.find("isowave: ");  // clang, within PoCL, counts its errors in a line before
+    ASSERT_NE(begin, std::string::npos) << run.err;
+    EXPECT_EQ(run.err.find('\n', begin), run.err.size() - 1) << run.err;
+    EXPECT_NE(run.err.find("CL_BUILD_PROGRAM_FAILURE", begin), std::string::npos) << run.err;
+    const std::string saying = "the compiler's whole log is ";
+    const std::size_t at = run.err.find(saying);
+    ASSERT_NE(at, std::string::npos) << run.err;
+    const std::string log = run.err.substr(at + saying.size(), run.err.size() - at - saying.size() - 1);
+    EXPECT_TRUE(log.starts_with(folder.path().string())) << log;
+    EXPECT_NE(test::read_file(log), "");
+  }
+  EXPECT_TRUE(failed) << "else this proves nothing";
+}
+
 /// As an ordinary user: root may write where nobody else may.
 TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
   const TemporaryFolder folder, temporary;

@@ -146,7 +146,11 @@ TEST_F(CliOutputs, WhatCannotBeWrittenIsSaidBeforeAnyWork) {
   expect_one_line_error("bench pareto " + inputs + "--json " + name("pipe"), "not a regular file");
   expect_one_line_error("bench solvers none.raw:1 --json " + name("pipe"), "not a regular file");
   expect_one_line_error("convert none_8x8x8_uint8.raw -o " + name("missing/a.zfp"), "cannot write");
-  expect_one_line_error("generate sphere --dims 65536 -o " + name("a.raw"), "are free");
+  // Within a limit: whoever does not look first must not fill the disk.
+  const auto too_large = test::run_command("ulimit -f 64; " + test::isowave_program() +
+                                           " generate sphere --dims 65536 -o " + name("a.raw"));
+  EXPECT_EQ(too_large.status, 1);
+  EXPECT_NE(too_large.err.find("are free"), std::string::npos) << too_large.err;
   if (::geteuid() == 0) return;  // may write anywhere
   fs::permissions(folder_ / "v.zfp", fs::perms::owner_read);
   expect_refused(render(raw()) + "--depth " + name("v.zfp"), "cannot write");
