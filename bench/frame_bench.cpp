@@ -5,8 +5,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <cstdio>
-#include <exception>
 #include <optional>
 #include <utility>
 
@@ -15,8 +13,11 @@
 #include "bench/run_info.hpp"
 #include "core/error.hpp"
 #include "core/renderer.hpp"
+#include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
+#include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::bench {
@@ -120,16 +121,16 @@ std::vector<std::uint64_t> budgets_of(const Options &options, const ocl::DeviceI
   if (renderer.memory_budget != 0 || renderer.cache_slots != 0)
     throw Error("--budgets stands for --memory-budget and --cache-slots: give it alone");
   if (options.budgets.starts_with(kAuto)) {
-    std::uint32_t count = 0;
-    if (!CLI::detail::lexical_cast(options.budgets.substr(kAuto.size()), count) || count < 2 || count > 1000)
+    const std::uint64_t count = tools::parse_whole(options.budgets.substr(kAuto.size())).value_or(0);
+    if (count < 2 || count > 1000)
       throw Error("--budgets {}: auto:N makes 2 to 1000 budgets", options.budgets);
-    return geometric_budgets(device_info, volume, renderer, count);
+    return geometric_budgets(device_info, volume, renderer, static_cast<std::uint32_t>(count));
   }
   std::vector<std::uint64_t> budgets;
-  for (std::string text : CLI::detail::split(options.budgets, ',')) {
-    const std::string error = CLI::AsSizeValue(true)(text);
-    if (!error.empty() || !CLI::detail::lexical_cast(text, budgets.emplace_back()) || budgets.back() == 0)
-      throw Error("--budgets {}: '{}' is no number of bytes", options.budgets, text);
+  for (const std::string &text : CLI::detail::split(options.budgets, ',')) {
+    const std::optional<std::uint64_t> bytes = tools::parse_bytes(text);
+    if (!bytes) throw Error("--budgets {}: '{}' is no number of bytes", options.budgets, text);
+    budgets.push_back(*bytes);
   }
   return budgets;
 }
@@ -143,8 +144,19 @@ BudgetSweep measure_budgets(const Options &options, std::string command) {
                        options.resident);
 }
 
+/// What can be told from the options alone.
+void check_options(const CLI::App &app, const Options &options) {
+  tools::check_renderer_options(app, options.renderer);
+  check_image_size({options.size.at(0), options.size.at(1), options.samples});
+  if (options.budgets.empty()) tools::refuse_options(app, {"--max-passes"}, "is of --budgets");
+  tools::Outputs outputs;
+  outputs.read_volume(options.volume);
+  outputs.write("--json", options.json);
+}
+
 /// Prints one report or the other, and writes it where asked.
-void run(Options options, const std::string &command) {
+void run(const CLI::App &app, Options options, const std::string &command) {
+  check_options(app, options);
   tools::want_levels(options.renderer, options.compression);
   if (options.renderer.values.max_pixel_error > 0) options.resident = false;  // it draws the finest level
   nlohmann::ordered_json json;
@@ -163,7 +175,8 @@ void run(Options options, const std::string &command) {
 void add_options(CLI::App &app, Options &options) {
   app.add_option("VOLUME", options.volume, "a .zfp file, or " + std::string(tools::kVolumeHelp))->required();
   tools::add_volume_options(app, options.volume_options);
-  app.add_option("--isovalue,-i", options.isovalue, "isovalue [the middle of the volume's values]");
+  app.add_option("--isovalue,-i", options.isovalue, "isovalue [the middle of the volume's values]")
+      ->check(tools::fits_float32());
   tools::add_compression_options(app, options.compression);
   app.add_option("--size", options.size, "picture size WxH [1280x720]")->delimiter('x')->expected(2);
   app.add_option("--samples", options.samples, "N: N x N rays for each pixel")
@@ -196,17 +209,11 @@ void add_options(CLI::App &app, Options &options) {
 }  // namespace isowave::bench
 
 int main(int argc, char **argv) {
-  CLI::App app("Times whole frames of a volume: cold, warm and the next view, and each stage.");
+  CLI::App app("Times whole frames of a volume: cold, warm and the next view, and each stage.",
+               "frame_bench");
   isowave::bench::Options options;
   isowave::bench::add_options(app, options);
-  try {
-    app.parse(argc, argv);
-    isowave::bench::run(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
-    return 0;
-  } catch (const CLI::Success &help) {
-    return app.exit(help);
-  } catch (const std::exception &error) {
-    fmt::print(stderr, "frame_bench: {}\n", error.what());
-    return 1;
-  }
+  app.callback(
+      [&] { isowave::bench::run(app, options, fmt::format("{}", fmt::join(argv, argv + argc, " "))); });
+  return isowave::tools::run_program(app, argc, argv);
 }

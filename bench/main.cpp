@@ -8,14 +8,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
-#include <exception>
 #include <iterator>
 #include <string>
 #include <vector>
 
 #include "bench/harness.hpp"
 #include "bench/run_info.hpp"
+#include "tools/isowave/program.hpp"
 
 namespace {
 
@@ -45,7 +44,7 @@ int run_benchmarks(const std::string &device, bool profiling, std::vector<std::s
 }  // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("Times every stage of isowave alone.");
+  CLI::App app("Times every stage of isowave alone.", "isowave_bench");
   std::string device;
   bool no_events = false;
   app.add_option("--device", device,
@@ -53,17 +52,12 @@ int main(int argc, char **argv) {
   app.add_flag("--no-events", no_events, "time with the wall clock: profiling slows launches down");
   app.allow_extras();
   app.footer("All other options are Google Benchmark's: see --benchmark_help.");
-  try {
-    app.parse(argc, argv);
+  app.callback([&] {
     std::vector<std::string> arguments = {argv[0], kMinTime};
     for (const std::string &extra : app.remaining()) {
       arguments.push_back(extra == "--benchmark_help" ? "--help" : extra);
     }
-    return run_benchmarks(device, !no_events, std::move(arguments));
-  } catch (const CLI::Success &help) {
-    return app.exit(help);
-  } catch (const std::exception &error) {
-    fmt::print(stderr, "isowave_bench: {}\n", error.what());
-    return 1;
-  }
+    if (run_benchmarks(device, !no_events, std::move(arguments)) != 0) throw CLI::RuntimeError(1);
+  });
+  return isowave::tools::run_program(app, argc, argv);
 }

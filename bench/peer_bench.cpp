@@ -25,7 +25,10 @@
 #include "bench/peer_sides.hpp"
 #include "bench/run_info.hpp"
 #include "core/error.hpp"
+#include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::bench {
@@ -262,6 +265,16 @@ void compare(const Options &options, const std::string &command, const std::stri
   if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
+/// What can be told from the options alone.
+void check_options(const CLI::App &app, const Options &options) {
+  if (!options.volume.empty()) tools::refuse_options(app, {"--dims"}, "leave it out, or --volume");
+  if (tools::is_zfp_name(options.volume))
+    tools::refuse_options(app, {"--rate"}, "the volume is compressed already");
+  tools::Outputs outputs;
+  outputs.read_volume(options.volume);
+  outputs.write("--json", options.json);
+}
+
 void add_options(CLI::App &app, Options &options) {
   app.add_option("--dims", options.dims, "edges of the mixing layers [256 512]");
   app.add_option("--volume", options.volume,
@@ -285,22 +298,18 @@ void add_options(CLI::App &app, Options &options) {
 }  // namespace isowave::bench
 
 int main(int argc, char **argv) {
-  CLI::App app("Times a new isovalue, and further frames, beside VTK's Flying Edges and Embree.");
+  CLI::App app("Times a new isovalue, and further frames, beside VTK's Flying Edges and Embree.",
+               "peer_bench");
   isowave::bench::Options options;
   options.device = "cpu";
   isowave::bench::add_options(app, options);
-  try {
-    app.parse(argc, argv);
+  app.callback([&] {
     if (options.side.empty()) {
+      isowave::bench::check_options(app, options);
       isowave::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")), argv[0]);
     } else {
       isowave::bench::serve(options);
     }
-    return 0;
-  } catch (const CLI::Success &help) {
-    return app.exit(help);
-  } catch (const std::exception &error) {
-    fmt::print(stderr, "peer_bench: {}\n", error.what());
-    return 1;
-  }
+  });
+  return isowave::tools::run_program(app, argc, argv);
 }

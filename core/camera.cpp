@@ -1,14 +1,15 @@
 #include "core/camera.hpp"
 
 #include <cmath>
-#include <exception>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
+#include <system_error>
 
 #include "core/error.hpp"
+#include "core/io/input_file.hpp"
 
 namespace isowave {
 namespace {
@@ -17,6 +18,8 @@ using nlohmann::json;
 
 /// sin of the smallest angle between view and up: below it the image's right is rounding noise.
 constexpr double kMinSinViewUp = 1e-6;
+/// Of eye to at, and of up: squares of longer vectors, and of those as much shorter than 1, leave double's range.
+constexpr double kLongest = 0x1p500;
 
 const json &member(const json &object, const char *key, const std::string &where) {
   if (!object.is_object()) throw Error("{}: expected an object with \"{}\"", where, key);
@@ -52,6 +55,25 @@ glm::uvec3 size3(const json &value, const char *key, const std::string &where) {
   return {positive_uint(v[0], key, where), positive_uint(v[1], key, where), positive_uint(v[2], key, where)};
 }
 
+json parse_file(const std::filesystem::path &path) {
+  constexpr std::uintmax_t kMostBytes = 64u << 20;  // what is parsed takes many times as much memory
+  check_input_file(path);
+  std::error_code failure;
+  if (std::filesystem::file_size(path, failure) > kMostBytes)
+    throw Error("{}: not a camera file: it has more than {} bytes", path.string(), kMostBytes);
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw Error("{}: cannot open the camera file", path.string());
+  try {
+    return json::parse(in);
+  } catch (const json::parse_error &error) {
+    throw Error("{}: not a camera file: no JSON from byte {} on", path.string(), error.byte);
+  } catch (const json::out_of_range &) {
+    throw Error("{}: not a camera file: it holds a number that is too large", path.string());
+  } catch (const std::ios::failure &) {
+    throw Error("{}: cannot read the camera file", path.string());
+  }
+}
+
 bool finite(const glm::dvec3 &v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
@@ -67,11 +89,9 @@ void check_camera(const Camera &camera, std::string_view what) {
   }
   const glm::dvec3 view = camera.at - camera.eye;
   const double view_length = glm::length(view), up_length = glm::length(camera.up);
-  if (!std::isfinite(view_length) || !std::isfinite(up_length)) {
-    throw Error("{}: eye, at and up are too large", what);
-  }
-  if (view_length == 0.0) throw Error("{}: eye and at are the same point", what);
-  if (up_length == 0.0) throw Error("{}: up is the zero vector", what);
+  if (view_length > kLongest || up_length > kLongest) throw Error("{}: eye, at and up are too large", what);
+  if (view_length < 1 / kLongest) throw Error("{}: eye and at are the same point", what);
+  if (up_length < 1 / kLongest) throw Error("{}: up is the zero vector", what);
   if (glm::length(glm::cross(view / view_length, camera.up / up_length)) < kMinSinViewUp) {
     throw Error("{}: up is parallel to the view; choose another up", what);
   }
@@ -79,23 +99,15 @@ void check_camera(const Camera &camera, std::string_view what) {
 
 CameraFile read_camera_file(const std::filesystem::path &path) {
   const std::string where = path.string();
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw Error("{}: cannot open the camera file", where);
-  json root;
-  try {
-    root = json::parse(in);
-  } catch (
-      const std::exception &error) {  // of the parser, or of the stream: a folder opens, but cannot be read
-    throw Error("{}: not a camera file: {}", where, error.what());
-  }
+  const json root = parse_file(path);
 
   CameraFile file;
   const double fovy_deg = number(member(root, "fovy_deg", where), "fovy_deg", where);
   if (root.contains("dims")) file.dims = size3(root["dims"], "dims", where);
   if (root.contains("spacing")) {
     file.spacing = vector3(root["spacing"], "spacing", where);
-    if (!(glm::all(glm::greaterThan(*file.spacing, glm::dvec3(0.0))))) {
-      throw Error("{}: \"spacing\" must be positive", where);
+    if (!finite(*file.spacing) || !glm::all(glm::greaterThan(*file.spacing, glm::dvec3(0.0)))) {
+      throw Error("{}: \"spacing\" must be finite and positive", where);
     }
   }
   if (root.contains("width")) file.width = positive_uint(root["width"], "width", where);

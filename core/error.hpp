@@ -5,19 +5,34 @@
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace isowave {
 
+/// The text with \n, \t, \x1b and such for everything that would end a line, move a cursor or is no UTF-8: names of files and
+/// strings from files may hold any byte.
+std::string one_line(std::string_view text);
+
 /// Anything a user can cause or fix: a bad file, a missing device, a budget too small.
-/// what() is one line without a trailing newline; tools print it and exit with status 1.
+/// what() is one line without a trailing newline (see one_line()); tools print it and exit with status 1.
 class Error : public std::runtime_error {
  public:
-  explicit Error(const std::string &message) : std::runtime_error(message) {}
+  explicit Error(const std::string &message) : std::runtime_error(one_line(message)) {}
 
   template <class... Args>
   explicit Error(fmt::format_string<Args...> format, Args &&...args)
-      : std::runtime_error(fmt::format(format, std::forward<Args>(args)...)) {}
+      : Error(fmt::format(format, std::forward<Args>(args)...)) {}
+};
+
+/// What a compiler of kernels refused: what() names the first error, log() is all that the compiler said.
+class BuildError : public Error {
+ public:
+  BuildError(const std::string &message, std::string log) : Error(message), log_(std::move(log)) {}
+  const std::string &log() const { return log_; }
+
+ private:
+  std::string log_;
 };
 
 }  // namespace isowave

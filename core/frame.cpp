@@ -1,6 +1,7 @@
 #include "core/frame.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -18,6 +19,26 @@ float flush_tiny(double x) {
 
 double largest_component(const glm::dvec3 &v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// Lengths of a voxel's edges [world units].
+std::array<double, 3> edges(const VolumeInfo &info) {
+  const glm::dmat3 to_world = info.index_to_world();
+  return {glm::length(to_world[0]), glm::length(to_world[1]), glm::length(to_world[2])};
+}
+
+std::string spacing_text(const VolumeInfo &info) {
+  return fmt::format("{} {} {}", info.spacing.x, info.spacing.y, info.spacing.z);
+}
+
+/// Throws Error where float64 tells places beside `place`, a vector of the world, apart only by more than 2^-10 voxels.
+void check_places(const VolumeInfo &info, const glm::dvec3 &place, std::string_view what) {
+  const double farthest = largest_component(place);
+  const double shortest = std::ranges::min(edges(info));
+  if (farthest * 0x1p-52 <= shortest * 0x1p-10) return;
+  throw Error(
+      "{}: {:.3g} world units from the world's origin, float64 cannot tell voxels apart that are {:.3g} wide",
+      what, farthest, shortest);
 }
 
 }  // namespace
@@ -50,11 +71,31 @@ void check_image_size(ImageSize size) {
   }
 }
 
+void check_drawable(const VolumeInfo &info, std::string_view what) {
+  // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied to become it (below). An eye is
+  // at most 1e7 voxels off and dims are at most 2^16, so t is at most 2^25 voxels' longest edges; and nothing that matters is
+  // nearer than 2^-24 of the shortest. Within 2^+-100, neither reaches float32's ends, nor do a level of detail's voxels.
+  const std::array<double, 3> voxel = edges(info);
+  const double shortest = std::ranges::min(voxel), longest = std::ranges::max(voxel);
+  if (!(shortest >= 0x1p-100 && longest <= 0x1p100)) {
+    throw Error("{}: spacing {}: distances in float32 allow 2^-100 (8e-31) to 2^100 (1e30)", what,
+                spacing_text(info));
+  }
+  // Rays along the longest edge move that much slower in index space than along the shortest, and directions below 2^-60 are 0.
+  if (longest > 0x1p36 * shortest) {
+    throw Error("{}: spacing {}: directions in float32 allow one to be 2^36 (7e10) times another", what,
+                spacing_text(info));
+  }
+  check_places(info, info.origin, what);
+}
+
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue) {
   check_volume_info(info, "the volume");
   check_camera(camera, "the camera");
   check_image_size(size);
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number in the volume's value range");
+
+  check_drawable(info, "the volume");
 
   const glm::dmat3 world_to_index = glm::inverse(info.index_to_world());
   const glm::dvec3 eye = world_to_index * (camera.eye - info.origin);
@@ -69,6 +110,7 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
         "the camera's eye is {:.3g} voxels from the volume's origin: up to 1e7 can be drawn in float32",
         largest_component(eye));
   }
+  check_places(info, camera.eye, "the camera's eye");
 
   // A power of two takes the voxel size out of t, so that neither tiny nor huge spacings reach float32's
   // ends.

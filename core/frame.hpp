@@ -43,6 +43,10 @@ inline std::uint64_t num_macrocells(const FrameParams &grid) {
   return cells(grid.blocks_x) * cells(grid.blocks_y) * cells(grid.blocks_z);
 }
 
+/// Throws Error where distances within the volume, or directions, do not fit float32, or its origin is so far away that voxels
+/// are lost beside it. `what` names the volume.
+void check_drawable(const VolumeInfo &info, std::string_view what);
+
 /// Of the grid only, for what is done before there is a camera.
 FrameParams make_grid_params(const VolumeInfo &info);
 
@@ -50,8 +54,8 @@ FrameParams make_grid_params(const VolumeInfo &info);
 void set_screen_box(FrameParams &frame);
 
 /// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume; isovalue_index,
-/// speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, a size that check_image_size() refuses, a NaN
-/// isovalue.
+/// speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, or one too far away, what
+/// check_drawable() or check_image_size() refuses, a NaN isovalue.
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue);
 
 /// Depth of each hit, world units, INFINITY where nothing is hit.

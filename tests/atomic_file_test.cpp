@@ -54,6 +54,25 @@ TEST(AtomicFile, RelativeNamesAndLinks) {
   EXPECT_EQ(read_file(folder / "a"), "2");
 }
 
+TEST(AtomicFile, LongNamesAndDanglingLinks) {
+  const TemporaryFolder folder;
+  const std::string longest(255, 'n');
+  AtomicFile file(folder / longest);
+  file.write("1");
+  file.commit();
+  EXPECT_EQ(read_file(folder / longest), "1");
+  EXPECT_THROW(AtomicFile(folder / (longest + "n")), Error);
+
+  std::filesystem::create_symlink("b", folder / "link");
+  AtomicFile through_link(folder / "link");
+  through_link.write("2");
+  through_link.commit();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(read_file(folder / "b"), "2");
+  std::filesystem::create_symlink("circle", folder / "circle");
+  EXPECT_THROW(AtomicFile(folder / "circle"), Error);
+}
+
 TEST(AtomicFile, RefusesTargetsItCannotReplace) {
   const TemporaryFolder folder;
   EXPECT_THROW(AtomicFile(folder / "missing" / "a"), Error);

@@ -345,7 +345,7 @@ TEST(CliRender, TimeBudget) {
 
   const std::string command = "render " + scene + " -o " + picture("a") + " --time-budget ";
   test::expect_one_line_error(command + "0", "no picture can be drawn in 0 ms");
-  test::expect_one_line_error(command + "nan", "no picture can be drawn");
+  test::expect_one_line_error(command + "nan", "--time-budget");
   test::expect_one_line_error(command + "9 --reference", "--reference cannot choose");
   test::expect_one_line_error(command + "9 --max-error 1", "leave out --time-budget");
   test::expect_one_line_error(command + "9 --progress-dir " + quoted(folder / "p"),

@@ -167,7 +167,14 @@ TEST_P(OclDeviceOnDevice, ProgramsAreBuiltOncePerDefines) {
 TEST_P(OclDeviceOnDevice, BuildErrorsNameFileAndLine) {
   ocl::Device device(GetParam());
   const auto build = [&](const char *define) {
-    return message_of<Error>([&] { device.program("shared_types", {{define, "1+"}}); });
+    try {
+      device.program("shared_types", {{define, "1+"}});
+    } catch (const BuildError &error) {
+      EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos)
+          << "one line, and the log apart";
+      return error.what() + ("\n" + error.log());
+    }
+    return std::string("it builds");
   };
   const std::string in_kernel = build("sizes"), in_header = build("isovalue_index");
   EXPECT_THAT(in_kernel, HasSubstr("shared_types.cl does not build"));

@@ -1,6 +1,7 @@
 #include "core/io/atomic_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -23,31 +24,31 @@ namespace {
 
 }  // namespace
 
-AtomicFile::AtomicFile(const fs::path &target) : target_(target) {
-  if (target_.filename().empty()) throw Error("'{}': cannot write: no file name", target.string());
-  std::error_code ignored;
-  const fs::file_status status = fs::status(target_, ignored);
-  // rename() would replace a device such as /dev/null, and fails on a folder only after all the work.
-  if (fs::exists(status) && !fs::is_regular_file(status)) {
-    throw Error("{}: cannot write: it exists and is not a regular file", target.string());
+fs::path follow_links(const fs::path &path) {
+  constexpr int kMostLinks = 40;  // as many as Linux follows
+  fs::path target = path;
+  for (int i = 0; i < kMostLinks; ++i) {
+    std::error_code failure;
+    const fs::path next = fs::read_symlink(target, failure);
+    if (failure) return target;
+    target = next.is_absolute() ? next : target.parent_path() / next;
   }
-  // Through a symbolic link to the file itself, so that the link survives.
-  if (fs::is_symlink(target_, ignored) && fs::exists(status)) target_ = fs::canonical(target_);
+  fail(path, ELOOP);
+}
 
-  static std::atomic<unsigned> next_id{0};
-  const std::string name =
-      fmt::format(".{}.{}.{}.tmp", target_.filename().string(), ::getpid(), next_id.fetch_add(1));
-  temporary_ = target_.parent_path() / name;
-  int fd = -1;
-#ifdef O_TMPFILE
-  // commit() names the file through /proc.
-  if (::access("/proc/self/fd", X_OK) == 0) {
-    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
-    fd = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666);
-    nameless_ = fd >= 0;
+AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {
+  if (target_.filename().empty()) throw Error("'{}': cannot write: no file name", target.string());
+  struct stat status {};
+  if (::stat(target_.c_str(), &status) == 0) {
+    // rename() would replace a device such as /dev/null, and fails on a folder only after all the work.
+    if (!S_ISREG(status.st_mode))
+      throw Error("{}: cannot write: it exists and is not a regular file", target.string());
+    // It would replace a file that is not to be written, too.
+    if (::access(target_.c_str(), W_OK) != 0) fail(target, errno);
+  } else if (errno != ENOENT) {
+    fail(target, errno);
   }
-#endif
-  if (fd < 0) fd = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  const int fd = open_temporary();
   if (fd < 0) fail(target_, errno);
   file_ = ::fdopen(fd, "w+b");
   if (file_ == nullptr) {
@@ -55,6 +56,29 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(target) {
     ::close(fd);
     if (!nameless_) ::unlink(temporary_.c_str());
     fail(target_, error_number);
+  }
+}
+
+void AtomicFile::choose_temporary_name() {
+  static std::atomic<unsigned> next_id{0};
+  // Not of the target's name, which may be as long as names may be.
+  temporary_ = target_.parent_path() / fmt::format(".isowave.{}.{}.tmp", ::getpid(), next_id.fetch_add(1));
+}
+
+int AtomicFile::open_temporary() {
+#ifdef O_TMPFILE
+  // commit() names the file through /proc.
+  if (::access("/proc/self/fd", X_OK) == 0) {
+    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
+    const int fd = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666);
+    nameless_ = fd >= 0;
+    if (nameless_) return fd;
+  }
+#endif
+  for (;;) {  // a killed process of the same number may have left such a file
+    choose_temporary_name();
+    const int fd = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0 || errno != EEXIST) return fd;
   }
 }
 
@@ -82,8 +106,12 @@ void AtomicFile::commit() {
   if (std::ferror(file_) != 0 || std::fflush(file_) != 0) fail(target_, errno != 0 ? errno : EIO);
   if (nameless_) {
     const std::string self = fmt::format("/proc/self/fd/{}", ::fileno(file_));
-    if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW) != 0)
-      fail(target_, errno);
+    int failed = 0;
+    do {
+      choose_temporary_name();
+      failed = ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW);
+    } while (failed != 0 && errno == EEXIST);
+    if (failed != 0) fail(target_, errno);
     nameless_ = false;
   }
   if (std::fclose(std::exchange(file_, nullptr)) != 0) fail(target_, errno);

@@ -11,6 +11,7 @@
 
 #include "core/error.hpp"
 #include "core/io/atomic_file.hpp"
+#include "core/io/input_file.hpp"
 
 namespace isowave {
 namespace {
@@ -72,6 +73,7 @@ void write_npy(const FloatImage &image, const std::filesystem::path &path) {
 
 FloatImage read_npy(const std::filesystem::path &path) {
   const std::string where = path.string();
+  check_input_file(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw Error("{}: cannot open", where);
   const auto get = [&](void *to, std::size_t bytes) {

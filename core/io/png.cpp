@@ -11,6 +11,7 @@
 
 #include "core/error.hpp"
 #include "core/io/atomic_file.hpp"
+#include "core/io/input_file.hpp"
 
 namespace isowave {
 namespace {
@@ -111,6 +112,7 @@ void write_png(const Image8 &image, const std::filesystem::path &path) {
 
 Image8 read_png(const std::filesystem::path &path) {
   const std::string where = path.string();
+  check_input_file(path);
   const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(where.c_str(), "rb"), &std::fclose);
   if (!file) throw Error("{}: cannot open", where);
   png_byte signature[kSignatureBytes];

@@ -9,6 +9,7 @@
 #include "core/error.hpp"
 #include "core/ocl/device_list.hpp"
 #include "core/ocl/kernel_sources.hpp"
+#include "core/ocl/pocl_environment.hpp"
 
 namespace isowave::ocl {
 
@@ -57,6 +58,18 @@ std::string build_options(const DeviceInfo &device, Defines defines) {
     options += fmt::format(" -D {}={}", name, value);
   }
   return options;
+}
+
+/// The line of a compiler's log that says most.
+std::string first_error(std::string_view log) {
+  std::string first;
+  while (!log.empty()) {
+    const std::string_view line = log.substr(0, log.find('\n'));
+    if (line.find("error") != std::string_view::npos) return std::string(line);
+    if (first.empty()) first = line;
+    log.remove_prefix(std::min(log.size(), line.size() + 1));
+  }
+  return first.empty() ? "the compiler left no log" : first;
 }
 
 }  // namespace
@@ -111,8 +124,10 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
   } catch (const cl::BuildError &error) {
     std::string log;
     for (const auto &[device, text] : error.getBuildLog()) log += text;
-    throw Error("{}.cl does not build on '{}' with {}: {}\n{}", stem, info_.name, options,
-                error_name(error.err()), log.empty() ? "(the compiler left no log)" : log);
+    const std::string message =
+        fmt::format("{}.cl does not build on '{}' with {}: {}: {}{}", stem, info_.name, options,
+                    error_name(error.err()), first_error(log), cache_trouble());
+    throw BuildError(message, std::move(log));
   } catch (const cl::Error &error) {
     throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info_.name, options, error.what(),
                 error_name(error.err()));

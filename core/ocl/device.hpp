@@ -78,7 +78,7 @@ class Device {
   StageTimer &timer() { return timer_; }
 
   /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per (stem,
-  /// defines). Throws Error with the whole compiler log when it does not build.
+  /// defines). Throws BuildError when it does not build.
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
 
   /// The programs built so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".

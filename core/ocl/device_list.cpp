@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/error.hpp"
+#include "core/ocl/pocl_environment.hpp"
 
 namespace isowave::ocl {
 
@@ -107,6 +108,7 @@ void append_devices(const cl::Platform &platform, std::vector<ListedDevice> &res
     info.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
     info.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
     info.platform = platform_name;
+    if (platform_name == "Portable Computing Language") note_pocl();
     info.driver_version = trimmed(device.getInfo<CL_DRIVER_VERSION>());
     info.type = device_type(device.getInfo<CL_DEVICE_TYPE>());
     info.capabilities = probe(device, version);
@@ -116,6 +118,7 @@ void append_devices(const cl::Platform &platform, std::vector<ListedDevice> &res
 
 std::vector<ListedDevice> enumerate() {
   std::vector<cl::Platform> platforms;
+  prepare_for_pocl();  // before a driver is loaded
   try {
     cl::Platform::get(&platforms);
   } catch (const cl::Error &) {
@@ -196,7 +199,8 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
   if (devices.empty()) {
     throw Error(
         "no OpenCL 1.2 device found: install a driver, for the CPU the package pocl-opencl-icd "
-        "(apt install pocl-opencl-icd)");
+        "(apt install pocl-opencl-icd){}",
+        cache_trouble());
   }
   const std::string_view source = selector.empty() ? " (from ISOWAVE_DEVICE)" : "";
   const std::string wanted = lower_case(selector.empty() ? environment : selector);

@@ -21,8 +21,10 @@
 #include "core/renderer.hpp"
 #include "reference/accuracy.hpp"
 #include "tools/isowave/frame_options.hpp"
+#include "tools/isowave/outputs.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
+#include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {
 
@@ -52,14 +54,14 @@ CompressionOptions parse_storage(const std::string &text) {
     options.exact = true;
     return options;
   }
-  double number = 0;
-  if (colon == std::string::npos || !CLI::detail::lexical_cast(text.substr(colon + 1), number))
-    throw Error("--storage {}: give rate:R, tolerance:E, tolerance-relative:E or exact", text);
-  if (kind == "rate") {
-    options.rate = static_cast<std::uint32_t>(number);
-  } else if (kind == "tolerance") {
+  const std::string_view value = colon == std::string::npos ? "" : std::string_view(text).substr(colon + 1);
+  const std::optional<std::uint64_t> rate = parse_whole(value);
+  const std::optional<double> number = parse_finite(value);
+  if (kind == "rate" && rate && *rate >= 1 && *rate <= 32) {
+    options.rate = static_cast<std::uint32_t>(*rate);
+  } else if (kind == "tolerance" && number && *number > 0) {
     options.tolerance = number;
-  } else if (kind == "tolerance-relative") {
+  } else if (kind == "tolerance-relative" && number && *number > 0) {
     options.relative_tolerance = number;
   } else {
     throw Error("--storage {}: give rate:R, tolerance:E, tolerance-relative:E or exact", text);
@@ -410,9 +412,10 @@ void compare_choices(ocl::Device &device, const ParetoSubject &subject, std::vec
 }
 
 void run_bench_pareto(BenchParetoArgs options) {
-  const std::filesystem::path folder = std::filesystem::path(options.json).parent_path();
-  if (!folder.empty() && !std::filesystem::is_directory(folder))
-    throw Error("cannot write {}: {} is no folder", options.json, folder.string());
+  Outputs outputs;
+  outputs.read_volume(options.input);
+  outputs.write("--json", options.json);
+  for (const std::string &solver : options.solvers) solver_from_string(solver);
   if (is_zfp_name(options.input))
     throw Error("{}: is compressed already: give the volume that is to be compressed", options.input);
   for (const std::string &storage : options.storages) parse_storage(storage);
@@ -462,7 +465,7 @@ void add_bench_pareto(CLI::App &bench) {
       "Bytes and ms of cold frames beside their errors, for storage, pipeline, solver, level and precision");
   const auto options = std::make_shared<BenchParetoArgs>();
   command->add_option("VOLUME", options->input, kVolumeHelp)->required();
-  command->add_option("--isovalue,-i", options->isovalue, "isovalue")->required();
+  command->add_option("--isovalue,-i", options->isovalue, "isovalue")->check(fits_float32())->required();
   add_volume_options(*command, options->volume);
   command
       ->add_option("--storage", options->storages,

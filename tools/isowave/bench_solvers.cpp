@@ -24,7 +24,9 @@
 #include "reference/scalar_renderer.hpp"
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/frame_options.hpp"
+#include "tools/isowave/outputs.hpp"
 #include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {
 
@@ -38,7 +40,8 @@ constexpr std::size_t kMaxSegments = 1 << 20;
 struct BenchSolversArgs {
   std::vector<std::string> volumes;  ///< FILE:ISOVALUE
   VolumeOptions volume;
-  std::uint32_t rate = 8, rounds = 7;
+  CompressionOptions compression;
+  std::uint32_t rounds = 7;
   std::string size = "640x360", device, json, pictures;
 };
 
@@ -67,20 +70,41 @@ struct Subject {
 };
 
 /// FILE:ISOVALUE
-Subject load_subject(const std::string &argument, const BenchSolversArgs &options) {
+std::pair<std::string, float> parse_subject(const std::string &argument) {
   const std::size_t colon = argument.rfind(':');
-  Subject subject;
-  try {
-    if (colon == std::string::npos) throw std::invalid_argument(argument);
-    std::size_t used = 0;
-    subject.isovalue = std::stof(argument.substr(colon + 1), &used);
-    if (used != argument.size() - colon - 1) throw std::invalid_argument(argument);
-  } catch (const std::exception &) {
+  std::string isovalue = colon == std::string::npos ? "" : argument.substr(colon + 1);
+  float number = 0;
+  if (!fits_float32()(isovalue).empty() || !CLI::detail::lexical_cast(isovalue, number))
     throw Error("{}: give VOLUME:ISOVALUE, such as bonsai.zfp:40", argument);
+  return {argument.substr(0, colon), number};
+}
+
+/// Where the failures of a solver are drawn.
+std::filesystem::path picture_path(const BenchSolversArgs &options, const std::string &name, Solver solver) {
+  const auto stem = name.substr(0, name.find('_'));
+  return std::filesystem::path(options.pictures) / fmt::format("{}_{}.png", stem, to_string(solver));
+}
+
+void check_outputs(const BenchSolversArgs &options) {
+  Outputs outputs;
+  for (const std::string &argument : options.volumes) outputs.read_volume(parse_subject(argument).first);
+  outputs.write("--json", options.json);
+  if (options.pictures.empty()) return;
+  if (!std::filesystem::is_directory(options.pictures))
+    throw Error("cannot write pictures: {} is no folder", options.pictures);
+  for (const std::string &argument : options.volumes) {
+    const std::string name = std::filesystem::path(parse_subject(argument).first).filename().string();
+    for (const std::string_view solver : kSolverNames)
+      outputs.write("--pictures", picture_path(options, name, solver_from_string(solver)));
   }
-  const std::string path = argument.substr(0, colon);
+}
+
+Subject load_subject(const std::string &argument, const BenchSolversArgs &options) {
+  const auto [path, isovalue] = parse_subject(argument);
+  Subject subject;
+  subject.isovalue = isovalue;
   subject.name = std::filesystem::path(path).filename().string();
-  subject.volume = load_volume(path, to_overrides(options.volume), {.rate = options.rate});
+  subject.volume = load_volume(path, to_overrides(options.volume), options.compression);
   subject.voxels = decode_with_libzfp(subject.volume);
   subject.camera = orbit_cameras(subject.volume.info, 1).front();
   subject.frame =
@@ -273,9 +297,7 @@ void write_failure_picture(const BenchSolversArgs &options, const Subject &subje
           tally);
     verdicts[pixel] = verdict_of(tally);
   });
-  const auto stem = subject.name.substr(0, subject.name.find('_'));
-  write_png(failure_picture(renderer.shade({}), verdicts),
-            std::filesystem::path(options.pictures) / fmt::format("{}_{}.png", stem, to_string(solver)));
+  write_png(failure_picture(renderer.shade({}), verdicts), picture_path(options, subject.name, solver));
 }
 
 ordered_json bench_frames(ocl::Device &device, const Subject &subject, const BenchSolversArgs &options) {
@@ -339,13 +361,12 @@ void print_results(const ordered_json &document) {
   }
 }
 
-void run_bench_solvers(const BenchSolversArgs &options) {
-  const std::filesystem::path folder = std::filesystem::path(options.json).parent_path();
-  if (!folder.empty() && !std::filesystem::is_directory(folder))
-    throw Error("cannot write {}: {} is no folder", options.json, folder.string());
-  if (!options.pictures.empty() && !std::filesystem::is_directory(options.pictures))
-    throw Error("cannot write pictures: {} is no folder", options.pictures);
+void run_bench_solvers(const CLI::App &command, const BenchSolversArgs &options) {
   check_image_size(parse_size(options.size));
+  if (std::ranges::all_of(options.volumes,
+                          [](const auto &volume) { return is_zfp_name(parse_subject(volume).first); }))
+    refuse_options(command, {"--rate"}, "all volumes are compressed already");
+  check_outputs(options);
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   std::vector<Subject> subjects;
@@ -374,7 +395,8 @@ void add_bench_solvers(CLI::App &bench) {
   const auto options = std::make_shared<BenchSolversArgs>();
   command->add_option("VOLUME:ISOVALUE", options->volumes, "volumes and the isovalue of each")->required();
   add_volume_options(*command, options->volume);
-  command->add_option("--rate", options->rate, "bits per voxel of volumes that are not compressed")
+  command
+      ->add_option("--rate", options->compression.rate, "bits per voxel of volumes that are not compressed")
       ->capture_default_str();
   command->add_option("--size", options->size, "picture size WxH")->capture_default_str();
   command->add_option("--rounds", options->rounds, "times that everything is measured; the median counts")
@@ -384,7 +406,7 @@ void add_bench_solvers(CLI::App &bench) {
   command->add_option("--json", options->json, "write the results for tools/charts");
   command->add_option("--pictures", options->pictures,
                       "folder for VOLUME_SOLVER.png: missed pixels red, false blue, unstable yellow");
-  command->callback([options] { run_bench_solvers(*options); });
+  command->callback([command, options] { run_bench_solvers(*command, *options); });
 }
 
 }  // namespace isowave::tools

@@ -13,6 +13,7 @@
 
 #include "core/error.hpp"
 #include "core/flip.hpp"
+#include "core/io/input_file.hpp"
 #include "tools/isowave/commands.hpp"
 
 namespace isowave::tools {
@@ -27,6 +28,7 @@ enum class ImageKind { kDepth, kColour };
 
 /// Goes by the first bytes: a file's name may say anything.
 ImageKind image_kind(const std::filesystem::path &path) {
+  check_input_file(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw Error("{}: cannot open", path.string());
   std::array<char, 6> first{};

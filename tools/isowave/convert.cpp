@@ -12,6 +12,8 @@
 #include "core/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
+#include "tools/isowave/outputs.hpp"
+#include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {
@@ -27,12 +29,17 @@ struct ConvertArgs {
   bool no_verify = false;
 };
 
-void run(const ConvertArgs &options) {
+void run_convert(const CLI::App &command, const ConvertArgs &options) {
   if (!is_zfp_name(options.output)) throw Error("{}: end the output's name in .zfp", options.output);
   if (is_zfp_name(options.path)) throw Error("{}: is compressed already", options.path);
   if (options.device && options.compression.bounded())
     throw Error("--device compresses at a fixed rate only: leave it, or the bound on the error");
+  if (options.compression.bounded())
+    refuse_options(command, {"--no-verify"}, "a bound on the error is found by measuring it");
   const RawOverrides overrides = to_overrides(options.volume);
+  Outputs outputs;
+  outputs.read_volume(options.path);
+  outputs.write("--output", options.output);
   const std::unique_ptr<VolumeReader> reader = open_any_volume(options.path, overrides);
   CompressOptions compress{.rate = options.compression.rate,
                            .measure_error = !options.no_verify,
@@ -50,8 +57,8 @@ void run(const ConvertArgs &options) {
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);
   const std::uint64_t bytes_out = std::filesystem::file_size(options.output);
-  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", options.output, dims.x, dims.y,
-             dims.z, to_string(volume.info.type), with_commas(bytes_in), with_commas(bytes_out),
+  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output), dims.x,
+             dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in), with_commas(bytes_out),
              volume.rate(), volume.max_error ? fmt::format(", max error {:.6g}", *volume.max_error) : "");
   for (const CompressedVolume &level : volume.coarser) {
     const glm::uvec3 coarse = level.info.dims;
@@ -68,7 +75,8 @@ void add_convert(CLI::App &app) {
   command->add_option("IN", options->path, kVolumeHelp)->required();
   command->add_option("-o,--output", options->output, "the .zfp file to write")->required();
   add_compression_options(*command, options->compression);
-  command->add_option("--map-nan", options->input.map_nan, "replace NaN and infinite voxels by this value");
+  command->add_option("--map-nan", options->input.map_nan, "replace NaN and infinite voxels by this value")
+      ->check(fits_float32());
   command->add_option("--device", options->device,
                       "compress on this device, at a fixed rate: index, cpu, gpu, or a part of its name [the "
                       "host's processors]; the "
@@ -76,7 +84,7 @@ void add_convert(CLI::App &app) {
   command->add_option("--threads", options->input.num_threads, "0: one per processor")->capture_default_str();
   command->add_flag("--no-verify", options->no_verify, "do not decode again to measure the largest error");
   add_volume_options(*command, options->volume);
-  command->callback([options] { run(*options); });
+  command->callback([command, options] { run_convert(*command, *options); });
 }
 
 }  // namespace isowave::tools

@@ -85,8 +85,7 @@ void print_json(const std::vector<ocl::DeviceInfo> &devices, std::optional<std::
     entry["default"] = info.index == default_index;
     list.push_back(std::move(entry));
   }
-  // Driver strings need not be UTF-8; nothing else could make dump() throw.
-  fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print("{}", json_text(list));
 }
 
 void run_devices(bool as_json) {

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/error.hpp"
+#include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {
 
@@ -26,15 +27,27 @@ std::string dims_text(const glm::uvec3 &dims) {
 
 }  // namespace
 
+Views read_views(const FrameOptions &options) {
+  Views views;
+  if (!options.cameras.empty()) views.file = read_camera_file(options.cameras);
+  if (views.file) {
+    views.count = static_cast<std::uint32_t>(views.file->cameras.size());
+    views.size = {views.file->width.value_or(views.size.width),
+                  views.file->height.value_or(views.size.height)};
+  } else {
+    views.count = std::max(1u, options.orbit);
+  }
+  if (!options.size.empty()) views.size = parse_size(options.size);
+  views.size.samples = options.samples;
+  check_image_size(views.size);
+  return views;
+}
+
 Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
-                 ocl::Device *device) {
-  Scene scene;  // what is cheap to refuse comes before the volume, which may take minutes
-  std::optional<CameraFile> file;
-  if (!options.cameras.empty()) file = read_camera_file(options.cameras);
-  if (file) scene.size = {file->width.value_or(scene.size.width), file->height.value_or(scene.size.height)};
-  if (!options.size.empty()) scene.size = parse_size(options.size);
-  scene.size.samples = options.samples;
-  check_image_size(scene.size);
+                 const Views &views, ocl::Device *device) {
+  Scene scene;
+  const std::optional<CameraFile> &file = views.file;
+  scene.size = views.size;
   scene.volume = load_volume(path, to_overrides(volume), options.compression, device);
   const VolumeInfo &info = scene.volume.info;
   if (file && file->dims && *file->dims != info.dims) {
@@ -47,7 +60,7 @@ Scene load_scene(const std::string &path, const VolumeOptions &volume, const Fra
                 file->spacing->x, file->spacing->y, file->spacing->z, path, info.spacing.x, info.spacing.y,
                 info.spacing.z);
   }
-  scene.cameras = file ? file->cameras : orbit_cameras(info, std::max(1u, options.orbit));
+  scene.cameras = file ? file->cameras : orbit_cameras(info, views.count);
   return scene;
 }
 
@@ -55,6 +68,7 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
   CLI::Option *isovalue = command
                               .add_option("--isovalue,-i", options.isovalues,
                                           "isovalue; repeat it for more surfaces, each drawn from all views")
+                              ->check(fits_float32())
                               ->allow_extra_args(false);  // one number each time: VOLUME may follow
   add_compression_options(command, options.compression);
   command

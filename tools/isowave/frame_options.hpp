@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,7 @@
 
 namespace isowave::tools {
 
-/// Options as typed; load_scene() checks them.
+/// Options as typed; read_views() and load_scene() check them.
 struct FrameOptions {
   CompressionOptions compression;  ///< of a volume that is not
   std::vector<float> isovalues;
@@ -25,10 +26,21 @@ struct FrameOptions {
 };
 
 /// Adds --isovalue, --value-error, --size, --orbit, --cameras and add_compression_options(). Returns the option --isovalue.
+/// (--samples is render's alone.)
 CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options);
 
 /// "1280x720". Throws Error.
 ImageSize parse_size(const std::string &text);
+
+/// What is known of the frames before the volume is.
+struct Views {
+  std::optional<CameraFile> file;
+  std::uint32_t count = 1;
+  ImageSize size;
+};
+
+/// Reads the camera file, if there is one. Throws Error.
+Views read_views(const FrameOptions &options);
 
 /// The volume and the views of it.
 struct Scene {
@@ -40,6 +52,6 @@ struct Scene {
 /// Reads or compresses the volume and makes its cameras. Throws Error in one line, also when a camera file is for another
 /// volume. Where a device is given, it compresses the volume.
 Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
-                 ocl::Device *device = nullptr);
+                 const Views &views, ocl::Device *device = nullptr);
 
 }  // namespace isowave::tools

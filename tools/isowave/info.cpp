@@ -8,10 +8,14 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
+#include "core/error.hpp"
+#include "core/io/input_file.hpp"
 #include "core/level_bounds.hpp"
 #include "core/zfp_stream.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {
@@ -41,6 +45,8 @@ ordered_json describe_grid(const VolumeInfo &info) {
 }
 
 ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
+  if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
+  check_input_file(path);
   // Reading all of it checks the checksum; the words are not needed afterwards.
   CompressedVolume volume = no_scan ? read_zfp_file_info(path) : read_zfp_file(path);
   if (overrides.spacing) set_spacing(volume, *overrides.spacing);
@@ -93,7 +99,7 @@ void add_value_range(VolumeReader &reader, ordered_json &result) {
 }
 
 std::string to_text(const ordered_json &value) {
-  if (value.is_string()) return value.get<std::string>();
+  if (value.is_string()) return one_line(value.get<std::string>());
   if (value.is_number_unsigned()) return with_commas(value.get<std::uint64_t>());
   if (!value.is_array()) return value.dump();
   std::string text;
@@ -109,9 +115,9 @@ void run(const InfoArgs &options) {
   const RawOverrides overrides = to_overrides(options.volume);
   ordered_json result;
   result["file"] = options.input;
-  if (std::filesystem::is_regular_file(options.input)) {
-    result["file_bytes"] = std::filesystem::file_size(options.input);
-  }
+  std::error_code failure;
+  if (std::filesystem::is_regular_file(options.input, failure))
+    result["file_bytes"] = std::filesystem::file_size(options.input, failure);
   if (is_zfp_name(options.input)) {
     result.update(describe_zfp(options.input, overrides, options.no_scan));
   } else {
@@ -121,7 +127,7 @@ void run(const InfoArgs &options) {
     if (!options.no_scan) add_value_range(*reader, result);
   }
   if (options.json) {
-    fmt::print("{}\n", result.dump(2));
+    fmt::print("{}", json_text(result));
     return;
   }
   for (const auto &[key, value] : result.items()) fmt::print("{:<15}{}\n", key, to_text(value));

@@ -1,12 +1,9 @@
-// The program `isowave`: parses the command line, runs one subcommand, turns every error into one line.
-
-#include <fmt/format.h>
+// The program `isowave`: parses the command line and runs one subcommand.
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
 
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/program.hpp"
 
 int main(int argc, char **argv) {
   CLI::App app{
@@ -24,16 +21,5 @@ int main(int argc, char **argv) {
   add_compare(app);
   add_verify(app);
   add_bench(app);
-  try {
-    app.parse(argc, argv);
-    return 0;
-  } catch (const CLI::Success &help) {
-    return app.exit(help);
-  } catch (
-      const CLI::RuntimeError &status) {  // a result, already printed, that is not success: compare --exact
-    return status.get_exit_code();
-  } catch (const std::exception &error) {
-    fmt::print(stderr, "isowave: {}\n", error.what());
-    return 1;
-  }
+  return run_program(app, argc, argv);
 }

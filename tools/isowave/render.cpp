@@ -20,8 +20,10 @@
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/frame_options.hpp"
+#include "tools/isowave/outputs.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
+#include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {
@@ -59,10 +61,10 @@ glm::vec3 parse_color(const char *option, const std::string &text) {
   throw Error("{} {}: give a colour as #RRGGBB", option, text);
 }
 
-/// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT.
-fs::path frame_path(const fs::path &path, const Scene &scene, const RenderArgs &options, float isovalue,
+/// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT. Empty for an empty name.
+fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArgs &options, float isovalue,
                     std::size_t view) {
-  if (scene.cameras.size() * options.frame.isovalues.size() == 1) return path;
+  if (path.empty() || num_views * options.frame.isovalues.size() == 1) return path;
   fs::path result = path;
   result.replace_filename(
       fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view, path.extension().string()));
@@ -229,11 +231,11 @@ class TwinFrames : public FrameSource {
 void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &frames, float isovalue,
                    std::size_t view) {
   if (!options.image.empty()) {
-    write_png(frames.shade(), frame_path(options.image, scene, options, isovalue, view));
+    write_png(frames.shade(), frame_path(options.image, scene.cameras.size(), options, isovalue, view));
   }
   if (!options.depth.empty()) {
     write_npy({scene.size.ray_columns(), scene.size.ray_rows(), depth_of(frames.hits())},
-              frame_path(options.depth, scene, options, isovalue, view));
+              frame_path(options.depth, scene.cameras.size(), options, isovalue, view));
   }
 }
 
@@ -243,7 +245,7 @@ OnPass progress_writer(const RenderArgs &options, const Scene &scene, FrameSourc
   if (options.progress_dir.empty()) return {};
   return [&options, &scene, &frames, isovalue, view, pass = 0](const PassStats &) mutable {
     const fs::path name = fs::path(options.progress_dir) / fmt::format("pass{:04}.png", ++pass);
-    write_png(frames.shade(), frame_path(name, scene, options, isovalue, view));
+    write_png(frames.shade(), frame_path(name, scene.cameras.size(), options, isovalue, view));
     return true;
   };
 }
@@ -259,13 +261,12 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
       result.push_back(frame_json(isovalue, view, camera, stats));
-      const fs::path error_map = options.error_map.empty()
-                                     ? fs::path{}
-                                     : frame_path(options.error_map, scene, options, isovalue, view);
-      frames.report(camera, isovalue, error_map, result.back());
+      frames.report(camera, isovalue,
+                    frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
+                    result.back());
       if (!options.refined.empty()) {
         const FrameStats refined = frames.refine(camera, isovalue);
-        write_png(frames.shade(), frame_path(options.refined, scene, options, isovalue, view));
+        write_png(frames.shade(), frame_path(options.refined, scene.cameras.size(), options, isovalue, view));
         fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.rays_hit),
                    refined.total_ms);
       }
@@ -299,20 +300,25 @@ nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVo
       {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
 }
 
-/// Outputs go to folders that exist, but for --progress-dir, which is made. Found out before any work is
-/// done.
-void check_outputs(const RenderArgs &options) {
-  for (const std::string &output :
-       {options.image, options.depth, options.stats, options.error_map, options.refined}) {
-    const fs::path folder = fs::path(output).parent_path();
-    if (!folder.empty() && !fs::is_directory(folder))
-      throw Error("cannot write {}: {} is no folder", output, folder.string());
-    if (fs::is_directory(output)) throw Error("cannot write {}: it is a folder", output);
+/// Outputs go to folders that exist, but for --progress-dir, which is made when frames are drawn. Throws Error before any work.
+Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
+  Outputs outputs;
+  outputs.read_volume(options.input);
+  if (!options.frame.cameras.empty()) outputs.read(options.frame.cameras);
+  outputs.write("--stats", options.stats);
+  for (const float isovalue : options.frame.isovalues) {
+    for (std::size_t view = 0; view < num_views; ++view) {
+      const auto write = [&](const char *option, const std::string &name) {
+        outputs.write(option, frame_path(name, num_views, options, isovalue, view));
+      };
+      write("--output", options.image);
+      write("--depth", options.depth);
+      write("--error-map", options.error_map);
+      write("--refined", options.refined);
+    }
   }
-  if (options.progress_dir.empty()) return;
-  std::error_code failure;
-  fs::create_directories(options.progress_dir, failure);
-  if (failure) throw Error("cannot make the folder {}: {}", options.progress_dir, failure.message());
+  outputs.write_pictures("--progress-dir", options.progress_dir, "pass");
+  return outputs;
 }
 
 std::unique_ptr<ocl::Device> open_device(const RenderArgs &options) {
@@ -358,20 +364,26 @@ void check_choice(const RenderArgs &options) {
     throw Error("--max-error chooses for itself: leave out --value-error and --max-pixel-error");
 }
 
-void run_render(RenderArgs options) {
+/// What can be told from the options alone.
+void check_options(const CLI::App &command, const RenderArgs &options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
-  for (const float isovalue : options.frame.isovalues) {
-    if (std::isnan(isovalue)) throw Error("--isovalue nan: give a number in the volume's value range");
-  }
+  if (options.image.empty() && options.refined.empty() && options.progress_dir.empty())
+    refuse_options(command, {"--color", "--background"}, "no picture is written: give --output");
+  check_renderer_options(command, options.renderer_flags);
   coarser({}, options.frame.value_error);  // or throws
-  options.max_pixel_error = options.renderer_flags.values.max_pixel_error;
   check_max_pixel_error(options.max_pixel_error);
   check_choice(options);
-  check_outputs(options);
+}
+
+void run_render(const CLI::App &command, RenderArgs options) {
+  options.max_pixel_error = options.renderer_flags.values.max_pixel_error;
+  check_options(command, options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
+  const Views views = read_views(options.frame);
+  const Outputs outputs = check_outputs(options, views.count);
   const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
@@ -385,7 +397,8 @@ void run_render(RenderArgs options) {
       options.max_error || (options.time_budget && options.renderer_flags.pipeline != "blocks");
   if (chooses_levels) wanted.max_pixel_error = 1;
   want_levels(options.renderer_flags, options.frame.compression);
-  const Scene scene = load_scene(options.input, options.volume, options.frame, device.get());
+  const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
+  outputs.make_folder();
   if (chooses_levels && scene.volume.coarser.empty()) wanted.max_pixel_error = options.max_pixel_error;
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
@@ -428,7 +441,9 @@ void add_render(CLI::App &app) {
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
   add_renderer_options(*command, options->renderer_flags);
-  command->add_flag("--reference", options->reference, "use the scalar C++ reference instead of a device");
+  command->add_flag("--reference", options->reference,
+                    "use the scalar C++ reference instead of a device; options of how a device draws are "
+                    "then without effect");
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
@@ -455,7 +470,7 @@ void add_render(CLI::App &app) {
                     "leave ms per stage out of --stats: measuring them makes the host wait after each pass");
   command->add_flag("--verbose", options->verbose, "print the plan of the device's memory");
   command->add_option("--progress-dir", options->progress_dir, "folder for the picture after every pass");
-  command->callback([options] { run_render(*options); });
+  command->callback([command, options] { run_render(*command, *options); });
 }
 
 }  // namespace isowave::tools

@@ -8,11 +8,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Driver strings need not be UTF-8; nothing else could make dump() throw.
-std::string dump(const ordered_json &document) {
-  return document.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
-}
-
 ordered_json vec_json(const glm::dvec3 &v) {
   return {v.x, v.y, v.z};
 }
@@ -87,9 +82,13 @@ ordered_json memory_json(const ocl::MemoryLedger &ledger) {
   return {{"current", ledger.current()}, {"peak", ledger.peak()}, {"by_name", std::move(by_name)}};
 }
 
+std::string json_text(const ordered_json &document) {
+  return document.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
 void write_json(const ordered_json &document, const std::string &path) {
   AtomicFile file(path);
-  file.write(dump(document));
+  file.write(json_text(document));
   file.commit();
 }
 

@@ -21,6 +21,9 @@ nlohmann::ordered_json frame_json(float isovalue, std::size_t view, const Camera
 /// Bytes of device memory: current, peak, and by buffer name.
 nlohmann::ordered_json memory_json(const ocl::MemoryLedger &ledger);
 
+/// The document as text. Names of files and drivers' strings need not be UTF-8: what is none is replaced by U+FFFD.
+std::string json_text(const nlohmann::ordered_json &document);
+
 /// Writes the document whole or not at all. Throws Error.
 void write_json(const nlohmann::ordered_json &document, const std::string &path);
 

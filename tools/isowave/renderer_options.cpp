@@ -1,5 +1,8 @@
 #include "tools/isowave/renderer_options.hpp"
 
+#include "core/error.hpp"
+#include "tools/isowave/strict_options.hpp"
+
 namespace isowave::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
@@ -20,7 +23,8 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->capture_default_str();
   app.add_option("--memory-budget", flags.values.memory_budget,
                  "bound on all device memory, e.g. 600MB (1000^2) or 1GiB (1024^3) [3/4 of the device's]")
-      ->transform(CLI::AsSizeValue(true));
+      ->transform(byte_count())
+      ->type_name("BYTES");
   app.add_option("--cache-slots", flags.values.cache_slots,
                  "decoded blocks kept on the device, at least 8 [as many as the budget allows; without one "
                  "2^20 or all]")
@@ -44,6 +48,15 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->capture_default_str();
   app.add_option("--group-size", flags.values.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();
+}
+
+void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
+  if (flags.speculation == "off") refuse_options(app, {"--max-speculation"}, "--speculation off is 1");
+  solver_from_string(flags.solver);
+  grouping_from_string(flags.grouping);
+  closest_hit_from_string(flags.closest);
+  if (flags.pipeline != "blocks")
+    refuse_options(app, {"--grouping", "--closest"}, "give --pipeline blocks, which alone has it");
 }
 
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) {

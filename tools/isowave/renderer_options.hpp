@@ -20,8 +20,11 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags);
 
 /// Asks for levels of detail of a volume that is compressed now, if they are to be drawn and nobody said how many.
 inline void want_levels(const RendererFlags &flags, CompressionOptions &compression) {
-  if (flags.values.max_pixel_error > 0 && compression.levels == 1) compression.levels = 0;
+  if (flags.values.max_pixel_error > 0 && !says_levels(compression)) compression.levels = 0;
 }
+
+/// Throws Error on names that there are not, and on options without effect beside others.
+void check_renderer_options(const CLI::App &app, const RendererFlags &flags);
 
 /// Throws Error on a solver, grouping or way to the closest hit that there is not.
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);

@@ -14,7 +14,9 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
+#include "tools/isowave/outputs.hpp"
 #include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/verify_errors.hpp"
 #include "tools/isowave/verify_frames.hpp"
 
@@ -105,7 +107,29 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, oc
   return failures;
 }
 
-void run_verify(VerifyArgs options) {
+/// What can be told from the options alone.
+void check_options(const CLI::App &command, const VerifyArgs &options) {
+  for (const std::string &name : options.solvers) solver_from_string(name);
+  if (options.frames.input.empty()) {
+    refuse_options(command,
+                   {"--oracle", "--isovalue", "--value-error", "--size", "--orbit", "--cameras", "--dims",
+                    "--type", "--spacing", "--rate", "--tolerance", "--tolerance-relative", "--exact"},
+                   "is for frames: give a VOLUME");
+  } else {
+    refuse_options(command, {"--rays", "--watertight", "--seed"}, "is for the suite: leave out VOLUME");
+    if (options.frames.frame.isovalues.empty()) throw Error("{}: give --isovalue", options.frames.input);
+  }
+  refuse_options(
+      command, {"--levels"},
+      options.frames.max_error ? "--max-error has all levels of detail" : "the finest level alone is judged");
+  Outputs outputs;
+  outputs.read_volume(options.frames.input);
+  if (!options.frames.frame.cameras.empty()) outputs.read(options.frames.frame.cameras);
+  outputs.write("--json", options.json);
+}
+
+void run_verify(const CLI::App &command, VerifyArgs options) {
+  check_options(command, options);
   const bool all = options.solvers.empty();
   if (all) options.solvers.assign(kSolverNames.begin(), kSolverNames.end());
   ordered_json document = {{"program", "isowave 0.1.0"}, {"seed", options.seed}};
@@ -119,7 +143,6 @@ void run_verify(VerifyArgs options) {
     if (all) options.solvers = {std::string(judged)};
     failures = verify_frames(options.frames, options.solvers, document);
   } else {
-    if (!options.frames.oracles.empty()) throw Error("--oracle is for frames: give a VOLUME");
     const std::unique_ptr<ocl::Device> device = open_device(options);
     if (device) document["device"] = device_json(device->info());
     for (const std::string &name : options.solvers) {
@@ -146,15 +169,18 @@ void add_verify(CLI::App &app) {
   command->add_option(
       "--solver", options->solvers,
       "linear, marmitt, analytic, bernstein; repeat it [suite: all; frames: the default one]");
-  command->add_option("--rays", options->rays, "rays per case of the suite")->capture_default_str();
+  command->add_option("--rays", options->rays, "rays per case of the suite")
+      ->check(CLI::Range(1u, 100'000'000u))
+      ->capture_default_str();
   command
       ->add_option(
           "--watertight", options->watertight,
           "rays per surface of the watertight test, for the twin and for each pipeline of the device")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000}))
       ->capture_default_str();
   command->add_option("--seed", options->seed, "of the suite's fields and rays")->capture_default_str();
   command->add_option("--json", options->json, "write the results as JSON");
-  command->callback([options] { run_verify(*options); });
+  command->callback([command, options] { run_verify(*command, *options); });
 }
 
 }  // namespace isowave::tools

@@ -135,7 +135,7 @@ void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, 
 
 std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vector<std::string> &solvers,
                             ordered_json &document) {
-  const Scene scene = load_scene(options.input, options.volume, options.frame);
+  const Scene scene = load_scene(options.input, options.volume, options.frame, read_views(options.frame));
   const std::vector<float> voxels = decode_with_libzfp(scene.volume, options.frame.value_error);
   const glm::uvec3 dims = scene.volume.info.dims;
   const std::vector<std::string> names =

@@ -4,13 +4,15 @@
 
 #include <charconv>
 #include <cstdio>
-#include <map>
 
 #include "core/error.hpp"
+#include "core/frame.hpp"
 #include "core/generate.hpp"
+#include "core/io/input_file.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/zfp_accuracy.hpp"
+#include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {
 
@@ -108,15 +110,31 @@ void add_compression_options(CLI::App &command, CompressionOptions &options) {
   CLI::Option *exact =
       command.add_flag("--exact", options.exact,
                        "the same, with no error: decoded values are the input's (integers below 2^24 only)");
-  command
-      .add_option("--levels", options.levels,
-                  "levels of detail of a volume that is compressed, each of half the voxels along each axis, "
-                  "itself among them: a number, or all")
-      ->transform(CLI::Transformer(std::map<std::string, std::uint32_t>{{"all", 0}}))
-      ->capture_default_str();
+  CLI::Option *levels =
+      command
+          .add_option(
+              "--levels", options.levels,
+              "levels of detail of a volume that is compressed, each of half the voxels along each axis, "
+              "itself among them: a number, or all")
+          ->transform(count_or_all())
+          ->type_name("N|all")
+          ->capture_default_str();
   tolerance->excludes(rate, relative, exact);
   relative->excludes(rate, exact);
   exact->excludes(rate);
+  options.options = {rate, tolerance, relative, exact, levels};
+}
+
+void refuse_compression(const CompressionOptions &options, const std::string &path) {
+  for (const CLI::Option *option : options.options) {
+    if (option->count() > 0)
+      throw Error("{}: {} is compressed already, and is drawn as it is: leave out the option",
+                  option->get_name(), path);
+  }
+}
+
+bool says_levels(const CompressionOptions &options) {
+  return !options.options.empty() && options.options.back()->count() > 0;
 }
 
 std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
@@ -139,12 +157,16 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
                              const CompressionOptions &compression, ocl::Device *device) {
   if (is_zfp_name(path)) {
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
+    refuse_compression(compression, path);
+    check_input_file(path);
     CompressedVolume volume = map_zfp_file(path);
     if (overrides.spacing) set_spacing(volume, *overrides.spacing);
     check_volume_info(volume.info, path);
+    check_drawable(volume.info, path);
     return volume;
   }
   const std::unique_ptr<VolumeReader> reader = open_any_volume(path, overrides);
+  check_drawable(reader->info(), path);
   CompressOptions options;
   options.rate = compression.rate;
   options.error_bound = find_error_bound(path, overrides, compression);

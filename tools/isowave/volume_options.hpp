@@ -34,14 +34,19 @@ struct CompressionOptions {
   std::uint32_t rate = 8;  ///< bits per voxel
   std::optional<double> tolerance{}, relative_tolerance{};
   bool exact = false;
-  std::uint32_t levels = 1;    ///< of detail; 0: all there can be
-  bool measure_error = false;  ///< at a fixed rate, too
+  std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
+  bool measure_error = false;                  ///< at a fixed rate, too
+  std::vector<const CLI::Option *> options{};  ///< those on the command line that say all this
 
   bool bounded() const { return tolerance || relative_tolerance || exact; }
 };
 
 /// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given, and --levels.
 void add_compression_options(CLI::App &command, CompressionOptions &options);
+/// Throws Error where an option of how to compress was given for volumes that are compressed already.
+void refuse_compression(const CompressionOptions &options, const std::string &path);
+/// Whether the command line says how many levels there are to be.
+bool says_levels(const CompressionOptions &options);
 /// The bound that was asked for, or none: the rate. Reads all of the volume, for a relative tolerance twice. Throws Error: see
 /// choose_error_bound().
 std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
@@ -55,8 +60,8 @@ inline constexpr const char *kVolumeHelp =
 
 /// Whether the name ends in .zfp.
 bool is_zfp_name(const std::string &path);
-/// Maps a .zfp file into memory (its spacing may be overridden), or compresses any other volume, at a rate on `device` where one
-/// is given. Clears that device's stage times.
+/// Maps a .zfp file into memory (its spacing may be overridden; options of how to compress are refused), or compresses any other
+/// volume, at a rate on `device` where one is given. Clears that device's stage times. Throws Error also on what cannot be drawn.
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device = nullptr);
 

@@ -1,0 +1,281 @@
+// Options and streams of the program, run as a user runs it: values that mean nothing, options without effect, pipes, a standard output
+// that fails, and errors that are one line whatever they quote.
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/run_program.hpp"
+
+namespace isowave {
+namespace {
+
+namespace fs = std::filesystem;
+using test::expect_one_line_error;
+using test::isowave_program;
+using test::quoted;
+using test::run_command;
+using test::run_isowave;
+using test::TemporaryFolder;
+using test::write_file;
+
+const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
+const std::string kRender = "render " + kNucleon + " -i 80 --size 16x12 ";
+
+/// Status 1 and one line that begins with the program's name and says `text`; what was printed before does not matter.
+void expect_failure(const test::ProgramResult &result, std::string_view text) {
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_TRUE(result.err.starts_with("isowave: ")) << result.err;
+  EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+}
+
+TEST(CliOptions, EmptyValuesAreRefused) {
+  for (const char *option : {"-i",
+                             "--tolerance",
+                             "--tolerance-relative",
+                             "--rate",
+                             "--levels",
+                             "--value-error",
+                             "--size",
+                             "--orbit",
+                             "--cameras",
+                             "--memory-budget",
+                             "--output",
+                             "--depth",
+                             "--stats",
+                             "--device",
+                             "--max-error",
+                             "--progress-dir",
+                             "--color",
+                             "--dims",
+                             "--type",
+                             "--spacing",
+                             "--pipeline",
+                             "--solver"}) {
+    const std::string name = std::string_view(option) == "-i" ? "--isovalue" : option;
+    expect_one_line_error(kRender + option + " ''", name + ": the value is empty");
+  }
+  expect_one_line_error("render '' -i 80", "VOLUME: the value is empty");
+  expect_one_line_error(kRender + "--depth= --stats x", "--depth: the value is empty");
+  expect_one_line_error(kRender + "-o --depth x", "a value is missing before --depth");
+  expect_one_line_error("bench pareto " + kNucleon + " -i 80 --storage exact,,rate:2", "is empty");
+  expect_one_line_error("compare '' ''", "the value is empty");
+}
+
+TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
+  for (const char *value :
+       {"-1", "0", "GB", "18446744073709551616", "1e30GB", "99999999999EB", "-1GB", "1.5GB", "1XB", " 1GB "})
+    expect_one_line_error(kRender + "--memory-budget '" + value + "'", "--memory-budget: ");
+  for (const char *value : {"inf", "-inf", "nan", "1e39", "1e400", "0x10", "1,5", "80x", " 80"})
+    expect_one_line_error("render " + kNucleon + " -i '" + value + "'", "--isovalue: ");
+  for (const char *value : {"-1", "18446744073709551616", "1e3", "0x10", "+1", "1.0"})
+    expect_one_line_error("generate mixing_layer --dims 8 --seed '" + std::string(value) + "'", "--seed: ");
+  for (const char *option :
+       {"--value-error", "--max-pixel-error", "--max-error", "--time-budget", "--tolerance", "--spacing"})
+    expect_one_line_error(kRender + option + " inf", option);
+  expect_one_line_error(kRender + "--levels 0", "--levels: ");
+  expect_one_line_error(kRender + "--levels -1", "--levels: ");
+  expect_one_line_error(kRender + "--orbit 99999999999", "--orbit");
+  expect_one_line_error("verify --rays 0", "--rays");
+  expect_one_line_error("verify --watertight 0", "--watertight");
+  expect_one_line_error("convert " + kNucleon + " --map-nan 1e39 -o a.zfp", "--map-nan");
+  expect_one_line_error("bench pareto " + kNucleon + " -i 80 --storage rate:-1", "--storage");
+  expect_one_line_error("bench pareto " + kNucleon + " -i 80 --storage tolerance:nan", "--storage");
+  expect_one_line_error("bench solvers " + kNucleon + ":1e39", "VOLUME:ISOVALUE");
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_isowave("generate sphere --dims 010 -o " + quoted(folder.path())).status, 0);
+  EXPECT_TRUE(fs::exists(folder / "sphere_10x10x10_uint8.raw")) << "decimal, not octal";
+}
+
+TEST(CliOptions, SpacingsAndPlacesThatFloatsCannotHoldAreRefused) {
+  expect_failure(run_isowave(kRender + "--spacing 1e-300"), "spacing 1e-300");
+  expect_failure(run_isowave(kRender + "--spacing 1e300"), "spacing 1e+300");
+  expect_failure(run_isowave(kRender + "--spacing 1e-31"), "float32");
+  expect_failure(run_isowave(kRender + "--spacing 1e31"), "float32");
+  expect_failure(run_isowave(kRender + "--spacing 1 1 1e11"), "float32");
+  const TemporaryFolder folder;
+  write_file(folder / "far.nhdr",
+             std::string_view("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspace: "
+                              "left-posterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+                              "space origin: (1e15,0,0)\ndata file: v.raw\n"));
+  write_file(folder / "v.raw", std::string(512, '\x20'));
+  const auto far = run_isowave("render " + quoted(folder / "far.nhdr") + " -i 1 --reference --size 8x8");
+  expect_failure(far, "cannot tell voxels apart");
+  const auto camera = [&](const std::string &eye, const std::string &up) {
+    write_file(folder / "c.json", R"({"width":8,"height":8,"fovy_deg":50,"cameras":[{"eye":)" + eye +
+                                      R"(,"at":[0,0,0],"up":)" + up + "}]}");
+    return run_isowave("render " + kNucleon + " -i 1 --reference --cameras " + quoted(folder / "c.json"));
+  };
+  expect_failure(camera("[1e160,0,0]", "[0,1,0]"), "too large");
+  expect_failure(camera("[1e-160,0,0]", "[0,1,0]"), "the same point");
+  expect_failure(camera("[1e8,0,0]", "[0,1,0]"), "1e7");
+  expect_failure(camera("[1e400,0,0]", "[0,1,0]"), "too large");
+  EXPECT_EQ(run_isowave(kRender + "--spacing 1e-30 --reference").status, 0);
+  EXPECT_EQ(run_isowave(kRender + "--spacing 1e30 --reference").status, 0);
+}
+
+TEST(CliOptions, OptionsWithoutEffectAreRefused) {
+  const TemporaryFolder folder;
+  const std::string zfp = quoted(folder / "n.zfp");
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 1 -o " + zfp).status, 0);
+  for (const char *option :
+       {"--exact", "--rate 8", "--tolerance 1", "--tolerance-relative 0.1", "--levels 1"}) {
+    const std::string name = std::string(option).substr(0, std::string(option).find(' '));
+    expect_failure(run_isowave("render " + zfp + " -i 80 --size 8x8 --reference " + option), name + ": ");
+    if (name != "--levels")
+      expect_failure(run_isowave("verify " + zfp + " -i 80 --size 8x8 " + option), name + ": ");
+  }
+  expect_one_line_error("bench solvers " + zfp + ":80 --rate 8", "--rate: ");
+  expect_one_line_error("info " + zfp + " --dims 41", "--dims");
+  expect_one_line_error(kRender + "--grouping radix", "--grouping: ");
+  expect_one_line_error(kRender + "--pipeline rays --closest scan", "--closest: ");
+  expect_one_line_error(kRender + "--speculation off --max-speculation 8", "--max-speculation: ");
+  expect_one_line_error(kRender + "--color '#102030'", "--color: ");
+  expect_one_line_error("verify --isovalue 80", "give a VOLUME");
+  expect_one_line_error("verify " + kNucleon + " -i 80 --rays 100", "--rays: ");
+  expect_one_line_error("verify " + kNucleon, "give --isovalue");
+  expect_one_line_error("verify " + kNucleon + " -i 80 --levels 2", "--levels: ");
+  expect_one_line_error("generate sphere --dims 8 --seed 3", "--seed: ");
+  expect_one_line_error("convert " + kNucleon + " --exact --no-verify -o " + quoted(folder / "a.zfp"),
+                        "--no-verify: ");
+}
+
+TEST(CliOptions, PipesAreNotWaitedFor) {
+  const TemporaryFolder folder;
+  for (const char *name : {"p", "p.zfp", "p_8x8x8_uint8.raw", "p.nrrd"}) {
+    ASSERT_EQ(::mkfifo((folder / name).c_str(), 0600), 0);
+    const std::string pipe = quoted(folder / name);
+    for (const std::string &arguments :
+         {"info " + pipe, "render " + pipe + " -i 80", "render " + kNucleon + " -i 80 --cameras " + pipe,
+          "compare " + pipe + " " + pipe, "convert " + pipe + " -o " + quoted(folder / "a.zfp")}) {
+      const auto result = run_command("timeout 20 " + isowave_program() + " " + arguments);
+      EXPECT_EQ(result.status, 1) << arguments;
+      EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    }
+  }
+  expect_one_line_error(kRender + "--cameras /dev/zero", "not a regular file");
+}
+
+TEST(CliOptions, AStandardOutputThatFailsIsAnError) {
+  const TemporaryFolder folder;
+  for (const std::string &arguments :
+       {"info " + kNucleon, "info --json " + kNucleon, std::string("--help"), std::string("--version"),
+        std::string("render --help"), std::string("devices"), kRender + "--reference",
+        "generate sphere --dims 8 -o " + quoted(folder / "s.raw"),
+        "convert " + kNucleon + " -o " + quoted(folder / "n.zfp")}) {
+    for (const char *where : {" >/dev/full", " >&-"}) {
+      SCOPED_TRACE(arguments + where);
+      expect_failure(run_command(isowave_program() + " " + arguments + where), "standard output");
+    }
+  }
+  const std::string raw = test::read_file(folder / "s.raw");
+  EXPECT_EQ(raw.size(), 512u) << "standard output must not have gone to the file";
+  const auto no_error_output = run_command(isowave_program() + " info missing.raw 2>&-");
+  EXPECT_EQ(no_error_output.status, 1);
+  const auto reader_gone = run_command("{ " + isowave_program() + " --help; echo $? >&2; } | true");
+  EXPECT_EQ(reader_gone.err.find("terminate"), std::string::npos) << reader_gone.err;
+}
+
+TEST(CliOptions, ErrorsAreOneLineWhateverTheyQuote) {
+  const TemporaryFolder folder;
+  expect_one_line_error("info 'a\nb.raw'", R"(a\nb.raw)");
+  expect_one_line_error("info 'a\x1b[2Jb.raw'", R"(a\x1b[2Jb.raw)");
+  expect_one_line_error(
+      "info 'a\xff"
+      "b.raw'",
+      R"(a\xffb.raw)");
+  expect_one_line_error("'no\nsuch'", R"(no\nsuch)");
+  expect_one_line_error(kRender + "--device 'x\ny'", R"(x\ny)");
+  write_file(folder / "bad.json", std::string_view("{\"a\":\n\"\xff\"}"));
+  const auto camera = run_isowave(kRender + "--cameras " + quoted(folder / "bad.json"));
+  expect_failure(camera, "bad.json: not a camera file");
+  EXPECT_EQ(camera.err.find("json.exception"), std::string::npos) << camera.err;
+}
+
+TEST(CliOptions, NamesThatAreNoUtf8GoIntoJson) {
+  const TemporaryFolder folder;
+  const std::string name = (folder / "v\xff_8x8x8_uint8.raw").string();
+  std::string voxels(512, '\0');
+  for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = char(i % 8 * 16);
+  write_file(name, voxels);
+  const auto info = run_isowave("info --json '" + name + "'");
+  EXPECT_EQ(info.status, 0) << info.err;
+  EXPECT_EQ(nlohmann::json::parse(info.out)["dims"][0], 8);
+  const auto render =
+      run_isowave("render '" + name + "' -i 40 --size 8x8 --reference --stats " + quoted(folder / "s.json"));
+  EXPECT_EQ(render.status, 0) << render.err;
+  EXPECT_NO_THROW(nlohmann::json::parse(test::read_file(folder / "s.json")));
+}
+
+TEST(CliOptions, OutOfMemoryIsOneLine) {
+  const auto result = run_command(
+      "ulimit -v 300000; " + isowave_program() + " " +
+      "render generate:sphere_1024x1024x1024_uint8 -i 80 --size 16384x16384 --rate 32 --reference");
+  EXPECT_EQ(result.status, 1) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_EQ(result.err.find("bad_alloc"), std::string::npos) << result.err;
+}
+
+/// A limit on open files stands in for a compiler that fails.
+TEST(CliOptions, KernelsThatDoNotBuildAreOneLineAndALog) {
+  const TemporaryFolder folder;
+  bool failed = false;
+  for (int files = 4; files < 10 && !failed; ++files) {
+    const auto run =
+        run_command("env OCL_ICD_VENDORS=pocl.icd POCL_CACHE_DIR=" + quoted(folder / "cache") +
+                    " TMPDIR=" + quoted(folder.path()) + " prlimit --nofile=" + std::to_string(files) + " " +
+                    isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
+    if (run.err.find("does not build") == std::string::npos) continue;
+    failed = true;
+    EXPECT_EQ(run.status, 1);
+    const std::size_t begin =
+        run.err.find("isowave: ");  // clang, within PoCL, counts its errors in a line before
+    ASSERT_NE(begin, std::string::npos) << run.err;
+    EXPECT_EQ(run.err.find('\n', begin), run.err.size() - 1) << run.err;
+    EXPECT_NE(run.err.find("CL_BUILD_PROGRAM_FAILURE", begin), std::string::npos) << run.err;
+    const std::string saying = "the compiler's whole log is ";
+    const std::size_t at = run.err.find(saying);
+    ASSERT_NE(at, std::string::npos) << run.err;
+    const std::string log = run.err.substr(at + saying.size(), run.err.size() - at - saying.size() - 1);
+    EXPECT_TRUE(log.starts_with(folder.path().string())) << log;
+    EXPECT_NE(test::read_file(log), "");
+  }
+  EXPECT_TRUE(failed) << "else this proves nothing";
+}
+
+/// As an ordinary user: root may write where nobody else may.
+TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
+  const TemporaryFolder folder, temporary;
+  if (run_isowave("devices").out.find("Portable Computing Language") == std::string::npos)
+    GTEST_SKIP() << "no PoCL";
+  for (const fs::path &path : {folder.path(), temporary.path()}) fs::permissions(path, fs::perms::all);
+  write_file(folder / "file", std::string_view(""));
+  const std::string as_user = ::geteuid() == 0 ? "setpriv --reuid 65534 --regid 65534 --clear-groups " : "";
+  const auto render = [&](const std::string &environment) {
+    return run_command(as_user + "env -u XDG_CACHE_HOME -u POCL_CACHE_DIR OCL_ICD_VENDORS=pocl.icd TMPDIR=" +
+                       quoted(temporary.path()) + " " + environment + " " + isowave_program() +
+                       " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8 --pipeline rays");
+  };
+  for (const char *environment :
+       {"HOME=/nonexistent", "XDG_CACHE_HOME=/proc/x", "POCL_CACHE_DIR= HOME=/dev/null"}) {
+    const auto run = render(environment);
+    EXPECT_EQ(run.status, 0) << environment << run.out << run.err;
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+    EXPECT_NE(run.err.find("compiled kernels go to " + temporary.path().string()), std::string::npos)
+        << run.err;
+  }
+  const auto no_path =
+      run_command("env PATH= POCL_CACHE_DIR=" + quoted(temporary / "new") + " OCL_ICD_VENDORS=pocl.icd " +
+                  isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
+  EXPECT_EQ(no_path.status, 0) << no_path.err;
+  const auto given = render("HOME=" + quoted(folder.path()));
+  EXPECT_EQ(given.status, 0) << given.err;
+  EXPECT_EQ(given.err, "") << "nothing is said where it works as usual";
+  expect_failure(render("POCL_CACHE_DIR=" + quoted(folder / "file")), "set POCL_CACHE_DIR to another folder");
+}
+
+}  // namespace
+}  // namespace isowave

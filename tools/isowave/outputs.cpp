@@ -1,0 +1,124 @@
+#include "tools/isowave/outputs.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include "core/error.hpp"
+#include "core/io/atomic_file.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::tools {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// The same for all names of a file that exists; for one that does not, its folder and name. Throws Error where it can be neither.
+std::string key_of(const fs::path &path) {
+  const fs::path target = follow_links(path);
+  struct stat status {};
+  if (::stat(target.c_str(), &status) == 0) return fmt::format("{}:{}", status.st_dev, status.st_ino);
+  const int reason = errno;
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  if (reason == ENOENT && ::stat(folder.c_str(), &status) == 0)
+    return fmt::format("{}:{}/{}", status.st_dev, status.st_ino, target.filename().string());
+  throw Error("{}: cannot write: {}", path.string(), std::strerror(reason));
+}
+
+/// The file of voxels that the header of an NRRD or MetaImage names, or nothing.
+fs::path detached_voxels(const fs::path &header) {
+  std::error_code failure;
+  if (!fs::is_regular_file(header, failure)) return {};
+  constexpr std::size_t kLongestHeader = 1u << 20;
+  std::ifstream in(header, std::ios::binary);
+  std::string line;
+  for (std::size_t read = 0; read < kLongestHeader && std::getline(in, line); read += line.size() + 1) {
+    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back())) != 0) line.pop_back();
+    if (line.empty()) return {};
+    const std::size_t separator = line.find_first_of(":=");
+    std::string key = CLI::detail::to_lower(line.substr(0, separator));
+    std::erase_if(key, [](unsigned char c) { return std::isspace(c) != 0; });
+    if (key != "datafile" && key != "elementdatafile") continue;
+    const std::size_t begin = line.find_first_not_of(" \t", separator + 1);
+    return begin == std::string::npos ? fs::path{} : header.parent_path() / line.substr(begin);
+  }
+  return {};
+}
+
+}  // namespace
+
+void Outputs::read(const fs::path &path) {
+  std::error_code failure;
+  if (fs::exists(path, failure)) users_.emplace(key_of(path), fmt::format("the input {}", path.string()));
+}
+
+void Outputs::read_volume(const std::string &path) {
+  if (path.starts_with("generate:")) return;
+  read(path);
+  constexpr std::string_view kWithHeader[] = {".nrrd", ".nhdr", ".mha", ".mhd"};
+  const std::string extension = CLI::detail::to_lower(fs::path(path).extension().string());
+  if (std::ranges::find(kWithHeader, extension) == std::end(kWithHeader)) return;
+  if (const fs::path voxels = detached_voxels(path); !voxels.empty()) read(voxels);
+}
+
+void Outputs::write(const std::string &option, const fs::path &path) {
+  if (path.empty()) return;
+  const fs::path folder = follow_links(path).parent_path();
+  std::error_code failure;
+  if (!folder.empty() && !fs::is_directory(folder, failure))
+    throw Error("cannot write {}: {} is no folder", path.string(), folder.string());
+  const auto [user, is_new] = users_.emplace(key_of(path), fmt::format("{} {}", option, path.string()));
+  if (!is_new) throw Error("{} {}: it would take the place of {}", option, path.string(), user->second);
+  // Of many frames' files in a folder, the first shows whether there can be any; a file that is replaced, whether it may be.
+  if (probed_.insert(folder).second || fs::exists(path, failure)) AtomicFile{path};
+}
+
+void Outputs::write_pictures(const std::string &option, const fs::path &folder, const std::string &prefix) {
+  if (folder.empty()) return;
+  std::error_code failure;
+  fs::path existing = folder, made;  // the deepest folder that is there, and the one that will be made in it
+  while (!fs::exists(existing, failure) && existing.has_relative_path()) {
+    if (!existing.filename().empty()) made = existing;
+    existing = existing.has_parent_path() ? existing.parent_path() : fs::path(".");
+  }
+  if (!fs::is_directory(existing, failure))
+    throw Error("cannot make the folder {}: {} is no folder", folder.string(), existing.string());
+  if (::access(existing.c_str(), W_OK | X_OK) != 0)
+    throw Error("cannot make or fill the folder {}: {}", folder.string(), std::strerror(errno));
+  if (!made.empty()) {
+    new_folder_ = folder;
+    if (const auto user = users_.find(key_of(made)); user != users_.end())
+      throw Error("{} {}: it would take the place of {}", option, folder.string(), user->second);
+    return;
+  }
+  struct stat status {};
+  if (::stat(folder.c_str(), &status) != 0) return;
+  for (const auto &entry : fs::directory_iterator(folder, failure)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(prefix) || !name.ends_with(".png") || !fs::exists(entry.path(), failure)) continue;
+    if (const auto user = users_.find(key_of(entry.path())); user != users_.end())
+      throw Error("{} {}: {} could take the place of {}", option, folder.string(), name, user->second);
+  }
+  const std::string in_folder = fmt::format("{}:{}/{}", status.st_dev, status.st_ino, prefix);
+  for (const auto &[key, user] : users_) {
+    if (key.starts_with(in_folder) && key.ends_with(".png"))
+      throw Error("{} {}: a picture could take the place of {}", option, folder.string(), user);
+  }
+}
+
+void Outputs::make_folder() const {
+  std::error_code failure;
+  if (!new_folder_.empty()) fs::create_directories(new_folder_, failure);
+  if (failure) throw Error("cannot make the folder {}: {}", new_folder_.string(), failure.message());
+}
+
+}  // namespace isowave::tools

@@ -1,0 +1,151 @@
+#include "tools/isowave/program.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+#include <system_error>
+
+#include "core/error.hpp"
+#include "core/ocl/device.hpp"
+#include "core/ocl/pocl_environment.hpp"
+#include "tools/isowave/strict_options.hpp"
+
+namespace isowave::tools {
+
+namespace {
+
+/// Gives descriptors 0 to 2 that are closed to /dev/null, or the next file that is opened would be standard input or output. In the
+/// wrong direction, so that whoever uses one finds that it fails.
+void open_standard_streams() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) == -1 && errno == EBADF)
+      ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
+
+/// To a file of its own in the folder for temporary files. Returns its name, or nothing where that fails.
+std::string keep_log(const std::string &log) {
+  std::error_code failure;
+  std::string name = (std::filesystem::temp_directory_path(failure) / "isowave_build_log_XXXXXX").string();
+  const int fd = failure ? -1 : ::mkstemp(name.data());
+  if (fd < 0) return {};
+  const bool written = ::write(fd, log.data(), log.size()) == static_cast<ssize_t>(log.size());
+  ::close(fd);
+  if (written) return name;
+  ::unlink(name.c_str());
+  return {};
+}
+
+std::string text_of(const std::filesystem::filesystem_error &error) {
+  return fmt::format("{}: {}", error.path1().string(), error.code().message());
+}
+
+/// Without the library's own number: "[json.exception.type_error.302] type must be ..."
+std::string text_of(const nlohmann::json::exception &error) {
+  const std::string_view text = error.what();
+  const std::size_t end = text.find("] ");
+  return std::string(end == std::string_view::npos ? text : text.substr(end + 2));
+}
+
+/// One line, to be called in a catch clause.
+std::string text_of_current_exception(const std::string &command) {
+  try {
+    throw;
+  } catch (const BuildError &error) {
+    const std::string name = error.log().empty() ? "" : keep_log(error.log());
+    return error.what() + (name.empty() ? "" : fmt::format("; the compiler's whole log is {}", name));
+  } catch (const Error &error) {
+    return error.what();
+  } catch (const std::filesystem::filesystem_error &error) {
+    return text_of(error);
+  } catch (const std::bad_alloc &) {
+    return fmt::format("out of memory: {} needs more than there is", command);
+  } catch (const std::length_error &) {
+    return fmt::format("out of memory: {} needs more than a program can have", command);
+  } catch (const nlohmann::json::exception &error) {
+    return fmt::format("{} failed: JSON: {}", command, text_of(error));
+  } catch (const cl::Error &error) {
+    return fmt::format("{} failed in OpenCL: {}: {}", command, error.what(), ocl::error_name(error.err()));
+  } catch (const std::system_error &error) {
+    return fmt::format("{} failed: {}", command, error.code().message());
+  } catch (const std::exception &error) {
+    return error.what();
+  } catch (...) {
+    return fmt::format("{} failed, and nothing says why", command);
+  }
+}
+
+/// Writes out what is left of standard output. Returns why it cannot be written to, or nothing.
+std::optional<std::string> finish_output() {
+  errno = 0;
+  std::cout.flush();
+  const bool failed = std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || std::cout.fail();
+  if (!failed) return {};
+  return "cannot write to standard output" + (errno != 0 ? fmt::format(": {}", std::strerror(errno)) : "");
+}
+
+/// Of a subcommand that is missing: CLI11 does not say that there is one of another name.
+std::string text_of(const CLI::RequiredError &error, const CLI::App &app) {
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (unknown.empty() || app.get_subcommands([](const CLI::App *) { return true; }).empty())
+    return error.what();
+  return fmt::format("{}; '{}' is none: see --help", error.what(), unknown.front());
+}
+
+/// The program and the subcommand that was asked for: "isowave bench pareto".
+std::string command_name(const CLI::App &app) {
+  std::string name = app.get_name();
+  for (const CLI::App *command = &app; !command->get_subcommands().empty();) {
+    command = command->get_subcommands().front();
+    name += " " + command->get_name();
+  }
+  return name;
+}
+
+void print_line(const CLI::App &app, const std::string &text) {
+  const std::string line = fmt::format("{}: {}\n", app.get_name(), one_line(text));
+  std::fwrite(line.data(), 1, line.size(), stderr);  // nobody can be told where that fails
+}
+
+}  // namespace
+
+int run_program(CLI::App &app, int argc, char **argv) {
+  open_standard_streams();
+  std::optional<std::string> message;
+  int status = 1;
+  try {
+    make_strict(app);
+    refuse_empty_values(app, argc, argv);
+    app.parse(argc, argv);
+    status = 0;
+  } catch (const CLI::Success &help) {
+    std::ostringstream text;
+    status = app.exit(help, text, text);
+    std::fputs(text.str().c_str(), stdout);
+  } catch (const CLI::RuntimeError &result) {
+    status = result.get_exit_code();
+  } catch (const CLI::RequiredError &error) {
+    message = text_of(error, app);
+  } catch (...) {
+    message = text_of_current_exception(command_name(app));
+  }
+  if (const auto failure = finish_output()) message = failure;
+  if (message) {
+    print_line(app, *message);
+    return 1;
+  }
+  if (const std::string notice = ocl::cache_notice(); status == 0 && !notice.empty()) print_line(app, notice);
+  return status;
+}
+
+}  // namespace isowave::tools
