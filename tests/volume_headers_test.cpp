@@ -1,6 +1,6 @@
 // NRRD, MetaImage and NIfTI: geometry in one world convention (LPS), and headers that must be refused.
 
-#include "core/io/itk_reader.hpp"
+#include "core/volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

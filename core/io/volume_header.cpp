@@ -1,0 +1,19 @@
+#include "core/io/volume_header.hpp"
+
+#include <cmath>
+
+namespace isowave {
+
+void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &direction) {
+  info.spacing[axis] = std::abs(spacing);
+  info.direction[axis] =
+      (spacing < 0 ? -direction : direction) + 0.0;  // no negative zeros in what people read
+}
+
+void set_data_file(VoxelLayout &voxels, const std::filesystem::path &header, const std::string &name) {
+  voxels.file = header.parent_path() / name;
+  voxels.what = header.string() + ": its data file " + voxels.file.string();
+  voxels.offset = 0;
+}
+
+}  // namespace isowave
