@@ -121,8 +121,11 @@ VoxelType meta_voxel_type(const HeaderFields &fields) {
                                          {"MET_ULONG", VoxelType::kUint32},
                                          {"MET_FLOAT", VoxelType::kFloat32},
                                          {"MET_DOUBLE", VoxelType::kFloat64}}};
+  std::string_view name = fields["ElementType"];
+  constexpr std::string_view kArray = "_ARRAY";  // of one: ElementNumberOfChannels
+  if (name.ends_with(kArray)) name.remove_suffix(kArray.size());
   for (const Name &candidate : kNames) {
-    if (candidate.name == fields["ElementType"]) return candidate.type;
+    if (candidate.name == name) return candidate.type;
   }
   fields.fail("ElementType", "not supported: need a number of 8, 16 or 32 bits, or MET_DOUBLE");
 }

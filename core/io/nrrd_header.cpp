@@ -289,7 +289,7 @@ void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxi
     if (!std::isnan(axis.max)) fields.fail("axis maxs", "not with a space: its 'space origin' says them");
     if (!axis.direction) continue;  // no axis has one: a unit grid
     const double length = glm::length(*axis.direction);
-    set_axis(info, i, length, *axis.direction / length * to_lps);
+    set_axis(info, i, length, *axis.direction * (1.0 / length) * to_lps);
   }
   if (fields.has("space origin")) {
     const auto origin = parse_vectors(fields, "space origin");
