@@ -236,12 +236,14 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
   const std::string header =
       "NRRD0001\ndatafile: ./a.raw\ndimension: 3\nsizes: 3 4 5\nspacings: 1 2 3\ntype: uchar\nencoding: "
       "raw\n";
-  expect_refused("a.nhdr", header, "a.raw: no such file");
+  expect_refused("a.nhdr", header, "its data file './a.raw': no such file");
   write_file(folder_ / "a.raw", ramp());
   expect_read("a.nhdr", header);
   EXPECT_EQ(
       open_volume(folder_ / "a.nhdr", {.dims = {}, .type = {}, .spacing = glm::dvec3(7)})->info().spacing,
       glm::dvec3(7));
+  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: \x1b[1m\xff.raw\n"),
+                 "its data file '?[1m?.raw': no such file");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: slice%03d.raw 1 5 1\n"), "several files");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: LIST\na.raw\n"), "is neither a field");
   std::string meta = meta_image("");
@@ -250,8 +252,8 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
   }
   expect_read("a.mhd", meta.substr(0, meta.size() - 6) + "a.raw\n");
   ASSERT_EQ(::mkfifo((folder_ / "pipe.raw").c_str(), 0600), 0);
-  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: pipe.raw\n"), "pipe.raw: not a regular file");
-  expect_refused("a.mhd", meta.substr(0, meta.size() - 6) + "pipe.raw\n", "pipe.raw: not a regular file");
+  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: pipe.raw\n"), "'pipe.raw': not a regular file");
+  expect_refused("a.mhd", meta.substr(0, meta.size() - 6) + "pipe.raw\n", "'pipe.raw': not a regular file");
   for (const char *name :
        {"a_3x4x5_uint8.raw", "a_3x4x5_uint8.raw.gz", "p.nrrd", "p.mha", "p.nii", "p.nii.gz"}) {
     ASSERT_EQ(::mkfifo((folder_ / name).c_str(), 0600), 0);
@@ -378,6 +380,7 @@ TEST_F(MetaImageFile, RefusedHeaders) {
                  "says otherwise");
   expect_refused("a.mha", with("Offset = 1 2 3\nPosition = 1 2 4\n"), "says otherwise");
   expect_refused("a.mha", with("Offset = 1 2\n"), "Offset");
+  expect_refused("a.mha", with("ID = one\n"), "ID");
   expect_refused("a.mha", with("ElementSpacing = 1 2 nan\n"), "ElementSpacing");
   expect_refused("a.mha", with("ElementSpacing = 1 2 0\n"), "spacing");
   expect_refused("a.mha", with("TransformMatrix = 1 0 0 0 1 0 0 0\n"), "TransformMatrix");

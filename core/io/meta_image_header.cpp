@@ -173,7 +173,7 @@ void check_other_meta_fields(const HeaderFields &fields, std::size_t num_axes) {
   for (const std::string_view key : {"CenterOfRotation", "SequenceID"}) {
     if (fields.has(key)) fields.numbers(key, num_axes);
   }
-  for (const std::string_view key : {"ElementMin", "ElementMax", "CompressionLevel"}) {
+  for (const std::string_view key : {"ElementMin", "ElementMax", "CompressionLevel", "ID", "ParentID"}) {
     if (fields.has(key)) fields.numbers(key, 1, HeaderFields::Nan::kUnknown);
   }
   if (fields.has("Color")) fields.numbers("Color", 4);

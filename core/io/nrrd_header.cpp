@@ -94,42 +94,23 @@ bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields 
 }
 
 VoxelType nrrd_voxel_type(const HeaderFields &fields) {
-  struct Name {
-    std::string_view name;
+  struct Names {
     VoxelType type;
+    std::array<std::string_view, 6> names;
   };
-  using enum VoxelType;
-  constexpr std::array<Name, 28> kNames{{{"signed char", kInt8},
-                                         {"int8", kInt8},
-                                         {"int8_t", kInt8},
-                                         {"uchar", kUint8},
-                                         {"unsigned char", kUint8},
-                                         {"uint8", kUint8},
-                                         {"uint8_t", kUint8},
-                                         {"short", kInt16},
-                                         {"short int", kInt16},
-                                         {"signed short", kInt16},
-                                         {"signed short int", kInt16},
-                                         {"int16", kInt16},
-                                         {"int16_t", kInt16},
-                                         {"ushort", kUint16},
-                                         {"unsigned short", kUint16},
-                                         {"unsigned short int", kUint16},
-                                         {"uint16", kUint16},
-                                         {"uint16_t", kUint16},
-                                         {"int", kInt32},
-                                         {"signed int", kInt32},
-                                         {"int32", kInt32},
-                                         {"int32_t", kInt32},
-                                         {"uint", kUint32},
-                                         {"unsigned int", kUint32},
-                                         {"uint32", kUint32},
-                                         {"uint32_t", kUint32},
-                                         {"float", kFloat32},
-                                         {"double", kFloat64}}};
+  constexpr std::array<Names, 8> kTypes{
+      {{VoxelType::kInt8, {"signed char", "int8", "int8_t"}},
+       {VoxelType::kUint8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
+       {VoxelType::kInt16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+       {VoxelType::kUint16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+       {VoxelType::kInt32, {"int", "signed int", "int32", "int32_t"}},
+       {VoxelType::kUint32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+       {VoxelType::kFloat32, {"float"}},
+       {VoxelType::kFloat64, {"double"}}}};
   const std::string wanted = lower_case(fields["type"]);
-  for (const Name &candidate : kNames) {
-    if (candidate.name == wanted) return candidate.type;
+  for (const Names &candidate : kTypes) {
+    const auto found = std::find(candidate.names.begin(), candidate.names.end(), wanted);
+    if (found != candidate.names.end() && !wanted.empty()) return candidate.type;
   }
   fields.fail("type", "not supported: need a number of 8, 16 or 32 bits, or double");
 }
@@ -249,7 +230,7 @@ std::optional<glm::dvec3> read_nrrd_space(const HeaderFields &fields) {
   if (fields.has("space dimension")) fields.fail("space dimension", "given beside 'space'");
   const std::string wanted = lower_case(fields["space"]);
   for (const Space &space : spaces) {
-    if (wanted == space.name || (wanted == space.short_name && !wanted.empty())) return space.to_lps;
+    if (!wanted.empty() && (wanted == space.name || wanted == space.short_name)) return space.to_lps;
   }
   fields.fail("space", "not supported: need one of 3 dimensions");
 }

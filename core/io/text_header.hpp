@@ -20,7 +20,9 @@ std::string lower_case(std::string_view text);
 std::string_view trim(std::string_view text);
 /// The parts between blanks and tabs.
 std::vector<std::string_view> split_words(std::string_view text);
-/// The start of a text from a file, in quotes and without control characters, for a message of one line.
+/// A text from a file, with '?' for what is not printable ASCII, for a message of one line.
+std::string printable(std::string_view text);
+/// The start of it, in quotes.
 std::string quote(std::string_view text);
 
 /// The whole text as a number in decimal; NaN and infinities by name. Empty if it is none or does not fit.

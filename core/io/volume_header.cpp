@@ -1,6 +1,10 @@
 #include "core/io/volume_header.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+
+#include "core/io/text_header.hpp"
 
 namespace isowave {
 
@@ -12,7 +16,7 @@ void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &dire
 
 void set_data_file(VoxelLayout &voxels, const std::filesystem::path &header, const std::string &name) {
   voxels.file = header.parent_path() / name;
-  voxels.what = header.string() + ": its data file " + voxels.file.string();
+  voxels.what = fmt::format("{}: its data file {}", header.string(), quote(name));
   voxels.offset = 0;
 }
 
