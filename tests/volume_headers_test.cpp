@@ -117,6 +117,10 @@ TEST_F(NrrdFile, ValidHeadersOfAllKinds) {
     expect_read("a.nrrd", nrrd(fields + raw) + ramp());
     expect_read("a.nrrd", "NRRD0004\n" + fields + nrrd(raw).substr(9) + ramp());  // before the others
   }
+  for (std::size_t length = 65530; length < 65545; ++length) {  // where a line is cut and a buffer ends
+    expect_read("a.nrrd", nrrd("#" + std::string(length, '#') + "\r\n" + raw) + ramp());
+    expect_read("a.nrrd", nrrd("key:=" + std::string(2 * length, ':') + "\n" + raw) + ramp());
+  }
   expect_read("a.nrrd", nrrd("encoding: gzip\n\n") + gzip(ramp().substr(0, 31)) + gzip(ramp().substr(31)));
   std::string commas;
   for (int i = 1; i <= 60; ++i) commas += fmt::format("{}, ", i);
@@ -179,6 +183,7 @@ TEST_F(NrrdFile, RefusedHeaders) {
   const auto with = [&](const std::string &fields) { return nrrd(fields + raw) + ramp(); };
   EXPECT_EQ(error_of(folder_ / "a.nrrd", with("")), "");
   expect_refused("a.nrrd", "", "not an NRRD file");
+  expect_refused("a.nrrd", std::string(100, '\0') + std::string(1 << 20, 'x'), "not an NRRD file");
   expect_refused("a.nrrd", "NRRD0099\n", "'NRRD0099' is not a version");
   expect_refused("a.nrrd", nrrd("encoding: raw\n"), "no empty line");
   expect_refused("a.nrrd", nrrd("\n") + ramp(), "no 'encoding'");

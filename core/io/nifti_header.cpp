@@ -235,9 +235,9 @@ void set_nifti_scale(const NiftiHeader &header, VoxelLayout &voxels) {
 VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
   const NiftiHeader bytes(path, is_gzipped);
   constexpr std::size_t kMagicAt = 344;
-  if (bytes.has_at(kMagicAt, std::string_view("ni1", 4)))
+  if (bytes.has_at(kMagicAt, std::string_view("ni1\0", 4)))
     bytes.fail("its voxels lie in an .img file: convert it to one file");
-  if (!bytes.has_at(kMagicAt, std::string_view("n+1", 4))) bytes.fail("not a NIfTI-1 file");
+  if (!bytes.has_at(kMagicAt, std::string_view("n+1\0", 4))) bytes.fail("not a NIfTI-1 file");
 
   VolumeHeader header;
   read_nifti_dims(bytes, header.info);

@@ -70,34 +70,41 @@ std::optional<std::int64_t> parse_integer(std::string_view text) {
   return parse<std::int64_t>(text);
 }
 
-bool HeaderLines::next() {
+bool HeaderLines::refill() {
   constexpr std::size_t kBufferBytes = 1u << 16;
-  line_.clear();
-  is_cut_ = false;
-  const std::uint64_t begin = end_;
-  while (true) {
-    if (position_ == buffer_.size()) {
-      buffer_.resize(kBufferBytes);
-      buffer_.resize(file_->read_at(end_, buffer_));
-      position_ = 0;
-      if (buffer_.empty()) break;
-    }
-    const char *text = reinterpret_cast<const char *>(buffer_.data()) + position_;
-    const std::size_t left = buffer_.size() - position_;
-    const void *newline = std::memchr(text, '\n', left);
-    const std::size_t length =
-        newline != nullptr ? std::size_t(static_cast<const char *>(newline) - text) : left;
-    const std::size_t kept = std::min(length, kMaxLength - line_.size());
-    line_.append(text, kept);
-    is_cut_ = is_cut_ || kept < length;
-    const std::size_t used = length + (newline != nullptr ? 1 : 0);
-    position_ += used;
-    end_ += used;
-    if (newline != nullptr) break;
+  if (position_ < buffer_.size()) return true;
+  buffer_.resize(kBufferBytes);
+  buffer_.resize(file_->read_at(end_, buffer_));
+  position_ = 0;
+  return !buffer_.empty();
+}
+
+bool HeaderLines::add_up_to(std::size_t most) {
+  const char *text = reinterpret_cast<const char *>(buffer_.data()) + position_;
+  const std::size_t left = std::min(buffer_.size() - position_, most);
+  const void *newline = std::memchr(text, '\n', left);
+  const std::size_t length =
+      newline != nullptr ? std::size_t(static_cast<const char *>(newline) - text) : left;
+  line_.append(text, length);
+  const std::size_t used = length + (newline != nullptr ? 1 : 0);
+  position_ += used;
+  end_ += used;
+  return newline != nullptr;
+}
+
+bool HeaderLines::next() {
+  while (is_cut_ && refill()) {  // the rest of a long line
+    line_.clear();
+    is_cut_ = !add_up_to(buffer_.size());
   }
-  if (end_ == begin) return false;
-  if (line_.ends_with('\r')) line_.pop_back();
+  line_.clear();
+  if (is_cut_ || !refill()) return false;
   ++number_;
+  bool has_ended = false;
+  while (!has_ended && line_.size() < kMaxLength && refill())
+    has_ended = add_up_to(kMaxLength - line_.size());
+  is_cut_ = !has_ended && refill();
+  if (!is_cut_ && line_.ends_with('\r')) line_.pop_back();
   return true;
 }
 

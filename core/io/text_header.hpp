@@ -38,17 +38,23 @@ class HeaderLines {
 
   /// Goes on to the next line. False at the end of the file.
   bool next();
-  /// The line without its end (\n or \r\n); of a line longer than kMaxLength only that much, and is_cut().
+  /// The line without its end (\n or \r\n); of a line longer than kMaxLength only that much, and is_cut(). The rest is
+  /// read only to get to the next line.
   std::string_view line() const { return line_; }
   bool is_cut() const { return is_cut_; }
   std::uint64_t number() const { return number_; }
-  /// Bytes of the file up to the end of the line, line end included.
+  /// Bytes of the file up to the end of a line that is not cut, line end included.
   std::uint64_t end() const { return end_; }
 
  private:
+  /// Reads on where the buffer is used up. False at the end of the file.
+  bool refill();
+  /// Moves at most that many bytes of the buffer to the line. Returns whether it has ended.
+  bool add_up_to(std::size_t most);
+
   std::shared_ptr<const InputFile> file_;
   std::vector<std::byte> buffer_;
-  std::size_t position_ = 0;  ///< of the next line in the buffer
+  std::size_t position_ = 0;  ///< of what is next in the buffer
   std::string line_;
   bool is_cut_ = false;
   std::uint64_t number_ = 0, end_ = 0;
