@@ -59,7 +59,7 @@ constexpr std::array<std::string_view, 40> kMetaKeys{"ObjectType",
 bool is_meta_key(std::string_view key, const std::string &what) {
   for (const std::string_view known : kMetaKeys) {
     if (key == known) return true;
-    if (lower_case(key) == lower_case(known)) {
+    if (key.size() == known.size() && lower_case(key) == lower_case(known)) {
       throw Error("{}: broken header: {} must be written '{}'", what, quote(key), known);
     }
   }
