@@ -106,6 +106,7 @@ std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrid
     throw Error("{}: --dims and --type are for raw files; this file's header gives its own", path.string());
   }
   if (overrides.spacing) header->info.spacing = *overrides.spacing;
+  check_volume_info(header->info, path.string());
   return open_voxels(*header);
 }
 

@@ -247,6 +247,8 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
   EXPECT_EQ(
       open_volume(folder_ / "a.nhdr", {.dims = {}, .type = {}, .spacing = glm::dvec3(7)})->info().spacing,
       glm::dvec3(7));
+  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: a.raw" + std::string(1, '\0') + "x\n"),
+                 "no file can have this name");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: \x1b[1m\xff.raw\n"),
                  "its data file '?[1m?.raw': no such file");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: slice%03d.raw 1 5 1\n"), "several files");
@@ -412,6 +414,11 @@ TEST_F(NiftiFile, RasBecomesLps) {
     EXPECT_EQ(reader->info().type, VoxelType::kUint8);
     expect_ramp(*reader);
   }
+}
+
+TEST_F(NiftiFile, OtherFilesOfTheNameAreNotRead) {
+  write_file(folder_ / "a.nii", NiftiFields().bytes() + std::string(60, 'x'));
+  expect_read("a.nii.gz", gzip(NiftiFields().bytes() + ramp()));  // ITK would take the voxels of a.nii
 }
 
 TEST_F(NiftiFile, OriginInTheUnitOfTheSpacings) {

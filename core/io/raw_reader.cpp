@@ -253,7 +253,6 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
 
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
-  check_volume_info(header.info, voxels.what);
   const auto file = std::make_shared<const InputFile>(voxels.file, voxels.what);
   const std::uint64_t begin = find_begin(header, file);
   check_size(header, file->size() - begin);
@@ -294,6 +293,7 @@ std::unique_ptr<VolumeReader> open_raw(const fs::path &path, bool is_gzipped, co
   header.info.dims = overrides.dims ? *overrides.dims : name->dims;
   header.info.type = overrides.type ? *overrides.type : name->type;
   header.info.spacing = overrides.spacing.value_or(glm::dvec3(1.0));
+  check_volume_info(header.info, path.string());
   header.voxels.file = path;
   header.voxels.what = path.string();
   header.voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;

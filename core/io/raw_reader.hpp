@@ -30,7 +30,7 @@ std::optional<RawName> parse_raw_name(std::string_view stem);
 /// Converts little-endian voxels of `type` to float32. voxels.size() == out.size() * size_of(type).
 void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out);
 
-/// Opens the voxels that a header describes; header.info.spacing and all else may have been replaced. Layers are read as
+/// Opens the voxels that a header describes, whose info has passed check_volume_info(). Layers are read as
 /// they are asked for, in pieces. Throws Error before anything is allocated where the file has too few bytes for the voxels:
 /// by its exact length where they are not packed, by what could become of it where they are. The reader throws Error where
 /// voxels cannot be unpacked or parsed, and with the last layer where the data does not end with it.
