@@ -6,7 +6,9 @@
 #include <utility>
 
 #include "core/error.hpp"
-#include "core/io/itk_reader.hpp"
+#include "core/io/meta_image_header.hpp"
+#include "core/io/nifti_header.hpp"
+#include "core/io/nrrd_header.hpp"
 #include "core/io/raw_reader.hpp"
 
 namespace isowave {
@@ -90,20 +92,22 @@ std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrid
     return std::any_of(endings.begin(), endings.end(),
                        [&](std::string_view ending) { return name.ends_with(ending); });
   };
-  if (ends_with({".raw", ".raw.gz"})) return open_raw(path, overrides);
+  if (ends_with({".raw", ".raw.gz"})) return open_raw(path, ends_with({".gz"}), overrides);
 
-  std::optional<ItkFormat> format;
-  if (ends_with({".nrrd", ".nhdr"})) format = ItkFormat::kNrrd;
-  if (ends_with({".mha", ".mhd"})) format = ItkFormat::kMetaImage;
-  if (ends_with({".nii", ".nii.gz"})) format = ItkFormat::kNifti;
-  if (!format) {
+  std::optional<VolumeHeader> header;
+  if (ends_with({".nrrd", ".nhdr"})) header = read_nrrd_header(path);
+  if (ends_with({".mha", ".mhd"})) header = read_meta_image_header(path);
+  if (ends_with({".nii", ".nii.gz"})) header = read_nifti_header(path, ends_with({".gz"}));
+  if (!header) {
     throw Error("{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
                 path.string());
   }
   if (overrides.dims || overrides.type) {
     throw Error("{}: --dims and --type are for raw files; this file's header gives its own", path.string());
   }
-  return open_with_itk(path, *format, overrides.spacing);
+  if (overrides.spacing) header->info.spacing = *overrides.spacing;
+  check_volume_info(header->info, path.string());
+  return open_voxels(*header);
 }
 
 }  // namespace isowave

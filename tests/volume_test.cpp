@@ -161,6 +161,12 @@ TEST(RawReader, WrongSizesAreRefused) {
   }
   EXPECT_THAT([&] { read_gzip(noise); }, ThrowsMessage<Error>(HasSubstr("not a gzip file")));
   EXPECT_THROW(read_gzip(stream + gzip("y")), Error) << "a second member adds a byte";
+  EXPECT_NO_THROW(read_gzip(stream + gzip("") + gzip("")));
+  EXPECT_NO_THROW(read_gzip(gzip(noise.substr(0, 50)) + gzip(noise.substr(50))));
+  for (const std::string &rest :
+       {std::string(1, '\0'), std::string(512, '\0'), std::string("x"), std::string("\x1f")}) {
+    EXPECT_THROW(read_gzip(stream + rest), Error);
+  }
   std::string flipped = stream;
   flipped[stream.size() - 6] ^= 1;  // in the checksum
   EXPECT_THAT([&] { read_gzip(flipped); }, ThrowsMessage<Error>(HasSubstr("broken gzip stream")));

@@ -1,18 +1,17 @@
 #include "core/io/raw_reader.hpp"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <charconv>
-#include <cstdio>
 #include <cstring>
-#include <limits>
+#include <stdexcept>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/io/byte_source.hpp"
+#include "core/io/text_voxels.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;
@@ -22,66 +21,30 @@ static_assert(std::endian::native == std::endian::little,
 
 namespace {
 
-/// Voxel bytes in file order.
-class ByteSource {
- public:
-  virtual ~ByteSource() = default;
-  /// Reads up to bytes.size() bytes; fewer only at the end of the data.
-  virtual std::size_t read(std::span<std::byte> bytes) = 0;
-};
+void swap_bytes(std::span<std::byte> bytes, std::size_t voxel_bytes) {
+  for (; !bytes.empty(); bytes = bytes.subspan(voxel_bytes)) std::ranges::reverse(bytes.first(voxel_bytes));
+}
 
-class FileSource : public ByteSource {
- public:
-  explicit FileSource(const fs::path &path)
-      : path_(path), file_(std::fopen(path.c_str(), "rb"), &std::fclose) {
-    if (!file_) throw Error("{}: cannot open: {}", path.string(), std::strerror(errno));
-  }
-  std::size_t read(std::span<std::byte> bytes) override {
-    const std::size_t count = std::fread(bytes.data(), 1, bytes.size(), file_.get());
-    if (count < bytes.size() && std::ferror(file_.get())) {
-      throw Error("{}: cannot read: {}", path_.string(), std::strerror(errno));
+/// As ITK scales: voxels but float64 become float32 first.
+void scale_to_float(const VoxelLayout &voxels, std::span<const std::byte> bytes, std::span<float> out) {
+  if (voxels.type == VoxelType::kFloat64) {
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      double value = 0;
+      std::memcpy(&value, bytes.data() + i * sizeof(double), sizeof(double));
+      out[i] = static_cast<float>(value * voxels.slope + voxels.intercept);
     }
-    return count;
+    return;
   }
+  convert_to_float(voxels.type, bytes, out);
+  for (float &value : out) value = static_cast<float>(double(value) * voxels.slope + voxels.intercept);
+}
 
- private:
-  fs::path path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE *)> file_;
-};
-
-class GzipSource : public ByteSource {
- public:
-  explicit GzipSource(const fs::path &path) : path_(path), file_(::gzopen(path.c_str(), "rb"), &::gzclose) {
-    if (!file_) throw Error("{}: cannot open: {}", path.string(), std::strerror(errno));
-    ::gzbuffer(file_.get(), 1u << 18);
-    // zlib passes through what is not gzip; here that is a wrong file.
-    if (::gzdirect(file_.get()) != 0) throw Error("{}: not a gzip file, despite its name", path.string());
-  }
-  std::size_t read(std::span<std::byte> bytes) override {
-    std::size_t done = 0;
-    while (done < bytes.size()) {
-      const auto part = unsigned(std::min<std::size_t>(bytes.size() - done, 1u << 30));
-      const int count = ::gzread(file_.get(), bytes.data() + done, part);
-      int code = Z_OK;
-      const char *reason = ::gzerror(file_.get(), &code);
-      if (code == Z_BUF_ERROR) throw Error("{}: truncated: the gzip stream ends too early", path_.string());
-      if (count < 0 || code < 0) throw Error("{}: broken gzip stream ({})", path_.string(), reason);
-      done += std::size_t(count);
-      if (unsigned(count) < part) break;
-    }
-    return done;
-  }
-
- private:
-  fs::path path_;
-  std::unique_ptr<gzFile_s, int (*)(gzFile)> file_;
-};
-
+/// Reads the voxels of a layout from a source that begins with them.
 class RawReader : public VolumeReader {
  public:
-  RawReader(const fs::path &path, const VolumeInfo &info, std::unique_ptr<ByteSource> source)
-      : path_(path), source_(std::move(source)) {
-    info_ = info;
+  RawReader(const VolumeHeader &header, std::unique_ptr<ByteSource> source)
+      : voxels_(header.voxels), source_(std::move(source)) {
+    info_ = header.info;
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
@@ -91,6 +54,7 @@ class RawReader : public VolumeReader {
       throw std::invalid_argument(
           "RawReader: layers not ascending, outside the volume, or out of a wrong size");
     }
+    if (!std::exchange(begun_, true)) skip_bytes(voxels_.bytes_to_skip);
     skip(layer_size * (z_begin - next_layer_));
     read_voxels(out);
     next_layer_ = z_begin + num_layers;
@@ -102,22 +66,37 @@ class RawReader : public VolumeReader {
 
   /// Reads the next voxels piece by piece, so that the raw bytes need no buffer of the size of `out`.
   void read_voxels(std::span<float> out) {
-    piece_.resize(kPieceVoxels * size_of(info_.type));
+    piece_.resize(kPieceVoxels * size_of(voxels_.type));
     while (!out.empty()) {
       const std::size_t count = std::min(kPieceVoxels, out.size());
-      const std::span bytes = std::span(piece_).first(count * size_of(info_.type));
+      const std::span bytes = std::span(piece_).first(count * size_of(voxels_.type));
       read_exactly(bytes);
-      convert_to_float(info_.type, bytes, out.first(count));
+      if (voxels_.big_endian) swap_bytes(bytes, size_of(voxels_.type));
+      if (voxels_.is_scaled()) {
+        scale_to_float(voxels_, bytes, out.first(count));
+      } else {
+        convert_to_float(voxels_.type, bytes, out.first(count));
+      }
       out = out.subspan(count);
     }
   }
 
   void skip(std::uint64_t num_voxels) {
-    piece_.resize(kPieceVoxels * size_of(info_.type));
+    piece_.resize(kPieceVoxels * size_of(voxels_.type));
     while (num_voxels > 0) {
       const auto count = std::size_t(std::min<std::uint64_t>(kPieceVoxels, num_voxels));
-      read_exactly(std::span(piece_).first(count * size_of(info_.type)));
+      read_exactly(std::span(piece_).first(count * size_of(voxels_.type)));
       num_voxels -= count;
+    }
+  }
+
+  /// Bytes that stand before the voxels.
+  void skip_bytes(std::uint64_t count) {
+    piece_.resize(kPieceVoxels * size_of(voxels_.type));
+    while (count > 0) {
+      const std::span bytes = std::span(piece_).first(std::min<std::uint64_t>(piece_.size(), count));
+      if (source_->read(bytes) < bytes.size()) fail_size("truncated");
+      count -= bytes.size();
     }
   }
 
@@ -130,23 +109,23 @@ class RawReader : public VolumeReader {
   /// After the last layer nothing may follow. Also makes zlib check the stream's checksum.
   void check_end() {
     std::vector<std::byte> rest(1u << 18);
-    const std::uint64_t expected = bytes_read_;
-    while (const std::size_t count = source_->read(rest)) bytes_read_ += count;
-    if (bytes_read_ != expected) fail_size("too long");
+    const std::size_t count = source_->read(rest);
+    bytes_read_ += count;
+    if (count > 0) fail_size("too long", count == rest.size() ? "at least " : "");
   }
 
-  [[noreturn]] void fail_size(std::string_view how) const {
-    throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", path_.string(), how, info_.dims.x,
-                info_.dims.y, info_.dims.z, to_string(info_.type), info_.num_voxels() * size_of(info_.type),
-                bytes_read_);
+  [[noreturn]] void fail_size(std::string_view how, std::string_view at_least = "") const {
+    throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}{}", voxels_.what, how, info_.dims.x,
+                info_.dims.y, info_.dims.z, to_string(voxels_.type),
+                info_.num_voxels() * size_of(voxels_.type), at_least, bytes_read_);
   }
 
-  fs::path path_;
+  VoxelLayout voxels_;
   std::unique_ptr<ByteSource> source_;
   std::vector<std::byte> piece_;
   std::uint64_t bytes_read_ = 0;
   std::uint32_t next_layer_ = 0;
-  bool end_checked_ = false;
+  bool begun_ = false, end_checked_ = false;
 };
 
 template <class T>
@@ -156,6 +135,62 @@ void convert(std::span<const std::byte> voxels, std::span<float> out) {
     std::memcpy(&value, voxels.data() + i * sizeof(T), sizeof(T));
     out[i] = static_cast<float>(value);
   }
+}
+
+bool is_compressed(VoxelEncoding encoding) {
+  return encoding == VoxelEncoding::kGzip || encoding == VoxelEncoding::kGzipOrZlib;
+}
+
+[[noreturn]] void fail_size(const VolumeHeader &header, std::string_view how, std::string_view needed,
+                            std::uint64_t found) {
+  const VolumeInfo &info = header.info;
+  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", header.voxels.what, how, info.dims.x,
+              info.dims.y, info.dims.z, to_string(header.voxels.type), needed, found);
+}
+
+/// Where voxels, or the compressed data that holds them, begin in the file.
+std::uint64_t find_begin(const VolumeHeader &header, const std::shared_ptr<const InputFile> &file) {
+  const VoxelLayout &voxels = header.voxels;
+  const std::uint64_t bytes = header.info.num_voxels() * size_of(voxels.type);
+  std::uint64_t begin = std::min(voxels.offset, file->size());
+  if (voxels.from_end) {
+    if (file->size() - begin < bytes)
+      fail_size(header, "truncated", fmt::format("{}", bytes), file->size() - begin);
+    return file->size() - bytes;
+  }
+  CharacterSource characters(file, begin);
+  for (std::uint64_t line = 0; line < voxels.lines_to_skip; ++line) {
+    std::optional<char> c;
+    do {
+      c = characters.next();
+      if (!c)
+        throw Error("{}: truncated: {} lines to skip, found {}", voxels.what, voxels.lines_to_skip, line);
+      ++begin;
+    } while (*c != '\n');
+  }
+  if (is_compressed(voxels.encoding)) return begin;
+  return begin + std::min(voxels.bytes_to_skip, file->size() - begin);
+}
+
+/// Refuses at once what cannot be right: `found` bytes of the file from where voxels begin.
+void check_size(const VolumeHeader &header, std::uint64_t found) {
+  const VoxelLayout &voxels = header.voxels;
+  const std::uint64_t bytes = header.info.num_voxels() * size_of(voxels.type);
+  std::uint64_t least = bytes;
+  if (voxels.encoding == VoxelEncoding::kHex) least = bytes * 2;
+  if (voxels.encoding == VoxelEncoding::kText)
+    least = header.info.num_voxels() * 2 - 1;  // a digit each, and spaces
+  if (is_compressed(voxels.encoding)) {
+    least = bytes / kMaxDeflateRatio;
+    if (voxels.packed_bytes && *voxels.packed_bytes != found) {
+      throw Error("{}: {} bytes of compressed voxels, but the header says {}", voxels.what, found,
+                  *voxels.packed_bytes);
+    }
+  }
+  const bool is_raw = voxels.encoding == VoxelEncoding::kRaw;
+  if (found < least)
+    fail_size(header, "truncated", fmt::format("{}{}", is_raw ? "" : "at least ", least), found);
+  if (is_raw && found > least) fail_size(header, "too long", fmt::format("{}", least), found);
 }
 
 /// Parses a whole string as an unsigned number.
@@ -216,9 +251,37 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
   return result;
 }
 
-std::unique_ptr<VolumeReader> open_raw(const fs::path &path, const RawOverrides &overrides) {
-  const bool gzipped = path.extension() == ".gz";
-  const fs::path stem = gzipped ? path.stem().stem() : path.stem();
+std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
+  const VoxelLayout &voxels = header.voxels;
+  const auto file = std::make_shared<const InputFile>(voxels.file, voxels.what);
+  const std::uint64_t begin = find_begin(header, file);
+  check_size(header, file->size() - begin);
+  VolumeHeader remaining = header;
+  std::unique_ptr<ByteSource> source;
+  switch (voxels.encoding) {
+    case VoxelEncoding::kRaw:
+      source = std::make_unique<FileSource>(file, begin);
+      break;
+    case VoxelEncoding::kGzip:
+      source = std::make_unique<InflateSource>(file, begin, Packing::kGzip);
+      break;
+    case VoxelEncoding::kGzipOrZlib:
+      source = std::make_unique<InflateSource>(file, begin, Packing::kGzipOrZlib);
+      break;
+    case VoxelEncoding::kHex:
+      source = std::make_unique<HexSource>(file, begin);
+      break;
+    case VoxelEncoding::kText:
+      source = std::make_unique<NumberSource>(file, begin, voxels.type);
+      remaining.voxels.big_endian = false;
+      break;
+  }
+  if (!is_compressed(voxels.encoding)) remaining.voxels.bytes_to_skip = 0;
+  return std::make_unique<RawReader>(remaining, std::move(source));
+}
+
+std::unique_ptr<VolumeReader> open_raw(const fs::path &path, bool is_gzipped, const RawOverrides &overrides) {
+  const fs::path stem = is_gzipped ? path.stem().stem() : path.stem();
   const std::optional<RawName> name = parse_raw_name(stem.string());
   if (!name && !(overrides.dims && overrides.type)) {
     throw Error(
@@ -226,33 +289,16 @@ std::unique_ptr<VolumeReader> open_raw(const fs::path &path, const RawOverrides 
         "--type",
         path.string());
   }
-  VolumeInfo info;
-  info.dims = overrides.dims ? *overrides.dims : name->dims;
-  info.type = overrides.type ? *overrides.type : name->type;
-  info.spacing = overrides.spacing.value_or(glm::dvec3(1.0));
-  check_volume_info(info, path.string());
-
-  const std::uint64_t expected = info.num_voxels() * size_of(info.type);
-  std::error_code error;
-  const std::uint64_t file_size = fs::file_size(path, error);
-  if (error) throw Error("{}: cannot open: {}", path.string(), error.message());
-  if (!gzipped && file_size != expected) {
-    throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", path.string(),
-                file_size < expected ? "truncated" : "too long", info.dims.x, info.dims.y, info.dims.z,
-                to_string(info.type), expected, file_size);
-  }
-  if (gzipped && file_size < expected / kMaxDeflateRatio) {
-    throw Error("{}: truncated: {}x{}x{} {} voxels need {} bytes, which cannot come from {} gzipped ones",
-                path.string(), info.dims.x, info.dims.y, info.dims.z, to_string(info.type), expected,
-                file_size);
-  }
-  std::unique_ptr<ByteSource> source;
-  if (gzipped) {
-    source = std::make_unique<GzipSource>(path);
-  } else {
-    source = std::make_unique<FileSource>(path);
-  }
-  return std::make_unique<RawReader>(path, info, std::move(source));
+  VolumeHeader header;
+  header.info.dims = overrides.dims ? *overrides.dims : name->dims;
+  header.info.type = overrides.type ? *overrides.type : name->type;
+  header.info.spacing = overrides.spacing.value_or(glm::dvec3(1.0));
+  check_volume_info(header.info, path.string());
+  header.voxels.file = path;
+  header.voxels.what = path.string();
+  header.voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;
+  header.voxels.type = header.info.type;
+  return open_voxels(header);
 }
 
 }  // namespace isowave

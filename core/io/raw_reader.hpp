@@ -1,5 +1,6 @@
 #pragma once
-// Headerless voxel files in the Open-SciVis naming: `NAME_XxYxZ_TYPE.raw`, optionally gzipped (`.raw.gz`).
+// Voxels of any file, by what its header said or, for headerless files in the Open-SciVis naming, its name:
+// `NAME_XxYxZ_TYPE.raw`, optionally gzipped (`.raw.gz`).
 
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/io/volume_header.hpp"
 #include "core/volume.hpp"
 
 namespace isowave {
@@ -28,11 +30,14 @@ std::optional<RawName> parse_raw_name(std::string_view stem);
 /// Converts little-endian voxels of `type` to float32. voxels.size() == out.size() * size_of(type).
 void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out);
 
-/// Opens a .raw or .raw.gz file; see open_volume. An uncompressed file of the wrong size is refused here, a
-/// gzip stream of the wrong length by the read that meets its end (the last layer's).
-std::unique_ptr<VolumeReader> open_raw(const std::filesystem::path &path, const RawOverrides &overrides);
+/// Opens the voxels that a header describes, whose info has passed check_volume_info(). Layers are read as
+/// they are asked for, in pieces. Throws Error before anything is allocated where the file has too few bytes for the voxels:
+/// by its exact length where they are not packed, by what could become of it where they are. The reader throws Error where
+/// voxels cannot be unpacked or parsed, and with the last layer where the data does not end with it.
+std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header);
 
-/// deflate cannot shrink data more than this: a bound on what a compressed file may unpack to.
-inline constexpr std::uint64_t kMaxDeflateRatio = 1032;
+/// Opens a .raw or .raw.gz file; see open_volume.
+std::unique_ptr<VolumeReader> open_raw(const std::filesystem::path &path, bool is_gzipped,
+                                       const RawOverrides &overrides);
 
 }  // namespace isowave

@@ -1,0 +1,263 @@
+#include "core/io/nifti_header.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <optional>
+
+#include "core/error.hpp"
+#include "core/io/byte_source.hpp"
+
+namespace isowave {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kNiftiHeaderBytes = 348;
+
+/// The bytes of the header, and their numbers by where they stand.
+class NiftiHeader {
+ public:
+  NiftiHeader(const fs::path &path, bool is_gzipped) : what_(path.string()) {
+    const auto file = std::make_shared<const InputFile>(path, what_);
+    std::unique_ptr<ByteSource> source;
+    if (is_gzipped) {
+      source = std::make_unique<InflateSource>(file, 0, Packing::kGzip);
+    } else {
+      source = std::make_unique<FileSource>(file, 0);
+    }
+    if (source->read(bytes_) != kNiftiHeaderBytes) fail("shorter than a NIfTI header");
+    constexpr std::int32_t kNifti2HeaderBytes = 540;
+    const auto size_is = [&](std::int32_t size) { return get<std::int32_t>(0) == size; };
+    is_swapped_ = true;
+    is_swapped_ = size_is(std::int32_t(kNiftiHeaderBytes)) || size_is(kNifti2HeaderBytes);
+    if (size_is(kNifti2HeaderBytes)) fail("NIfTI-2, which is not supported: convert it to NIfTI-1");
+    if (!size_is(std::int32_t(kNiftiHeaderBytes))) fail("not a NIfTI-1 file");
+  }
+
+  const std::string &what() const { return what_; }
+  bool is_big_endian() const { return is_swapped_; }
+  bool has_at(std::size_t at, std::string_view text) const {
+    return std::memcmp(bytes_.data() + at, text.data(), text.size()) == 0;
+  }
+
+  template <class T>
+  T get(std::size_t at) const {
+    std::array<std::byte, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), bytes_.data() + at, sizeof(T));
+    if (is_swapped_) std::reverse(bytes.begin(), bytes.end());
+    T value;
+    std::memcpy(&value, bytes.data(), sizeof(T));
+    return value;
+  }
+  double get_finite(std::size_t at, std::string_view name) const {
+    const float value = get<float>(at);
+    if (!std::isfinite(value)) throw Error("{}: broken header: {} is {}", what_, name, value);
+    return value;
+  }
+
+  [[noreturn]] void fail(std::string_view reason) const { throw Error("{}: {}", what_, reason); }
+
+ private:
+  std::string what_;
+  std::array<std::byte, kNiftiHeaderBytes> bytes_{};
+  bool is_swapped_ = false;
+};
+
+VoxelType nifti_voxel_type(const NiftiHeader &header) {
+  struct Code {
+    std::int16_t code;
+    VoxelType type;
+  };
+  constexpr std::array<Code, 8> kCodes{{{2, VoxelType::kUint8},
+                                        {4, VoxelType::kInt16},
+                                        {8, VoxelType::kInt32},
+                                        {16, VoxelType::kFloat32},
+                                        {64, VoxelType::kFloat64},
+                                        {256, VoxelType::kInt8},
+                                        {512, VoxelType::kUint16},
+                                        {768, VoxelType::kUint32}}};
+  const auto code = header.get<std::int16_t>(70);
+  const auto bits = header.get<std::int16_t>(72);
+  for (const Code &candidate : kCodes) {
+    if (candidate.code != code) continue;
+    if (bits != 8 * std::int16_t(size_of(candidate.type))) {
+      throw Error("{}: broken header: bitpix {} does not fit datatype {}", header.what(), bits, code);
+    }
+    return candidate.type;
+  }
+  throw Error(
+      "{}: NIfTI datatype {} is not supported: need one number of at most 32 bits, or float64, per voxel",
+      header.what(), code);
+}
+
+void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
+  constexpr std::size_t kDimsAt = 40;
+  const int num_axes = header.get<std::int16_t>(kDimsAt);
+  if (num_axes < 1 || num_axes > 7) throw Error("{}: broken header: {} axes", header.what(), num_axes);
+  bool is_volume = num_axes >= 3;
+  for (int axis = 1; axis <= num_axes; ++axis) {
+    const int count = header.get<std::int16_t>(kDimsAt + 2 * std::size_t(axis));
+    if (count <= 0) throw Error("{}: broken header: {} voxels along axis {}", header.what(), count, axis);
+    if (axis <= 3) {
+      info.dims[axis - 1] = std::uint32_t(count);
+    } else if (count != 1) {
+      is_volume = false;
+    }
+  }
+  if (!is_volume) throw Error("{}: an image of {} axes, need a volume of 3", header.what(), num_axes);
+  constexpr std::int16_t kMatrixIntent = 1004;
+  if (header.get<std::int16_t>(68) == kMatrixIntent) header.fail("matrices as voxels are not supported");
+}
+
+/// pixdim, where 0 is unknown.
+glm::dvec3 read_nifti_spacing(const NiftiHeader &header) {
+  glm::dvec3 spacing;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double value = header.get_finite(80 + 4 * std::size_t(axis), "pixdim");
+    if (value < 0) throw Error("{}: broken header: pixdim {}: must be positive", header.what(), value);
+    spacing[axis] = value == 0 ? 1.0 : value;
+  }
+  return spacing;
+}
+
+/// From index space to RAS, in the file's units.
+struct Placement {
+  glm::dmat3 direction;  ///< column a: unit direction of index axis a
+  glm::dvec3 origin;
+};
+
+Placement read_qform(const NiftiHeader &header) {
+  const double b = header.get_finite(256, "quatern_b"), c = header.get_finite(260, "quatern_c"),
+               d = header.get_finite(264, "quatern_d");
+  const double flip = header.get_finite(76, "pixdim[0]") < 0 ? -1.0 : 1.0;
+  constexpr double kRounding = 1e-5;
+  const double squares = b * b + c * c + d * d;
+  if (squares > 1.0 + kRounding) header.fail("broken header: the qform's quaternion is longer than 1");
+  const double a = std::sqrt(std::max(0.0, 1.0 - squares));
+  const double length = std::sqrt(a * a + squares);
+  const double w = a / length, x = b / length, y = c / length, z = d / length;
+  Placement placement;
+  placement.direction[0] = {w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)};
+  placement.direction[1] = {2 * (x * y - w * z), w * w + y * y - x * x - z * z, 2 * (y * z + w * x)};
+  placement.direction[2] =
+      flip * glm::dvec3(2 * (x * z + w * y), 2 * (y * z - w * x), w * w + z * z - x * x - y * y);
+  for (int row = 0; row < 3; ++row)
+    placement.origin[row] = header.get_finite(268 + 4 * std::size_t(row), "qoffset");
+  return placement;
+}
+
+/// Empty where its axes are not at right angles or its spacings are not those given.
+std::optional<Placement> read_sform(const NiftiHeader &header, const glm::dvec3 &spacing) {
+  Placement placement;
+  for (int row = 0; row < 3; ++row) {
+    const std::size_t at = 280 + 16 * std::size_t(row);
+    for (int axis = 0; axis < 3; ++axis) {
+      placement.direction[axis][row] = header.get_finite(at + 4 * std::size_t(axis), "the sform");
+    }
+    placement.origin[row] = header.get_finite(at + 12, "the sform");
+  }
+  // Writers round to float32 and from other forms.
+  constexpr double kSpacingTolerance = 1e-3, kSpacingRatio = 1e-2, kAngleTolerance = 1e-4;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double length = glm::length(placement.direction[axis]);
+    if (std::abs(length - spacing[axis]) > std::min(kSpacingTolerance, kSpacingRatio * spacing[axis]))
+      return std::nullopt;
+    placement.direction[axis] /= length;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const double cosine = glm::dot(placement.direction[axis], placement.direction[(axis + 1) % 3]);
+    if (!(std::abs(cosine) <= kAngleTolerance)) return std::nullopt;
+  }
+  return placement;
+}
+
+std::optional<Placement> read_placement(const NiftiHeader &header, const glm::dvec3 &spacing) {
+  constexpr int kLastCode = 5, kScanner = 1;
+  const int qform = header.get<std::int16_t>(252), sform = header.get<std::int16_t>(254);
+  for (const int code : {qform, sform}) {
+    if (code < 0 || code > kLastCode)
+      throw Error("{}: broken header: code {} of a qform or sform", header.what(), code);
+  }
+  if (qform == 0 && sform == 0) return std::nullopt;
+  const std::optional<Placement> by_qform = qform > 0 ? std::optional(read_qform(header)) : std::nullopt;
+  const std::optional<Placement> by_sform = sform > 0 ? read_sform(header, spacing) : std::nullopt;
+  if (by_sform && (!by_qform || sform == kScanner)) return by_sform;
+  if (by_qform) return by_qform;
+  header.fail("its sform has shear or other spacings than pixdim, and there is no qform: not supported");
+}
+
+/// Millimetres in the unit of lengths.
+double length_unit(const NiftiHeader &header) {
+  constexpr int kSpaceBits = 7;
+  switch (header.get<std::uint8_t>(123) & kSpaceBits) {
+    case 0:  // unknown
+    case 2:
+      return 1.0;
+    case 1:
+      return 1e3;
+    case 3:
+      return 1e-3;
+    default:
+      header.fail("broken header: unknown unit of lengths in xyzt_units");
+  }
+}
+
+void set_nifti_geometry(const NiftiHeader &header, VolumeInfo &info) {
+  const glm::dvec3 spacing = read_nifti_spacing(header);
+  const double millimetres = length_unit(header);
+  info.spacing = spacing * millimetres;
+  const std::optional<Placement> placement = read_placement(header, spacing);
+  if (!placement) return;
+  const glm::dvec3 to_lps(-1, -1, 1);
+  for (int axis = 0; axis < 3; ++axis) info.direction[axis] = placement->direction[axis] * to_lps + 0.0;
+  info.origin = placement->origin * to_lps * millimetres + 0.0;
+}
+
+void set_nifti_scale(const NiftiHeader &header, VoxelLayout &voxels) {
+  const float slope = header.get<float>(112), intercept = header.get<float>(116);
+  if (std::isinf(slope)) header.fail("broken header: scl_slope is infinite");
+  if (slope == 0 || std::isnan(slope)) {
+    if (intercept == 0 || std::isnan(intercept)) return;  // voxels are not scaled
+    throw Error(
+        "{}: scl_inter {} without a scl_slope, which readers understand differently: set scl_slope to 1",
+        header.what(), intercept);
+  }
+  voxels.slope = slope;
+  voxels.intercept = header.get_finite(116, "scl_inter");
+}
+
+}  // namespace
+
+VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
+  const NiftiHeader bytes(path, is_gzipped);
+  constexpr std::size_t kMagicAt = 344;
+  if (bytes.has_at(kMagicAt, std::string_view("ni1\0", 4)))
+    bytes.fail("its voxels lie in an .img file: convert it to one file");
+  if (!bytes.has_at(kMagicAt, std::string_view("n+1\0", 4))) bytes.fail("not a NIfTI-1 file");
+
+  VolumeHeader header;
+  read_nifti_dims(bytes, header.info);
+  VoxelLayout &voxels = header.voxels;
+  voxels.file = path;
+  voxels.what = bytes.what();
+  voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;
+  voxels.type = nifti_voxel_type(bytes);
+  voxels.big_endian = bytes.is_big_endian();
+  set_nifti_scale(bytes, voxels);
+  header.info.type = voxels.is_scaled() && is_integer(voxels.type) ? VoxelType::kFloat32 : voxels.type;
+  set_nifti_geometry(bytes, header.info);
+
+  const double offset = bytes.get_finite(108, "vox_offset");
+  constexpr double kLeastOffset = 352, kMostOffset = 1e9;
+  if (offset < kLeastOffset || offset > kMostOffset || offset != std::floor(offset)) {
+    throw Error("{}: broken header: voxels at byte {}", bytes.what(), offset);
+  }
+  voxels.bytes_to_skip = std::uint64_t(offset);
+  return header;
+}
+
+}  // namespace isowave
