@@ -150,6 +150,16 @@ class ItkReader : public VolumeReader {
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
+    read_as(z_begin, num_layers, out, &convert_to_float);
+  }
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+    read_as(z_begin, num_layers, out, &convert_to_double);
+  }
+
+ private:
+  template <class Value, class Convert>
+  void read_as(std::uint32_t z_begin, std::uint32_t num_layers, std::span<Value> out,
+               const Convert &convert) {
     const std::uint64_t layer_size = std::uint64_t(info_.dims.x) * info_.dims.y;
     if (z_begin < next_layer_ || num_layers > info_.dims.z || z_begin > info_.dims.z - num_layers ||
         out.size() != layer_size * num_layers) {
@@ -160,20 +170,18 @@ class ItkReader : public VolumeReader {
     const std::uint64_t layer_bytes = layer_size * size_of(info_.type);
     if (by_layer_) {
       load(z_begin, num_layers);
-      convert_to_float(info_.type, voxels_, out);
+      convert(info_.type, voxels_, out);
     } else {
       if (voxels_.empty()) {
         verify_deflated(data_);
         load(0, info_.dims.z);
       }
-      convert_to_float(info_.type,
-                       std::span(voxels_).subspan(z_begin * layer_bytes, num_layers * layer_bytes), out);
+      convert(info_.type, std::span(voxels_).subspan(z_begin * layer_bytes, num_layers * layer_bytes), out);
     }
     next_layer_ = z_begin + num_layers;
     if (next_layer_ == info_.dims.z) std::vector<std::byte>().swap(voxels_);
   }
 
- private:
   void load(std::uint32_t z_begin, std::uint32_t num_layers) {
     with_itk(path_, "cannot read its voxels", [&] {
       voxels_.resize(std::size_t(info_.dims.x) * info_.dims.y * num_layers * size_of(info_.type));

@@ -85,6 +85,18 @@ class RawReader : public VolumeReader {
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
+    read_as(z_begin, num_layers, out, &convert_to_float);
+  }
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+    read_as(z_begin, num_layers, out, &convert_to_double);
+  }
+
+ private:
+  static constexpr std::size_t kPieceVoxels = 1u << 17;
+
+  template <class Value, class Convert>
+  void read_as(std::uint32_t z_begin, std::uint32_t num_layers, std::span<Value> out,
+               const Convert &convert) {
     const std::uint64_t layer_size = std::uint64_t(info_.dims.x) * info_.dims.y;
     if (z_begin < next_layer_ || num_layers > info_.dims.z || z_begin > info_.dims.z - num_layers ||
         out.size() != layer_size * num_layers) {
@@ -92,22 +104,20 @@ class RawReader : public VolumeReader {
           "RawReader: layers not ascending, outside the volume, or out of a wrong size");
     }
     skip(layer_size * (z_begin - next_layer_));
-    read_voxels(out);
+    read_voxels(out, convert);
     next_layer_ = z_begin + num_layers;
     if (next_layer_ == info_.dims.z && !std::exchange(end_checked_, true)) check_end();
   }
 
- private:
-  static constexpr std::size_t kPieceVoxels = 1u << 17;
-
   /// Reads the next voxels piece by piece, so that the raw bytes need no buffer of the size of `out`.
-  void read_voxels(std::span<float> out) {
+  template <class Value, class Convert>
+  void read_voxels(std::span<Value> out, const Convert &convert) {
     piece_.resize(kPieceVoxels * size_of(info_.type));
     while (!out.empty()) {
       const std::size_t count = std::min(kPieceVoxels, out.size());
       const std::span bytes = std::span(piece_).first(count * size_of(info_.type));
       read_exactly(bytes);
-      convert_to_float(info_.type, bytes, out.first(count));
+      convert(info_.type, bytes, out.first(count));
       out = out.subspan(count);
     }
   }
@@ -149,28 +159,19 @@ class RawReader : public VolumeReader {
   bool end_checked_ = false;
 };
 
-template <class T>
-void convert(std::span<const std::byte> voxels, std::span<float> out) {
+template <class T, class Value>
+void convert(std::span<const std::byte> voxels, std::span<Value> out) {
   for (std::size_t i = 0; i < out.size(); ++i) {
     T value;
     std::memcpy(&value, voxels.data() + i * sizeof(T), sizeof(T));
-    out[i] = static_cast<float>(value);
+    out[i] = static_cast<Value>(value);
   }
 }
 
-/// Parses a whole string as an unsigned number.
-std::optional<std::uint32_t> parse_uint(std::string_view text) {
-  std::uint32_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
-}  // namespace
-
-void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out) {
+template <class Value>
+void convert_voxels(VoxelType type, std::span<const std::byte> voxels, std::span<Value> out) {
   if (voxels.size() != out.size() * size_of(type))
-    throw std::invalid_argument("convert_to_float: sizes differ");
+    throw std::invalid_argument("convert_voxels: sizes differ");
   switch (type) {
     case VoxelType::kUint8:
       return convert<std::uint8_t>(voxels, out);
@@ -189,6 +190,23 @@ void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::sp
     case VoxelType::kFloat64:
       return convert<double>(voxels, out);
   }
+}
+
+/// Parses a whole string as an unsigned number.
+std::optional<std::uint32_t> parse_uint(std::string_view text) {
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out) {
+  convert_voxels(type, voxels, out);
+}
+void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::span<double> out) {
+  convert_voxels(type, voxels, out);
 }
 
 std::optional<RawName> parse_raw_name(std::string_view stem) {

@@ -27,6 +27,8 @@ std::optional<RawName> parse_raw_name(std::string_view stem);
 
 /// Converts little-endian voxels of `type` to float32. voxels.size() == out.size() * size_of(type).
 void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out);
+/// The same to float64, which holds all of them exactly.
+void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::span<double> out);
 
 /// Opens a .raw or .raw.gz file; see open_volume. An uncompressed file of the wrong size is refused here, a
 /// gzip stream of the wrong length by the read that meets its end (the last layer's).
