@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -82,6 +83,7 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
 }
 
 void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) {
+  if (!fits_float32(info_.type)) throw std::logic_error("this reader has voxels in float32 only");
   std::vector<float> voxels(out.size());
   read_layers(z_begin, num_layers, voxels);
   std::ranges::copy(voxels, out.begin());

@@ -59,7 +59,7 @@ class VolumeReader {
   virtual void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) = 0;
 
   /// As read_layers(), but every voxel exactly as the file has it. A reader of types that float32 does not hold
-  /// (fits_float32()) must override this one.
+  /// (fits_float32()) must override this one, which throws std::logic_error for them.
   virtual void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out);
 
  protected:

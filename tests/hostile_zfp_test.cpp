@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "core/error.hpp"
+#include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/zfp_accuracy.hpp"
 #include "core/zfp_file.hpp"
@@ -244,6 +245,31 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
   }
   EXPECT_GT(num_read, 10u);
   EXPECT_GT(num_refused, 400u);
+}
+
+/// Files of programs that did not count casts, whose errors are said too small.
+TEST_F(HostileZfp, ErrorsThatLeaveOutTheCastAreNotKnown) {
+  for (const std::string kind : {"float64", "int32", "float32"}) {
+    for (const std::string compression : {"--rate 6", "--tolerance-relative 0.01"}) {
+      const auto run = test::run_isowave("convert generate:gyroid_18x17x19_" + kind + " --levels 2 " +
+                                         compression + " -o " + quoted(path_));
+      ASSERT_EQ(run.status, 0) << run.err;
+      const CompressedVolume right = open_zfp_file(path_);
+      EXPECT_TRUE(known_max_error(right));
+      EXPECT_FALSE(right.bounds.codes.empty());
+      const Parts parts(test::read_file(path_));
+      json trailer = json::parse(parts.text);
+      const bool had_casts = trailer.erase("cast_counts") > 0;
+      EXPECT_EQ(had_casts, kind != "float32");
+      test::write_file(path_, with_trailer(parts.before, trailer.dump(), parts.version));
+      for (const CompressedVolume &read : {open_zfp_file(path_), read_zfp_file_info(path_)}) {
+        EXPECT_EQ(known_max_error(read), had_casts ? std::nullopt : right.max_error);
+      }
+      const CompressedVolume read = open_zfp_file(path_);
+      EXPECT_EQ(read.bounds.codes.empty(), had_casts);
+      EXPECT_EQ(read.coarser[0].bounds.codes.empty(), had_casts);
+    }
+  }
 }
 
 // ---- advice

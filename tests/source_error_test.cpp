@@ -11,7 +11,6 @@
 #include "core/level_bounds.hpp"
 #include "core/zfp_accuracy.hpp"
 #include "core/zfp_encode.hpp"
-#include "core/zfp_file.hpp"
 #include "kernels_cl/block_bound.h"
 #include "reference/cell_oracle.hpp"
 #include "reference/random.hpp"
@@ -228,26 +227,6 @@ TEST(SourceError, RangesAreOfFloatsAndOfTheSource) {
   const ValueRange range = read_in_chunks(reader, {}, nothing);
   EXPECT_EQ(range.coded, (std::array{16777216.0f, 16777216.0f}));
   EXPECT_EQ(range.source, (std::array{16777217.0, 16777217.0}));
-}
-
-TEST(SourceError, FilesThatLeaveOutTheCastHaveNoErrors) {
-  const TemporaryFolder folder;
-  for (const VoxelType type : {VoxelType::kFloat64, VoxelType::kFloat32}) {
-    ExactReader reader = sources()[1].reader();
-    CompressedVolume volume = compress(reader, {.measure_error = true, .levels = 2});
-    volume.info.type = type;
-    ZfpFileWriter file(folder / "a.zfp", volume);
-    for (std::size_t level = 0; level < 2; ++level) {
-      const std::vector<std::uint32_t> &words = level == 0 ? volume.words : volume.coarser[0].words;
-      file.write(std::as_bytes(std::span(words).first(words.size() - 2)), level);
-    }
-    file.commit(volume);
-    const std::string key = "cast_counts", bytes = test::read_file(folder / "a.zfp");
-    EXPECT_EQ(bytes.find(key) != std::string::npos, type == VoxelType::kFloat64);
-    const CompressedVolume read = open_zfp_file(folder / "a.zfp");
-    EXPECT_EQ(read.max_error, volume.max_error);
-    EXPECT_EQ(read.coarser[0].bounds.codes, volume.coarser[0].bounds.codes);
-  }
 }
 
 /// Values that one float32 stands for are apart.
