@@ -85,13 +85,15 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, 
 void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t> index,
                              std::span<const std::uint8_t> bounds) {
   layout.bounds_begin = static_cast<std::uint32_t>(index.size());
-  std::vector<std::uint32_t> packed((bounds.size() + 3) / 4);
-  for (std::size_t block = 0; block < bounds.size(); ++block)
-    packed[block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
-  if (index.empty() && packed.empty()) return;
-  block_index.emplace(device, "block index", index.size() + packed.size());
-  if (!index.empty()) block_index->write(index);
-  if (!packed.empty()) block_index->write(packed, index.size());
+  std::vector<std::uint32_t> both;
+  if (!bounds.empty()) {
+    both.assign(index.begin(), index.end());
+    both.resize(index.size() + (bounds.size() + 3) / 4);
+    for (std::size_t block = 0; block < bounds.size(); ++block)
+      both[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
+    index = both;
+  }
+  if (!index.empty()) block_index.emplace(device, "block index", index);
 }
 
 ocl::Defines DeviceStream::defines() const {
