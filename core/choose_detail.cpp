@@ -80,7 +80,7 @@ void advise(const CompressedVolume &volume, double error, double max_error, Deta
     choice.advice =
         fmt::format("{}; a volume converted with --tolerance {:.2g} would do", half, *choice.tolerance);
   } else if (error <= least) {
-    choice.advice = "and voxels can hardly be stored with a smaller error than these";
+    choice.advice = "voxels can hardly be stored with a smaller error than these have";
   } else if (choice.median > max_error) {
     choice.advice = fmt::format("{}; no error that voxels can be stored with would do", half);
   } else {
@@ -115,7 +115,8 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
     renderer.set_max_pixel_error(detail.max_pixel_error / scale);
     renderer.set_value_error(detail.value_error);
   };
-  const std::optional<double> error = known_max_error(volume);  // or certify() throws
+  // Neither is known: certify() throws.
+  const double error = known_max_error(volume).value_or(double{largest_bound(volume.bounds)});
   DetailChoice choice;
   const auto try_out = [&](const Detail &detail) {
     set(detail, stride);
@@ -133,7 +134,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
     choice.median = stride * at_full_detail.median;
     const double best = choice.tries.front().certified;
     choice.reachable = best >= 0.5;
-    if (!choice.reachable) advise(volume, *error, max_error, choice);
+    if (!choice.reachable) advise(volume, error, max_error, choice);
     const auto suffices = [&](const Detail &detail) {
       try_out(detail);
       return choice.tries.back().certified >= best - kLostShare;
@@ -153,7 +154,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
       if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.max_pixel_error = coarsest;
     }
     if (choice.reachable && volume.rate() > kMinPlaneRate) {
-      choice.detail.value_error = first_to_suffice(value_errors(volume, *error), [&](double value_error) {
+      choice.detail.value_error = first_to_suffice(value_errors(volume, error), [&](double value_error) {
         return Detail{choice.detail.max_pixel_error, value_error};
       });
     }

@@ -109,7 +109,7 @@ void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
 
 /// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more levels than it can have).
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
-/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each block. Writes to a temporary name and renames;
+/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each block, 9 where float32 does not hold all voxels. Writes to a temporary name and renames;
 /// nothing is left behind on an error. Returns what was written, but for the words, which stay empty.
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
