@@ -21,6 +21,14 @@ inline float rounded_up(double error) {
   return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
 }
 
+/// Of voxels that are off by `error` from voxels that are off by `lost` from the source (Chunk::lost). Never below the sum.
+inline double with_lost(double error, float lost) {
+  const double least = std::min(error, double{lost}), largest = std::max(error, double{lost});
+  const double sum = largest + least;
+  const bool is_below = sum - largest < least;  // the difference is exact
+  return is_below ? std::nextafter(sum, std::numeric_limits<double>::infinity()) : sum;
+}
+
 /// Largest |decoded - source| of a block's voxels, at each place (bound_place()).
 struct BlockError {
   std::array<double, ISO_BOUND_PLACES> at_place{};
@@ -29,6 +37,9 @@ struct BlockError {
   void add(std::uint32_t voxel, double error) {
     double &largest = at_place[bound_place(voxel)];
     largest = std::max(largest, error);
+  }
+  void add_lost(float lost) {
+    for (double &largest : at_place) largest = with_lost(largest, lost);
   }
   double largest() const { return std::ranges::max(at_place); }
   /// Of which no place's share (bound_share()) is exceeded.
@@ -40,19 +51,24 @@ struct BlockError {
   }
 };
 
-/// Errors of blocks, a few at a time, in order.
+/// Errors of blocks against their source, a few at a time, in order.
 class BlockErrors {
  public:
   /// keep: bound_by_place() of each block, in 4 bytes; else only the largest of all.
   explicit BlockErrors(bool keep) : keep_(keep) {}
 
-  /// Zeros for the next blocks, to be filled in before end().
+  /// What the next blocks had lost before they were compressed (Chunk::lost); to be called before their end().
+  void add_lost(std::span<const float> lost) { lost_.insert(lost_.end(), lost.begin(), lost.end()); }
+  /// Zeros for the next blocks, to be filled in with how far they are off from what was compressed before end().
   std::span<BlockError> begin(std::size_t num_blocks) {
     some_.assign(num_blocks, {});
     return some_;
   }
   std::span<BlockError> some() { return some_; }
   void end() {
+    const std::size_t num_lost = std::min(lost_.size(), some_.size());
+    for (std::size_t i = 0; i < num_lost; ++i) some_[i].add_lost(lost_[i]);
+    lost_.erase(lost_.begin(), lost_.begin() + std::ptrdiff_t(num_lost));
     for (const BlockError &error : some_) {
       max_ = std::max(max_, error.largest());
       if (keep_) kept_.push_back(rounded_up(error.bound_by_place()));
@@ -65,6 +81,7 @@ class BlockErrors {
  private:
   bool keep_;
   double max_ = 0;
+  std::vector<float> lost_;  ///< of the blocks that are to come
   std::vector<BlockError> some_;
   std::vector<float> kept_;
 };

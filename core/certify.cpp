@@ -9,7 +9,6 @@
 
 #include "core/detail.hpp"
 #include "core/error.hpp"
-#include "core/io/mapped_file.hpp"
 #include "core/level_bounds.hpp"
 #include "core/parallel_for.hpp"
 #include "kernels_cl/cell_intersect.h"
@@ -105,7 +104,6 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
         "the error of frames drawn with solver {} has no bound, since it may miss a surface: take bernstein",
         to_string(options.solver));
   }
-  if (volume.file) volume.file->check();
   Certificate certificate;
   const auto draw = [&](FieldBound bound) {
     renderer.draw_bound(bound);

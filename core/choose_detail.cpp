@@ -54,6 +54,42 @@ double blocks_share(std::span<const HitRecord> hits, std::span<const FrameParams
   return finest == 0 ? 1.0 : with_levels / finest;
 }
 
+/// An error of at least so much can be kept in any volume of these values: 2^-24 of the next power of two above them is lost by the cast
+/// to float32 and another by zfp, at most, or all of a value that is flushed to 0.
+double least_tolerance(const std::array<float, 2> &range) {
+  return std::max(std::ldexp(double{std::max(std::abs(range[0]), std::abs(range[1]))}, -22),
+                  2 * double{kMinMagnitude});
+}
+
+/// Two digits, which are not more.
+double rounded_down(double value) {
+  const double digit = std::pow(10.0, std::floor(std::log10(value)) - 1);
+  return std::floor(value / digit) * digit;
+}
+
+/// Says what would help where most pixels do not keep max_error. error: of the volume's voxels.
+void advise(const CompressedVolume &volume, double error, double max_error, DetailChoice &choice) {
+  const double least = least_tolerance(volume.value_range);
+  if (choice.median > max_error && error > 0) {
+    const double tolerance = rounded_down(error * max_error / choice.median);
+    if (tolerance >= least && tolerance < error) choice.tolerance = tolerance;
+  }
+  const std::string half =
+      fmt::format("at full detail half of those with a bound are within {:.3g}", choice.median);
+  if (choice.tolerance) {
+    choice.advice =
+        fmt::format("{}; a volume converted with --tolerance {:.2g} would do", half, *choice.tolerance);
+  } else if (error <= least) {
+    choice.advice = "voxels can hardly be stored with a smaller error than these have";
+  } else if (choice.median > max_error) {
+    choice.advice = fmt::format("{}; no error that voxels can be stored with would do", half);
+  } else {
+    choice.advice = fmt::format(
+        "most have no bound at all; with voxels that are off by less than these, by up to {:.3g}, more would",
+        error);
+  }
+}
+
 }  // namespace
 
 void check_max_error(double max_error) {
@@ -79,7 +115,8 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
     renderer.set_max_pixel_error(detail.max_pixel_error / scale);
     renderer.set_value_error(detail.value_error);
   };
-  const std::optional<double> error = known_max_error(volume);  // or certify() throws
+  // Neither is known: certify() throws.
+  const double error = known_max_error(volume).value_or(double{largest_bound(volume.bounds)});
   DetailChoice choice;
   const auto try_out = [&](const Detail &detail) {
     set(detail, stride);
@@ -95,9 +132,9 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
   try {
     const auto [at_full_detail, finest_hits] = try_out({});
     choice.median = stride * at_full_detail.median;
-    choice.tolerance = *error * max_error / choice.median;
     const double best = choice.tries.front().certified;
     choice.reachable = best >= 0.5;
+    if (!choice.reachable) advise(volume, error, max_error, choice);
     const auto suffices = [&](const Detail &detail) {
       try_out(detail);
       return choice.tries.back().certified >= best - kLostShare;
@@ -117,7 +154,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
       if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.max_pixel_error = coarsest;
     }
     if (choice.reachable && volume.rate() > kMinPlaneRate) {
-      choice.detail.value_error = first_to_suffice(value_errors(volume, *error), [&](double value_error) {
+      choice.detail.value_error = first_to_suffice(value_errors(volume, error), [&](double value_error) {
         return Detail{choice.detail.max_pixel_error, value_error};
       });
     }

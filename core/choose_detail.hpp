@@ -1,6 +1,8 @@
 #pragma once
 // The cheapest way to draw a frame within an error: how coarse its levels of detail, how few its bit planes may be.
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/certify.hpp"
@@ -16,7 +18,10 @@ struct DetailChoice {
   Detail detail;
   bool reachable = true;  ///< most pixels keep the error at full detail
   double median = 0;      ///< bound there [pixels]
-  double tolerance = 0;   ///< error of the volume's voxels with which the median would be max_error
+  /// Where it is not reachable: what would help. tolerance: error of the volume's voxels, smaller than it is, with which the median
+  /// would be max_error; none where none is known that any volume can be stored with.
+  std::optional<double> tolerance{};
+  std::string advice{};
   /// What was tried, and the share of pixels that are not certain to miss and keep the error with it.
   struct Try {
     Detail detail;

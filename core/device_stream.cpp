@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "core/error.hpp"
-#include "core/io/mapped_file.hpp"
 
 namespace isowave {
 
@@ -28,7 +27,6 @@ void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffe
   std::vector<uint> chunk(std::min(kChunkWords, part.size()));
   for (std::size_t done = 0; done < part.size(); done += chunk.size()) {
     chunk.resize(std::min(chunk.size(), part.size() - done));
-    volume.file->check();
     volume.read_words(32 * (first + done), chunk);
     part.write(chunk, done);
   }
@@ -73,24 +71,29 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, 
     write_words(volume, first, parts.back());
     first += split.words_per_part;
   }
-  add_index(device, indexed_ ? volume.index : std::vector<std::uint32_t>{},
+  add_index(device, indexed_ ? volume.index : std::span<const std::uint32_t>{},
             with_bounds ? volume.bounds.codes : std::span<const std::uint8_t>{});
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host, bool with_bounds)
-    : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks)),
+    : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks, host.max_copy)),
       layout(layout_of(volume, 0)),
       indexed_(volume.is_indexed()) {
   if (with_bounds) add_index(device, {}, volume.bounds.codes);  // a window brings where its blocks begin
 }
 
-void DeviceStream::add_index(ocl::Device &device, std::vector<std::uint32_t> words,
+void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t> index,
                              std::span<const std::uint8_t> bounds) {
-  layout.bounds_begin = static_cast<std::uint32_t>(words.size());
-  words.resize(words.size() + (bounds.size() + 3) / 4);
-  for (std::size_t block = 0; block < bounds.size(); ++block)
-    words[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
-  if (!words.empty()) block_index.emplace(device, "block index", std::span<const uint>(words));
+  layout.bounds_begin = static_cast<std::uint32_t>(index.size());
+  std::vector<std::uint32_t> both;
+  if (!bounds.empty()) {
+    both.assign(index.begin(), index.end());
+    both.resize(index.size() + (bounds.size() + 3) / 4);
+    for (std::size_t block = 0; block < bounds.size(); ++block)
+      both[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
+    index = both;
+  }
+  if (!index.empty()) block_index.emplace(device, "block index", index);
 }
 
 ocl::Defines DeviceStream::defines() const {

@@ -34,6 +34,7 @@ std::uint64_t bound_words(const CompressedVolume &volume);
 /// The tag of a stream that stays on the host.
 struct OnHost {
   std::uint32_t window_blocks = 0;  ///< see StreamWindow
+  std::uint64_t max_copy = StreamWindow::default_max_copy();
 };
 
 class DeviceStream {
@@ -65,7 +66,8 @@ class DeviceStream {
   StreamLayout layout;
 
  private:
-  void add_index(ocl::Device &device, std::vector<std::uint32_t> words, std::span<const std::uint8_t> bounds);
+  void add_index(ocl::Device &device, std::span<const std::uint32_t> index,
+                 std::span<const std::uint8_t> bounds);
 
   bool indexed_;
 };

@@ -78,6 +78,12 @@ class GeneratedReader : public VolumeReader {
       convert_to_float(info_.type, voxels, out.subspan(row * info_.dims.x, info_.dims.x));
     });
   }
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+    check_range(z_begin, num_layers, out.size());
+    for_rows(z_begin, num_layers, [&](std::uint64_t row, std::span<const std::byte> voxels) {
+      convert_to_double(info_.type, voxels, out.subspan(row * info_.dims.x, info_.dims.x));
+    });
+  }
 
   /// The voxels in their own type.
   void read_stored(std::uint32_t z_begin, std::uint32_t num_layers, std::span<std::byte> out) const {

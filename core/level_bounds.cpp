@@ -148,7 +148,8 @@ BlockBounds encode_bounds(std::span<const float> bounds) {
 
 std::optional<double> known_max_error(const CompressedVolume &volume) {
   if (volume.max_error) return volume.max_error;
-  if (volume.error_bound.min_exponent == ISO_ALL_PLANES) return {};
+  // zfp's promise is for the float32 that it was given.
+  if (volume.error_bound.min_exponent == ISO_ALL_PLANES || !fits_float32(volume.info.type)) return {};
   return std::ldexp(1.0, volume.error_bound.min_exponent);
 }
 

@@ -28,11 +28,11 @@ class LevelBounds {
   void add_fine(std::span<const float> layers);
   void add_coarse(std::span<const float> layers, std::span<const float> decoded);
 
-  /// Of blocks, against the finest level.
+  /// Of blocks, against the source.
   struct Off {
     std::vector<float> made, decoded;
   };
-  /// The coarse level's; finer: those of the fine level as it was made; none: it is the finest.
+  /// The coarse level's; finer: those of the fine level as it was made, or, of the finest, what it lost (Chunk::lost); none: nothing.
   Off finish(std::span<const float> finer) const;
 
  private:

@@ -83,7 +83,7 @@ class Renderer {
   Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
 
   /// Draws one frame and waits for it. Decoded blocks stay in the cache for the next frame, whatever its
-  /// isovalue. Throws Error when a mapped volume's file has become shorter; the next frame is drawn as if this had not been.
+  /// isovalue. Throws Error when a file that blocks are read from has become shorter; the next frame is drawn as if this had not been.
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
 
   /// How far the voxels of further frames may be from the volume's: 0, as at first, not at all; more, and fewer bit planes of

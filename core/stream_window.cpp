@@ -1,9 +1,10 @@
 #include "core/stream_window.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 
 #include "core/error.hpp"
-#include "core/io/mapped_file.hpp"
 #include "core/parallel_for.hpp"
 
 namespace isowave {
@@ -14,6 +15,8 @@ namespace {
 constexpr std::size_t kGatherBlocks = 4096;
 /// Of the request list, so many are read together with its length: one round trip instead of two.
 constexpr std::size_t kIdsAtOnce = 4096;
+/// Of a payload that is copied, so many are read at a time.
+constexpr std::uint64_t kCopyWords = 1u << 20;
 
 void wait(const cl::Event &event) {
   try {
@@ -47,7 +50,8 @@ void hold_back(ocl::Device &device, const cl::Event &event) {
 
 }  // namespace
 
-StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks)
+StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks,
+                           std::uint64_t max_copy)
     : device_(device),
       volume_(volume),
       window_blocks_(window_blocks),
@@ -58,7 +62,21 @@ StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume, 
               Half{{device, "stream window", half_words(volume, window_blocks)},
                    {device, "stream staging", half_words(volume, window_blocks)},
                    {},
-                   {}}} {}
+                   {}}} {
+  const std::uint64_t num_words = volume.word_count();
+  if (!volume.file || num_words * sizeof(std::uint32_t) > max_copy) return;
+  copy_.resize(num_words);
+  parallel_for((num_words + kCopyWords - 1) / kCopyWords, 0, [&](std::uint64_t part, std::uint32_t) {
+    const std::uint64_t first = part * kCopyWords;
+    volume.read_words(
+        32 * first, std::span(copy_).subspan(first, std::min<std::uint64_t>(kCopyWords, num_words - first)));
+  });
+}
+
+std::uint64_t StreamWindow::default_max_copy() {
+  const auto pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGESIZE);
+  return pages > 0 && page_bytes > 0 ? std::uint64_t(pages) * std::uint64_t(page_bytes) / 4 : 0;
+}
 
 StreamWindow::~StreamWindow() {
   try {
@@ -92,25 +110,31 @@ std::size_t StreamWindow::run_length(std::span<const uint> block_ids) const {
   return count;
 }
 
+void StreamWindow::read_block(std::uint32_t block_id, std::span<uint> out) const {
+  const std::uint64_t begin = volume_.block_begin(block_id);
+  if (copy_.empty()) return volume_.read_words(begin, out);
+  copy_bits(std::as_bytes(std::span(copy_)), begin, 32 * std::uint64_t{out.size()}, out);
+}
+
 std::span<uint> StreamWindow::gather(std::span<const uint> block_ids, Half &half) const {
-  if (volume_.file) volume_.file->check();
   const std::span<uint> words = half.staging.words();
   const std::size_t count = block_ids.size(), each = words_per_block(volume_);
   std::size_t end = count * each;
   if (volume_.is_indexed()) {
     end = count + 1;
     for (std::size_t i = 0; i < count; ++i) {
-      words[i] = static_cast<uint>(end);
-      end += (volume_.block_bits(block_ids[i]) + 31) / 32;
+      const std::uint32_t bits = volume_.block_bits(block_ids[i]), num_words = (bits + 31) / 32;
+      words[i] = window_entry(static_cast<uint>(end), 32 * num_words - bits);
+      end += num_words;
     }
-    words[count] = static_cast<uint>(end);
+    words[count] = window_entry(static_cast<uint>(end), 0);
   }
   parallel_for((count + kGatherBlocks - 1) / kGatherBlocks, 0, [&](std::uint64_t part, std::uint32_t) {
     const std::size_t first = part * kGatherBlocks;
     for (std::size_t i = first; i < std::min(first + kGatherBlocks, count); ++i) {
-      const std::size_t begin = volume_.is_indexed() ? words[i] : i * each;
-      const std::size_t num_words = volume_.is_indexed() ? words[i + 1] - begin : each;
-      volume_.read_words(volume_.block_begin(block_ids[i]), words.subspan(begin, num_words));
+      const std::size_t begin = volume_.is_indexed() ? entry_bit(words[i]) / 32 : i * each;
+      const std::size_t num_words = volume_.is_indexed() ? entry_bit(words[i + 1]) / 32 - begin : each;
+      read_block(block_ids[i], words.subspan(begin, num_words));
     }
   });
   return words.first(end + kDecoderAhead);

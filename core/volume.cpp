@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/error.hpp"
 #include "core/io/meta_image_header.hpp"
@@ -45,6 +47,9 @@ std::size_t size_of(VoxelType type) {
 bool is_integer(VoxelType type) {
   return type != VoxelType::kFloat32 && type != VoxelType::kFloat64;
 }
+bool fits_float32(VoxelType type) {
+  return type != VoxelType::kUint32 && type != VoxelType::kInt32 && type != VoxelType::kFloat64;
+}
 
 VoxelType voxel_type_from_string(std::string_view name) {
   for (const TypeEntry &candidate : kVoxelTypes) {
@@ -77,6 +82,13 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
   if (!(std::abs(determinant) > 1e-6) || !std::isfinite(determinant)) {
     throw Error("{}: the direction matrix is singular or not finite", what);
   }
+}
+
+void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) {
+  if (!fits_float32(info_.type)) throw std::logic_error("this reader has voxels in float32 only");
+  std::vector<float> voxels(out.size());
+  read_layers(z_begin, num_layers, voxels);
+  std::ranges::copy(voxels, out.begin());
 }
 
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {

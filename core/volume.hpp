@@ -25,6 +25,8 @@ VoxelType voxel_type_from_string(std::string_view name);
 /// Bytes per voxel.
 std::size_t size_of(VoxelType type);
 bool is_integer(VoxelType type);
+/// Whether float32 holds every value of the type.
+bool fits_float32(VoxelType type);
 
 /// The grid of a volume. Plain data; the defaults are a unit grid at the origin.
 struct VolumeInfo {
@@ -55,6 +57,10 @@ class VolumeReader {
   /// Integer types are converted exactly up to 2^24 and rounded beyond. NaN and Inf pass through.
   /// Throws Error on a short or unreadable file.
   virtual void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) = 0;
+
+  /// As read_layers(), but every voxel exactly as the file has it. A reader of types that float32 does not hold
+  /// (fits_float32()) must override this one, which throws std::logic_error for them.
+  virtual void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out);
 
  protected:
   VolumeInfo info_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/block_errors.hpp"
 #include "core/error.hpp"
 #include "core/parallel_for.hpp"
 
@@ -21,6 +22,8 @@ struct Findings {
   std::uint64_t bad_count = 0, first_bad = ~std::uint64_t(0);  ///< NaN, Inf; linear voxel index
   std::uint64_t too_large_count = 0, first_too_large = ~std::uint64_t(0);
   float min = std::numeric_limits<float>::infinity(), max = -std::numeric_limits<float>::infinity();
+  double source_min = std::numeric_limits<double>::infinity(),
+         source_max = -std::numeric_limits<double>::infinity();
 
   bool refused() const { return bad_count > 0 || too_large_count > 0; }
 
@@ -31,12 +34,47 @@ struct Findings {
     first_too_large = std::min(first_too_large, other.first_too_large);
     min = std::min(min, other.min);
     max = std::max(max, other.max);
+    add_source(other.source_min, other.source_max);
+  }
+  void add_source(double least, double largest) {
+    source_min = std::min(source_min, least);
+    source_max = std::max(source_max, largest);
   }
 };
 
-/// Adds the range of `values` to `found` if each of them is compressed as it is. Else returns false. Made for
+/// A run of voxels along x, from x = 0 on.
+struct Line {
+  std::span<float> voxels{};
+  std::span<const double> source{};  ///< none: voxels are
+  std::uint64_t first = 0;           ///< linear voxel index of the first
+  float *lost = nullptr;             ///< of the blocks that they are in: Chunk::lost
+};
+
+void raise_lost(float &lost, double error) {
+  if (error > double{lost}) lost = rounded_up(error);
+}
+
+/// Sets voxels to what float32 holds of their source, and those that will be refused or mapped to what is; tiny ones become 0.
+void cast_line(const Line &line, Findings &found) {
+  for (std::size_t x = 0; x < line.source.size(); ++x) {
+    const double source = line.source[x];
+    float &value = line.voxels[x];
+    if (!std::isfinite(source)) {
+      value = std::numeric_limits<float>::quiet_NaN();
+    } else if (std::abs(source) >= double{kMaxMagnitude}) {
+      value = kMaxMagnitude;
+    } else {
+      value = static_cast<float>(source);
+      if (std::abs(value) < kMinMagnitude) value = 0.0f;
+      raise_lost(line.lost[x / kBlockEdge], std::abs(double{value} - source));
+      found.add_source(source, source);
+    }
+  }
+}
+
+/// Adds the range of the line to `found` if each of its voxels is compressed as it is. Else returns false. Made for
 /// vector instructions: no branches, and the bits of floats as integers of the same order.
-bool add_plain_values(std::span<const float> values, Findings &found) {
+bool add_plain_values(const Line &line, Findings &found) {
   constexpr std::int32_t kMagnitudeBits = 0x7FFFFFFF;
   constexpr auto kLeast = std::bit_cast<std::int32_t>(kMinMagnitude);
   constexpr auto kEnd = std::bit_cast<std::int32_t>(kMaxMagnitude);
@@ -45,7 +83,7 @@ bool add_plain_values(std::span<const float> values, Findings &found) {
   };  // its own inverse
   std::int32_t min = std::numeric_limits<std::int32_t>::max(), max = std::numeric_limits<std::int32_t>::min();
   std::uint32_t others = 0;
-  for (const float value : values) {
+  for (const float value : line.voxels) {
     const auto bits = std::bit_cast<std::int32_t>(value);
     const std::int32_t magnitude = bits & kMagnitudeBits, order = ordered(bits);
     others |= std::uint32_t(magnitude != 0) &
@@ -54,33 +92,38 @@ bool add_plain_values(std::span<const float> values, Findings &found) {
     max = std::max(max, order);
   }
   if (others != 0) return false;
-  found.min = std::min(found.min, std::bit_cast<float>(ordered(min)));
-  found.max = std::max(found.max, std::bit_cast<float>(ordered(max)));
+  const auto least = std::bit_cast<float>(ordered(min)), largest = std::bit_cast<float>(ordered(max));
+  found.min = std::min(found.min, least);
+  found.max = std::max(found.max, largest);
+  if (line.source.empty()) found.add_source(double{least}, double{largest});
   return true;
 }
 
-/// Checks `values`, the first of which is voxel `first`: maps NaN, flushes tiny ones, notes what cannot be compressed.
-void check_values(std::span<float> values, std::uint64_t first, const std::optional<float> &map_nan,
-                  Findings &found) {
-  if (add_plain_values(values, found)) return;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    float &value = values[i];
-    if (!std::isfinite(value)) {
+/// Checks a line: maps NaN, flushes tiny voxels, notes what cannot be compressed.
+void check_line(const Line &line, const std::optional<float> &map_nan, Findings &found) {
+  cast_line(line, found);
+  if (add_plain_values(line, found)) return;
+  for (std::size_t x = 0; x < line.voxels.size(); ++x) {
+    float &value = line.voxels[x];
+    const bool is_mapped = !std::isfinite(value);
+    if (is_mapped) {
       if (!map_nan) {
         ++found.bad_count;
-        found.first_bad = std::min(found.first_bad, first + i);
+        found.first_bad = std::min(found.first_bad, line.first + x);
         continue;
       }
       value = *map_nan;
     }
+    if (is_mapped || line.source.empty()) found.add_source(double{value}, double{value});
     found.min = std::min(found.min, value);
     found.max = std::max(found.max, value);
     const float magnitude = std::abs(value);
     if (magnitude < kMinMagnitude) {
+      raise_lost(line.lost[x / kBlockEdge], double{magnitude});
       value = 0.0f;
     } else if (magnitude >= kMaxMagnitude) {
       ++found.too_large_count;
-      found.first_too_large = std::min(found.first_too_large, first + i);
+      found.first_too_large = std::min(found.first_too_large, line.first + x);
     }
   }
 }
@@ -102,20 +145,25 @@ void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
 }
 
 /// Checks the rows of a chunk and has them coded, unless a voxel was refused: what follows is only counted then.
-Findings code_rows(const Chunk &chunk, const glm::uvec3 &dims, const InputOptions &options,
-                   ChunkCoder &coder) {
+/// source: of its voxels, where they are still to be cast.
+Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm::uvec3 &dims,
+                   const InputOptions &options, ChunkCoder &coder) {
   const std::uint64_t layer = std::uint64_t(dims.x) * dims.y, rows_per_slab = (dims.y + 3u) / 4u;
+  const std::uint64_t blocks_x = (dims.x + 3u) / 4u;
   std::vector<Findings> findings(thread_count(options.num_threads));
   parallel_for(chunk.num_rows, options.num_threads, [&](std::uint64_t index, std::uint32_t thread) {
     const auto y = std::uint32_t(index % rows_per_slab) * kBlockEdge,
                z = std::uint32_t(index / rows_per_slab) * kBlockEdge;
     const std::uint64_t begin = z * layer + std::uint64_t(y) * dims.x;
+    float *lost = chunk.lost.data() + index * blocks_x;
     const BlockRow row{index, chunk.voxels.data() + begin, std::min(kBlockEdge, dims.y - y),
-                       std::min(kBlockEdge, chunk.num_layers - z)};
+                       std::min(kBlockEdge, chunk.num_layers - z), lost};
     Findings &found = findings[thread];
     for (std::uint64_t i = 0; i < std::uint64_t(row.ny) * row.nz; ++i) {
       const std::uint64_t at = begin + i / row.ny * layer + i % row.ny * dims.x;
-      check_values(chunk.voxels.subspan(at, dims.x), chunk.z * layer + at, options.map_nan, found);
+      check_line({chunk.voxels.subspan(at, dims.x), source.empty() ? source : source.subspan(at, dims.x),
+                  chunk.z * layer + at, lost},
+                 options.map_nan, found);
     }
     if (!found.refused()) coder.code_row(row, thread);
   });
@@ -137,13 +185,15 @@ Chunk make_chunk(const glm::uvec3 &dims, std::uint32_t z, std::span<float> voxel
   return {z, num_layers, voxels, std::uint64_t((dims.y + 3u) / 4u) * ((num_layers + 3u) / 4u)};
 }
 
-void code_chunk(const Chunk &chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder) {
+void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder) {
+  std::vector<float> lost(chunk.num_rows * ((dims.x + 3u) / 4u));
+  chunk.lost = lost;
   coder.begin_chunk(chunk);
-  code_rows(chunk, dims, options, coder);
+  code_rows(chunk, {}, dims, options, coder);
   coder.end_chunk(chunk);
 }
 
-std::array<float, 2> read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder) {
+ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder) {
   check_volume_info(reader.info(), "volume");
   if (options.map_nan && !(std::abs(*options.map_nan) < kMaxMagnitude)) {
     throw Error("--map-nan {}: must be finite and below {:.4g}", *options.map_nan, kMaxMagnitude);
@@ -154,28 +204,43 @@ std::array<float, 2> read_in_chunks(VolumeReader &reader, const InputOptions &op
   const auto layers_at = [&](std::uint64_t z) {
     return z < dims.z ? std::uint32_t(std::min<std::uint64_t>(chunk_layers, dims.z - z)) : 0;
   };
-  const auto read_ahead = [&](std::uint64_t z, std::vector<float> &voxels) {
+  // Float64, and integers of 32 bits, are read as they are, and cast where what that loses can be noted.
+  struct Layers {
+    std::vector<float> voxels;
+    std::vector<double> source;
+  };
+  const bool is_exact = fits_float32(reader.info().type);
+  const auto read_ahead = [&](std::uint64_t z, Layers &layers) {
     return std::async(std::launch::async, [&, z] {
-      voxels.resize(layer * layers_at(z));
-      if (layers_at(z) > 0) reader.read_layers(std::uint32_t(z), layers_at(z), voxels);
+      layers.voxels.resize(layer * layers_at(z));
+      if (!is_exact) layers.source.resize(layers.voxels.size());
+      if (layers_at(z) == 0) return;
+      if (is_exact) {
+        reader.read_layers(std::uint32_t(z), layers_at(z), layers.voxels);
+      } else {
+        reader.read_exact_layers(std::uint32_t(z), layers_at(z), layers.source);
+      }
     });
   };
   Findings total;
-  std::vector<float> current, next;
+  Layers current, next;
+  std::vector<float> lost;
   std::future<void> pending = read_ahead(0, next);
   for (std::uint32_t z = 0; z < dims.z; z += chunk_layers) {
     pending.get();
     std::swap(current, next);
     pending = read_ahead(std::uint64_t(z) + chunk_layers, next);
-    const Chunk chunk = make_chunk(dims, z, current);
+    Chunk chunk = make_chunk(dims, z, current.voxels);
+    lost.assign(chunk.num_rows * ((dims.x + 3u) / 4u), 0.0f);
+    chunk.lost = lost;
     coder.begin_chunk(chunk);
-    total.add(code_rows(chunk, dims, options, coder));
+    total.add(code_rows(chunk, current.source, dims, options, coder));
     if (!total.refused()) coder.end_chunk(chunk);
     if (options.progress) options.progress(z + layers_at(z), dims.z);
   }
   refuse_bad_voxels(total, reader.info());
-  return {total.min + 0.0f,
-          total.max + 0.0f};  // not -0: of equal values, the one met first would depend on the threads
+  // + 0: not -0; of equal values, the one met first would depend on the threads
+  return {{total.min + 0.0f, total.max + 0.0f}, {total.source_min + 0.0, total.source_max + 0.0}};
 }
 
 }  // namespace isowave

@@ -34,6 +34,9 @@ struct Chunk {
   std::uint32_t z = 0, num_layers = 0;
   std::span<float> voxels{};   ///< [num_layers][ny][nx]
   std::uint64_t num_rows = 0;  ///< of blocks along x
+  /// [num_rows][blocks along x]: how far a block's voxels are from the source's, at most: what float32 cannot hold, and tiny
+  /// values that became 0. The source of a mapped NaN is what it was mapped to. Complete when end_chunk() is called.
+  std::span<float> lost{};
 };
 
 /// Layers of the chunks that a volume is cut into, but for its last.
@@ -46,6 +49,7 @@ struct BlockRow {
   std::uint64_t index = 0;        ///< in its chunk, in the order of blocks
   const float *voxels = nullptr;  ///< its first; a voxel row is nx values, a layer nx * ny of the volume
   std::uint32_t ny = 0, nz = 0;   ///< voxel rows and layers that it has, 1..4
+  const float *lost = nullptr;    ///< of its blocks: Chunk::lost
 };
 
 /// What becomes of the voxels.
@@ -60,10 +64,15 @@ class ChunkCoder {
 };
 
 /// Codes one chunk of voxels that were made here: checked as those of a file are, but none can be refused.
-void code_chunk(const Chunk &chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder);
+void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder);
 
-/// Reads the volume from front to back for `coder`. Returns its [min, max] (after map_nan). Throws Error: voxels that cannot be
-/// compressed, after all of them were looked at; a bad grid; an unfit map_nan.
-std::array<float, 2> read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder);
+/// [min, max] of a volume's voxels, after map_nan.
+struct ValueRange {
+  std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
+  std::array<double, 2> source{};  ///< as the source has them
+};
+/// Reads the volume from front to back for `coder`. Throws Error: voxels that cannot be compressed, after all of them were
+/// looked at; a bad grid; an unfit map_nan.
+ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder);
 
 }  // namespace isowave

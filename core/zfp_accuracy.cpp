@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 
 #include "core/error.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"
+#include "core/printed_bound.hpp"
 
 namespace isowave {
 
@@ -81,15 +83,15 @@ BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, co
 /// Largest errors of the whole volume with several numbers of bit planes at once.
 class ErrorMeter : public ChunkCoder {
  public:
-  static constexpr std::size_t kNumCandidates = 7;
-
-  /// Candidate i ends at first + i. Those that exceed `limit` are given up.
-  ErrorMeter(const glm::uvec3 &dims, std::int32_t first, double limit, bool rounded,
+  /// Candidate i ends at first + i, up to `last`, at most kMaxCandidates. Those that exceed `limit` are given up.
+  static constexpr std::int32_t kMaxCandidates = 8;
+  ErrorMeter(const glm::uvec3 &dims, std::int32_t first, std::int32_t last, double limit, bool rounded,
              std::uint32_t num_threads)
       : nx_(dims.x),
         layer_(std::ptrdiff_t{dims.x} * dims.y),
         blocks_x_((dims.x + 3) / 4),
         first_(first),
+        num_candidates_(std::size_t(last - first) + 1),
         limit_(limit),
         rounded_(rounded),
         errors_(thread_count(num_threads)) {}
@@ -99,10 +101,11 @@ class ErrorMeter : public ChunkCoder {
     for (std::uint32_t bx = 0; bx < blocks_x_; ++bx) {
       codec.set_planes(first_);
       codec.encode(row, bx, nx_, layer_);
-      for (std::size_t i = 0; i < kNumCandidates; ++i) {
+      for (std::size_t i = 0; i < num_candidates_; ++i) {
         if (given_up_[i].load(std::memory_order_relaxed)) continue;
-        const double error =
-            error_of_block(codec.decode(first_ + std::int32_t(i)), row, bx, nx_, layer_, rounded_).largest();
+        const double error = with_lost(
+            error_of_block(codec.decode(first_ + std::int32_t(i)), row, bx, nx_, layer_, rounded_).largest(),
+            row.lost[bx]);
         errors_[thread][i] = std::max(errors_[thread][i], error);
         if (i > 0 && !(error <= limit_)) given_up_[i].store(true, std::memory_order_relaxed);
       }
@@ -111,7 +114,7 @@ class ErrorMeter : public ChunkCoder {
 
   /// The coarsest within the limit, or none.
   std::optional<ErrorBound> best() const {
-    for (std::size_t i = kNumCandidates; i-- > 0;) {
+    for (std::size_t i = num_candidates_; i-- > 0;) {
       if (!given_up_[i].load() && error(i) <= limit_)
         return ErrorBound{first_ + std::int32_t(i), rounded_, error(i)};
     }
@@ -128,11 +131,29 @@ class ErrorMeter : public ChunkCoder {
   std::ptrdiff_t nx_, layer_;
   std::uint32_t blocks_x_;
   std::int32_t first_;
+  std::size_t num_candidates_;
   double limit_;
   bool rounded_;
-  std::vector<std::array<double, kNumCandidates>> errors_;  ///< of each thread
-  std::array<std::atomic<bool>, kNumCandidates> given_up_{};
+  std::vector<std::array<double, kMaxCandidates>> errors_;  ///< of each thread
+  std::array<std::atomic<bool>, kMaxCandidates> given_up_{};
 };
+
+}  // namespace
+
+namespace {
+
+/// The first and the last end of bit planes that are worth a look.
+std::array<std::int32_t, 2> exponents_to_try(VoxelType type, const ErrorGoal &goal) {
+  constexpr std::int32_t kNumFewer = 6, kAllPlanes = ISO_ALL_PLANES + 1;
+  if (goal.exact) return {-2, -2 + kNumFewer};  // a quarter at most
+  // Values that became 0 may have taken nearly all of it.
+  if (goal.tolerance <= 4 * double{kMinMagnitude}) return {kAllPlanes, kAllPlanes};
+  const std::int32_t promised = std::ilogb(goal.tolerance);  // zfp's error is 2^promised at most
+  // Where the cast to float32, or to 0, may have taken a part of the tolerance, half of the rest is enough: a block that does not have
+  // all its planes by then has lost a quarter at most.
+  const bool may_lose = !fits_float32(type) || goal.tolerance < 0x1p-80;
+  return {promised - (may_lose ? 1 : 0), promised + kNumFewer};
+}
 
 }  // namespace
 
@@ -146,18 +167,20 @@ ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal, const
     throw Error("tolerance {}: must be above 0 and finite", goal.tolerance);
   }
   const double limit = goal.exact ? 0 : goal.tolerance;
-  // What zfp promises: 2^first <= tolerance; for integers, an error of a quarter at most.
-  const std::int32_t first = goal.exact ? -2 : std::max(std::ilogb(goal.tolerance), ISO_ALL_PLANES + 1);
-  ErrorMeter meter(info.dims, first, limit, goal.exact, options.num_threads);
-  const std::array<float, 2> range = read_in_chunks(reader, options, meter);
+  const std::array<std::int32_t, 2> exponents = exponents_to_try(info.type, goal);
+  ErrorMeter meter(info.dims, exponents[0], exponents[1], limit, goal.exact, options.num_threads);
+  const std::array<float, 2> range = read_in_chunks(reader, options, meter).coded;
   if (goal.exact && std::max(-range[0], range[1]) >= kIntegerEnd) {
     throw Error("values from {} to {}: exact compression is for integers below 2^24, which float32 holds",
                 range[0], range[1]);
   }
   const std::optional<ErrorBound> best = meter.best();
   if (!best) {
-    throw Error("a tolerance of {} cannot be kept: with all bit planes, zfp's error is {:.6g}",
-                goal.tolerance, meter.error(0));
+    throw Error(
+        "a tolerance of {} cannot be kept: voxels are stored as float32, and with all bit planes off by up "
+        "to {}; "
+        "give at least that",
+        goal.tolerance, printed_bound(meter.error(0)));
   }
   return *best;
 }
@@ -244,8 +267,11 @@ void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
   coded.bits.pad();
 }
 
-void ErrorBoundCoder::end_chunk(const Chunk &) {
-  if (errors_) errors_->end();
+void ErrorBoundCoder::end_chunk(const Chunk &chunk) {
+  if (errors_) {
+    errors_->add_lost(chunk.lost);
+    errors_->end();
+  }
   for (const CodedRow &row : rows_) {
     std::uint64_t bits = 0;
     for (const std::uint16_t length : row.lengths) {
@@ -264,27 +290,43 @@ std::vector<std::uint32_t> ErrorBoundCoder::finish() {
   return index_.finish();
 }
 
-std::vector<std::uint32_t> index_by_decoding(const CompressedVolume &volume, const std::string &what) {
+namespace {
+
+/// Of `words` from bit `bit` on, how many of the bits in that word are 0 before the first 1.
+std::uint32_t zeros_at(std::span<const std::uint32_t> words, std::uint64_t bit) {
+  const auto left = static_cast<std::uint32_t>(32 - bit % 32);
+  return std::min(static_cast<std::uint32_t>(std::countr_zero(words[bit / 32] >> bit % 32)), left);
+}
+
+}  // namespace
+
+void find_block_lengths(const CompressedVolume &volume, const std::string &what,
+                        const std::function<void(std::uint32_t bits, std::uint64_t count)> &take) {
   constexpr std::uint64_t kChunkBits = 1u << 23;
+  const std::uint64_t num_blocks = volume.block_count();
   std::array<float, ISO_BLOCK_VOXELS> values;
   std::vector<std::uint32_t> words((kChunkBits + ISO_MAX_BLOCK_BITS) / 32 + 4);
-  BlockIndexBuilder index;
-  std::uint64_t position = 0, block = 0;
-  while (block < volume.block_count()) {
-    volume.read_words(position, words);  // with zeros behind its end, which libzfp does not know of
+  for (std::uint64_t begin = 0, block = 0; block < num_blocks;) {
+    volume.read_words(begin, words);  // with zeros behind its end, which libzfp does not know of
     const ZfpStream stream = make_zfp_stream(0, volume.error_bound.min_exponent);
     const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)), &stream_close);
     zfp_stream_set_bit_stream(stream.get(), bits.get());
-    for (std::uint64_t at = 0; at < kChunkBits && block < volume.block_count(); ++block) {
-      const std::size_t length = zfp_decode_block_float_3(stream.get(), values.data());
-      at += length;
-      position += length;
-      index.add(static_cast<std::uint32_t>(length));
-      if (position > volume.payload_bits())
-        throw Error("{}: truncated: its stream ends in block {} of {}", what, block, volume.block_count());
+    std::uint64_t at = 0;
+    while (at < kChunkBits && block < num_blocks) {
+      std::uint64_t count = std::min<std::uint64_t>(zeros_at(words, at), num_blocks - block), length = 1;
+      if (count == 0) {  // not empty
+        count = 1;
+        stream_rseek(bits.get(), at);
+        length = zfp_decode_block_float_3(stream.get(), values.data());
+      }
+      at += length * count;
+      block += count;
+      if (begin + at > volume.payload_bits())
+        throw Error("{}: truncated: its stream ends in block {} of {}", what, block, num_blocks);
+      take(static_cast<std::uint32_t>(length), count);
     }
+    begin += at;
   }
-  return index.finish();
 }
 
 }  // namespace isowave

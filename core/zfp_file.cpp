@@ -4,18 +4,17 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <string>
-#include <system_error>
+#include <type_traits>
 
 #include "core/error.hpp"
-#include "core/io/mapped_file.hpp"
+#include "core/io/file_bytes.hpp"
+#include "core/io/raw_reader.hpp"
 #include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/pyramid.hpp"
@@ -54,6 +53,7 @@ std::uint32_t json_crc(std::string_view text, const Footer &footer) {
 /// What stands between a stream and its trailer [bytes].
 struct PartSizes {
   std::uint64_t index = 0, bounds = 0;
+  bool bounds_count_casts = true;  ///< else they are of no use
 };
 
 json to_json(const CompressedVolume &volume, const PartSizes &sizes,
@@ -69,6 +69,7 @@ json to_json(const CompressedVolume &volume, const PartSizes &sizes,
   trailer["type"] = to_string(info.type);
   if (std::isfinite(volume.value_range[0])) trailer["value_range"] = volume.value_range;
   if (volume.max_error) trailer["max_error"] = *volume.max_error;
+  if (!fits_float32(info.type)) trailer["cast_counts"] = true;
   if (volume.is_indexed()) {
     trailer["payload_bits"] = volume.indexed_bits;
     trailer["index_bytes"] = sizes.index;
@@ -83,12 +84,55 @@ json to_json(const CompressedVolume &volume, const PartSizes &sizes,
   return trailer;
 }
 
-glm::dvec3 vector_from(const json &value) {
-  const auto numbers = value.get<std::array<double, 3>>();
-  return {numbers[0], numbers[1], numbers[2]};
+/// A number of the trailer. json would turn others than T has into some T.
+template <typename T>
+T number_from(const json &value) {
+  if constexpr (std::is_unsigned_v<T>) {
+    if (!value.is_number_unsigned()) throw Error("a count is a {}", value.type_name());
+  } else if constexpr (std::is_integral_v<T>) {
+    if (!value.is_number_integer() || value.get<std::int64_t>() != std::int64_t{value.get<T>()})
+      throw Error("an integer is a {}, or too large", value.type_name());
+  } else if (!value.is_number() ||
+             !(std::abs(value.get<double>()) <= double{std::numeric_limits<T>::max()})) {
+    throw Error("a number is a {}, or too large", value.type_name());
+  }
+  return value.get<T>();
 }
 
-/// level_bytes: those of the coarser levels.
+glm::dvec3 vector_from(const json &value) {
+  if (value.size() != 3) throw Error("{} numbers where 3 must be", value.size());
+  return {number_from<double>(value.at(0)), number_from<double>(value.at(1)),
+          number_from<double>(value.at(2))};
+}
+
+VoxelType type_from(const json &value) {
+  const auto name = value.get<std::string>();
+  if (!std::ranges::all_of(name, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }))
+    throw Error("its voxels have no type");
+  return voxel_type_from_string(name);
+}
+
+/// Of types that float32 does not hold, errors in older files leave out the cast: nothing is known then.
+bool counts_casts(const json &trailer, const VolumeInfo &info) {
+  return fits_float32(info.type) || trailer.value("cast_counts", json(false)) == true;
+}
+
+void apply_errors(const json &trailer, CompressedVolume &volume) {
+  if (trailer.contains("value_range")) {
+    const json &range = trailer["value_range"];
+    volume.value_range = {number_from<float>(range.at(0)), number_from<float>(range.at(1))};
+    if (volume.value_range[0] > volume.value_range[1])
+      throw Error("{} to {} is no range", volume.value_range[0], volume.value_range[1]);
+  }
+  if (trailer.contains("max_error")) {
+    const auto max_error = number_from<double>(trailer["max_error"]);
+    if (max_error < 0) throw Error("{} is no error", max_error);
+    if (counts_casts(trailer, volume.info)) volume.max_error = max_error;
+  }
+  if (volume.is_indexed()) volume.error_bound.max_error = volume.max_error;
+}
+
+/// Sets level_bytes to those of the coarser levels.
 PartSizes apply_json(const std::string &text, CompressedVolume &volume,
                      std::vector<std::uint64_t> &level_bytes) {
   const json trailer = json::parse(text);
@@ -97,23 +141,23 @@ PartSizes apply_json(const std::string &text, CompressedVolume &volume,
   for (int column = 0; column < 3; ++column) {
     volume.info.direction[column] = vector_from(trailer.at("direction").at(std::size_t(column)));
   }
-  volume.info.type = voxel_type_from_string(trailer.at("type").get<std::string>());
-  if (trailer.contains("value_range"))
-    volume.value_range = trailer["value_range"].get<std::array<float, 2>>();
-  if (trailer.contains("max_error")) volume.max_error = trailer["max_error"].get<double>();
-  if (trailer.contains("level_bytes")) level_bytes = trailer["level_bytes"].get<std::vector<std::uint64_t>>();
+  volume.info.type = type_from(trailer.at("type"));
+  apply_errors(trailer, volume);
+  if (trailer.contains("level_bytes")) {
+    for (const json &bytes : trailer["level_bytes"]) level_bytes.push_back(number_from<std::uint64_t>(bytes));
+  }
   PartSizes sizes;
+  sizes.bounds_count_casts = counts_casts(trailer, volume.info);
   if (trailer.contains("bounds_bytes")) {
-    sizes.bounds = trailer["bounds_bytes"].get<std::uint64_t>();
-    volume.bounds.exponent = trailer.at("bounds_exponent").get<std::int32_t>();
+    sizes.bounds = number_from<std::uint64_t>(trailer["bounds_bytes"]);
+    volume.bounds.exponent = number_from<std::int32_t>(trailer.at("bounds_exponent"));
     // Of another rule, all voxels of a block have its whole bound.
     volume.bounds.by_place = trailer.value("bounds_by_place", json(0)) == ISO_BOUND_PLACES_RULE;
   }
   if (!volume.is_indexed()) return sizes;
-  volume.indexed_bits = trailer.at("payload_bits").get<std::uint64_t>();
+  volume.indexed_bits = number_from<std::uint64_t>(trailer.at("payload_bits"));
   volume.error_bound.whole_numbers = trailer.at("whole_numbers").get<bool>();
-  volume.error_bound.max_error = volume.max_error;
-  sizes.index = trailer.at("index_bytes").get<std::uint64_t>();
+  sizes.index = number_from<std::uint64_t>(trailer.at("index_bytes"));
   return sizes;
 }
 
@@ -137,13 +181,19 @@ struct Deflater : z_stream {
 
 constexpr std::size_t kItemsAtOnce = 1u << 15;
 
+/// A piece of a file.
+struct FilePart {
+  const FileBytes &file;
+  std::uint64_t begin = 0, size = 0;
+};
+
 /// Calls take(items) with `total` items of a deflated piece of a file, a few at a time, until it returns false. Returns whether all of
 /// that worked.
 template <typename T, typename Take>
-bool inflate_items(std::span<const std::byte> deflated, std::uint64_t total, const Take &take) {
+bool inflate_items(const FilePart &deflated, std::uint64_t total, const Take &take) {
   Inflater inflater;
-  inflater.next_in = const_cast<Bytef *>(reinterpret_cast<const Bytef *>(deflated.data()));
-  std::uint64_t in_left = deflated.size();
+  std::vector<std::byte> in(std::min<std::uint64_t>(deflated.size, 1u << 18));
+  std::uint64_t in_done = 0;
   std::vector<T> items;
   for (std::uint64_t done = 0; done < total; done += items.size()) {
     items.resize(std::min<std::uint64_t>(kItemsAtOnce, total - done));
@@ -151,8 +201,11 @@ bool inflate_items(std::span<const std::byte> deflated, std::uint64_t total, con
     inflater.avail_out = static_cast<uInt>(items.size() * sizeof(T));
     while (inflater.avail_out > 0) {
       if (inflater.avail_in == 0) {
-        inflater.avail_in = static_cast<uInt>(std::min<std::uint64_t>(in_left, 1u << 30));
-        in_left -= inflater.avail_in;
+        in.resize(std::min<std::uint64_t>(in.size(), deflated.size - in_done));
+        deflated.file.read(deflated.begin + in_done, in);
+        in_done += in.size();
+        inflater.next_in = reinterpret_cast<Bytef *>(in.data());
+        inflater.avail_in = static_cast<uInt>(in.size());
       }
       const int status = ::inflate(&inflater, Z_NO_FLUSH);
       if (status != Z_OK && inflater.avail_out > 0) return false;
@@ -162,28 +215,23 @@ bool inflate_items(std::span<const std::byte> deflated, std::uint64_t total, con
   return true;
 }
 
-/// The index of so many blocks from their deflated lengths, or nothing where they are not that.
-std::vector<std::uint32_t> inflate_index(std::span<const std::byte> deflated, std::uint64_t num_blocks) {
-  BlockIndexBuilder index;
-  const bool whole =
-      inflate_items<std::uint16_t>(deflated, num_blocks, [&](std::span<const std::uint16_t> lengths) {
-        for (const std::uint16_t length : lengths) {
-          if (length < 1 || length > ISO_MAX_BLOCK_BITS) return false;
-          index.add(length);
-        }
-        return true;
-      });
-  return whole ? index.finish() : std::vector<std::uint32_t>{};
+/// Calls take(length) for so many blocks, whose lengths are deflated. Returns whether they are.
+template <typename Take>
+bool inflate_lengths(const FilePart &deflated, std::uint64_t num_blocks, const Take &take) {
+  return inflate_items<std::uint16_t>(deflated, num_blocks, [&](std::span<const std::uint16_t> lengths) {
+    for (const std::uint16_t length : lengths) {
+      if (length < 1 || length > ISO_MAX_BLOCK_BITS) return false;
+      take(length);
+    }
+    return true;
+  });
 }
 
 /// A `.zfp` file being read: the checks in the order in which the file is trusted.
 class ZfpFileReader {
  public:
-  explicit ZfpFileReader(const fs::path &path) : path_(path), file_(std::fopen(path.c_str(), "rb"), &close) {
-    if (!file_) throw Error("{}: cannot open: {}", path.string(), std::strerror(errno));
-    std::error_code error;
-    file_size_ = fs::file_size(path, error);
-    if (error) throw Error("{}: cannot open: {}", path.string(), error.message());
+  explicit ZfpFileReader(const fs::path &path)
+      : path_(path), file_(std::make_shared<FileBytes>(path)), file_size_(file_->size()) {
     read_head();
   }
 
@@ -192,32 +240,31 @@ class ZfpFileReader {
     return std::move(volume_);
   }
 
-  CompressedVolume take_mapped() {
-    const auto file = std::make_shared<MappedFile>(path_, bytes_before_trailer());
-    if (has_trailer_ && update_crc(0, file->bytes()) != stream_crc_) {
-      throw Error("{}: damaged: the checksum of its stream does not match", path_.string());
-    }
-    return take_from(file);
+  /// keep: the index and bounds, and the file.
+  CompressedVolume take_checked(bool keep) {
+    check_sum();
+    return take(keep);
   }
 
  private:
-  static void close(std::FILE *file) {
-    if (file) std::fclose(file);
-  }
-
   /// A level of detail: a file in the file.
   ZfpFileReader(const ZfpFileReader &finer, std::uint64_t begin, std::uint64_t size)
-      : path_(finer.path_), file_(finer.file_), begin_(begin), file_size_(size) {
+      : path_(finer.path_), file_(finer.file_), begin_(begin), file_size_(size), is_level_(true) {
     read_head();
-    if (!has_trailer_ || !levels_.empty() || volume_.info.dims != coarser_level(finer.volume_.info).dims)
-      throw Error("{}: damaged: one of its levels of detail is none", path_.string());
+    if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims) refuse_level();
     volume_.info = coarser_level(finer.volume_.info);
+    sizes_.bounds_count_casts = finer.sizes_.bounds_count_casts;
+  }
+
+  [[noreturn]] void refuse_level() const {
+    throw Error("{}: damaged: one of its levels of detail is none", path_.string());
   }
 
   void read_head() {
     read_header();
     read_trailer();
     check_volume_info(volume_.info, path_.string());
+    if (level_bytes_.size() > (is_level_ ? 0 : max_levels(volume_.info.dims) - 1)) refuse_level();
     std::uint64_t begin = begin_ + stream_bytes_ + sizes_.index + sizes_.bounds;
     for (const std::uint64_t bytes : level_bytes_) {
       levels_.push_back(ZfpFileReader(levels_.empty() ? *this : levels_.back(), begin, bytes));
@@ -230,54 +277,85 @@ class ZfpFileReader {
                            stream_bytes_ + sizes_.index + sizes_.bounds);
   }
 
-  CompressedVolume take_from(const std::shared_ptr<const MappedFile> &file) {
-    volume_.file = file;
+  /// That of everything before the trailer.
+  void check_sum() const {
+    if (!has_trailer_) return;
+    std::vector<std::byte> piece(1u << 20);
+    std::uint32_t crc = 0;
+    for (std::uint64_t at = 0, end = bytes_before_trailer(); at < end; at += piece.size()) {
+      piece.resize(std::min<std::uint64_t>(piece.size(), end - at));
+      file_->read(at, piece);
+      crc = update_crc(crc, piece);
+    }
+    if (crc != stream_crc_)
+      throw Error("{}: damaged: the checksum of its stream does not match", path_.string());
+  }
+
+  CompressedVolume take(bool keep) {
+    volume_.file = file_;
     volume_.file_first_bit = 8 * begin_ + header_bits_;
-    if (volume_.is_indexed()) read_index();
-    if (sizes_.bounds != 0) read_bounds();
-    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take_from(file));
+    if (volume_.is_indexed()) read_index(keep);
+    if (sizes_.bounds != 0) read_bounds(keep);
+    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take(keep));
+    if (!keep) volume_.file.reset();
     return std::move(volume_);
   }
 
-  void read_at(std::uint64_t offset, std::span<std::byte> bytes) {
-    if (::fseeko(file_.get(), off_t(begin_ + offset), SEEK_SET) != 0 ||
-        std::fread(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) {
-      throw Error("{}: cannot read {} bytes at {}", path_.string(), bytes.size(), begin_ + offset);
-    }
+  void read_at(std::uint64_t offset, std::span<std::byte> bytes) const {
+    file_->read(begin_ + offset, bytes);
   }
 
   /// A file of zfp's own tool has no index: its blocks must be decoded to know where they are.
-  void read_index() {
-    if (!has_trailer_) {
-      volume_.index = index_by_decoding(volume_, path_.string());
-      const std::uint64_t bits = volume_.block_begin(static_cast<std::uint32_t>(volume_.block_count()));
-      const std::uint64_t used = (header_bits_ + bits + 63) / 64 * 8;
+  void read_index(bool keep) {
+    const std::uint64_t num_blocks = volume_.block_count();
+    if (volume_.indexed_bits < num_blocks) {  // before memory is taken for them
+      throw Error("{}: truncated: {} blocks cannot come from {} bytes", path_.string(), num_blocks,
+                  file_size_);
+    }
+    BlockIndexBuilder index;
+    if (keep) index.reserve(num_blocks);
+    std::uint64_t end = 0;
+    const auto take = [&](std::uint32_t bits, std::uint64_t count) {
+      end += bits * count;
+      for (std::uint64_t i = 0; keep && i < count; ++i) index.add(bits);
+    };
+    bool is_whole = true;
+    if (has_trailer_) {
+      is_whole = inflate_lengths({*file_, begin_ + stream_bytes_, sizes_.index}, num_blocks,
+                                 [&](std::uint32_t bits) { take(bits, 1); });
+    } else {
+      find_block_lengths(volume_, path_.string(), take);
+      const std::uint64_t used = (header_bits_ + end + 63) / 64 * 8;
       if (file_size_ > used) {
         throw Error("{}: damaged: {} unknown bytes after the zfp stream", path_.string(), file_size_ - used);
       }
-    } else {
-      volume_.index = inflate_index(volume_.file->bytes().subspan(begin_ + stream_bytes_, sizes_.index),
-                                    volume_.block_count());
     }
-    const auto num_blocks = static_cast<std::uint32_t>(volume_.block_count());
-    const std::uint64_t end = volume_.index.empty() ? 0 : volume_.block_begin(num_blocks);
-    if (end == 0 || (has_trailer_ && end != volume_.indexed_bits)) {
+    if (!is_whole || (has_trailer_ && end != volume_.indexed_bits)) {
       throw Error("{}: damaged: the lengths of its blocks are not those of its stream", path_.string());
     }
     volume_.indexed_bits = end;
+    if (keep) volume_.index = index.finish();
   }
 
-  void read_bounds() {
-    const auto deflated = volume_.file->bytes().subspan(begin_ + stream_bytes_ + sizes_.index, sizes_.bounds);
+  void read_bounds(bool keep) {
+    const std::uint64_t num_blocks = volume_.block_count();
     std::vector<std::uint8_t> &codes = volume_.bounds.codes;
+    const FilePart deflated{*file_, begin_ + stream_bytes_ + sizes_.index, sizes_.bounds};
+    if (num_blocks / kMaxDeflateRatio > sizes_.bounds) refuse_bounds();
+    if (keep) codes.reserve(num_blocks);
     const bool whole =
-        inflate_items<std::uint8_t>(deflated, volume_.block_count(), [&](std::span<const std::uint8_t> some) {
+        inflate_items<std::uint8_t>(deflated, num_blocks, [&](std::span<const std::uint8_t> some) {
           codes.insert(codes.end(), some.begin(), some.end());
+          if (!keep) codes = {std::ranges::max(codes)};
           return true;
         });
     const std::int32_t exponent = volume_.bounds.exponent;
-    if (!whole || exponent < kMinBoundExponent || exponent > kMaxBoundExponent)
-      throw Error("{}: damaged: a level of detail has no bounds of its errors", path_.string());
+    if (!whole || exponent < kMinBoundExponent || exponent > kMaxBoundExponent) refuse_bounds();
+    if (!sizes_.bounds_count_casts) volume_.bounds = {};
+  }
+
+  [[noreturn]] void refuse_bounds() const {
+    throw Error("{}: damaged: a level of detail has no bounds of its errors", path_.string());
   }
 
   void read_header() {
@@ -373,6 +451,8 @@ class ZfpFileReader {
       sizes_ = apply_json(text, volume_, level_bytes_);
     } catch (const json::exception &error) {
       throw Error("{}: broken trailer: {}", path_.string(), error.what());
+    } catch (const Error &error) {
+      throw Error("{}: broken trailer: {}", path_.string(), error.what());
     }
     check_layout(json_end - footer.json_bytes);
     has_trailer_ = true;
@@ -400,9 +480,10 @@ class ZfpFileReader {
   }
 
   fs::path path_;
-  std::shared_ptr<std::FILE> file_;
+  std::shared_ptr<const FileBytes> file_;
   std::uint64_t begin_ = 0;  ///< of this level in the file
   std::uint64_t file_size_ = 0, header_bits_ = 0;
+  bool is_level_ = false;
   std::uint64_t stream_bytes_ = 0;  ///< header, payload and padding
   PartSizes sizes_;                 ///< behind them
   std::vector<std::uint64_t> level_bytes_;
@@ -508,16 +589,18 @@ std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) 
 }
 
 CompressedVolume read_zfp_file(const fs::path &path) {
-  CompressedVolume volume = map_zfp_file(path);
+  CompressedVolume volume = open_zfp_file(path);
   std::vector<std::uint32_t> words(volume.word_count());
-  volume.file->check();
   volume.read_words(0, words);
   volume.words = std::move(words);
   volume.file.reset();
   return volume;
 }
-CompressedVolume map_zfp_file(const fs::path &path) {
-  return ZfpFileReader(path).take_mapped();
+CompressedVolume open_zfp_file(const fs::path &path) {
+  return ZfpFileReader(path).take_checked(true);
+}
+CompressedVolume check_zfp_file(const fs::path &path) {
+  return ZfpFileReader(path).take_checked(false);
 }
 CompressedVolume read_zfp_file_info(const fs::path &path) {
   return ZfpFileReader(path).take_info();

@@ -15,7 +15,7 @@
 
 #include "core/block_errors.hpp"
 #include "core/error.hpp"
-#include "core/io/mapped_file.hpp"
+#include "core/io/file_bytes.hpp"
 #include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"
@@ -86,8 +86,10 @@ class FixedRateCoder : public LevelCoder {
     }
   }
 
-  void end_chunk(const Chunk &) override {
+  void end_chunk(const Chunk &chunk) override {
     sink_(std::as_bytes(std::span(words_)));
+    if (!options_.measure_error) return;
+    errors_.add_lost(chunk.lost);
     errors_.end();
   }
 
@@ -120,7 +122,10 @@ class DeviceCoder : public LevelCoder {
         measure_error_(options.measure_error),
         sink_(sink) {}
 
-  void end_chunk(const Chunk &chunk) override { encoder_.encode(chunk.voxels, chunk.num_layers, sink_); }
+  void end_chunk(const Chunk &chunk) override {
+    if (measure_error_) encoder_.errors().add_lost(chunk.lost);
+    encoder_.encode(chunk.voxels, chunk.num_layers, sink_);
+  }
 
   std::vector<float> finish(CompressedVolume &volume) override {
     encoder_.finish(sink_);
@@ -166,7 +171,7 @@ class PyramidCoder : public ChunkCoder {
   /// are a seventh.
   PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
                std::span<const Sink> sinks, bool is_finest = true)
-      : volume_(*volumes[0]) {
+      : volume_(*volumes[0]), is_finest_(is_finest) {
     const glm::uvec3 dims = volume_.info.dims;
     const bool keep = is_finest && volumes.size() > 1;
     if (volume_.is_indexed()) {
@@ -191,23 +196,40 @@ class PyramidCoder : public ChunkCoder {
   void end_chunk(const Chunk &chunk) override {
     coder_->end_chunk(chunk);
     if (!next_) return;
-    if (bounds_) bounds_->add_fine(chunk.voxels);
+    if (bounds_) {
+      bounds_->add_fine(chunk.voxels);
+      if (is_finest_) keep_lost(chunk.lost);
+    }
     downsampler_->add(chunk.voxels);
   }
-  /// off: how far a coarser level's blocks are from the finest level.
+  /// off: how far a coarser level's blocks are from the source.
   void finish(const LevelBounds::Off &off = {}) {
     const std::vector<float> errors = coder_->finish(volume_);
     volume_.bounds = encode_bounds(errors.empty() ? off.decoded : errors);
     volume_.bounds.by_place = !errors.empty();
-    if (next_) next_->finish(bounds_ ? bounds_->finish(off.made) : LevelBounds::Off{});
+    if (!next_) return;
+    if (!lost_.empty()) lost_.resize(num_blocks_);
+    next_->finish(bounds_ ? bounds_->finish(is_finest_ ? lost_ : off.made) : LevelBounds::Off{});
   }
 
  private:
+  /// Takes no memory as long as nothing was lost.
+  void keep_lost(std::span<const float> lost) {
+    if (std::ranges::any_of(lost, [](float of_block) { return of_block > 0; })) {
+      lost_.resize(num_blocks_);
+      lost_.insert(lost_.end(), lost.begin(), lost.end());
+    }
+    num_blocks_ += lost.size();
+  }
+
   CompressedVolume &volume_;
+  bool is_finest_;
   std::unique_ptr<LevelCoder> coder_;
   std::unique_ptr<PyramidCoder> next_;
   std::optional<Downsampler> downsampler_;
   std::optional<LevelBounds> bounds_;  ///< of the next level
+  std::vector<float> lost_;            ///< of the finest level's blocks (Chunk::lost); empty: nothing
+  std::size_t num_blocks_ = 0;         ///< that lost_ is known of
 };
 
 /// All but what the voxels decide.
@@ -250,7 +272,7 @@ std::vector<CompressedVolume *> all_levels(CompressedVolume &volume) {
 void run(VolumeReader &reader, const CompressOptions &options, std::span<const Sink> sinks,
          CompressedVolume &volume) {
   PyramidCoder coder(options, all_levels(volume), sinks);
-  volume.value_range = read_in_chunks(reader, options.input, coder);
+  volume.value_range = read_in_chunks(reader, options.input, coder).coded;
   coder.finish();
 }
 
@@ -275,13 +297,22 @@ std::uint64_t CompressedVolume::word_count() const {
 }
 
 void CompressedVolume::read_words(std::uint64_t bit, std::span<std::uint32_t> out) const {
-  const std::uint64_t end = payload_bits();
-  const std::uint64_t asked = 32 * std::uint64_t{out.size()},
-                      bits = bit < end ? std::min(asked, end - bit) : 0;
-  const std::span<const std::byte> bytes = file ? file->bytes() : std::as_bytes(std::span(words));
-  const std::uint64_t first = (file ? file_first_bit : 0) + bit, shift = first % 8;
-  const std::byte *source = bytes.data() + first / 8;
-  const std::uint64_t num_words = bits / 32;
+  const std::uint64_t end = payload_bits(), left = bit < end ? end - bit : 0;
+  const std::uint64_t count = std::min(32 * std::uint64_t{out.size()}, left);
+  if (!file) return copy_bits(std::as_bytes(std::span(words)), bit, count, out);
+  const std::uint64_t first = file_first_bit + bit, num_bytes = (first % 8 + count + 7) / 8;
+  std::array<std::byte, ISO_MAX_BLOCK_BITS / 8 + 2> of_block{};
+  std::vector<std::byte> of_many(num_bytes > of_block.size() ? num_bytes : 0);
+  const std::span<std::byte> bytes =
+      std::span(of_many.empty() ? std::span<std::byte>(of_block) : std::span(of_many)).first(num_bytes);
+  file->read(first / 8, bytes);
+  copy_bits(bytes, first % 8, count, out);
+}
+
+void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_t count,
+               std::span<std::uint32_t> out) {
+  const std::uint64_t num_words = count / 32, left = count % 32, shift = bit % 8;
+  const std::byte *source = bytes.data() + bit / 8;
   if (shift == 0) {
     std::memcpy(out.data(), source, num_words * sizeof(std::uint32_t));
   } else {
@@ -293,7 +324,6 @@ void CompressedVolume::read_words(std::uint64_t bit, std::span<std::uint32_t> ou
   }
   if (num_words == out.size()) return;
   std::uint64_t last = 0;
-  const std::uint64_t left = bits % 32;
   if (left != 0) {
     std::memcpy(&last, source + num_words * sizeof(std::uint32_t), (shift + left + 7) / 8);
     last = last >> shift & ((1ull << left) - 1);
@@ -348,10 +378,12 @@ ErrorBound coarser(const ErrorBound &bound, double value_error) {
   return {min_exponent, false, {}};  // rounding would only add to the error
 }
 
+/// A block with fewer bits has no exponent.
+constexpr std::uint32_t kExponentEnd = 9;
+
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double value_error) {
   // libzfp reads whole 64-bit words: four of 32 bits more keep its last read inside.
   std::vector<std::uint32_t> words(volume.word_count() + 4);
-  if (volume.file) volume.file->check();
   volume.read_words(0, words);
   const glm::uvec3 dims = volume.info.dims, blocks = volume.num_blocks();
   const ErrorBound bound = coarser(volume.error_bound, value_error);
@@ -364,6 +396,11 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double val
     const glm::uvec3 at = 4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
     const glm::uvec3 size = glm::min(dims - at, glm::uvec3(4));
     stream_rseek(bits.get(), volume.block_begin(id));  // a block may have more bits than are decoded
+    const std::uint32_t length = volume.block_bits(id);
+    if (length < kExponentEnd) continue;  // an empty block: zeros
+    // A lying index may end a block before its bits do.
+    if (volume.is_indexed())
+      zfp_stream_set_params(stream.get(), ZFP_MIN_BITS, length, ZFP_MAX_PREC, bound.min_exponent);
     const auto layer = std::ptrdiff_t{dims.x} * dims.y;
     zfp_decode_partial_block_strided_float_3(stream.get(),
                                              voxel + at.x + std::ptrdiff_t{dims.x} * at.y + layer * at.z,

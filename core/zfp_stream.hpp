@@ -22,7 +22,7 @@
 
 namespace isowave {
 
-class MappedFile;
+class FileBytes;
 namespace ocl {
 class Device;
 }
@@ -72,8 +72,8 @@ struct CompressedVolume {
   std::uint64_t indexed_bits = 0;  ///< and the length of all of them
   std::vector<std::uint32_t>
       words;  ///< payload from bit 0, little endian; two zero words follow the last bit; empty where file is set
-  std::shared_ptr<const MappedFile> file{};  ///< holds the payload instead of words ...
-  std::uint64_t file_first_bit = 0;          ///< ... from this bit on
+  std::shared_ptr<const FileBytes> file{};  ///< holds the payload instead of words ...
+  std::uint64_t file_first_bit = 0;         ///< ... from this bit on
   std::array<float, 2> value_range{};  ///< [min, max] of the source voxels, as float32 and after map_nan;
                                        ///< {-inf, inf} when unknown
   std::optional<double> max_error{};   ///< largest |decoded - source| when it was measured
@@ -95,17 +95,21 @@ struct CompressedVolume {
   double rate() const { return double(payload_bits()) / (64.0 * double(block_count())); }
   /// Size of words, or what it would be.
   std::uint64_t word_count() const;
-  /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its end. Reads a mapped file
-  /// without a look at its size: see MappedFile::check().
+  /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its end. Throws Error where a file is
+  /// shorter than it was, or cannot be read.
   void read_words(std::uint64_t bit, std::span<std::uint32_t> out) const;
 };
+
+/// Copies bits [bit, bit + count) of `bytes`, little endian, to `out`, which they fit; the rest of it becomes 0.
+void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_t count,
+               std::span<std::uint32_t> out);
 
 /// Gives a volume, and its coarser levels, another spacing.
 void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
 
 /// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more levels than it can have).
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
-/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each block. Writes to a temporary name and renames;
+/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each block, 9 where float32 does not hold all voxels. Writes to a temporary name and renames;
 /// nothing is left behind on an error. Returns what was written, but for the words, which stay empty.
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
@@ -113,10 +117,13 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
 /// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full header (spacing 1 then).
 /// Throws Error in one line on a broken header, other types or modes, truncation, checksum mismatch.
 CompressedVolume read_zfp_file(const std::filesystem::path &path);
-/// As read_zfp_file(), but leaves the payload in the file, which is mapped into memory: words stays empty. The checksum is
+/// As read_zfp_file(), but leaves the payload in the file, to be read when it is needed: words stays empty. The checksum is
 /// checked once, here.
-CompressedVolume map_zfp_file(const std::filesystem::path &path);
-/// As read_zfp_file(), but neither reads nor checks the payload: words stays empty, and so may the index.
+CompressedVolume open_zfp_file(const std::filesystem::path &path);
+/// As open_zfp_file(), with all its checks, but keeps nothing that grows with the number of blocks: words and index stay empty, and of a
+/// level's bounds only the largest is there.
+CompressedVolume check_zfp_file(const std::filesystem::path &path);
+/// As check_zfp_file(), but neither reads nor checks the payload, index and bounds.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
 /// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as value_error allows: see coarser(). The ground

@@ -28,6 +28,18 @@ ISO_INLINE ulong block_begin(ISO_GLOBAL const uint *index, uint block_id) {
   return ((ulong)group[1] << 32 | group[0]) + (pair >> 16u * (block_id & 1u) & 0xFFFFu);
 }
 
+/// In a window, blocks begin with whole words, and an entry before them says where, and how many of the bits before the next block are
+/// not this one's, 0 to 31. first_word: below 2^27.
+ISO_INLINE uint window_entry(uint first_word, uint unused_bits) {
+  return first_word << 5 | unused_bits;
+}
+ISO_INLINE uint entry_bit(uint entry) {
+  return entry & ~31u;
+}
+ISO_INLINE uint entry_bits(uint entry, uint next_entry) {
+  return entry_bit(next_entry) - entry_bit(entry) - (entry & 31u);
+}
+
 ISO_NAMESPACE_END
 
 #endif

@@ -4,7 +4,8 @@
 /// words, each going on so far behind its end that a block which begins in it is whole. 0: part_0 is a window that holds only the
 /// blocks of this launch, one after the other, each beginning with a whole word.
 /// ISO_STREAM_INDEXED: 0 all blocks are layout.bits_per_block long. 1: `index` says where they begin (block_index.h); a window
-/// begins with the number of the first word of each of its blocks, and of the one behind the last.
+/// begins with an entry (window_entry()) for each of its blocks, and for the end of the last.
+/// A block ends where its length says, also where that lies: what its bits say by then is decoded, as at a fixed rate.
 #ifndef ISOWAVE_BLOCK_STREAM_H
 #define ISOWAVE_BLOCK_STREAM_H
 
@@ -27,8 +28,8 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
   uint bits = layout.bits_per_block;
   ulong first_bit = (ulong)block_id * bits;
   if (ISO_STREAM_PARTS == 0 && ISO_STREAM_INDEXED) {
-    first_bit = (ulong)part_0[place] * 32u;
-    bits = (part_0[place + 1u] - part_0[place]) * 32u;
+    first_bit = entry_bit(part_0[place]);
+    bits = entry_bits(part_0[place], part_0[place + 1u]);
   } else if (ISO_STREAM_PARTS == 0) {
     first_bit = (ulong)place * ((bits + 31u) & ~31u);
   } else if (ISO_STREAM_INDEXED) {

@@ -187,9 +187,20 @@ struct CellQuery : RTCIntersectContext {
 };
 
 CellOracle::CellOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
-    : voxels_(voxels), dims_(dims), isovalue_(isovalue), scene_(std::make_unique<EmbreeScene>(false)) {
+    : CellOracle(voxels, {}, dims, isovalue) {}
+CellOracle::CellOracle(std::span<const double> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
+    : CellOracle({}, voxels, dims, isovalue) {}
+
+CellOracle::CellOracle(std::span<const float> voxels, std::span<const double> exact_voxels,
+                       std::array<std::uint32_t, 3> dims, float isovalue)
+    : voxels_(voxels),
+      exact_voxels_(exact_voxels),
+      dims_(dims),
+      isovalue_(isovalue),
+      scene_(std::make_unique<EmbreeScene>(false)) {
   const auto [smallest, largest] = std::minmax_element(dims.begin(), dims.end());
-  if (voxels.size() != std::size_t{dims[0]} * dims[1] * dims[2] || *smallest < 2 || *largest > 0x10000) {
+  if (voxels.size() + exact_voxels.size() != std::size_t{dims[0]} * dims[1] * dims[2] || *smallest < 2 ||
+      *largest > 0x10000) {
     throw std::invalid_argument("CellOracle: the voxels do not fit the dims, or those are not 2 to 65536");
   }
   find_cells();
@@ -212,7 +223,7 @@ void CellOracle::find_cells() {
       for (std::size_t x = 0; x + 1 < dims_[0]; ++x) {
         const std::size_t first = x + row * y + layer * z;
         int num_inside = 0;
-        for (const std::size_t offset : offsets) num_inside += voxels_[first + offset] >= isovalue_;
+        for (const std::size_t offset : offsets) num_inside += value(first + offset) >= isovalue_;
         if (num_inside != 0 && num_inside != 8) cells_.push_back(first);
       }
     }
@@ -242,7 +253,7 @@ std::array<double, 8> CellOracle::corners(const Cell &cell) const {
     const std::size_t x = static_cast<std::size_t>(cell[0]) + (corner & 1u),
                       y = static_cast<std::size_t>(cell[1]) + (corner >> 1 & 1u),
                       z = static_cast<std::size_t>(cell[2]) + (corner >> 2);
-    v[corner] = voxels_[x + dims_[0] * (y + std::size_t{dims_[1]} * z)] - isovalue_;  // its sign is exact
+    v[corner] = value(x + dims_[0] * (y + std::size_t{dims_[1]} * z)) - isovalue_;  // its sign is exact
   }
   return v;
 }

@@ -32,6 +32,7 @@ class CellOracle final : public HitOracle {
   /// voxels [nz][ny][nx], x fastest, finite; they must outlive the oracle. dims 2 to 2^16. Builds Embree's tree.
   /// Throws std::invalid_argument (dims), Error (memory).
   CellOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
+  CellOracle(std::span<const double> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
   ~CellOracle() override;
   CellOracle(const CellOracle &) = delete;  // Embree holds its address
   CellOracle &operator=(const CellOracle &) = delete;
@@ -48,13 +49,19 @@ class CellOracle final : public HitOracle {
   friend struct CellQuery;
   using Cell = std::array<int, 3>;
 
+  CellOracle(std::span<const float> voxels, std::span<const double> exact_voxels,
+             std::array<std::uint32_t, 3> dims, float isovalue);
+  double value(std::size_t voxel) const {
+    return exact_voxels_.empty() ? double{voxels_[voxel]} : exact_voxels_[voxel];
+  }
   Cell cell_of(std::uint64_t voxel) const;
   Cell cell_at(const std::array<double, 3> &point) const;
   std::array<double, 8> corners(const Cell &cell) const;
   void find_cells();
   bool starts_inside(const OracleRay &ray, bool &enters) const;
 
-  std::span<const float> voxels_;
+  std::span<const float> voxels_;         ///< or
+  std::span<const double> exact_voxels_;  ///< these
   std::array<std::uint32_t, 3> dims_;
   double isovalue_;
   std::vector<std::uint64_t> cells_;  ///< by primitive: index of the voxel that is the cell's lower corner

@@ -23,6 +23,11 @@ class ArrayReader : public VolumeReader {
     const std::size_t layer = std::size_t(info_.dims.x) * info_.dims.y;
     std::copy_n(voxels_.begin() + std::ptrdiff_t(z_begin * layer), num_layers * layer, out.begin());
   }
+  /// Whatever the type is said to be.
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+    const std::size_t layer = std::size_t(info_.dims.x) * info_.dims.y;
+    std::copy_n(voxels_.begin() + std::ptrdiff_t(z_begin * layer), num_layers * layer, out.begin());
+  }
 
  private:
   std::vector<float> voxels_;

@@ -406,7 +406,8 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
     EXPECT_EQ(renderer.options().size.width, kMedium.width);
     if (max_error == 0.00005) {
       EXPECT_FALSE(choice.reachable);
-      EXPECT_LT(choice.tolerance, *scene.volume.max_error);
+      ASSERT_TRUE(choice.tolerance);
+      EXPECT_LT(*choice.tolerance, *scene.volume.max_error);
       EXPECT_EQ(pixel_error, 0);
     } else {
       EXPECT_TRUE(choice.reachable);

@@ -9,10 +9,11 @@
 #include <numeric>
 
 #include "core/error.hpp"
-#include "core/io/mapped_file.hpp"
+#include "core/io/file_bytes.hpp"
 #include "core/macrocells.hpp"
 #include "core/zfp_decode.hpp"
 #include "kernels_cl/zfp_codec.h"
+#include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
@@ -126,7 +127,7 @@ TEST(ReadWords, AnyBitOfWordsAndFiles) {
         if ((volume.words[i / 32] >> (i % 32) & 1u) == 0) bytes[to / 8] &= char(~(1u << to % 8));
       }
       test::write_file(folder / "bits", bytes);
-      shifted.file = std::make_shared<MappedFile>(folder / "bits", bytes.size());
+      shifted.file = std::make_shared<FileBytes>(folder / "bits");
       shifted.file_first_bit = first_bit;
       for (const CompressedVolume *source : {&volume, static_cast<const CompressedVolume *>(&shifted)}) {
         EXPECT_EQ(source->word_count(), volume.words.size());
@@ -144,16 +145,25 @@ TEST(ReadWords, AnyBitOfWordsAndFiles) {
   }
 }
 
-TEST(MappedFile, MissingShortAndTruncatedFilesAreOneLine) {
+TEST(FileBytes, MissingShortAndTruncatedFilesAreOneLine) {
   const test::TemporaryFolder folder;
-  EXPECT_THAT([&] { MappedFile(folder / "none", 1); }, ThrowsMessage<Error>(HasSubstr("none: cannot map")));
+  EXPECT_THAT([&] { FileBytes(folder / "none"); }, ThrowsMessage<Error>(HasSubstr("none: cannot open")));
+  EXPECT_THAT([&] { FileBytes(folder.path()); }, ThrowsMessage<Error>(HasSubstr("not a regular file")));
   test::write_file(folder / "a", std::string(10'000, 'a'));
-  EXPECT_THAT([&] { MappedFile(folder / "a", 10'001); }, ThrowsMessage<Error>(HasSubstr("truncated")));
-  const MappedFile file(folder / "a", 10'000);
-  EXPECT_EQ(file.bytes().size(), 10'000u);
-  EXPECT_NO_THROW(file.check());
+  const FileBytes file(folder / "a");
+  EXPECT_EQ(file.size(), 10'000u);
+  std::vector<std::byte> all(10'000);
+  file.read(0, all);
+  EXPECT_EQ(std::ranges::count(all, std::byte{'a'}), 10'000);
+  EXPECT_THAT([&] { file.read(1, all); }, ThrowsMessage<Error>(HasSubstr("truncated")));
   std::filesystem::resize_file(folder / "a", 9'999);
-  EXPECT_THAT([&] { file.check(); }, ThrowsMessage<Error>(HasSubstr("10000 bytes were there, now 9999")));
+  EXPECT_NO_THROW(file.read(0, std::span(all).first(9'999)));
+  EXPECT_THAT([&] { file.read(0, all); },
+              ThrowsMessage<Error>(HasSubstr("10000 bytes were there, now 9999")));
+  test::write_file(folder / "b", std::string(10'000, 'b'));
+  std::filesystem::rename(folder / "b", folder / "a");  // the name of another file now
+  file.read(0, std::span(all).first(9'999));
+  EXPECT_EQ(all[0], std::byte{'a'});
 }
 
 // ---- on devices
@@ -222,21 +232,86 @@ TEST_P(DeviceStreamOnDevice, SmallWholeNumbersAreRounded) {
   expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
 }
 
-/// An index that lies about where blocks begin gives wrong values, but nothing outside the stream is read.
-TEST_P(DeviceStreamOnDevice, SmallLyingIndexStaysInside) {
-  CompressedVolume volume = indexed_volume(-4, {9, 10, 11});
-  const auto num_blocks = static_cast<uint>(volume.block_count());
-  BlockIndexBuilder index;  // all blocks but the last are a bit long
-  for (uint b = 0; b + 1 < num_blocks; ++b) index.add(1);
-  index.add(static_cast<uint>(
-      std::min<std::uint64_t>(volume.payload_bits() - (num_blocks - 1), ISO_MAX_BLOCK_BITS)));
-  volume.index = index.finish();
-  std::vector<float> expected(64 * std::size_t{num_blocks});
-  for (uint b = 0; b < num_blocks; ++b) {
-    zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
-                     volume.error_bound.min_exponent, expected.data() + 64 * std::size_t{b});
+/// The index of a volume whose blocks have other lengths, by as much as `most`, which add up to the same.
+std::vector<std::uint32_t> lying_index(const CompressedVolume &volume, std::uint32_t most, uint seed) {
+  std::vector<std::uint32_t> lengths;
+  for (uint b = 0; b < volume.block_count(); ++b) lengths.push_back(volume.block_bits(b));
+  Random random(seed);
+  for (std::uint32_t &from : lengths) {
+    std::uint32_t &to = lengths[random() % lengths.size()];
+    const std::uint32_t moved =
+        std::min({std::uint32_t(random() % (most + 1)), from - 1, ISO_MAX_BLOCK_BITS - to});
+    from -= moved;
+    to += moved;
   }
-  EXPECT_EQ(first_difference(decode(volume, DeviceStream(device_, volume)), expected), kNoDifference);
+  BlockIndexBuilder index;
+  for (const std::uint32_t length : lengths) index.add(length);
+  return index.finish();
+}
+
+/// A block ends where its length says, however it lies: the same wrong values everywhere, and nothing outside the stream is read.
+TEST_P(DeviceStreamOnDevice, SmallLyingIndexDecodesToTheSameBits) {
+  const CompressedVolume truth = indexed_volume(-4, {9, 10, 11});
+  const auto num_blocks = static_cast<uint>(truth.block_count());
+  std::vector<CompressedVolume> volumes;
+  for (const std::uint32_t most : {1u, 40u, ISO_MAX_BLOCK_BITS}) {
+    volumes.push_back(truth);
+    volumes.back().index = lying_index(truth, most, most);
+  }
+  BlockIndexBuilder short_blocks;  // all but the last are too short for an exponent
+  for (uint b = 0; b + 1 < num_blocks; ++b) short_blocks.add(1 + b % 9);
+  const std::uint64_t rest =
+      std::min<std::uint64_t>(truth.payload_bits() - 5 * std::uint64_t{num_blocks}, ISO_MAX_BLOCK_BITS);
+  short_blocks.add(static_cast<uint>(rest));
+  volumes.push_back(truth);
+  volumes.back().index = short_blocks.finish();
+  for (const CompressedVolume &volume : volumes) {
+    const std::vector<float> expected = decode_blocks_with_libzfp(volume);
+    EXPECT_NE(first_difference(expected, decode_blocks_with_libzfp(truth)), kNoDifference);
+    expect_decoded(volume, DeviceStream(device_, volume));
+    expect_decoded(volume, DeviceStream(device_, volume, limit_for(volume, 2)));
+    expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
+    expect_same_ranges(volume, DeviceStream(device_, volume, OnHost{5}));
+    for (uint b = 0; b < num_blocks; ++b) {
+      float values[64];
+      zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
+                       volume.error_bound.min_exponent, values);
+      ASSERT_EQ(std::memcmp(values, &expected[64 * std::size_t{b}], sizeof(values)), 0) << "block " << b;
+    }
+  }
+}
+
+/// Where the payload is too large to be copied, blocks are read from the file, wherever it is cut meanwhile.
+TEST_P(DeviceStreamOnDevice, SmallFilesThatBecomeShorterAreOneLine) {
+  const test::TemporaryFolder folder;
+  const auto path = folder / "a.zfp";
+  for (const bool indexed : {false, true}) {
+    test::ArrayVolume source(test::grid_info({9, 10, 11}), random_voxels({9, 10, 11}, -3, 3, 7));
+    CompressOptions options{.rate = 5};
+    if (indexed) options.error_bound = ErrorBound{-4};
+    compress_to_file(source, options, path);
+    const std::string bytes = test::read_file(path);
+    for (const bool copied : {true, false}) {
+      const CompressedVolume volume = open_zfp_file(path);
+      const std::uint64_t end = 12 + (volume.payload_bits() + 7) / 8;
+      const DeviceStream stream(device_, volume, OnHost{8, copied ? bytes.size() : 0});
+      const std::vector<float> expected = decode_blocks_with_libzfp(volume);
+      EXPECT_EQ(first_difference(decode(volume, stream), expected), kNoDifference);
+      for (const std::uint64_t cut : {end - 1, end / 2, std::uint64_t{13}, std::uint64_t{0}}) {
+        std::filesystem::resize_file(path, cut);
+        if (copied) {
+          EXPECT_EQ(first_difference(decode(volume, stream), expected), kNoDifference);
+        } else {
+          EXPECT_THAT([&] { decode(volume, stream); },
+                      ThrowsMessage<Error>(HasSubstr("truncated while it was in use")));
+        }
+        EXPECT_THAT([&] { DeviceStream(device_, volume); }, ThrowsMessage<Error>(HasSubstr("truncated")));
+        EXPECT_THAT([&] { DeviceStream(device_, volume, OnHost{8}); },
+                    ThrowsMessage<Error>(HasSubstr("truncated")));
+      }
+      test::write_file(path, bytes);
+    }
+  }
 }
 
 TEST_P(DeviceStreamOnDevice, PartsOfEveryRate) {

@@ -73,6 +73,15 @@ inline FrameParams grid_frame(const glm::uvec3 &dims) {
   return frame;
 }
 
+/// The index of a fixed-accuracy payload that has none.
+inline std::vector<std::uint32_t> index_by_decoding(const CompressedVolume &volume) {
+  BlockIndexBuilder index;
+  find_block_lengths(volume, "a test", [&](std::uint32_t bits, std::uint64_t count) {
+    for (std::uint64_t i = 0; i < count; ++i) index.add(bits);
+  });
+  return index.finish();
+}
+
 /// Compresses [nz][ny][nx] voxels by one call of libzfp, at any number of bits per block, 9..2048; 0: with the bit planes of
 /// min_exponent.
 inline CompressedVolume compress_with_libzfp(std::vector<float> voxels, const glm::uvec3 &dims,
@@ -94,7 +103,7 @@ inline CompressedVolume compress_with_libzfp(std::vector<float> voxels, const gl
   std::memcpy(volume.words.data(), words.data(),
               std::min(volume.words.size() * sizeof(std::uint32_t), words.size() * sizeof(std::uint64_t)));
   if (volume.is_indexed()) {
-    volume.index = index_by_decoding(volume, "a test");
+    volume.index = index_by_decoding(volume);
     volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
     volume.words.resize((volume.payload_bits() + 31) / 32 + 2);
   }

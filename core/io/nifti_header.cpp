@@ -248,7 +248,10 @@ VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
   voxels.type = nifti_voxel_type(bytes);
   voxels.big_endian = bytes.is_big_endian();
   set_nifti_scale(bytes, voxels);
-  header.info.type = voxels.is_scaled() && is_integer(voxels.type) ? VoxelType::kFloat32 : voxels.type;
+  header.info.type = voxels.type;
+  if (voxels.is_scaled() &&
+      is_integer(voxels.type))  // values are not whole; float32 holds those of 8 and 16 bits to its precision
+    header.info.type = fits_float32(voxels.type) ? VoxelType::kFloat32 : VoxelType::kFloat64;
   set_nifti_geometry(bytes, header.info);
 
   const double offset = bytes.get_finite(108, "vox_offset");

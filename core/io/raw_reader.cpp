@@ -25,17 +25,23 @@ void swap_bytes(std::span<std::byte> bytes, std::size_t voxel_bytes) {
   for (; !bytes.empty(); bytes = bytes.subspan(voxel_bytes)) std::ranges::reverse(bytes.first(voxel_bytes));
 }
 
-/// As ITK scales: voxels but float64 become float32 first.
-void scale_to_float(const VoxelLayout &voxels, std::span<const std::byte> bytes, std::span<float> out) {
-  if (voxels.type == VoxelType::kFloat64) {
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      double value = 0;
-      std::memcpy(&value, bytes.data() + i * sizeof(double), sizeof(double));
-      out[i] = static_cast<float>(value * voxels.slope + voxels.intercept);
-    }
+/// The values of stored voxels, exact.
+void to_double(const VoxelLayout &voxels, std::span<const std::byte> bytes, std::span<double> out) {
+  convert_to_double(voxels.type, bytes, out);
+  if (!voxels.is_scaled()) return;
+  for (double &value : out) value = value * voxels.slope + voxels.intercept;
+}
+
+/// The same in float32. As ITK scales: voxels but float64 become float32 first.
+void to_float(const VoxelLayout &voxels, std::span<const std::byte> bytes, std::span<float> out) {
+  if (voxels.is_scaled() && voxels.type == VoxelType::kFloat64) {
+    std::vector<double> values(out.size());
+    to_double(voxels, bytes, values);
+    std::ranges::transform(values, out.begin(), [](double value) { return static_cast<float>(value); });
     return;
   }
   convert_to_float(voxels.type, bytes, out);
+  if (!voxels.is_scaled()) return;
   for (float &value : out) value = static_cast<float>(double(value) * voxels.slope + voxels.intercept);
 }
 
@@ -48,6 +54,18 @@ class RawReader : public VolumeReader {
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
+    read_as(z_begin, num_layers, out, &to_float);
+  }
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+    read_as(z_begin, num_layers, out, &to_double);
+  }
+
+ private:
+  static constexpr std::size_t kPieceVoxels = 1u << 17;
+
+  template <class Value, class Convert>
+  void read_as(std::uint32_t z_begin, std::uint32_t num_layers, std::span<Value> out,
+               const Convert &convert) {
     const std::uint64_t layer_size = std::uint64_t(info_.dims.x) * info_.dims.y;
     if (z_begin < next_layer_ || num_layers > info_.dims.z || z_begin > info_.dims.z - num_layers ||
         out.size() != layer_size * num_layers) {
@@ -56,27 +74,21 @@ class RawReader : public VolumeReader {
     }
     if (!std::exchange(begun_, true)) skip_bytes(voxels_.bytes_to_skip);
     skip(layer_size * (z_begin - next_layer_));
-    read_voxels(out);
+    read_voxels(out, convert);
     next_layer_ = z_begin + num_layers;
     if (next_layer_ == info_.dims.z && !std::exchange(end_checked_, true)) check_end();
   }
 
- private:
-  static constexpr std::size_t kPieceVoxels = 1u << 17;
-
   /// Reads the next voxels piece by piece, so that the raw bytes need no buffer of the size of `out`.
-  void read_voxels(std::span<float> out) {
+  template <class Value, class Convert>
+  void read_voxels(std::span<Value> out, const Convert &convert) {
     piece_.resize(kPieceVoxels * size_of(voxels_.type));
     while (!out.empty()) {
       const std::size_t count = std::min(kPieceVoxels, out.size());
       const std::span bytes = std::span(piece_).first(count * size_of(voxels_.type));
       read_exactly(bytes);
       if (voxels_.big_endian) swap_bytes(bytes, size_of(voxels_.type));
-      if (voxels_.is_scaled()) {
-        scale_to_float(voxels_, bytes, out.first(count));
-      } else {
-        convert_to_float(voxels_.type, bytes, out.first(count));
-      }
+      convert(voxels_, bytes, out.first(count));
       out = out.subspan(count);
     }
   }
@@ -128,12 +140,12 @@ class RawReader : public VolumeReader {
   bool begun_ = false, end_checked_ = false;
 };
 
-template <class T>
-void convert(std::span<const std::byte> voxels, std::span<float> out) {
+template <class T, class Value>
+void convert(std::span<const std::byte> voxels, std::span<Value> out) {
   for (std::size_t i = 0; i < out.size(); ++i) {
     T value;
     std::memcpy(&value, voxels.data() + i * sizeof(T), sizeof(T));
-    out[i] = static_cast<float>(value);
+    out[i] = static_cast<Value>(value);
   }
 }
 
@@ -201,11 +213,10 @@ std::optional<std::uint32_t> parse_uint(std::string_view text) {
   return value;
 }
 
-}  // namespace
-
-void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out) {
+template <class Value>
+void convert_voxels(VoxelType type, std::span<const std::byte> voxels, std::span<Value> out) {
   if (voxels.size() != out.size() * size_of(type))
-    throw std::invalid_argument("convert_to_float: sizes differ");
+    throw std::invalid_argument("convert_voxels: sizes differ");
   switch (type) {
     case VoxelType::kUint8:
       return convert<std::uint8_t>(voxels, out);
@@ -224,6 +235,15 @@ void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::sp
     case VoxelType::kFloat64:
       return convert<double>(voxels, out);
   }
+}
+
+}  // namespace
+
+void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out) {
+  convert_voxels(type, voxels, out);
+}
+void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::span<double> out) {
+  convert_voxels(type, voxels, out);
 }
 
 std::optional<RawName> parse_raw_name(std::string_view stem) {

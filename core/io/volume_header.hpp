@@ -36,7 +36,7 @@ struct VoxelLayout {
 };
 
 struct VolumeHeader {
-  VolumeInfo info;  ///< type: of the values: float32 where stored integers are scaled
+  VolumeInfo info;  ///< type: of the values: float32, or of 32 bits float64, where stored integers are scaled
   VoxelLayout voxels;
 };
 

@@ -9,6 +9,7 @@
 
 #include "core/error.hpp"
 #include "core/ocl/device.hpp"
+#include "core/printed_bound.hpp"
 #include "core/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
@@ -59,7 +60,8 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   const std::uint64_t bytes_out = std::filesystem::file_size(options.output);
   fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output), dims.x,
              dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in), with_commas(bytes_out),
-             volume.rate(), volume.max_error ? fmt::format(", max error {:.6g}", *volume.max_error) : "");
+             volume.rate(),
+             volume.max_error ? fmt::format(", max error {}", printed_bound(*volume.max_error)) : "");
   for (const CompressedVolume &level : volume.coarser) {
     const glm::uvec3 coarse = level.info.dims;
     fmt::print("  level of detail {}x{}x{}: {} bytes\n", coarse.x, coarse.y, coarse.z,

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <system_error>
 
 #include "core/error.hpp"
@@ -47,8 +48,7 @@ ordered_json describe_grid(const VolumeInfo &info) {
 ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
   if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
   check_input_file(path);
-  // Reading all of it checks the checksum; the words are not needed afterwards.
-  CompressedVolume volume = no_scan ? read_zfp_file_info(path) : read_zfp_file(path);
+  CompressedVolume volume = no_scan ? read_zfp_file_info(path) : check_zfp_file(path);
   if (overrides.spacing) set_spacing(volume, *overrides.spacing);
   ordered_json result = describe_grid(volume.info);
   const glm::uvec3 blocks = volume.num_blocks();
@@ -71,20 +71,28 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   return result;
 }
 
-/// Reads all voxels, a few layers at a time.
+void read(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::span<float> out) {
+  reader.read_layers(z, num_layers, out);
+}
+void read(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::span<double> out) {
+  reader.read_exact_layers(z, num_layers, out);
+}
+
+/// Reads all voxels, a few layers at a time, as what holds them.
+template <class Value>
 void add_value_range(VolumeReader &reader, ordered_json &result) {
   const glm::uvec3 dims = reader.info().dims;
   const std::uint64_t layer_size = std::uint64_t(dims.x) * dims.y;
   const auto chunk = std::uint32_t(std::clamp<std::uint64_t>((1u << 22) / layer_size, 1, dims.z));
   const Progress progress = make_progress_bar("reading");
-  std::vector<float> voxels;
+  std::vector<Value> voxels;
   std::uint64_t bad_count = 0;
-  float min = std::numeric_limits<float>::infinity(), max = -min;
+  Value min = std::numeric_limits<Value>::infinity(), max = -min;
   for (std::uint32_t z = 0; z < dims.z; z += chunk) {
     const std::uint32_t layers = std::min(chunk, dims.z - z);
     voxels.resize(layer_size * layers);
-    reader.read_layers(z, layers, voxels);
-    for (const float value : voxels) {
+    read(reader, z, layers, std::span(voxels));
+    for (const Value value : voxels) {
       if (!std::isfinite(value)) {
         ++bad_count;
         continue;
@@ -124,7 +132,8 @@ void run(const InfoArgs &options) {
     const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);
     result["format"] = "voxels";
     result.update(describe_grid(reader->info()));
-    if (!options.no_scan) add_value_range(*reader, result);
+    if (!options.no_scan && fits_float32(reader->info().type)) add_value_range<float>(*reader, result);
+    if (!options.no_scan && !fits_float32(reader->info().type)) add_value_range<double>(*reader, result);
   }
   if (options.json) {
     fmt::print("{}", json_text(result));

@@ -166,11 +166,7 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
       with_commas(summary.num_uncertain), choice_.detail.max_pixel_error, choice_.detail.value_error,
       choice_.total_ms, certificate.total_ms);
   if (!choice_.reachable) {
-    spdlog::warn(
-        "most pixels cannot be kept within {} pixels: at full detail half of them are within {:.3g}; a "
-        "volume "
-        "converted with --tolerance {:.2g} would do",
-        *max_error_, choice_.median, choice_.tolerance);
+    spdlog::warn("most pixels cannot be kept within {} pixels: {}", *max_error_, choice_.advice);
   }
   if (!error_map.empty())
     write_npy(

@@ -30,8 +30,8 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   CompileReport compiling(device);
   const Scene scene = load_scene(options.input, options.volume, frame_options, read_views(frame_options));
   const glm::uvec3 dims = scene.volume.info.dims;
-  std::vector<float> source(scene.volume.info.num_voxels());
-  open_any_volume(options.input, to_overrides(options.volume))->read_layers(0, dims.z, source);
+  std::vector<double> source(scene.volume.info.num_voxels());
+  open_any_volume(options.input, to_overrides(options.volume))->read_exact_layers(0, dims.z, source);
   Renderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
   compiling.finish();
   fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view", "px chosen",

@@ -50,6 +50,9 @@ class RespacedReader : public VolumeReader {
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
     source_->read_layers(z_begin, num_layers, out);
   }
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+    source_->read_exact_layers(z_begin, num_layers, out);
+  }
 
  private:
   std::unique_ptr<VolumeReader> source_;
@@ -144,10 +147,11 @@ std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOve
   if (options.relative_tolerance) {
     ChunkCoder nothing;
     input.progress = make_progress_bar("reading the value range");
-    const std::array<float, 2> range = read_in_chunks(*open_any_volume(path, overrides), input, nothing);
+    const std::array<double, 2> range =
+        read_in_chunks(*open_any_volume(path, overrides), input, nothing).source;
     if (range[0] == range[1])
       throw Error("{}: all voxels are {}: there is no range that an error is relative to", path, range[0]);
-    goal.tolerance = *options.relative_tolerance * (double{range[1]} - double{range[0]});
+    goal.tolerance = *options.relative_tolerance * (range[1] - range[0]);
   }
   input.progress = make_progress_bar("measuring errors");
   return choose_error_bound(*open_any_volume(path, overrides), goal, input);
@@ -159,7 +163,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
     refuse_compression(compression, path);
     check_input_file(path);
-    CompressedVolume volume = map_zfp_file(path);
+    CompressedVolume volume = open_zfp_file(path);
     if (overrides.spacing) set_spacing(volume, *overrides.spacing);
     check_volume_info(volume.info, path);
     check_drawable(volume.info, path);

@@ -1,0 +1,327 @@
+// Compressed files that lie, with checksums that are right, that become shorter while they are read, or that would take more memory than
+// they are worth: the program says so in one line, or draws what its reference draws.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "core/error.hpp"
+#include "core/level_bounds.hpp"
+#include "core/libzfp.hpp"
+#include "core/zfp_accuracy.hpp"
+#include "core/zfp_file.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/run_program.hpp"
+
+namespace isowave {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using test::quoted;
+using test::TemporaryFolder;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr std::size_t kFooterBytes = 24;
+
+std::uint32_t crc_of(std::string_view bytes) {
+  return static_cast<std::uint32_t>(
+      ::crc32_z(0, reinterpret_cast<const Bytef *>(bytes.data()), bytes.size()));
+}
+
+/// A trailer whose checksums are right, for what stands before it.
+std::string with_trailer(const std::string &before, const std::string &text, std::uint32_t version) {
+  const std::array<std::uint32_t, 3> numbers{version, static_cast<std::uint32_t>(text.size()),
+                                             crc_of(before)};
+  std::string end = text + std::string(reinterpret_cast<const char *>(numbers.data()), sizeof(numbers));
+  const std::uint32_t crc = crc_of(end);
+  return before + end + std::string(reinterpret_cast<const char *>(&crc), sizeof(crc)) + "ISOWAVE\n";
+}
+
+/// A file in its parts.
+struct Parts {
+  explicit Parts(const std::string &bytes) {
+    std::memcpy(&version, &bytes[bytes.size() - kFooterBytes], 4);
+    std::memcpy(&json_bytes, &bytes[bytes.size() - kFooterBytes + 4], 4);
+    before = bytes.substr(0, bytes.size() - kFooterBytes - json_bytes);
+    text = bytes.substr(before.size(), json_bytes);
+  }
+  std::uint32_t version = 0, json_bytes = 0;
+  std::string before, text;
+};
+
+std::string deflated(const std::string &bytes) {
+  uLongf size = ::compressBound(bytes.size());
+  std::string out(size, 0);
+  ::compress(reinterpret_cast<Bytef *>(out.data()), &size, reinterpret_cast<const Bytef *>(bytes.data()),
+             bytes.size());
+  out.resize(size);
+  return out;
+}
+
+class HostileZfp : public testing::Test {
+ protected:
+  /// A small volume with levels, as a file; fixed rate, or fixed accuracy.
+  std::string make(bool indexed) {
+    test::ArrayVolume source(test::grid_info({18, 17, 19}),
+                             test::sample({18, 17, 19}, test::gyroid_field(9)));
+    CompressOptions options{.rate = 6, .measure_error = true, .levels = 2};
+    if (indexed) options.error_bound = ErrorBound{-8};
+    compress_to_file(source, options, path_);
+    return test::read_file(path_);
+  }
+  std::string header(const glm::uvec3 &dims, std::int32_t min_exponent) {
+    const ZfpHeader words = make_zfp_header(dims, 0, min_exponent);
+    return {reinterpret_cast<const char *>(words.data()), sizeof(words)};
+  }
+
+  TemporaryFolder folder_;
+  fs::path path_ = folder_ / "a.zfp";
+};
+
+/// A command that gets no more memory; a program with sanitizers needs its own and more.
+std::string in_400_mb(const std::string &program) {
+  return (program.find("_sanitized") == std::string::npos ? "ulimit -v 400000; " : "") + program;
+}
+
+// ---- files that become shorter
+
+TEST_F(HostileZfp, CutWhereverAfterItWasOpened) {
+  for (const bool indexed : {false, true}) {
+    const std::string bytes = make(indexed);
+    const CompressedVolume volume = open_zfp_file(path_);
+    const std::uint64_t end = 12 + (volume.payload_bits() + 7) / 8;
+    const std::vector<float> expected = decode_with_libzfp(volume);
+    for (std::uint64_t cut = bytes.size(); cut-- > 0;) {
+      fs::resize_file(path_, cut);
+      if (cut >= end) continue;
+      ASSERT_THAT([&] { decode_with_libzfp(volume); },
+                  ThrowsMessage<Error>(HasSubstr("truncated while it was in use")))
+          << cut;
+      cut -= std::min<std::uint64_t>(cut, 6);
+    }
+    test::write_file(path_, bytes);
+    EXPECT_EQ(decode_with_libzfp(volume), expected) << "written again, in place";
+    fs::remove(path_);
+    EXPECT_EQ(decode_with_libzfp(volume), expected) << "no longer there by its name";
+  }
+}
+
+/// However it falls out: an answer or one line, never a signal.
+TEST_F(HostileZfp, CutWhileTheProgramReadsIt) {
+  const std::string bytes = make(true);
+  std::atomic<bool> done = false;
+  std::thread cutter([&] {
+    for (std::uint64_t turn = 0; !done; ++turn) {
+      fs::resize_file(path_, bytes.size() * (turn % 7) / 7);
+      test::write_file(folder_ / "b", bytes);
+      fs::rename(folder_ / "b", path_);
+    }
+  });
+  for (int run = 0; run < 25; ++run) {
+    const auto result = test::run_isowave("info " + quoted(path_));
+    EXPECT_LE(result.status, 1) << result.err;
+    EXPECT_LE(std::ranges::count(result.err, '\n'), 1) << result.err;
+  }
+  done = true;
+  cutter.join();
+}
+
+// ---- more than they are worth
+
+/// 268 million empty blocks in 32 MiB: their index would take 671 MB.
+TEST_F(HostileZfp, EmptyBlocksAreCountedInLittleMemory) {
+  test::write_file(path_, header({4096, 4096, 1024}, 0));
+  fs::resize_file(path_, 12 + (1ull << 28) / 8 + 4);
+  const auto result = test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("268,435,456"));
+  fs::resize_file(path_, 12 + (1ull << 28) / 8 - 4);
+  test::expect_one_line_error("info " + quoted(path_), "truncated");
+}
+
+TEST_F(HostileZfp, EmptyAndOtherBlocksAreFoundAlike) {
+  std::vector<float> voxels = test::sample({64, 36, 21}, test::gyroid_field(9));
+  for (std::size_t i = 0; i < voxels.size(); ++i)
+    if (i % 64 / 4 % 5 < 3 || i / 64 % 36 < 13) voxels[i] = 0;
+  test::ArrayVolume source(test::grid_info({64, 36, 21}), voxels);
+  const CompressedVolume volume = compress(source, {.error_bound = ErrorBound{-6}});
+  std::uint32_t block = 0;
+  find_block_lengths(volume, "a test", [&](std::uint32_t bits, std::uint64_t count) {
+    for (; count > 0; --count) EXPECT_EQ(bits, volume.block_bits(block++));
+  });
+  EXPECT_EQ(block, volume.block_count());
+}
+
+TEST_F(HostileZfp, MoreBlocksThanBitsAreRefusedFirst) {
+  for (const glm::uvec3 &dims :
+       {glm::uvec3(65536), glm::uvec3(4096, 4096, 4096), glm::uvec3(65536, 65536, 2)}) {
+    const std::string head = header(dims, 0), payload(2000, 0);
+    test::write_file(path_, head + payload);
+    const auto result = test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
+    EXPECT_EQ(result.status, 1);
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+    json trailer = json::parse(Parts(make(true)).text);
+    trailer.erase("level_bytes");
+    trailer.erase("bounds_bytes");
+    const std::string index = deflated(std::string(20'000, '\1'));
+    trailer["payload_bits"] = 8 * payload.size();
+    trailer["index_bytes"] = index.size();
+    test::write_file(path_, with_trailer(head + payload + std::string(4, 0) + index, trailer.dump(), 2));
+    EXPECT_THROW(open_zfp_file(path_), Error);
+  }
+}
+
+/// Levels within levels: each a file of its own, whose trailer says that it has one, too.
+TEST_F(HostileZfp, LevelsOfLevelsAreRefusedAtOnce) {
+  const ZfpHeader words = make_zfp_header({2, 2, 2}, 64);
+  const std::string head(reinterpret_cast<const char *>(words.data()), sizeof(words));
+  const std::string grid =
+      R"("spacing":[1,1,1],"origin":[0,0,0],"type":"uint8","direction":[[1,0,0],[0,1,0],[0,0,1]])";
+  std::string file = with_trailer(head + std::string(12, 0), "{" + grid + "}", 4);
+  while (file.size() < 3'000'000) {
+    const std::string level_bytes = fmt::format(R"(,"level_bytes":[{}])", file.size());
+    file = with_trailer(head + std::string(12, 0) + file, "{" + grid + level_bytes + "}", 4);
+  }
+  test::write_file(path_, file);
+  EXPECT_THAT([&] { open_zfp_file(path_); },
+              ThrowsMessage<Error>(HasSubstr("one of its levels of detail is none")));
+}
+
+// ---- trailers that lie
+
+TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
+  const std::vector<std::string> values = {"null",
+                                           "true",
+                                           "\"x\\ny\"",
+                                           "-1",
+                                           "0",
+                                           "1",
+                                           "65535",
+                                           "4294967296",
+                                           "18446744073709551615",
+                                           "1e300",
+                                           "-1e300",
+                                           "1e-320",
+                                           "0.5",
+                                           "[]",
+                                           "{}",
+                                           "[1]",
+                                           "[1,2]",
+                                           "[2,1]",
+                                           "[1e300,2e300]",
+                                           "[[1,0,0],[0,1,0],[0,0,0]]",
+                                           "[0,0,0]",
+                                           "[1,1,1]",
+                                           "[1e300,1e300,1e300]",
+                                           "[[[[[[[[]]]]]]]]",
+                                           "[18446744073709551615]",
+                                           "[1,1]"};
+  std::size_t num_read = 0, num_refused = 0;
+  for (const bool indexed : {false, true}) {
+    const Parts parts(make(indexed));
+    const json trailer = json::parse(parts.text);
+    for (const auto &[key, right] : trailer.items()) {
+      for (const std::string &value : values) {
+        json changed = trailer;
+        changed[key] = json::parse(value);
+        test::write_file(path_, with_trailer(parts.before, changed.dump(), parts.version));
+        try {
+          const CompressedVolume volume = open_zfp_file(path_);
+          EXPECT_TRUE(!volume.max_error || (*volume.max_error >= 0 && std::isfinite(*volume.max_error)));
+          EXPECT_LE(volume.value_range[0], volume.value_range[1]);
+          decode_with_libzfp(volume);
+          ++num_read;
+        } catch (const Error &error) {
+          EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+          ++num_refused;
+        }
+      }
+    }
+  }
+  EXPECT_GT(num_read, 10u);
+  EXPECT_GT(num_refused, 400u);
+}
+
+/// Files of programs that did not count casts, whose errors are said too small.
+TEST_F(HostileZfp, ErrorsThatLeaveOutTheCastAreNotKnown) {
+  for (const std::string kind : {"float64", "int32", "float32"}) {
+    for (const std::string compression : {"--rate 6", "--tolerance-relative 0.01"}) {
+      const auto run = test::run_isowave("convert generate:gyroid_18x17x19_" + kind + " --levels 2 " +
+                                         compression + " -o " + quoted(path_));
+      ASSERT_EQ(run.status, 0) << run.err;
+      const CompressedVolume right = open_zfp_file(path_);
+      EXPECT_TRUE(known_max_error(right));
+      EXPECT_FALSE(right.bounds.codes.empty());
+      const Parts parts(test::read_file(path_));
+      json trailer = json::parse(parts.text);
+      const bool had_casts = trailer.erase("cast_counts") > 0;
+      EXPECT_EQ(had_casts, kind != "float32");
+      test::write_file(path_, with_trailer(parts.before, trailer.dump(), parts.version));
+      for (const CompressedVolume &read : {open_zfp_file(path_), read_zfp_file_info(path_)}) {
+        EXPECT_EQ(known_max_error(read), had_casts ? std::nullopt : right.max_error);
+      }
+      const CompressedVolume read = open_zfp_file(path_);
+      EXPECT_EQ(read.bounds.codes.empty(), had_casts);
+      EXPECT_EQ(read.coarser[0].bounds.codes.empty(), had_casts);
+    }
+  }
+}
+
+// ---- advice
+
+/// What a frame that cannot be kept within an error says would help, `convert` takes, and it is less than there is.
+TEST_F(HostileZfp, AdviceCanBeFollowed) {
+  const auto constant = folder_ / "c_16x16x16_float32.raw", ramp = folder_ / "r_16x16x16_float32.raw",
+             high = folder_ / "h_16x16x16_float64.raw";
+  test::write_file(constant, std::vector<float>(4096, 3.0f));
+  std::vector<float> values(4096);
+  std::vector<double> high_values(4096);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = float(i % 16) + 0.01f * float(i * 7919 % 101);
+    high_values[i] = 1e7 + values[i];
+  }
+  test::write_file(ramp, values);
+  test::write_file(high, high_values);
+  std::size_t num_advised = 0;
+  for (const auto &[voxels, isovalue] : {std::pair(constant, "3"), std::pair(constant, "2.5"),
+                                         std::pair(ramp, "7.3"), std::pair(high, "10000007")}) {
+    for (const std::string compression : {"--rate 2", "--rate 8", "--rate 32", "--tolerance 0.7"}) {
+      for (const std::string error : {"1e-9", "0.001", "1"}) {
+        const auto run = test::run_isowave(
+            fmt::format("render {} {} -i {} --device cpu --size 32x24 --max-error {} -o {}", quoted(voxels),
+                        compression, isovalue, error, quoted(folder_ / "p.png")));
+        const std::string what =
+            voxels.string() + " " + compression + " -i " + isovalue + " --max-error " + error;
+        if (run.status != 0) {
+          EXPECT_THAT(run.err, HasSubstr("cannot be kept")) << what;
+          continue;
+        }
+        const std::string all = run.out + run.err, before = "--tolerance ";
+        EXPECT_EQ(all.find("nan"), std::string::npos) << what << all;
+        const std::size_t at = all.find(before);
+        if (at == std::string::npos) continue;
+        ++num_advised;
+        const std::string tolerance =
+            all.substr(at + before.size(), all.find(' ', at + before.size()) - at - before.size());
+        EXPECT_GT(std::stod(tolerance), 0) << what << all;
+        EXPECT_EQ(test::run_isowave(fmt::format("convert {} --tolerance {} -o {}", quoted(voxels), tolerance,
+                                                quoted(path_)))
+                      .status,
+                  0)
+            << what << all;
+      }
+    }
+  }
+  EXPECT_GT(num_advised, 3u);
+}
+
+}  // namespace
+}  // namespace isowave
