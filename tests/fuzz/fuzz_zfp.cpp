@@ -37,7 +37,7 @@ void mutate_part(fuzz::ZfpParts &parts, std::size_t max_size, std::minstd_rand &
   } else if (dice < 31 && !parts.levels.empty()) {
     parts.levels.pop_back();
   } else {
-    parts.version = random() % 6;
+    parts.version = std::uint32_t(random() % 6);
   }
 }
 

@@ -1,4 +1,5 @@
-// Gives a target each file of the named folders once: the seeds, and what was found before. For compilers without libFuzzer.
+// Gives a target each file of the named folders once: the seeds, and what was found before (there may be none). For compilers
+// without libFuzzer.
 //   fuzz_NAME FOLDER|FILE...
 
 #include <cstdio>
@@ -21,10 +22,8 @@ int main(int argc, char **argv) {
     ++num_files;
   };
   for (int i = 1; i < argc; ++i) {
-    if (!fs::is_directory(argv[i])) {
-      run(argv[i]);
-      continue;
-    }
+    if (fs::is_regular_file(argv[i])) run(argv[i]);
+    if (!fs::is_directory(argv[i])) continue;
     for (const fs::directory_entry &entry : fs::directory_iterator(argv[i])) run(entry.path());
   }
   std::printf("%zu files\n", num_files);
