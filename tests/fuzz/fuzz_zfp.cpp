@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "core/io/mapped_file.hpp"
 #include "core/zfp_file.hpp"
 #include "core/zfp_stream.hpp"
 #include "kernels_cl/zfp_codec.h"
