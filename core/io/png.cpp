@@ -108,6 +108,21 @@ bool read_rows(Reader &reader, png_bytepp rows) {
   return true;
 }
 
+/// From the file's first byte to its first pixel.
+void begin(Reader &reader, std::FILE *file, const std::string &where) {
+  std::rewind(file);
+  png_byte signature[kSignatureBytes];
+  if (std::fread(signature, 1, sizeof signature, file) != sizeof signature ||
+      png_sig_cmp(signature, 0, sizeof signature) != 0) {
+    throw Error("{}: not a PNG file", where);
+  }
+  if (!read_header(reader, file)) throw Error("{}: broken PNG: {}", where, reader.message.text);
+  if (png_get_bit_depth(reader.png, reader.info) != 8) {
+    throw Error("{}: has {} bits per channel, only up to 8 are read", where,
+                png_get_bit_depth(reader.png, reader.info));
+  }
+}
+
 }  // namespace
 
 void write_png(const Image8 &image, const std::filesystem::path &path) {
@@ -122,21 +137,6 @@ void write_png(const Image8 &image, const std::filesystem::path &path) {
     throw Error("{}: cannot write the PNG: {}", path.string(), writer.message.text);
   }
   out.commit();
-}
-
-/// From the file's first byte to its first pixel.
-void begin(Reader &reader, std::FILE *file, const std::string &where) {
-  std::rewind(file);
-  png_byte signature[kSignatureBytes];
-  if (std::fread(signature, 1, sizeof signature, file) != sizeof signature ||
-      png_sig_cmp(signature, 0, sizeof signature) != 0) {
-    throw Error("{}: not a PNG file", where);
-  }
-  if (!read_header(reader, file)) throw Error("{}: broken PNG: {}", where, reader.message.text);
-  if (png_get_bit_depth(reader.png, reader.info) != 8) {
-    throw Error("{}: has {} bits per channel, only up to 8 are read", where,
-                png_get_bit_depth(reader.png, reader.info));
-  }
 }
 
 Image8 read_png(const std::filesystem::path &path) {
