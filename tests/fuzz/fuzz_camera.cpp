@@ -10,7 +10,7 @@ using namespace isowave;
 namespace {
 
 std::string json_of(const glm::dvec3 &v) {
-  return fmt::format("[{},{},{}]", v.x, v.y, v.z);
+  return fmt::format("[{:.17e},{:.17e},{:.17e}]", v.x, v.y, v.z);  // JSON takes "-0" for the integer 0
 }
 
 std::string json_of(const CameraFile &file) {
