@@ -33,9 +33,7 @@ fs::path make_folder() {
     fs::create_directories(kept);
     return kept;
   }
-  const fs::path memory = "/dev/shm";
-  std::string name =
-      ((fs::is_directory(memory) ? memory : fs::temp_directory_path()) / "isowave_fuzz_XXXXXX").string();
+  std::string name = (fs::temp_directory_path() / "isowave_fuzz_XXXXXX").string();
   demand(::mkdtemp(name.data()) != nullptr, "cannot make a temporary folder");
   return name;
 }

@@ -25,7 +25,7 @@ namespace isowave::fuzz {
 /// Ends the process, with `what` as the last line on stderr, unless `holds`.
 void demand(bool holds, std::string_view what);
 
-/// This process's own folder, on tmpfs where there is one; removed at exit. ISOWAVE_FUZZ_KEEP names another, which stays,
+/// This process's own folder among the temporary files, removed at exit. ISOWAVE_FUZZ_KEEP names another, which stays,
 /// and has refusals printed: to look at a single input.
 const std::filesystem::path &folder();
 /// Replaces a file in folder().
