@@ -38,10 +38,13 @@ fs::path make_folder() {
   return name;
 }
 
-void remove_folder() {
-  std::error_code ignored;
-  if (kept_folder() == nullptr) fs::remove_all(folder(), ignored);
-}
+struct Folder {
+  fs::path path = make_folder();
+  ~Folder() {
+    std::error_code ignored;
+    if (kept_folder() == nullptr) fs::remove_all(path, ignored);
+  }
+};
 
 /// All voxels, at most so many layers in each call; empty if the volume is refused.
 std::vector<float> read_voxels(const fs::path &path, std::uint64_t voxels_at_once) {
@@ -71,12 +74,8 @@ void demand(bool holds, std::string_view what) {
 }
 
 const fs::path &folder() {
-  static const fs::path path = [] {
-    fs::path made = make_folder();
-    std::atexit(&remove_folder);
-    return made;
-  }();
-  return path;
+  static const Folder folder;
+  return folder.path;
 }
 
 fs::path put(const std::string &name, std::string_view bytes) {
