@@ -23,7 +23,9 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Lt;
 using testing::Not;
+using testing::SizeIs;
 
 class NpyTest : public testing::Test {
  protected:
@@ -127,6 +129,7 @@ TEST_F(NpyTest, RefusesOtherArrays) {
   EXPECT_EQ(refusal(with("'<f4'", "False", "(2, 3)")), "accepted");
   EXPECT_THAT(refusal(with("'<f8'", "False", "(1, 3)")), HasSubstr("'<f8'"));
   EXPECT_THAT(refusal(with("'>f4'", "False", "(2, 3)")), HasSubstr("'>f4'"));
+  EXPECT_THAT(refusal(with(std::string(10000, 'x'), "False", "(2, 3)")), SizeIs(Lt(300u)));
   EXPECT_THAT(refusal(with("'<f4'", "True", "(2, 3)")), HasSubstr("Fortran"));
   EXPECT_THAT(refusal(with("'<f4'", "False", "(6,)")), HasSubstr("1 dimensions"));
   EXPECT_THAT(refusal(with("'<f4'", "False", "(1, 2, 3)")), HasSubstr("3 dimensions"));

@@ -95,7 +95,7 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
 void AtomicFile::read_back(const std::function<void(std::span<const std::byte>)> &take) {
   errno = 0;
   if (std::ferror(file_) != 0 || ::fseeko(file_, 0, SEEK_SET) != 0) fail(target_, errno != 0 ? errno : EIO);
-  std::vector<std::byte> piece(1u << 20);
+  std::vector<std::byte> piece(1u << 16);
   while (const std::size_t count = std::fread(piece.data(), 1, piece.size(), file_))
     take(std::span(piece).first(count));
   if (std::ferror(file_) != 0) fail(target_, errno != 0 ? errno : EIO);

@@ -1,5 +1,6 @@
 #include "core/io/npy.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <fstream>
@@ -96,7 +97,9 @@ FloatImage read_npy(const std::filesystem::path &path) {
 
   const std::string_view descr = value_of(header, "'descr'", where);
   if (!descr.starts_with("'<f4'")) {
-    throw Error("{}: holds {}, not '<f4' (little-endian float32)", where, descr.substr(0, descr.find(',')));
+    constexpr std::size_t kMostShown = 40;  // a file may name its type by its whole header
+    throw Error("{}: holds {}, not '<f4' (little-endian float32)", where,
+                descr.substr(0, std::min(descr.find(','), kMostShown)));
   }
   if (!value_of(header, "'fortran_order'", where).starts_with("False")) {
     throw Error("{}: is in Fortran order; save it with numpy.ascontiguousarray", where);

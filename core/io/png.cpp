@@ -20,7 +20,6 @@ namespace {
 // false, and leave the message in Message; their callers own everything and throw.
 
 constexpr std::size_t kSignatureBytes = 8;
-constexpr std::uint64_t kMaxIdatRatio = 1032;  ///< deflate codes at most 258 bytes in 2 bits
 
 struct Message {
   char text[120] = "unknown error";
@@ -73,12 +72,15 @@ bool write_image(Writer &writer, std::FILE *file, const Image8 &image) {
   return true;
 }
 
-/// Reads everything before the pixels and asks for 8-bit RGB or RGBA.
+/// Reads everything before the pixels and asks for 8-bit RGB or RGBA. Texts, profiles and such are passed over: they may be large,
+/// once they are unpacked.
 bool read_header(Reader &reader, std::FILE *file) {
   png_structp png = reader.png;
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_init_io(png, file);
   png_set_sig_bytes(png, kSignatureBytes);
+  constexpr int kAllThatNoPixelNeeds = -1;
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, kAllThatNoPixelNeeds);
   png_read_info(png, reader.info);
   png_set_expand(png);
   png_set_gray_to_rgb(png);
@@ -87,11 +89,39 @@ bool read_header(Reader &reader, std::FILE *file) {
   return true;
 }
 
+/// Whether the file holds all its pixels; they are lost. row: room for one row.
+bool check_rows(Reader &reader, png_bytep row) {
+  png_structp png = reader.png;
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  const png_uint_32 height = png_get_image_height(png, reader.info);
+  const bool interlaced = png_get_interlace_type(png, reader.info) != PNG_INTERLACE_NONE;
+  for (int pass = 0; pass < (interlaced ? PNG_INTERLACE_ADAM7_PASSES : 1); ++pass) {
+    for (png_uint_32 y = 0; y < height; ++y) png_read_row(png, row, nullptr);
+  }
+  png_read_end(png, nullptr);
+  return true;
+}
+
 bool read_rows(Reader &reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png)) != 0) return false;
   png_read_image(reader.png, rows);
   png_read_end(reader.png, nullptr);
   return true;
+}
+
+/// From the file's first byte to its first pixel.
+void begin(Reader &reader, std::FILE *file, const std::string &where) {
+  std::rewind(file);
+  png_byte signature[kSignatureBytes];
+  if (std::fread(signature, 1, sizeof signature, file) != sizeof signature ||
+      png_sig_cmp(signature, 0, sizeof signature) != 0) {
+    throw Error("{}: not a PNG file", where);
+  }
+  if (!read_header(reader, file)) throw Error("{}: broken PNG: {}", where, reader.message.text);
+  if (png_get_bit_depth(reader.png, reader.info) != 8) {
+    throw Error("{}: has {} bits per channel, only up to 8 are read", where,
+                png_get_bit_depth(reader.png, reader.info));
+  }
 }
 
 }  // namespace
@@ -115,31 +145,20 @@ Image8 read_png(const std::filesystem::path &path) {
   check_input_file(path);
   const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(where.c_str(), "rb"), &std::fclose);
   if (!file) throw Error("{}: cannot open", where);
-  png_byte signature[kSignatureBytes];
-  if (std::fread(signature, 1, sizeof signature, file.get()) != sizeof signature ||
-      png_sig_cmp(signature, 0, sizeof signature) != 0) {
-    throw Error("{}: not a PNG file", where);
+  {  // A broken header may ask for any size. So nothing is asked for before the file has shown that it holds as much.
+    Reader reader;
+    begin(reader, file.get(), where);
+    std::vector<png_byte> row(png_get_rowbytes(reader.png, reader.info));
+    if (!check_rows(reader, row.data())) throw Error("{}: broken PNG: {}", where, reader.message.text);
   }
   Reader reader;
-  if (!read_header(reader, file.get())) throw Error("{}: broken PNG: {}", where, reader.message.text);
-  if (png_get_bit_depth(reader.png, reader.info) != 8) {
-    throw Error("{}: has {} bits per channel, only up to 8 are read", where,
-                png_get_bit_depth(reader.png, reader.info));
-  }
-
+  begin(reader, file.get(), where);
   Image8 image;
   image.width = png_get_image_width(reader.png, reader.info);
   image.height = png_get_image_height(reader.png, reader.info);
   image.channels = png_get_channels(reader.png, reader.info);
   const std::size_t row_bytes = png_get_rowbytes(reader.png, reader.info);
-  const std::uint64_t bytes = std::uint64_t(row_bytes) * image.height;
-  // A broken header may ask for any size: believe it only as far as the file could hold it, at 1 bit per
-  // pixel at least.
-  if (bytes / 32 / kMaxIdatRatio > std::filesystem::file_size(path)) {
-    throw Error("{}: broken PNG: {} x {} pixels cannot come from a file this small", where, image.width,
-                image.height);
-  }
-  image.pixels.resize(bytes);
+  image.pixels.resize(row_bytes * image.height);
   std::vector<png_bytep> rows(image.height);
   for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = image.pixels.data() + y * row_bytes;
   if (!read_rows(reader, rows.data())) throw Error("{}: broken PNG: {}", where, reader.message.text);
