@@ -55,7 +55,7 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       rank_histogram_(device, "eviction ranks", ISO_EVICTION_RANKS),
       request_(device, "block_cache", "cache_request", with_levels(group_defines(group_size), levels)),
       rank_histogram_kernel_(device, "block_cache", "cache_rank_histogram",
-                            with_levels(group_defines(group_size), levels)),
+                             with_levels(group_defines(group_size), levels)),
       select_(device, "block_cache", "cache_select", with_levels(group_defines(group_size), levels)),
       evict_(device, "block_cache", "cache_evict", with_levels(group_defines(group_size), levels)),
       rebuild_(device, "block_cache", "cache_rebuild", with_levels(group_defines(group_size), levels)),
@@ -80,7 +80,7 @@ void BlockCache::request(Wavefront &rays) {
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
   rank_histogram_kernel_(slots_range_, asked, num_slots, capacity, state, slot_block_ids, slot_stamps,
-                        rank_histogram_);
+                         rank_histogram_);
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, rank_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, table, state, free_slots_);

@@ -13,8 +13,8 @@
 #include <type_traits>
 
 #include "core/error.hpp"
+#include "core/io/byte_source.hpp"
 #include "core/io/file_bytes.hpp"
-#include "core/io/raw_reader.hpp"
 #include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/pyramid.hpp"
@@ -280,7 +280,7 @@ class ZfpFileReader {
   /// That of everything before the trailer.
   void check_sum() const {
     if (!has_trailer_) return;
-    std::vector<std::byte> piece(1u << 20);
+    std::vector<std::byte> piece(1u << 16);
     std::uint32_t crc = 0;
     for (std::uint64_t at = 0, end = bytes_before_trailer(); at < end; at += piece.size()) {
       piece.resize(std::min<std::uint64_t>(piece.size(), end - at));

@@ -132,8 +132,7 @@ TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
     EXPECT_THAT(device.timer().collect(), IsEmpty());
     EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
     const FrameStats first = renderer.render(cameras_[0], 0.1f);
-    EXPECT_EQ(first.passes.front().counts.pass,
-              ISO_AGE_BUCKETS + (pipeline == PipelineKind::kBlocks ? 1u : 0u));
+    EXPECT_EQ(first.passes.front().counts.pass, 1u + (pipeline == PipelineKind::kBlocks ? 1u : 0u));
     renderer.clear_cache();
     const FrameStats again = renderer.render(cameras_[0], 0.1f);
     ASSERT_EQ(first.passes.size(), again.passes.size());

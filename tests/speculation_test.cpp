@@ -35,7 +35,7 @@ TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
           counts.next_active_count = active;
           counts.window_count = 40;
           counts.requested_count = 100;
-          counts.decoded_count = scarce ? 99 : 100;
+          counts.decoded_count = scarce ? 25 : 100;
           return counts;
         }();
         rays.counts.write({&before, 1});
@@ -44,10 +44,10 @@ TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
         expected.pass = before.pass + 1;
         expected.active_count = active;
         expected.spec_count = active == 0 ? 0 : std::min(most, kPixels / active);
-        expected.window_count = std::min(active, scarce ? 20u : 51u);
+        expected.window_count = std::min(active, scarce ? 10u : 51u);
         expected.pair_slot_count = expected.window_count * expected.spec_count;
-        expected.pair_count = expected.granted_count = expected.visible_count = 0;
-        expected.requested_count = expected.decoded_count = expected.hit_count = 0;
+        expected.pair_count = expected.ahead_count = expected.granted_count = expected.visible_count = 0;
+        expected.requested_count = expected.decoded_count = expected.recycled_count = expected.hit_count = 0;
         expect_counts(rays.counts, expected);
       }
     }

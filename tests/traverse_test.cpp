@@ -125,12 +125,14 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       counts.active_count = static_cast<uint>(active.size());
       counts.window_count = counts.active_count;
       counts.spec_count = spec_count;
-      counts.pair_count = 0;
+      counts.pair_count = counts.ahead_count = 0;
       rays.counts.write({&counts, 1});
       stages.kernel(stages.range, rays.frame, masks, rays.counts, rays.active_ray_ids, rays.ray_block_ids,
                     pairs, rays.closest_pairs);
       const std::vector<uint> got = pairs.read(), states = rays.ray_block_ids.read();
       counts.pair_count = collect(got, active, spec_count, frame.per_ray_speculation, lists);
+      for (const uint ray : active)
+        counts.ahead_count += own_ahead(ray, spec_count, frame.per_ray_speculation);
       expect_counts(rays.counts, counts);
       std::vector<uint> closest = rays.closest_pairs.read();
       closest.resize(active.size());
@@ -144,13 +146,18 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     return lists;
   }
 
+  /// Blocks that a ray is to look ahead at.
+  static uint own_ahead(uint ray, uint spec_count, bool per_ray) {
+    return per_ray ? std::min(1u << ray % 7, spec_count) : spec_count;
+  }
+
   /// Appends a pass's pairs to the lists; returns how many there are.
   static uint collect(const std::vector<uint> &pairs, const std::vector<uint> &active, uint spec_count,
                       bool per_ray, BlockLists &lists) {
     uint num_pairs = 0;
     for (std::size_t a = 0; a < active.size(); ++a) {
       bool ended = false;
-      const uint ahead = per_ray ? std::min(1u << active[a] % 7, spec_count) : spec_count;
+      const uint ahead = own_ahead(active[a], spec_count, per_ray);
       for (uint k = 0; k < spec_count; ++k) {
         const uint block = pairs[a * spec_count + k];
         EXPECT_FALSE(ended && block != ISO_INVALID_ID) << "a gap in the pairs of ray " << active[a];

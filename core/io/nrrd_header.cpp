@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-constexpr std::array<std::string_view, 30> kFieldNames{"content",
+constexpr std::array<std::string_view, 30> kNrrdFields{"content",
                                                        "number",
                                                        "type",
                                                        "block size",
@@ -48,7 +48,7 @@ constexpr std::array<std::string_view, 30> kFieldNames{"content",
                                                        "sample units",
                                                        "measurement frame"};
 
-/// The field's name as in kFieldNames; empty if the format has no such field. Case does not matter, nor do blanks.
+/// The field's name as in kNrrdFields; empty if the format has no such field. Case does not matter, nor do blanks.
 std::string_view field_name(std::string_view text) {
   const auto squeeze = [](std::string_view name) {
     std::string result = lower_case(name);
@@ -57,7 +57,7 @@ std::string_view field_name(std::string_view text) {
   };
   std::string wanted = squeeze(text);
   if (wanted == "centerings") wanted = "centers";
-  for (const std::string_view name : kFieldNames) {
+  for (const std::string_view name : kNrrdFields) {
     if (squeeze(name) == wanted) return name;
   }
   return {};

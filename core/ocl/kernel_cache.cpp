@@ -1,21 +1,16 @@
 #include "core/ocl/kernel_cache.hpp"
 
 #include <chrono>
-#include <cstdlib>
 #include <string>
 #include <system_error>
+
+#include "core/ocl/environment.hpp"
 
 namespace isowave::ocl {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The value of an environment variable, or "".
-std::string environment(const char *name) {
-  const char *value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
 
 bool is_one_of(const std::string &text, std::initializer_list<const char *> values) {
   for (const char *value : values) {

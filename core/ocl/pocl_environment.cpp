@@ -11,6 +11,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "core/ocl/environment.hpp"
+
 namespace isowave::ocl {
 
 namespace fs = std::filesystem;
@@ -21,16 +23,10 @@ constexpr std::uintmax_t kNeededBytes = 64u << 20;  ///< kernels of one device, 
 constexpr std::size_t kLongestName =
     700;  ///< PoCL ends the process where names of files in it exceed 1,024 bytes
 
-struct CacheState {
+struct KernelFolder {
   std::string notice, trouble;
   bool has_pocl = false;
 };
-
-/// The value of an environment variable; empty if there is none.
-std::string environment(const char *name) {
-  const char *value = std::getenv(name);
-  return value ? value : "";
-}
 
 /// By PoCL 3.1's rule.
 fs::path usual_folder() {
@@ -69,7 +65,7 @@ bool make_private(const fs::path &folder) {
          (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
 }
 
-CacheState choose_folder() {
+KernelFolder choose_folder() {
   if (environment("POCL_CACHE_DIR").empty())
     ::unsetenv("POCL_CACHE_DIR");  // PoCL ends the process where it is empty
   const fs::path usual = usual_folder();
@@ -102,8 +98,8 @@ void complete_path() {
   ::setenv("PATH", (path + (path.empty() ? "" : ":") + "/usr/local/bin:/usr/bin:/bin").c_str(), 1);
 }
 
-CacheState &state() {
-  static CacheState chosen;
+KernelFolder &state() {
+  static KernelFolder chosen;
   return chosen;
 }
 

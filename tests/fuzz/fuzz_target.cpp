@@ -46,6 +46,14 @@ struct Folder {
   }
 };
 
+/// As compression reads them: float32 where that holds them, else exactly.
+void read_some(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::span<float> voxels) {
+  if (fits_float32(reader.info().type)) return reader.read_layers(z, num_layers, voxels);
+  std::vector<double> exact(voxels.size());
+  reader.read_exact_layers(z, num_layers, exact);
+  std::ranges::transform(exact, voxels.begin(), [](double value) { return static_cast<float>(value); });
+}
+
 /// All voxels, at most so many layers in each call; empty if the volume is refused.
 std::vector<float> read_voxels(const fs::path &path, std::uint64_t voxels_at_once) {
   std::vector<float> voxels;
@@ -58,7 +66,7 @@ std::vector<float> read_voxels(const fs::path &path, std::uint64_t voxels_at_onc
     for (std::uint32_t z = 0; z < info.dims.z; z += some) {
       const std::uint32_t layers = std::min(some, info.dims.z - z);
       voxels.resize(layer * (z + layers));
-      reader->read_layers(z, layers, std::span(voxels).subspan(layer * z));
+      read_some(*reader, z, layers, std::span(voxels).subspan(layer * z));
     }
   });
   if (!whole) voxels.clear();

@@ -115,11 +115,16 @@ std::size_t LLVMFuzzerCustomMutator(std::uint8_t *data, std::size_t size, std::s
 int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
   const std::filesystem::path path = fuzz::put("volume.zfp", fuzz::text_of(data, size));
   fuzz::accepts([&] { read_zfp_file_info(path); });
-  CompressedVolume volume;
-  if (!fuzz::accepts([&] { volume = read_zfp_file(path); })) return 0;
-  fuzz::demand(same_head(read_zfp_file_info(path), volume), "two ways to read a file differ");
-  demand_libzfp_agrees(volume);
-  for (const CompressedVolume &level : volume.coarser) demand_libzfp_agrees(level);
+  CompressedVolume volume, in_file;
+  const bool accepted = fuzz::accepts([&] { volume = read_zfp_file(path); });
+  fuzz::demand(accepted == fuzz::accepts([&] { in_file = open_zfp_file(path); }),
+               "one way to read a file refuses it, another does not");
+  if (!accepted) return 0;
+  fuzz::demand(same_head(read_zfp_file_info(path), volume) && same_head(in_file, volume) &&
+                   same_head(check_zfp_file(path), volume),
+               "two ways to read a file differ");
+  demand_libzfp_agrees(in_file);
+  for (const CompressedVolume &level : in_file.coarser) demand_libzfp_agrees(level);
   // At a fixed rate, only blocks of whole 64-bit words are written.
   if (volume.bits_per_block % 64 == 0) demand_written_again(volume, path);
   return 0;

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstdlib>
+#include <string>
+
+namespace isowave::ocl {
+
+/// The value of an environment variable; empty if there is none.
+inline std::string environment(const char *name) {
+  const char *value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace isowave::ocl
