@@ -9,6 +9,9 @@ namespace isowave {
 
 namespace {
 
+static_assert(std::uint64_t{ISO_MAX_CACHE_SLOTS} * ISO_BLOCK_VOXELS <= std::uint64_t{1} << 32,
+              "kernels find the values of a slot with 32 bits");
+
 std::uint32_t checked_slots(std::uint32_t num_slots) {
   if (num_slots < kMinCacheSlots || num_slots > ISO_MAX_CACHE_SLOTS) {
     throw Error("a block cache of {} slots cannot be used: {} (one dual grid) to {} can", num_slots,

@@ -14,7 +14,7 @@ inline constexpr std::uint32_t kMinCacheSlots = 8;
 /// What the stages of one pass read of the cache, and add to its requests.
 struct BlockCache {
   /// num_slots is at least kMinCacheSlots; num_rays bounds a pass's pairs. `grid`: its blocks are used, those of the finest
-  /// level where frames may have several levels of detail. Throws Error when there are too few slots, or more than 2^30.
+  /// level where frames may have several levels of detail. Throws Error when there are too few slots, or more than ISO_MAX_CACHE_SLOTS.
   BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots, std::uint64_t num_rays,
              std::uint32_t group_size, bool levels = false);
 

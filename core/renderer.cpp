@@ -34,8 +34,8 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   std::uint64_t num_ids = 0;  // see make_id_grid()
   for (const CompressedVolume *level : levels_of(volume, with_levels))
     num_ids += layer_ids * level->num_blocks().z;
-  if (num_ids >= ISO_MAX_CACHE_SLOTS) {
-    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids, ISO_MAX_CACHE_SLOTS);
+  if (num_ids >= ISO_MAX_BLOCK_IDS) {
+    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids, ISO_MAX_BLOCK_IDS);
   }
   if (options.max_speculation < 1 || options.max_speculation > ISO_MAX_SPECULATION) {
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,

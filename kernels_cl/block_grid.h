@@ -7,7 +7,8 @@
 ISO_NAMESPACE_BEGIN
 
 #define ISO_BLOCK_ABSENT 0xFFFFFFFFu  ///< instead of a cache slot: not in the cache
-#define ISO_MAX_CACHE_SLOTS 0x40000000u
+#define ISO_MAX_BLOCK_IDS 0x40000000u
+#define ISO_MAX_CACHE_SLOTS 0x04000000u  ///< 16 GiB of values, whose numbers kernels count in 32 bits
 
 typedef struct BlockCoords {
   uint x, y, z;

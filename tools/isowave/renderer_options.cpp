@@ -26,9 +26,9 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->transform(byte_count())
       ->type_name("BYTES");
   app.add_option("--cache-slots", flags.values.cache_slots,
-                 "decoded blocks kept on the device, at least 8 [as many as the budget allows; without one "
+                 "decoded blocks kept on the device, 8 to 2^26 [as many as the budget allows; without one "
                  "2^20 or all]")
-      ->check(CLI::Range(8u, 1u << 30));
+      ->check(CLI::Range(8u, 1u << 26));
   app.add_option(
          "--stream", flags.stream,
          "where the compressed volume is: device, host (blocks are uploaded when they are asked for), or "
