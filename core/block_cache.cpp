@@ -55,10 +55,10 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       slots_range_(ocl::Range::strided(slots, group_size, device)),
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
       free_slots_(device, "free slots", slots),
+      slot_ranks_(device, "slot ranks", slots),
       rank_histogram_(device, "eviction ranks", ISO_EVICTION_RANKS),
       request_(device, "block_cache", "cache_request", with_levels(group_defines(group_size), levels)),
-      rank_histogram_kernel_(device, "block_cache", "cache_rank_histogram",
-                             with_levels(group_defines(group_size), levels)),
+      rank_(device, "block_cache", "cache_rank", with_levels(group_defines(group_size), levels)),
       select_(device, "block_cache", "cache_select", with_levels(group_defines(group_size), levels)),
       evict_(device, "block_cache", "cache_evict", with_levels(group_defines(group_size), levels)),
       rebuild_(device, "block_cache", "cache_rebuild", with_levels(group_defines(group_size), levels)),
@@ -82,11 +82,12 @@ void BlockCache::request(Wavefront &rays) {
 }
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
-  rank_histogram_kernel_(slots_range_, asked, num_slots, capacity, state, slot_block_ids, slot_stamps,
-                         rank_histogram_);
+  rank_(slots_range_, rays.frame, asked, num_slots, capacity, state, table, slot_block_ids, slot_stamps,
+        slot_ranks_, rank_histogram_);
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, rank_histogram_, state);
-  evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, table, state, free_slots_);
+  evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, slot_ranks_, table, state,
+         free_slots_);
   rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, state, table);
 }
 

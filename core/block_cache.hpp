@@ -47,7 +47,7 @@ struct BlockCache {
   ocl::Buffer<float> values;            ///< [num_slots * 64] decoded values, x + 4y + 16z within a slot
   ocl::Buffer<ulong> inside;            ///< [num_slots] bit x + 4y + 16z: is value >= isovalue?
   ocl::Buffer<uint> slot_block_ids;     ///< [num_slots] block in each slot or ISO_INVALID_ID
-  ocl::Buffer<uint> slot_stamps;        ///< [num_slots] pass that used it last
+  ocl::Buffer<uint> slot_stamps;        ///< [num_slots] when it was used last: kernels_cl/slot_stamps.h
   ocl::Buffer<uint> requested_bits;     ///< [2 * coarse macrocells] one bit per block; 0 between passes
   ocl::Buffer<uint> request_block_ids;  ///< [capacity]
   ocl::Buffer<uint> decode_slots;       ///< [capacity] slot of each request granted
@@ -56,18 +56,20 @@ struct BlockCache {
  private:
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
-  ocl::Buffer<uint> free_slots_, rank_histogram_;
+  ocl::Buffer<uint> free_slots_;
+  ocl::Buffer<uchar> slot_ranks_;  ///< [num_slots] orders of eviction
+  ocl::Buffer<uint> rank_histogram_;
   ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_;
-  ocl::Kernel<ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>, ocl::In<uint>, ocl::In<uint>,
-              ocl::Out<uint>>
-      rank_histogram_kernel_;
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>, ocl::In<BlockEntry>,
+              ocl::In<uint>, ocl::In<uint>, ocl::Out<uchar>, ocl::Out<uint>>
+      rank_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
       select_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>, ocl::Out<BlockEntry>,
-              ocl::Out<CacheState>, ocl::Out<uint>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>, ocl::In<uchar>,
+              ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>
       evict_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<CacheState>,
               ocl::Out<BlockEntry>>

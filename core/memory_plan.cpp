@@ -187,6 +187,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"requested blocks", 8 * num_macrocells(ids)},
                        {"block requests", 4 * listed},
                        {"decode slots", 4 * listed},
+                       {"slot ranks", slots},
                        {"eviction ranks", 4 * std::uint64_t{ISO_EVICTION_RANKS}},
                        {"cache state", sizeof(CacheState)},
                        {"shading", sizeof(ShadeParams)},

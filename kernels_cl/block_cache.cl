@@ -5,7 +5,7 @@
 /// per block, 0 between passes.
 ///
 /// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may not
-/// suffice: cache_rank_histogram -> cache_select (how many, which) -> cache_evict -> cache_rebuild -> then cache_assign. All
+/// suffice: cache_rank -> cache_select (how many, which) -> cache_evict -> cache_rebuild -> then cache_assign. All
 /// cost O(slots) or O(requests), never O(blocks). Which block gets which slot is left to chance; no hit depends on it.
 ///
 /// Progress is certain: the first block of the first active ray is served before all others. If old slots are too few even
@@ -78,19 +78,45 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
   }
 }
 
-/// Counts the slots with blocks by eviction_rank(), unless free ones suffice. rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over
-/// slots.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank_histogram(
-    global const PassCounts *counts, uint num_slots, uint capacity, global const CacheState *cache,
-    global const uint *slot_block_ids, global const uint *slot_stamps, global uint *rank_histogram) {
+/// The stamp of the last use of a cached block. Who reads a block's cells reads its dual grid, but march stamps just that block,
+/// which costs a GPU less in each pass than eight stamps. So a block was also read when one was whose dual grid it is in.
+ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *table,
+                         global const uint *slot_stamps, uint block_id, uint stamp) {
+  const BlockCoords b = block_coords(frame, block_id);
+  const uint below_x = b.x != 0, below_y = b.y != 0, below_z = id_layer(frame, b.z) != 0;
+  const uint below = below_x + 2 * below_y + 4 * below_z; /* the corner that the block itself is */
+  BlockEntry entries[8];
+  uint latest = stamp;
+  find_dual_grid(frame, table, b.x - below_x, b.y - below_y, b.z - below_z, entries);
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((corner & ~below) == 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
+      const uint other = slot_stamps[entries[corner].slot];
+      if (is_read_stamp(other) && (int)(other - latest) > 0) latest = other;
+    }
+  }
+  return latest;
+}
+
+/// slot_ranks [slots], of those with blocks: eviction_rank(); and how many there are of each. Unless free slots suffice.
+/// rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over slots.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank(
+    const FrameParams frame_params, global const PassCounts *counts, uint num_slots, uint capacity,
+    global const CacheState *cache, global const BlockEntry *table, global const uint *slot_block_ids,
+    global const uint *slot_stamps, global uchar *slot_ranks, global uint *rank_histogram) {
+  const FrameParams *frame = &frame_params;
   local uint histogram[ISO_EVICTION_RANKS];
   /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
   const uint counted_slots = listed_count(counts, capacity) <= cache->free_count ? 0 : num_slots;
   for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE) histogram[rank] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
-    if (slot_block_ids[slot] != ISO_INVALID_ID)
-      atomic_inc(&histogram[eviction_rank(slot_stamps[slot], counts)]);
+    const uint block_id = slot_block_ids[slot], stamp = slot_stamps[slot];
+    if (block_id != ISO_INVALID_ID) {
+      const uint rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
+      slot_ranks[slot] = (uchar)rank;
+      atomic_inc(&histogram[rank]);
+    }
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE) {
@@ -185,8 +211,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
 
 /// Frees the slots selected; empties the table where it is to be rebuilt. Grid-stride over slots.
 kernel void cache_evict(const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
-                        global uint *slot_block_ids, global const uint *slot_stamps, global BlockEntry *table,
-                        global CacheState *cache, global uint *free_slots) {
+                        global uint *slot_block_ids, global const uint *slot_stamps,
+                        global const uchar *slot_ranks, global BlockEntry *table, global CacheState *cache,
+                        global uint *free_slots) {
   const FrameParams *frame = &frame_params;
   const uint cutoff_rank = cache->cutoff_rank, rebuild = cache->rebuild;
   if (counts->requested_count == 0) return;
@@ -197,7 +224,7 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
   for (uint slot = get_global_id(0); cutoff_rank < ISO_EVICTION_RANKS && slot < num_slots;
        slot += get_global_size(0)) {
     const uint stamp = slot_stamps[slot], block_id = slot_block_ids[slot];
-    const uint rank = eviction_rank(stamp, counts);
+    const uint rank = slot_ranks[slot];
     int is_victim =
         block_id != ISO_INVALID_ID && stamp != needed_stamp(counts->pass + 1) && rank >= cutoff_rank;
     if (is_victim && rank == cutoff_rank) is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;

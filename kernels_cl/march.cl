@@ -35,6 +35,11 @@ ISO_INLINE uint frame_rays(const FrameParams *frame) {
   return frame->width * frame->height;
 }
 
+/// N_Spec (Sec. 4) of so many rays at work.
+ISO_INLINE uint speculation_count(const FrameParams *frame, uint num_rays) {
+  return num_rays == 0 ? 0 : clamp(frame_rays(frame) / num_rays, 1u, frame->max_spec_count);
+}
+
 /// How many of the rays that wait ask for blocks in this pass; why, see begin_pass() in speculation.cl.
 ISO_INLINE uint open_window(const FrameParams *frame, global const PassCounts *prev,
                             global const PassCounts *counts) {
@@ -320,8 +325,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
   const uint item = get_local_id(0), num_waiting = counts->next_active_count;
   const uint num_rays = min(num_waiting, counts->window_count), lanes = lanes_per_ray(num_rays);
   const uint stamp = needed_stamp(counts->pass);
-  const uint spec_count =
-      num_waiting == 0 ? 0 : clamp(frame_rays(frame) / num_waiting, 1u, frame->max_spec_count);
+  const uint spec_count = speculation_count(frame, num_waiting);
+  /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more. With the number of those that
+     wait, which is fewer, decoding takes longer than the passes that it saves. */
+  const uint least = speculation_count(frame, counts->active_count) / 2;
   const int is_scarce = frame->slots_are_scarce != 0 || counts->window_count < frame_rays(frame);
   const uint most = is_scarce ? scarce_speculation(frame, num_rays) : ISO_MAX_SPECULATION;
   uint num_pairs = 0, num_ahead = 0;
@@ -340,8 +347,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       const LastPlanes last = last_planes(level);
       const Ray ray = make_ray(level, pixel);
       const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
-      /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more. */
-      const uint ahead = min(frame->per_ray_speculation ? max(own, spec_count / 2) : spec_count, most);
+      const uint ahead = min(frame->per_ray_speculation ? max(own, least) : spec_count, most);
       if (lane == 0) num_ahead += ahead;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
         const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,

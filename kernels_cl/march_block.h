@@ -87,33 +87,23 @@ ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
   return ends_band(frame, exit) ? border_event(frame->end_t) : exit;
 }
 
-/// Stamps the slots of those of a dual grid's corners that are cached. slots [8]: ISO_GROUP_SIZE apart.
-ISO_INLINE void stamp_corners(local const uint *slots, uint corners, global uint *slot_stamps, uint stamp) {
-  for (uint corner = 0; corners >> corner != 0; ++corner) {
-    const uint slot = slots[corner * ISO_GROUP_SIZE];
-    if ((corners >> corner & 1u) != 0 && slot != ISO_BLOCK_ABSENT) slot_stamps[slot] = stamp;
-  }
-}
-
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a block of
-/// the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE apart.
-/// slot_stamps: those of the blocks that are used become `stamp`. precise: settle doubts on the spot. side: where the ray was before the border at which its band begins in this block. may_end: its
-/// band may end in this one.
+/// the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE apart. If b is
+/// cached, its slot's stamp becomes `stamp`. precise: settle doubts on the spot. side: where the ray was before the border at
+/// which its band begins in this block. may_end: its band may end in this one.
 ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
                            global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
                            local uint *slots, global uint *slot_stamps, uint stamp, int precise, uint side,
                            int may_end, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  uint have, used = 1; /* corners of the dual grid */
+  uint have; /* corners of the dual grid */
   int result = ISO_RAY_LEFT, left = 0;
   const ulong cells = open_block(frame, table, inside, b, slots, &have);
   if ((have & 1u) == 0) return ISO_RAY_WAITS;
+  slot_stamps[slots[0]] = stamp; /* for all of the dual grid: see last_use() in block_cache.cl */
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const int ends = may_end && ends_band(frame, walk_exit(&block, ray));
-  if (cells == 0 && side == ISO_SIDE_UNKNOWN && !ends) { /* all corners have told so */
-    stamp_corners(slots, 0xFFu, slot_stamps, stamp);
-    return ISO_RAY_LEFT;
-  }
+  if (cells == 0 && side == ISO_SIDE_UNKNOWN && !ends) return ISO_RAY_LEFT;
   found->enter = band_entry(frame, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
   found->cell = enter_block(ray, b, found->enter, last);
   found->at_border = 0;
@@ -122,10 +112,8 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
     const RayEvent cell_exit = walk_exit(&found->cell, ray);
     const int ends_here = ends && ends_band(frame, cell_exit);
     const RayEvent exit = ends_here ? border_event(frame->end_t) : cell_exit;
-    const uint needed = cell_blocks(x, y, z);
-    used |= needed; /* if only to tell that nothing changes in the cell */
     if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0 || side != ISO_SIDE_UNKNOWN || ends_here) {
-      if ((needed & ~have) != 0) {
+      if ((cell_blocks(x, y, z) & ~have) != 0) {
         result = ISO_RAY_WAITS;
       } else {
         for (int corner = 0; corner < 8; ++corner) {
@@ -155,7 +143,6 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
       side = ISO_SIDE_UNKNOWN;
     }
   }
-  stamp_corners(slots, used, slot_stamps, stamp);
   return result;
 }
 

@@ -42,7 +42,7 @@ class CacheModel {
     check_assignment(world, pairs);
   }
 
-  /// Rays read some of the cached blocks in the last pass, as march says it.
+  /// Rays read in some of the cached blocks in the last pass, as march says it.
   void read_some(StageWorld &world, Random &random) {
     std::vector<uint> stamps = world.cache.slot_stamps.read();
     for (uint slot = 0; slot < slots_.size(); ++slot) {
@@ -107,10 +107,11 @@ class CacheModel {
     Order last_evicted{kEarlier, std::numeric_limits<int>::min()}, first_kept{kNever, 0};
     uint spared = 0, recycled = 0;
     bool stole = false;
+    find_last_uses();
     for (uint slot = 0; slot < num_slots; ++slot) {
       if (into.contains(slot)) {
         stole |= used_[slot] == now_;
-        if (slots_[slot] != ISO_INVALID_ID) recycled += used_[slot] >= frame_begin_;
+        if (slots_[slot] != ISO_INVALID_ID) recycled += last_uses_[slot] >= frame_begin_;
         ASSERT_FALSE(first_grid.contains(slots_[slot])) << "a block of the first pair was evicted";
         if (slots_[slot] != ISO_INVALID_ID) last_evicted = std::max(last_evicted, order(slot));
       } else if (slots[slot] == ISO_INVALID_ID && slots_[slot] != ISO_INVALID_ID) {
@@ -158,12 +159,27 @@ class CacheModel {
     num_stolen += stole;
   }
 
+  /// Who reads in a block reads its dual grid.
+  void find_last_uses() {
+    last_uses_ = used_;
+    for (uint slot = 0; slot < slots_.size(); ++slot) {
+      if (slots_[slot] == ISO_INVALID_ID || used_[slot] % 2 == 1) continue;
+      for (const uint block : dual_grid_blocks(frame_, slots_[slot])) {
+        const auto at = std::ranges::find(slots_, block) - slots_.begin();
+        if (std::cmp_less(at, slots_.size())) {
+          uint &last = last_uses_[static_cast<std::size_t>(at)];
+          last = std::max(last, used_[slot]);
+        }
+      }
+    }
+  }
+
   /// What is evicted first is less. Greater ages than this count as it; in this frame and the last one, as about a fourth.
   static constexpr uint kOldest = 127;
   enum Class { kEarlier, kUnreadInLast, kReadInLast, kUnreadInFrame, kReadInFrame, kNeeded, kNever };
   using Order = std::pair<Class, int>;
   Order order(uint slot) const {
-    const uint used = used_[slot];
+    const uint used = last_uses_[slot];
     const bool is_unread = used % 2 == 1;
     if (used >= now_) return {kNeeded, 0};
     const auto age_at = [used](uint time, uint oldest) {
@@ -176,7 +192,7 @@ class CacheModel {
   }
 
   FrameParams frame_;
-  std::vector<uint> slots_, used_;
+  std::vector<uint> slots_, used_, last_uses_;
   uint now_ = 0, last_begin_ = 0, frame_begin_ = 0;
   std::set<uint> wanted_;
 };
