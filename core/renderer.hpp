@@ -153,7 +153,6 @@ class Renderer {
   std::array<float, 2> value_range_;       ///< of the volume before compression
   double value_error_ = 0;
   FieldBound bound_ = FieldBound::kNone;
-  std::uint32_t scarce_frames_ = 0;       ///< further frames for which cache slots count as scarce
   std::optional<float> cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty
   std::unique_ptr<Pipeline> pipeline_;
   Shade shade_;

@@ -204,7 +204,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     cache->num_evicted = 0;
     cache->num_cutoff = 0;
     cache->free_count = num_free + evicted;
-    cache->rebuild = requested != 0 && cache->table_count + granted > 6 * frame->table_groups; /* of 8 */
+    cache->rebuild = requested != 0 && cache->table_count + granted > 5 * frame->table_groups; /* of 8 */
     if (cache->rebuild) cache->table_count = num_slots - cache->free_count;
   }
 }

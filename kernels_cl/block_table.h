@@ -1,8 +1,8 @@
 /// block_table.h -- which cache slot a block is in: a hash table of O(slots), not of O(blocks).
 ///
 /// Open addressing. The eight blocks of a 2^3 group begin their search side by side, for a ray asks for neighbours. An entry
-/// whose block was evicted keeps its key until the table is rebuilt (block_cache.cl); at least a quarter of the entries
-/// has no key, so every search ends.
+/// whose block was evicted keeps its key until the table is rebuilt (block_cache.cl); at least three eighths of the entries
+/// have no key, so every search ends, and most soon.
 #ifndef ISOWAVE_BLOCK_TABLE_H
 #define ISOWAVE_BLOCK_TABLE_H
 

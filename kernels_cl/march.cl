@@ -40,17 +40,18 @@ ISO_INLINE uint speculation_count(const FrameParams *frame, uint num_rays) {
   return num_rays == 0 ? 0 : clamp(frame_rays(frame) / num_rays, 1u, frame->max_spec_count);
 }
 
-/// How many of the rays that wait ask for blocks in this pass; why, see begin_pass() in speculation.cl.
+/// How many of the rays that wait ask for blocks in this pass: see next_window(). All in the first of a frame.
 ISO_INLINE uint open_window(const FrameParams *frame, global const PassCounts *prev,
                             global const PassCounts *counts) {
-  const uint asked = min(prev->window_count, prev->next_active_count);
   uint window = frame_rays(frame);
   if (counts->pass != counts->frame_pass) {
-    window = prev->requested_count > counts->decoded_count
-                 ? (uint)((ulong)asked * counts->decoded_count / prev->requested_count)
-                 : prev->window_count + prev->window_count / 4 + 1;
+    /* Fewer rays than take part may be left; that is no reason to leave out some of more. */
+    const uint asked = prev->requested_count > counts->decoded_count
+                           ? min(prev->window_count, prev->next_active_count)
+                           : prev->window_count;
+    window = next_window(asked, prev->requested_count, counts->decoded_count);
   }
-  return clamp(window, 1u, frame_rays(frame));
+  return min(window, frame_rays(frame));
 }
 
 /// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
@@ -165,6 +166,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     cache->first_block_id = ISO_INVALID_ID;
     counts->active_count = num_rays;
     counts->window_count = open_window(frame, prev, counts);
+    counts->free_count = cache->free_count;
   }
   if (item == 0) counters[0] = group_hits = group_blocks = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -329,8 +331,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
   /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more. With the number of those that
      wait, which is fewer, decoding takes longer than the passes that it saves. */
   const uint least = speculation_count(frame, counts->active_count) / 2;
-  const int is_scarce = frame->slots_are_scarce != 0 || counts->window_count < frame_rays(frame);
-  const uint most = is_scarce ? scarce_speculation(frame, num_rays) : ISO_MAX_SPECULATION;
+  const uint most =
+      counts->window_count < frame_rays(frame) ? scarce_speculation(frame, num_rays) : ISO_MAX_SPECULATION;
   uint num_pairs = 0, num_ahead = 0;
   if (get_global_id(0) == 0) counts->spec_count = spec_count;
   if (item == 0) num_staged = group_pairs = group_ahead = 0;

@@ -84,21 +84,32 @@ typedef struct FrameParams {
   /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
   uint screen_begin_x, screen_begin_y, screen_end_x, screen_end_y;
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
-  uint
-      slots_are_scarce;  ///< frames before needed more blocks than there are cache slots (scarce_speculation())
-  uint table_groups;     ///< entries / 8 of the block cache's table (block_table.h)
+  uint table_groups;  ///< entries / 8 of the block cache's table (block_table.h)
   /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z) of this one is number x +
   /// id_blocks_x (y + id_blocks_y (id_begin_z + z)).
   uint id_blocks_x, id_blocks_y, id_begin_z;
   uint ranges_begin, masks_begin;  ///< this level's among those of all levels (macrocells.cl) [entries]
   float begin_t, end_t;            ///< the band of the rays that is drawn at this level [t of the kernels]
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 180);
+ISO_CHECK_SIZE(FrameParams, 176);
 
-/// Most blocks that a ray looks ahead while cache slots are scarce, where num_rays rays do: for all together half as many as
-/// there are slots, but for each one. Not in the paper. What rays look at in vain costs slots whose blocks other rays would read.
+/// How many of the active rays take part in the next pass, after one in which `asked` rays asked for `requested` blocks and got
+/// `granted`. Not in the paper. Where blocks were missing, about as many as can be served: otherwise all would hold on to parts
+/// of their dual grids, none would get the rest, and only the ray that is served first would move. Else a quarter more.
+ISO_INLINE uint next_window(uint asked, uint requested, uint granted) {
+  uint window = asked + asked / 4 + 1;
+  if (requested > granted) {
+    window = (uint)((ulong)asked * granted / requested);
+    if (window < asked / 4) window = asked / 4; /* nothing was freed, perhaps, since the host took slots for ample */
+    if (window == 0) window = 1;
+  }
+  return window;
+}
+
+/// Most blocks that a ray looks ahead while only num_rays take part: for all together as many as there are slots, but for each
+/// one. Not in the paper. What rays look at in vain costs slots whose blocks other rays would read.
 ISO_INLINE uint scarce_speculation(const FrameParams *frame, uint num_rays) {
-  const uint each = 2 * frame->table_groups / (num_rays + 1);
+  const uint each = 4 * frame->table_groups / (num_rays + 1);
   return each < 1 ? 1 : each;
 }
 

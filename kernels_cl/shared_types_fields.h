@@ -15,7 +15,7 @@
   X(active_begin_x) X(active_begin_y) X(active_begin_z)                     \
   X(active_end_x) X(active_end_y) X(active_end_z)                           \
   X(screen_begin_x) X(screen_begin_y) X(screen_end_x) X(screen_end_y)       \
-  X(per_ray_speculation) X(slots_are_scarce) X(table_groups)                                    \
+  X(per_ray_speculation) X(table_groups)                                    \
   X(id_blocks_x) X(id_blocks_y) X(id_begin_z)                               \
   X(ranges_begin) X(masks_begin) X(begin_t) X(end_t)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
