@@ -56,6 +56,7 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
       free_slots_(device, "free slots", slots),
       slot_ranks_(device, "slot ranks", slots),
+      slot_changing_(device, "cells of cached blocks", slots),
       rank_histogram_(device, "eviction ranks", ISO_EVICTION_RANKS),
       request_(device, "block_cache", "cache_request", with_levels(group_defines(group_size), levels)),
       rank_(device, "block_cache", "cache_rank", with_levels(group_defines(group_size), levels)),
@@ -83,12 +84,12 @@ void BlockCache::request(Wavefront &rays) {
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
   rank_(slots_range_, rays.frame, asked, num_slots, capacity, state, table, slot_block_ids, slot_stamps,
-        slot_ranks_, rank_histogram_);
+        slot_ranks_, slot_changing_, rank_histogram_);
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, rank_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, slot_ranks_, table, state,
          free_slots_);
-  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, state, table);
+  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_changing_, state, table);
 }
 
 void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {

@@ -57,13 +57,14 @@ struct BlockCache {
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
   ocl::Buffer<uint> free_slots_;
-  ocl::Buffer<uchar> slot_ranks_;  ///< [num_slots] orders of eviction
+  ocl::Buffer<uchar> slot_ranks_;     ///< [num_slots] orders of eviction
+  ocl::Buffer<ulong> slot_changing_;  ///< [num_slots] BlockEntry::changing while the table is rebuilt
   ocl::Buffer<uint> rank_histogram_;
   ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>, ocl::In<BlockEntry>,
-              ocl::In<uint>, ocl::In<uint>, ocl::Out<uchar>, ocl::Out<uint>>
+              ocl::In<uint>, ocl::In<uint>, ocl::Out<uchar>, ocl::Out<ulong>, ocl::Out<uint>>
       rank_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
@@ -71,7 +72,7 @@ struct BlockCache {
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>, ocl::In<uchar>,
               ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>
       evict_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<CacheState>,
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<ulong>, ocl::In<CacheState>,
               ocl::Out<BlockEntry>>
       rebuild_;
   ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<float>, ocl::Out<ulong>, ocl::Out<BlockEntry>>

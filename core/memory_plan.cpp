@@ -188,6 +188,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                        {"block requests", 4 * listed},
                        {"decode slots", 4 * listed},
                        {"slot ranks", slots},
+                       {"cells of cached blocks", 8 * slots},
                        {"eviction ranks", 4 * std::uint64_t{ISO_EVICTION_RANKS}},
                        {"cache state", sizeof(CacheState)},
                        {"shading", sizeof(ShadeParams)},

@@ -19,8 +19,14 @@ ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
 }
 
+/// Are so many keys too many, those of evicted blocks included? Three eighths of the entries stay without.
+ISO_INLINE int table_is_full(const FrameParams *frame, uint num_keys) {
+  return num_keys > 5 * frame->table_groups;
+}
+
 /// Adds a key to the table, or finds the one it has.
-ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot) {
+ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot,
+                             ulong changing) {
   const BlockCoords b = block_coords(frame, block_id);
   uint i = table_home(frame, b.x, b.y, b.z);
   for (;;) {
@@ -29,7 +35,8 @@ ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table,
     i = table_next(frame, i);
   }
   table[i].slot = slot;
-  table[i].changing_low = table[i].changing_high = (uint)ISO_CHANGING_UNKNOWN;
+  table[i].changing_low = (uint)changing;
+  table[i].changing_high = (uint)(changing >> 32);
 }
 
 /// Marks the block as not cached; its key stays.
@@ -78,10 +85,11 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
   }
 }
 
-/// The stamp of the last use of a cached block. Who reads a block's cells reads its dual grid, but march stamps just that block,
-/// which costs a GPU less in each pass than eight stamps. So a block was also read when one was whose dual grid it is in.
+/// Who reads a block's cells reads its dual grid, but march stamps just that block, which costs a GPU less in each pass than
+/// eight stamps. So a block was also read when one was whose dual grid it is in; or may have been, where that was needed since.
+/// Returns the stamp of a cached block's last use. changing: what its table entry knows of its cells.
 ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *table,
-                         global const uint *slot_stamps, uint block_id, uint stamp) {
+                         global const uint *slot_stamps, uint block_id, uint stamp, ulong *changing) {
   const BlockCoords b = block_coords(frame, block_id);
   const uint below_x = b.x != 0, below_y = b.y != 0, below_z = id_layer(frame, b.z) != 0;
   const uint below = below_x + 2 * below_y + 4 * below_z; /* the corner that the block itself is */
@@ -91,31 +99,42 @@ ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *tabl
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
     if ((corner & ~below) == 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
-      const uint other = slot_stamps[entries[corner].slot];
-      if (is_read_stamp(other) && (int)(other - latest) > 0) latest = other;
+      const uint read = as_read_stamp(slot_stamps[entries[corner].slot]);
+      if ((int)(read - latest) > 0) latest = read;
     }
+    if (corner == below)
+      *changing = (ulong)entries[corner].changing_high << 32 | entries[corner].changing_low;
   }
   return latest;
 }
 
-/// slot_ranks [slots], of those with blocks: eviction_rank(); and how many there are of each. Unless free slots suffice.
-/// rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over slots.
+/// Of slots with blocks. Unless free slots suffice: slot_ranks [slots], eviction_rank() of each, and how many there are of each
+/// rank. Where the table may be rebuilt: slot_changing [slots], what it knows of the blocks' cells. Were that lost, a view that
+/// comes again could need blocks that were not worth keeping. rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over
+/// slots.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots, uint capacity,
     global const CacheState *cache, global const BlockEntry *table, global const uint *slot_block_ids,
-    global const uint *slot_stamps, global uchar *slot_ranks, global uint *rank_histogram) {
+    global const uint *slot_stamps, global uchar *slot_ranks, global ulong *slot_changing,
+    global uint *rank_histogram) {
   const FrameParams *frame = &frame_params;
   local uint histogram[ISO_EVICTION_RANKS];
   /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
-  const uint counted_slots = listed_count(counts, capacity) <= cache->free_count ? 0 : num_slots;
+  const uint requested = listed_count(counts, capacity);
+  const int is_short = requested > cache->free_count;
+  const int may_rebuild = table_is_full(frame, cache->table_count + requested);
+  const uint counted_slots = is_short || may_rebuild ? num_slots : 0;
   for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE) histogram[rank] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
     const uint block_id = slot_block_ids[slot], stamp = slot_stamps[slot];
     if (block_id != ISO_INVALID_ID) {
-      const uint rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
+      ulong changing;
+      const uint rank =
+          eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp, &changing), counts);
       slot_ranks[slot] = (uchar)rank;
-      atomic_inc(&histogram[rank]);
+      if (may_rebuild) slot_changing[slot] = changing;
+      if (is_short) atomic_inc(&histogram[rank]);
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -204,7 +223,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     cache->num_evicted = 0;
     cache->num_cutoff = 0;
     cache->free_count = num_free + evicted;
-    cache->rebuild = requested != 0 && cache->table_count + granted > 5 * frame->table_groups; /* of 8 */
+    cache->rebuild = requested != 0 && table_is_full(frame, cache->table_count + granted);
     if (cache->rebuild) cache->table_count = num_slots - cache->free_count;
   }
 }
@@ -238,13 +257,13 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
 
 /// Enters the blocks that are still cached into the emptied table. Grid-stride over slots.
 kernel void cache_rebuild(const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
-                          global const uint *slot_block_ids, global const CacheState *cache,
-                          global BlockEntry *table) {
+                          global const uint *slot_block_ids, global const ulong *slot_changing,
+                          global const CacheState *cache, global BlockEntry *table) {
   const FrameParams *frame = &frame_params;
   if (counts->requested_count == 0 || !cache->rebuild) return;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
     if (slot_block_ids[slot] != ISO_INVALID_ID) {
-      table_insert(frame, table, slot_block_ids[slot], slot);
+      table_insert(frame, table, slot_block_ids[slot], slot, slot_changing[slot]);
     }
   }
 }
@@ -290,7 +309,7 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
     requested_bits[request_word(frame, b.x, b.y, b.z)] = 0; /* every mark in it is of this pass */
     if (i < granted) {
       const uint slot = free_slots[num_free - 1 - i];
-      table_insert(frame, table, block_id, slot);
+      table_insert(frame, table, block_id, slot, ISO_CHANGING_UNKNOWN);
       slot_block_ids[slot] = block_id;
       slot_stamps[slot] = needed_stamp(asked->pass);
       decode_slots[i] = slot;

@@ -13,8 +13,9 @@ ISO_INLINE uint read_stamp(uint pass) {
 ISO_INLINE uint needed_stamp(uint pass) {
   return 2 * pass + 1;
 }
-ISO_INLINE int is_read_stamp(uint stamp) {
-  return (stamp & 1u) == 0;
+/// The read stamp of the same pass.
+ISO_INLINE uint as_read_stamp(uint stamp) {
+  return stamp & ~1u;
 }
 
 #define ISO_CLASS_RANKS (ISO_EVICTION_RANKS / 8)
@@ -34,7 +35,7 @@ ISO_INLINE uint eviction_rank(uint stamp, global const PassCounts *counts) {
   const uint now = needed_stamp(counts->pass), begin = read_stamp(counts->frame_pass),
              last_begin = read_stamp(counts->last_frame_pass);
   const uint oldest = ISO_CLASS_RANKS - 1; /* greater ages count as this */
-  const int is_unread = !is_read_stamp(stamp);
+  const int is_unread = stamp != as_read_stamp(stamp);
   uint rank = 0;
   /* Differences, since the clock of the stamps wraps. */
   if ((int)(stamp - last_begin) < 0) {

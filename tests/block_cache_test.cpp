@@ -163,12 +163,12 @@ class CacheModel {
   void find_last_uses() {
     last_uses_ = used_;
     for (uint slot = 0; slot < slots_.size(); ++slot) {
-      if (slots_[slot] == ISO_INVALID_ID || used_[slot] % 2 == 1) continue;
+      if (slots_[slot] == ISO_INVALID_ID) continue;
       for (const uint block : dual_grid_blocks(frame_, slots_[slot])) {
         const auto at = std::ranges::find(slots_, block) - slots_.begin();
         if (std::cmp_less(at, slots_.size())) {
           uint &last = last_uses_[static_cast<std::size_t>(at)];
-          last = std::max(last, used_[slot]);
+          last = std::max(last, used_[slot] - used_[slot] % 2);
         }
       }
     }

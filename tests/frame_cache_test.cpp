@@ -113,6 +113,30 @@ TEST_P(FrameCacheOnDevice, ViewsThatFitAreDecodedOnce) {
   }
 }
 
+/// A view that is drawn twice in a row is not decoded twice, unless it needs more blocks than there are slots. Many views, so that
+/// the table is rebuilt now and then, which must lose nothing.
+TEST_P(FrameCacheOnDevice, ViewsThatComeAgainAtOnceAreDecodedOnce) {
+  const glm::uvec3 dims(60, 62, 58);
+  const ImageSize size{56, 40};
+  const TestVolume volume(dims, test::gyroid_field(14));
+  const std::vector<Camera> cameras = close_ups(dims);
+  const std::vector<std::uint32_t> needs = blocks_read(volume, size, cameras);
+  Renderer renderer = renderer_of(volume, size, 2 * *std::ranges::max_element(needs));
+  Random random(3);
+  int num_decoding = 0;
+  for (int frame = 0; frame < 60; ++frame) {
+    const std::size_t view = random() % cameras.size();
+    SCOPED_TRACE(fmt::format("frame {}, view {}", frame, view));
+    const FrameStats first = renderer.render(cameras[view], kIsovalue);
+    num_decoding += num_decoded(first) != 0;
+    const FrameStats again = renderer.render(cameras[view], kIsovalue);
+    if (num_recycled(first) == 0) {
+      EXPECT_EQ(num_decoded(again), 0u);
+    }
+  }
+  EXPECT_GT(num_decoding, 20) << "else nothing was ever evicted";
+}
+
 /// A view of more blocks than there are slots, again and again. Where a few are missing, the others stay, though speculation has
 /// asked for more since than there are slots; where many are, the cache is emptied, and no frame is worse off than the first.
 TEST_P(FrameCacheOnDevice, ViewsThatDoNotFitAreNoWorseOffThanCold) {
