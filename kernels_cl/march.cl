@@ -24,9 +24,9 @@ ISO_INLINE void append_ray(int goes_on, uint entry, volatile local uint *counter
   barrier(CLK_LOCAL_MEM_FENCE);
 }
 
-/// Work-items for each ray: as many as there are, up to one for each block of a round.
+/// Work-items for each ray, all of one work-group: as many as there are, up to one for each block of a round.
 ISO_INLINE uint lanes_per_ray(uint num_rays) {
-  uint lanes = ISO_BLOCKS_AT_ONCE;
+  uint lanes = min(ISO_BLOCKS_AT_ONCE, (uint)ISO_GROUP_SIZE);
   while (lanes > 1 && lanes * num_rays > get_global_size(0)) lanes /= 2;
   return lanes;
 }
