@@ -272,8 +272,9 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   // A launch that is not needed costs more than a pass that finds slots missing now and then. The counts are a pass old: its
   // requests have taken slots since, and the pass after it may have asked for as many.
   const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
-  state_.slots_are_scarce = state_.cache.num_slots < kSmallCache ||
-                            counts.free_count < state_.cache.num_slots / 4 + spoken_for;
+  const std::uint32_t num_slots = state_.cache.num_slots;
+  state_.slots_are_scarce =
+      num_slots < kSmallCache || counts.free_count < std::max<std::uint64_t>(num_slots / 4, spoken_for);
   stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
   stats.utilization_percent = 100.0 * counts.granted_count / rays;
   stats.stage_ms = device_.timer().collect();

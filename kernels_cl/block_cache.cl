@@ -87,9 +87,9 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
 
 /// Who reads a block's cells reads its dual grid, but march stamps just that block, which costs a GPU less in each pass than
 /// eight stamps. So a block was also read when one was whose dual grid it is in; or may have been, where that was needed since.
-/// Returns the stamp of a cached block's last use. changing: what its table entry knows of its cells.
+/// Returns the stamp of a cached block's last use.
 ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *table,
-                         global const uint *slot_stamps, uint block_id, uint stamp, ulong *changing) {
+                         global const uint *slot_stamps, uint block_id, uint stamp) {
   const BlockCoords b = block_coords(frame, block_id);
   const uint below_x = b.x != 0, below_y = b.y != 0, below_z = id_layer(frame, b.z) != 0;
   const uint below = below_x + 2 * below_y + 4 * below_z; /* the corner that the block itself is */
@@ -102,8 +102,6 @@ ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *tabl
       const uint read = as_read_stamp(slot_stamps[entries[corner].slot]);
       if ((int)(read - latest) > 0) latest = read;
     }
-    if (corner == below)
-      *changing = (ulong)entries[corner].changing_high << 32 | entries[corner].changing_low;
   }
   return latest;
 }
@@ -129,12 +127,15 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ra
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
     const uint block_id = slot_block_ids[slot], stamp = slot_stamps[slot];
     if (block_id != ISO_INVALID_ID) {
-      ulong changing;
-      const uint rank =
-          eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp, &changing), counts);
-      slot_ranks[slot] = (uchar)rank;
-      if (may_rebuild) slot_changing[slot] = changing;
-      if (is_short) atomic_inc(&histogram[rank]);
+      if (is_short) {
+        const uint rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
+        slot_ranks[slot] = (uchar)rank;
+        atomic_inc(&histogram[rank]);
+      }
+      if (may_rebuild) {
+        const BlockCoords b = block_coords(frame, block_id);
+        slot_changing[slot] = changing_of(&table[find_entry(frame, table, b.x, b.y, b.z)]);
+      }
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);

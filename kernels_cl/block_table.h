@@ -22,6 +22,10 @@ ISO_CHECK_SIZE(BlockEntry, 16);
 /// half of each: cells too many, which does no harm.
 #define ISO_CHANGING_UNKNOWN 0xFFFFFFFFFFFFFFFFul
 
+ISO_INLINE ulong changing_of(ISO_GLOBAL const BlockEntry *entry) {
+  return (ulong)entry->changing_high << 32 | entry->changing_low;
+}
+
 /// What the cache's kernels leave for each other, and for the next pass.
 typedef struct CacheState {
   uint first_block_id;  ///< the block that the pass must serve, or ISO_INVALID_ID; of its dual grid,
