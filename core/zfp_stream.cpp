@@ -15,7 +15,7 @@
 
 #include "core/block_errors.hpp"
 #include "core/error.hpp"
-#include "core/io/file_bytes.hpp"
+#include "core/io/input_file.hpp"
 #include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"

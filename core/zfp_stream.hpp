@@ -22,7 +22,7 @@
 
 namespace isowave {
 
-class FileBytes;
+class InputFile;
 namespace ocl {
 class Device;
 }
@@ -72,7 +72,7 @@ struct CompressedVolume {
   std::uint64_t indexed_bits = 0;  ///< and the length of all of them
   std::vector<std::uint32_t>
       words;  ///< payload from bit 0, little endian; two zero words follow the last bit; empty where file is set
-  std::shared_ptr<const FileBytes> file{};  ///< holds the payload instead of words ...
+  std::shared_ptr<const InputFile> file{};  ///< holds the payload instead of words ...
   std::uint64_t file_first_bit = 0;         ///< ... from this bit on
   std::array<float, 2> value_range{};  ///< [min, max] of the source voxels, as float32 and after map_nan;
                                        ///< {-inf, inf} when unknown

@@ -25,7 +25,7 @@ class NiftiHeader {
     const auto file = std::make_shared<const InputFile>(path, what_);
     std::unique_ptr<ByteSource> source;
     if (is_gzipped) {
-      source = std::make_unique<InflateSource>(file, 0, Packing::kGzip);
+      source = std::make_unique<InflateSource>(FileSource(file, 0), Packing::kGzip);
     } else {
       source = std::make_unique<FileSource>(file, 0);
     }

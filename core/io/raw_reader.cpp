@@ -283,10 +283,10 @@ std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
       source = std::make_unique<FileSource>(file, begin);
       break;
     case VoxelEncoding::kGzip:
-      source = std::make_unique<InflateSource>(file, begin, Packing::kGzip);
+      source = std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzip);
       break;
     case VoxelEncoding::kGzipOrZlib:
-      source = std::make_unique<InflateSource>(file, begin, Packing::kGzipOrZlib);
+      source = std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzipOrZlib);
       break;
     case VoxelEncoding::kHex:
       source = std::make_unique<HexSource>(file, begin);

@@ -74,7 +74,7 @@ bool HeaderLines::refill() {
   constexpr std::size_t kBufferBytes = 1u << 16;
   if (position_ < buffer_.size()) return true;
   buffer_.resize(kBufferBytes);
-  buffer_.resize(file_->read_at(end_, buffer_));
+  buffer_.resize(source_.read(buffer_));
   position_ = 0;
   return !buffer_.empty();
 }

@@ -34,7 +34,7 @@ class HeaderLines {
  public:
   static constexpr std::size_t kMaxLength = 1u << 16;
 
-  explicit HeaderLines(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
+  explicit HeaderLines(const std::shared_ptr<const InputFile> &file) : source_(file, 0) {}
 
   /// Goes on to the next line. False at the end of the file.
   bool next();
@@ -52,7 +52,7 @@ class HeaderLines {
   /// Moves at most that many bytes of the buffer to the line. Returns whether it has ended.
   bool add_up_to(std::size_t most);
 
-  std::shared_ptr<const InputFile> file_;
+  FileSource source_;
   std::vector<std::byte> buffer_;
   std::size_t position_ = 0;  ///< of what is next in the buffer
   std::string line_;
