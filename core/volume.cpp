@@ -12,7 +12,7 @@
 #include "core/io/nifti_header.hpp"
 #include "core/io/nrrd_header.hpp"
 #include "core/io/raw_reader.hpp"
-#include "core/io/text_header.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;

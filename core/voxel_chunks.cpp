@@ -54,7 +54,8 @@ void raise_lost(float &lost, double error) {
   if (error > double{lost}) lost = rounded_up(error);
 }
 
-/// Sets voxels to what float32 holds of their source, and those that will be refused or mapped to what is; tiny ones become 0.
+/// Sets voxels to their source as float32; or, of those that will be mapped or refused, to what is. Notes what that loses, tiny
+/// ones that will become 0 among it.
 void cast_line(const Line &line, Findings &found) {
   for (std::size_t x = 0; x < line.source.size(); ++x) {
     const double source = line.source[x];
@@ -65,8 +66,8 @@ void cast_line(const Line &line, Findings &found) {
       value = kMaxMagnitude;
     } else {
       value = static_cast<float>(source);
-      if (std::abs(value) < kMinMagnitude) value = 0.0f;
-      raise_lost(line.lost[x / kBlockEdge], std::abs(double{value} - source));
+      const float stored = std::abs(value) < kMinMagnitude ? 0.0f : value;
+      raise_lost(line.lost[x / kBlockEdge], std::abs(double{stored} - source));
       found.add_source(source, source);
     }
   }

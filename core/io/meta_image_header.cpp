@@ -8,6 +8,7 @@
 
 #include "core/error.hpp"
 #include "core/io/text_header.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;

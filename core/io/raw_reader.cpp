@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cstring>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/error.hpp"
 #include "core/io/byte_source.hpp"
 #include "core/io/text_voxels.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;
@@ -205,14 +204,6 @@ void check_size(const VolumeHeader &header, std::uint64_t found) {
   if (is_raw && found > least) fail_size(header, "too long", fmt::format("{}", least), found);
 }
 
-/// Parses a whole string as an unsigned number.
-std::optional<std::uint32_t> parse_uint(std::string_view text) {
-  std::uint32_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 template <class Value>
 void convert_voxels(VoxelType type, std::span<const std::byte> voxels, std::span<Value> out) {
   if (voxels.size() != out.size() * size_of(type))
@@ -263,7 +254,7 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t end = axis < 2 ? dims.find('x') : dims.size();
     if (end == std::string_view::npos) return std::nullopt;
-    const std::optional<std::uint32_t> count = parse_uint(dims.substr(0, end));
+    const std::optional<std::uint32_t> count = parse_all<std::uint32_t>(dims.substr(0, end));
     if (!count) return std::nullopt;
     result.dims[axis] = *count;
     dims.remove_prefix(std::min(end + 1, dims.size()));
