@@ -55,7 +55,8 @@ glm::uvec3 size3(const json &value, const char *key, const std::string &where) {
 }
 
 json parse_file(const std::filesystem::path &path) {
-  constexpr std::uint64_t kMostBytes = 4u << 20;  // 30,000 cameras; what is parsed may take 80 times as much memory
+  constexpr std::uint64_t kMostBytes = 4u
+                                       << 20;  // 30,000 cameras. Parsed, it may take 80 times as much memory
   const InputFile file(path);
   if (file.size() > kMostBytes)
     throw Error("{}: not a camera file: it has more than {} bytes", file.what(), kMostBytes);

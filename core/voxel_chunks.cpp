@@ -54,8 +54,8 @@ void raise_lost(float &lost, double error) {
   if (error > double{lost}) lost = rounded_up(error);
 }
 
-/// Sets voxels to their source as float32; or, of those that will be mapped or refused, to what is. Notes what that loses, tiny
-/// ones that will become 0 among it.
+/// Sets voxels to their source as float32, and notes what that loses; of tiny ones, which will become 0, all of it.
+/// Those that will be mapped or refused become NaN, or kMaxMagnitude.
 void cast_line(const Line &line, Findings &found) {
   for (std::size_t x = 0; x < line.source.size(); ++x) {
     const double source = line.source[x];

@@ -1,4 +1,4 @@
-// Reads `.zfp` files: see zfp_file.hpp, and zfp_stream.hpp for the functions.
+// Reads `.zfp` files, trusting nothing that they say. The functions are declared in zfp_stream.hpp.
 
 #include <algorithm>
 #include <array>
@@ -24,8 +24,8 @@ constexpr std::uint64_t kMaxJsonBytes = 1u << 20;
 constexpr std::uint32_t kMinBlockBits = 9;  // "not empty" and the exponent; libzfp reads them at any rate
 constexpr std::uint32_t kMaxBlockBits = 2048;
 
-/// Calls take(items) with `total` items of a deflated part of a file, a few at a time, until it returns false. Returns whether
-/// all of that worked, and the part has no more items.
+/// Calls take(items) with `total` items of a deflated part of a file, a few at a time, until it returns false. Returns
+/// whether all of that worked, and the part has no more items.
 template <typename T, typename Take>
 bool inflate_items(const FileSource &part, std::uint64_t total, const Take &take) {
   constexpr std::uint64_t kMostItems = 1u << 15;

@@ -1,5 +1,5 @@
 #pragma once
-// The trailer of a `.zfp` file: what stands behind the parts that it tells the lengths of. See zfp_file.hpp.
+// The end of a `.zfp` file: JSON text and footer. README describes them ("File format").
 
 #include <array>
 #include <cstddef>
@@ -39,8 +39,8 @@ struct ZfpLayout {
 
 std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &layout);
 
-/// Sets what the text says of the volume, whose kind and dims the stream's header has said. Throws Error, which does not name
-/// the file: no JSON, a field that is missing or of another kind, a number that no such volume has.
+/// Sets what the text says of the volume, whose kind and dims the stream's header has said. Throws Error, which does
+/// not name the file: no JSON, a field that is missing or of another kind, a number that no such volume has.
 ZfpLayout apply_zfp_trailer(const std::string &text, CompressedVolume &volume);
 
 }  // namespace isowave

@@ -1,5 +1,5 @@
-// Compressed files that lie, with checksums that are right, that become shorter while they are read, or that would take more memory than
-// they are worth: the program says so in one line, or draws what its reference draws.
+// Compressed files that lie, with checksums that are right, that become shorter while they are read, or that would take
+// more memory than they are worth: the program says so in one line, or draws what its reference draws.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Errors are those against the source in its own type: what float32 cannot hold counts, tiny values that become 0 count.
+// Errors are those against the source in its own type: what float32 cannot hold counts, tiny values that become 0
+// count.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -124,8 +125,8 @@ TEST(SourceError, OfRatesAndTheirLevels) {
       const CompressedVolume volume = compress(reader, {.rate = rate, .measure_error = true, .levels = 0});
       const double error = true_error(volume, reader.voxels());
       EXPECT_GE(*volume.max_error, error);
-      // The sum of what the cast has lost and of what zfp has, which is at most error + lost. No float32 is closer to a voxel
-      // than its cast is, so that lost is at most the error; it is rounded up.
+      // The sum of what the cast has lost and of what zfp has, which is at most error + lost. No float32 is closer to a
+      // voxel than its cast is, so that lost is at most the error; it is rounded up.
       EXPECT_LE(*volume.max_error, 3 * error + double{std::numeric_limits<float>::denorm_min()});
       expect_bounds_hold(volume, reader.voxels());
     }

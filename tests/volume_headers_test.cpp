@@ -1,5 +1,5 @@
-// NRRD, MetaImage and NIfTI: geometry in one world convention (LPS), voxels to the byte, and headers that must be refused in
-// one line. itk_agreement_test.cpp compares the same with ITK.
+// NRRD, MetaImage and NIfTI: geometry in one world convention (LPS), voxels to the byte, and headers that must be
+// refused in one line. itk_agreement_test.cpp compares the same with ITK.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 #pragma once
-// `.zfp` files with other trailers, whose checksums are right. Made from the description of the format, not from its writer.
+// `.zfp` files with other trailers, whose checksums are right. Made from the description of the format, not from its
+// writer.
 
 #include <zlib.h>
 

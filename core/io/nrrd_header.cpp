@@ -284,8 +284,8 @@ void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxi
   if (fields.has("space units")) check_quoted(fields, "space units", 3);
 }
 
-/// Spacing from the field or from where the axis begins and ends; the first sample lies at its beginning or, where samples
-/// are cells, half a spacing further.
+/// Spacing from the field or from where the axis begins and ends; the first sample lies at its beginning or, where
+/// samples are cells, half a spacing further.
 void set_geometry_by_axes(const HeaderFields &fields, const std::vector<NrrdAxis> &axes, VolumeInfo &info) {
   for (const std::string_view name :
        {"space directions", "space origin", "measurement frame", "space units"}) {
