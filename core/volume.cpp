@@ -93,18 +93,18 @@ void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_la
 }
 
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {
-  check_input_file(path);
+  const auto file = std::make_shared<const InputFile>(path);
   const std::string name = lower_case(path.filename().string());
   const auto ends_with = [&](std::initializer_list<std::string_view> endings) {
     return std::any_of(endings.begin(), endings.end(),
                        [&](std::string_view ending) { return name.ends_with(ending); });
   };
-  if (ends_with({".raw", ".raw.gz"})) return open_raw(path, ends_with({".gz"}), overrides);
+  if (ends_with({".raw", ".raw.gz"})) return open_raw(file, ends_with({".gz"}), overrides);
 
   std::optional<VolumeHeader> header;
-  if (ends_with({".nrrd", ".nhdr"})) header = read_nrrd_header(path);
-  if (ends_with({".mha", ".mhd"})) header = read_meta_image_header(path);
-  if (ends_with({".nii", ".nii.gz"})) header = read_nifti_header(path, ends_with({".gz"}));
+  if (ends_with({".nrrd", ".nhdr"})) header = read_nrrd_header(file);
+  if (ends_with({".mha", ".mhd"})) header = read_meta_image_header(file);
+  if (ends_with({".nii", ".nii.gz"})) header = read_nifti_header(file, ends_with({".gz"}));
   if (!header) {
     throw Error("{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
                 path.string());

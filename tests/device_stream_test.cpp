@@ -265,7 +265,7 @@ TEST_P(DeviceStreamOnDevice, SmallFilesThatBecomeShorterAreOneLine) {
   const test::TemporaryFolder folder;
   const auto path = folder / "a.zfp";
   for (const bool indexed : {false, true}) {
-    test::ArrayVolume source(test::grid_info({9, 10, 11}), random_voxels({9, 10, 11}, -3, 3, 7));
+    ArrayReader source(test::grid_info({9, 10, 11}), random_voxels({9, 10, 11}, -3, 3, 7));
     CompressOptions options{.rate = 5};
     if (indexed) options.error_bound = ErrorBound{-4};
     compress_to_file(source, options, path);

@@ -36,8 +36,7 @@ class HostileZfp : public testing::Test {
  protected:
   /// A small volume with levels, as a file; fixed rate, or fixed accuracy.
   std::string make(bool indexed) {
-    test::ArrayVolume source(test::grid_info({18, 17, 19}),
-                             test::sample({18, 17, 19}, test::gyroid_field(9)));
+    ArrayReader source(test::grid_info({18, 17, 19}), test::sample({18, 17, 19}, test::gyroid_field(9)));
     CompressOptions options{.rate = 6, .measure_error = true, .levels = 2};
     if (indexed) options.error_bound = ErrorBound{-8};
     compress_to_file(source, options, path_);
@@ -117,7 +116,7 @@ TEST_F(HostileZfp, EmptyAndOtherBlocksAreFoundAlike) {
   std::vector<float> voxels = test::sample({64, 36, 21}, test::gyroid_field(9));
   for (std::size_t i = 0; i < voxels.size(); ++i)
     if (i % 64 / 4 % 5 < 3 || i / 64 % 36 < 13) voxels[i] = 0;
-  test::ArrayVolume source(test::grid_info({64, 36, 21}), voxels);
+  ArrayReader source(test::grid_info({64, 36, 21}), voxels);
   const CompressedVolume volume = compress(source, {.error_bound = ErrorBound{-6}});
   std::uint32_t block = 0;
   find_block_lengths(volume, "a test", [&](std::uint32_t bits, std::uint64_t count) {
@@ -218,7 +217,7 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
 
 /// Deflated parts end where the trailer says, and with the last block.
 TEST_F(HostileZfp, DeflatedPartsEndWithTheirBlocks) {
-  test::ArrayVolume source(test::grid_info({18, 17, 19}), test::sample({18, 17, 19}, test::gyroid_field(9)));
+  ArrayReader source(test::grid_info({18, 17, 19}), test::sample({18, 17, 19}, test::gyroid_field(9)));
   compress_to_file(source, {.error_bound = ErrorBound{-8}, .levels = 2}, path_);
   const TrailerFile parts(test::read_file(path_));
   const CompressedVolume volume = open_zfp_file(path_);

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <atomic>
 #include <limits>
+#include <thread>
 
 #include "core/error.hpp"
 #include "core/volume.hpp"
@@ -22,6 +24,7 @@ using test::ramp;
 using test::TemporaryFolder;
 using test::write_file;
 using test::zlib;
+using testing::Each;
 using testing::HasSubstr;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity(),
@@ -268,6 +271,31 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
     ASSERT_EQ(::mkfifo((folder_ / name).c_str(), 0600), 0);
     EXPECT_THAT(error_of(folder_ / name), HasSubstr("not a regular file"));
   }
+}
+
+/// One file takes another's name again and again: header and voxels are of the same.
+TEST_F(NrrdFile, IsReadFromOneFileWhoeverTakesItsName) {
+  const auto path = folder_ / "a.nrrd";
+  const auto put = [&](const std::string &sizes, char voxel) {
+    write_file(folder_ / "new", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: " + sizes +
+                                    "\nencoding: raw\n\n" + std::string(60, voxel));
+    std::filesystem::rename(folder_ / "new", path);
+  };
+  put("3 4 5", 3);
+  std::atomic<bool> done = false;
+  std::thread other([&] {
+    while (!done) {
+      put("5 4 3", 5);
+      put("3 4 5", 3);
+    }
+  });
+  for (int run = 0; run < 5000; ++run) {
+    const auto reader = open_volume(path);
+    const auto expected = static_cast<float>(reader->info().dims.x);
+    EXPECT_THAT(test::read_all(*reader), Each(expected));
+  }
+  done = true;
+  other.join();
 }
 
 TEST(Extensions, InAnyCase) {

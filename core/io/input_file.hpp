@@ -21,6 +21,7 @@ class InputFile {
   InputFile(const InputFile &) = delete;
   InputFile &operator=(const InputFile &) = delete;
 
+  const std::filesystem::path &path() const { return path_; }
   const std::string &what() const { return what_; }
   /// In bytes, when the file was opened: what is appended to it later is not read.
   std::uint64_t size() const { return size_; }
@@ -30,6 +31,7 @@ class InputFile {
   void read(std::uint64_t offset, std::span<std::byte> out) const;
 
  private:
+  std::filesystem::path path_;
   std::string what_;
   std::uint64_t size_ = 0;
   int descriptor_ = -1;

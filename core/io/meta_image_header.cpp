@@ -11,7 +11,6 @@
 #include "core/text.hpp"
 
 namespace isowave {
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -227,9 +226,9 @@ void set_meta_offset(const HeaderFields &fields, std::uint64_t offset, VoxelLayo
 
 }  // namespace
 
-VolumeHeader read_meta_image_header(const fs::path &path) {
-  const std::string what = path.string();
-  HeaderLines lines(std::make_shared<const InputFile>(path, what));
+VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file) {
+  const std::string &what = file->what();
+  HeaderLines lines(file);
   HeaderFields fields(what);
   read_meta_fields(lines, what, fields);
 
@@ -242,14 +241,13 @@ VolumeHeader read_meta_image_header(const fs::path &path) {
   set_meta_encoding(fields, voxels);
   const std::string &name = fields[kLastMetaKey];
   if (lower_case(name) == "local") {
-    voxels.file = path;
-    voxels.what = what;
+    voxels.file = file;
     set_meta_offset(fields, lines.end(), voxels);
   } else if (name.starts_with("LIST") || name.find('%') != name.npos) {
     throw Error("{}: its voxels lie in several files, which is not supported: convert it to one file", what);
   } else {
     if (name.empty()) fields.fail(kLastMetaKey, "need a file's name or LOCAL");
-    set_data_file(voxels, path, name);
+    voxels.file = open_data_file(*file, name);
     set_meta_offset(fields, 0, voxels);
   }
   return header;

@@ -5,13 +5,13 @@
 // Refused, besides what is broken: voxels in several files, 64-bit integers, more than one value per voxel, values that
 // are scaled.
 
-#include <filesystem>
+#include <memory>
 
 #include "core/io/volume_header.hpp"
 
 namespace isowave {
 
 /// Reads and judges the header, not the voxels. Throws Error.
-VolumeHeader read_meta_image_header(const std::filesystem::path &path);
+VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file);
 
 }  // namespace isowave

@@ -12,7 +12,6 @@
 #include "core/io/byte_source.hpp"
 
 namespace isowave {
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -21,8 +20,7 @@ constexpr std::size_t kNiftiHeaderBytes = 348;
 /// The bytes of the header, and their numbers by where they stand.
 class NiftiHeader {
  public:
-  NiftiHeader(const fs::path &path, bool is_gzipped) : what_(path.string()) {
-    const auto file = std::make_shared<const InputFile>(path, what_);
+  NiftiHeader(const std::shared_ptr<const InputFile> &file, bool is_gzipped) : what_(file->what()) {
     std::unique_ptr<ByteSource> source;
     if (is_gzipped) {
       source = std::make_unique<InflateSource>(FileSource(file, 0), Packing::kGzip);
@@ -232,8 +230,8 @@ void set_nifti_scale(const NiftiHeader &header, VoxelLayout &voxels) {
 
 }  // namespace
 
-VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
-  const NiftiHeader bytes(path, is_gzipped);
+VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, bool is_gzipped) {
+  const NiftiHeader bytes(file, is_gzipped);
   constexpr std::size_t kMagicAt = 344;
   if (bytes.has_at(kMagicAt, std::string_view("ni1\0", 4)))
     bytes.fail("its voxels lie in an .img file: convert it to one file");
@@ -242,8 +240,7 @@ VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
   VolumeHeader header;
   read_nifti_dims(bytes, header.info);
   VoxelLayout &voxels = header.voxels;
-  voxels.file = path;
-  voxels.what = bytes.what();
+  voxels.file = file;
   voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;
   voxels.type = nifti_voxel_type(bytes);
   voxels.big_endian = bytes.is_big_endian();

@@ -5,13 +5,13 @@
 // sform counts only without shear and with the spacings of pixdim. Refused, besides what is broken: NIfTI-2, Analyze,
 // headers whose voxels lie in an .img file, 64-bit integers, more than one value per voxel.
 
-#include <filesystem>
+#include <memory>
 
 #include "core/io/volume_header.hpp"
 
 namespace isowave {
 
 /// Reads and judges the header, not the voxels. Throws Error.
-VolumeHeader read_nifti_header(const std::filesystem::path &path, bool is_gzipped);
+VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, bool is_gzipped);
 
 }  // namespace isowave

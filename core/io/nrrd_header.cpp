@@ -12,7 +12,6 @@
 #include "core/text.hpp"
 
 namespace isowave {
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -364,9 +363,8 @@ void check_other_nrrd_fields(const HeaderFields &fields, const VolumeInfo &info)
 
 }  // namespace
 
-VolumeHeader read_nrrd_header(const fs::path &path) {
-  const std::string what = path.string();
-  const auto file = std::make_shared<const InputFile>(path, what);
+VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
+  const std::string &what = file->what();
   HeaderLines lines(file);
   HeaderFields fields(what);
   const bool has_end = read_nrrd_fields(lines, what, fields);
@@ -394,11 +392,10 @@ VolumeHeader read_nrrd_header(const fs::path &path) {
       throw Error("{}: its voxels lie in several files, which is not supported: convert it to one file",
                   what);
     }
-    set_data_file(voxels, path, fields["data file"]);
+    voxels.file = open_data_file(*file, fields["data file"]);
   } else {
     if (!has_end) throw Error("{}: broken header: no empty line after it, and no 'data file'", what);
-    voxels.file = path;
-    voxels.what = what;
+    voxels.file = file;
     voxels.offset = lines.end();
   }
   return header;

@@ -126,8 +126,8 @@ class RawReader : public VolumeReader {
   }
 
   [[noreturn]] void fail_size(std::string_view how, std::string_view at_least = "") const {
-    throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}{}", voxels_.what, how, info_.dims.x,
-                info_.dims.y, info_.dims.z, to_string(voxels_.type),
+    throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}{}", voxels_.file->what(), how,
+                info_.dims.x, info_.dims.y, info_.dims.z, to_string(voxels_.type),
                 info_.num_voxels() * size_of(voxels_.type), at_least, bytes_read_);
   }
 
@@ -155,13 +155,14 @@ bool is_compressed(VoxelEncoding encoding) {
 [[noreturn]] void fail_size(const VolumeHeader &header, std::string_view how, std::string_view needed,
                             std::uint64_t found) {
   const VolumeInfo &info = header.info;
-  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", header.voxels.what, how, info.dims.x,
-              info.dims.y, info.dims.z, to_string(header.voxels.type), needed, found);
+  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", header.voxels.file->what(), how,
+              info.dims.x, info.dims.y, info.dims.z, to_string(header.voxels.type), needed, found);
 }
 
 /// Where voxels, or the compressed data that holds them, begin in the file.
-std::uint64_t find_begin(const VolumeHeader &header, const std::shared_ptr<const InputFile> &file) {
+std::uint64_t find_begin(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
+  const std::shared_ptr<const InputFile> &file = voxels.file;
   const std::uint64_t bytes = header.info.num_voxels() * size_of(voxels.type);
   std::uint64_t begin = std::min(voxels.offset, file->size());
   if (voxels.from_end) {
@@ -175,7 +176,7 @@ std::uint64_t find_begin(const VolumeHeader &header, const std::shared_ptr<const
     do {
       c = characters.next();
       if (!c)
-        throw Error("{}: truncated: {} lines to skip, found {}", voxels.what, voxels.lines_to_skip, line);
+        throw Error("{}: truncated: {} lines to skip, found {}", file->what(), voxels.lines_to_skip, line);
       ++begin;
     } while (*c != '\n');
   }
@@ -194,7 +195,7 @@ void check_size(const VolumeHeader &header, std::uint64_t found) {
   if (is_compressed(voxels.encoding)) {
     least = bytes / kMaxDeflateRatio;
     if (voxels.packed_bytes && *voxels.packed_bytes != found) {
-      throw Error("{}: {} bytes of compressed voxels, but the header says {}", voxels.what, found,
+      throw Error("{}: {} bytes of compressed voxels, but the header says {}", voxels.file->what(), found,
                   *voxels.packed_bytes);
     }
   }
@@ -264,8 +265,8 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
 
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
-  const auto file = std::make_shared<const InputFile>(voxels.file, voxels.what);
-  const std::uint64_t begin = find_begin(header, file);
+  const std::shared_ptr<const InputFile> &file = voxels.file;
+  const std::uint64_t begin = find_begin(header);
   check_size(header, file->size() - begin);
   VolumeHeader remaining = header;
   std::unique_ptr<ByteSource> source;
@@ -291,22 +292,22 @@ std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   return std::make_unique<RawReader>(remaining, std::move(source));
 }
 
-std::unique_ptr<VolumeReader> open_raw(const fs::path &path, bool is_gzipped, const RawOverrides &overrides) {
-  const fs::path stem = is_gzipped ? path.stem().stem() : path.stem();
+std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file, bool is_gzipped,
+                                       const RawOverrides &overrides) {
+  const fs::path stem = is_gzipped ? file->path().stem().stem() : file->path().stem();
   const std::optional<RawName> name = parse_raw_name(stem.string());
   if (!name && !(overrides.dims && overrides.type)) {
     throw Error(
         "{}: the name does not end in _XxYxZ_TYPE (as in head_256x256x113_uint16.raw): give --dims and "
         "--type",
-        path.string());
+        file->what());
   }
   VolumeHeader header;
   header.info.dims = overrides.dims ? *overrides.dims : name->dims;
   header.info.type = overrides.type ? *overrides.type : name->type;
   header.info.spacing = overrides.spacing.value_or(glm::dvec3(1.0));
-  check_volume_info(header.info, path.string());
-  header.voxels.file = path;
-  header.voxels.what = path.string();
+  check_volume_info(header.info, file->what());
+  header.voxels.file = file;
   header.voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;
   header.voxels.type = header.info.type;
   return open_voxels(header);
