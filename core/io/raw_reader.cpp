@@ -24,6 +24,16 @@ void swap_bytes(std::span<std::byte> bytes, std::size_t voxel_bytes) {
   for (; !bytes.empty(); bytes = bytes.subspan(voxel_bytes)) std::ranges::reverse(bytes.first(voxel_bytes));
 }
 
+std::uint64_t num_bytes(const VolumeInfo &info, const VoxelLayout &voxels) {
+  return info.num_voxels() * size_of(voxels.type);
+}
+
+[[noreturn]] void fail_size(const VolumeInfo &info, const VoxelLayout &voxels, std::string_view how,
+                            std::string_view needed, std::string_view found) {
+  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", voxels.file->what(), how, info.dims.x,
+              info.dims.y, info.dims.z, to_string(voxels.type), needed, found);
+}
+
 /// The values of stored voxels, exact.
 void to_double(const VoxelLayout &voxels, std::span<const std::byte> bytes, std::span<double> out) {
   convert_to_double(voxels.type, bytes, out);
@@ -126,9 +136,8 @@ class RawReader : public VolumeReader {
   }
 
   [[noreturn]] void fail_size(std::string_view how, std::string_view at_least = "") const {
-    throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}{}", voxels_.file->what(), how,
-                info_.dims.x, info_.dims.y, info_.dims.z, to_string(voxels_.type),
-                info_.num_voxels() * size_of(voxels_.type), at_least, bytes_read_);
+    isowave::fail_size(info_, voxels_, how, fmt::format("{}", num_bytes(info_, voxels_)),
+                       fmt::format("{}{}", at_least, bytes_read_));
   }
 
   VoxelLayout voxels_;
@@ -139,35 +148,20 @@ class RawReader : public VolumeReader {
   bool begun_ = false, end_checked_ = false;
 };
 
-template <class T, class Value>
-void convert(std::span<const std::byte> voxels, std::span<Value> out) {
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    T value;
-    std::memcpy(&value, voxels.data() + i * sizeof(T), sizeof(T));
-    out[i] = static_cast<Value>(value);
-  }
-}
-
 bool is_compressed(VoxelEncoding encoding) {
   return encoding == VoxelEncoding::kGzip || encoding == VoxelEncoding::kGzipOrZlib;
-}
-
-[[noreturn]] void fail_size(const VolumeHeader &header, std::string_view how, std::string_view needed,
-                            std::uint64_t found) {
-  const VolumeInfo &info = header.info;
-  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", header.voxels.file->what(), how,
-              info.dims.x, info.dims.y, info.dims.z, to_string(header.voxels.type), needed, found);
 }
 
 /// Where voxels, or the compressed data that holds them, begin in the file.
 std::uint64_t find_begin(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
   const std::shared_ptr<const InputFile> &file = voxels.file;
-  const std::uint64_t bytes = header.info.num_voxels() * size_of(voxels.type);
+  const std::uint64_t bytes = num_bytes(header.info, voxels);
   std::uint64_t begin = std::min(voxels.offset, file->size());
   if (voxels.from_end) {
     if (file->size() - begin < bytes)
-      fail_size(header, "truncated", fmt::format("{}", bytes), file->size() - begin);
+      fail_size(header.info, voxels, "truncated", fmt::format("{}", bytes),
+                fmt::format("{}", file->size() - begin));
     return file->size() - bytes;
   }
   CharacterSource characters(file, begin);
@@ -187,7 +181,7 @@ std::uint64_t find_begin(const VolumeHeader &header) {
 /// Refuses at once what cannot be right: `found` bytes of the file from where voxels begin.
 void check_size(const VolumeHeader &header, std::uint64_t found) {
   const VoxelLayout &voxels = header.voxels;
-  const std::uint64_t bytes = header.info.num_voxels() * size_of(voxels.type);
+  const std::uint64_t bytes = num_bytes(header.info, voxels);
   std::uint64_t least = bytes;
   if (voxels.encoding == VoxelEncoding::kHex) least = bytes * 2;
   if (voxels.encoding == VoxelEncoding::kText)
@@ -200,33 +194,21 @@ void check_size(const VolumeHeader &header, std::uint64_t found) {
     }
   }
   const bool is_raw = voxels.encoding == VoxelEncoding::kRaw;
-  if (found < least)
-    fail_size(header, "truncated", fmt::format("{}{}", is_raw ? "" : "at least ", least), found);
-  if (is_raw && found > least) fail_size(header, "too long", fmt::format("{}", least), found);
+  if (found >= least && (!is_raw || found == least)) return;
+  fail_size(header.info, voxels, found < least ? "truncated" : "too long",
+            fmt::format("{}{}", is_raw ? "" : "at least ", least), fmt::format("{}", found));
 }
 
 template <class Value>
 void convert_voxels(VoxelType type, std::span<const std::byte> voxels, std::span<Value> out) {
   if (voxels.size() != out.size() * size_of(type))
     throw std::invalid_argument("convert_voxels: sizes differ");
-  switch (type) {
-    case VoxelType::kUint8:
-      return convert<std::uint8_t>(voxels, out);
-    case VoxelType::kInt8:
-      return convert<std::int8_t>(voxels, out);
-    case VoxelType::kUint16:
-      return convert<std::uint16_t>(voxels, out);
-    case VoxelType::kInt16:
-      return convert<std::int16_t>(voxels, out);
-    case VoxelType::kUint32:
-      return convert<std::uint32_t>(voxels, out);
-    case VoxelType::kInt32:
-      return convert<std::int32_t>(voxels, out);
-    case VoxelType::kFloat32:
-      return convert<float>(voxels, out);
-    case VoxelType::kFloat64:
-      return convert<double>(voxels, out);
-  }
+  with_voxel_type(type, [&]<class T>(T voxel) {
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      std::memcpy(&voxel, voxels.data() + i * sizeof(T), sizeof(T));
+      out[i] = static_cast<Value>(voxel);
+    }
+  });
 }
 
 }  // namespace

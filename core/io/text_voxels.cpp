@@ -47,33 +47,13 @@ std::optional<T> parse_voxel(std::string_view text) {
   }
 }
 
-template <class T>
-bool store(std::string_view text, std::byte *out) {
-  const std::optional<T> value = parse_voxel<T>(text);
-  if (value) std::memcpy(out, &*value, sizeof(T));
-  return value.has_value();
-}
-
+/// Returns whether the text is a voxel of the type, which then is at `out`.
 bool store(VoxelType type, std::string_view text, std::byte *out) {
-  switch (type) {
-    case VoxelType::kUint8:
-      return store<std::uint8_t>(text, out);
-    case VoxelType::kInt8:
-      return store<std::int8_t>(text, out);
-    case VoxelType::kUint16:
-      return store<std::uint16_t>(text, out);
-    case VoxelType::kInt16:
-      return store<std::int16_t>(text, out);
-    case VoxelType::kUint32:
-      return store<std::uint32_t>(text, out);
-    case VoxelType::kInt32:
-      return store<std::int32_t>(text, out);
-    case VoxelType::kFloat32:
-      return store<float>(text, out);
-    case VoxelType::kFloat64:
-      return store<double>(text, out);
-  }
-  return false;
+  return with_voxel_type(type, [&]<class T>(T) {
+    const std::optional<T> value = parse_voxel<T>(text);
+    if (value) std::memcpy(out, &*value, sizeof(T));
+    return value.has_value();
+  });
 }
 
 }  // namespace
