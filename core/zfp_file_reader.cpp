@@ -258,8 +258,8 @@ class ZfpFileReader {
     const std::uint32_t known = volume_.is_indexed() ? kIndexedVersion : kVersion;
     if (footer.version != known && footer.version != kBoundlessPyramidVersion &&
         footer.version != kPyramidVersion) {
-      throw Error("{}: its trailer has version {}, this program knows {} and {}", what(), footer.version,
-                  known, kPyramidVersion);
+      throw Error("{}: its trailer has version {}, this program knows {}, {} and {}", what(), footer.version,
+                  known, kBoundlessPyramidVersion, kPyramidVersion);
     }
     const std::uint64_t json_end = file_size_ - sizeof(ZfpFooter);
     std::string text;

@@ -31,6 +31,11 @@ TEST(InputFile, MissingShortAndTruncatedFilesAreOneLine) {
   EXPECT_NO_THROW(file.read(0, std::span(all).first(9'999)));
   EXPECT_THAT([&] { file.read(0, all); },
               ThrowsMessage<Error>(HasSubstr("10000 bytes were there, now 9999")));
+  std::filesystem::resize_file(folder / "a", 100);
+  EXPECT_THAT([&] { file.read(5'000, std::span(all).first(1)); },
+              ThrowsMessage<Error>(HasSubstr("10000 bytes were there, now 100")));
+  std::filesystem::resize_file(folder / "a", 9'999);
+  EXPECT_NO_THROW(file.read(0, std::span(all).first(100)));
   test::write_file(folder / "b", std::string(10'000, 'b'));
   std::filesystem::rename(folder / "b", folder / "a");  // the name of another file now
   file.read(0, std::span(all).first(9'999));

@@ -232,7 +232,8 @@ TEST_F(NrrdFile, RefusedHeaders) {
            raw + ramp();
   };
   expect_refused("a.nrrd", sizes("3", "60000 60000 60000"), "truncated");
-  expect_refused("a.nrrd", sizes("3", "3 4 9999999999"), "must be 2 to");
+  expect_refused("a.nrrd", sizes("3", "3 4 9999999999"), "sizes '3 4 9999999999': each must be 1 to 65536");
+  expect_refused("a.nrrd", sizes("3", "3 4 1"), "dims 3x4x1: each must be 2 to 65536");
   expect_refused("a.nrrd", sizes("3", "3 4 99999999999999999999"), "sizes");
   expect_refused("a.nrrd", sizes("3", "3 4 -5"), "sizes");
   expect_refused("a.nrrd", sizes("2", "3 4"), "an image of 2 axes");
@@ -427,8 +428,8 @@ TEST_F(MetaImageFile, RefusedHeaders) {
   expect_refused("a.mha", meta_image("", "LONG_LONG") + ramp<std::int64_t>(), "MET_LONG_LONG");
   std::string tube = with("");
   expect_refused("a.mha", tube.replace(tube.find("Image"), 5, "Tube"), "ObjectType");
-  for (const char *sizes :
-       {"3 4", "3 4 0", "3 4 -5", "3 4 5 6", "3 4 5.5", "60000 60000 60000", "3 4 99999999999999999999"}) {
+  for (const char *sizes : {"3 4", "3 4 0", "3 4 -5", "3 4 5 6", "3 4 5.5", "3 4 4294967301",
+                            "60000 60000 60000", "3 4 99999999999999999999"}) {
     std::string header = with("");
     EXPECT_NE(error_of(folder_ / "a.mha", header.replace(header.find("3 4 5"), 5, sizes)), "") << sizes;
   }

@@ -37,7 +37,10 @@ void InputFile::read(std::uint64_t offset, std::span<std::byte> out) const {
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throw Error("{}: cannot read: {}", what_, std::strerror(errno));
     if (count == 0) {
-      throw Error("{}: truncated while it was in use: {} bytes were there, now {}", what_, size_, offset);
+      struct stat now {};
+      ::fstat(descriptor_, &now);
+      throw Error("{}: truncated while it was in use: {} bytes were there, now {}", what_, size_,
+                  now.st_size);
     }
     offset += std::uint64_t(count);
     out = out.subspan(std::size_t(count));

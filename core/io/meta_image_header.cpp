@@ -139,16 +139,13 @@ std::size_t read_meta_dims(const HeaderFields &fields, const std::string &what, 
   if (num_axes < 1 || num_axes > kMaxAxes) fields.fail("NDims", "must be 1 to 10");
   const std::vector<std::int64_t> sizes = fields.integers("DimSize", std::size_t(num_axes));
   for (const std::int64_t size : sizes) {
-    if (size < 1) fields.fail("DimSize", "must be positive");
+    if (size < 1 || size > kMaxDim) fields.fail("DimSize", fmt::format("each must be 1 to {}", kMaxDim));
   }
   if (num_axes < 3 ||
       std::any_of(sizes.begin() + 3, sizes.end(), [](std::int64_t size) { return size != 1; })) {
     throw Error("{}: an image of {} axes, need a volume of 3", what, num_axes);
   }
-  for (int i = 0; i < 3; ++i) {
-    // Clamped: a 64-bit size must not wrap into an acceptable one.
-    info.dims[i] = std::uint32_t(std::min<std::int64_t>(sizes[std::size_t(i)], ~0u));
-  }
+  for (int i = 0; i < 3; ++i) info.dims[i] = std::uint32_t(sizes[std::size_t(i)]);
   return std::size_t(num_axes);
 }
 

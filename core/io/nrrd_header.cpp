@@ -179,7 +179,8 @@ std::vector<NrrdAxis> read_nrrd_axes(const HeaderFields &fields) {
   std::vector<NrrdAxis> axes(count);
   const std::vector<std::int64_t> sizes = fields.integers("sizes", count);
   for (std::size_t i = 0; i < count; ++i) {
-    if (sizes[i] < 1) fields.fail("sizes", "must be positive");
+    if (sizes[i] < 1 || sizes[i] > kMaxDim)
+      fields.fail("sizes", fmt::format("each must be 1 to {}", kMaxDim));
     axes[i].size = sizes[i];
   }
   const auto read_numbers = [&](std::string_view name, double NrrdAxis::*member) {
@@ -371,10 +372,7 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
 
   VolumeHeader header;
   const std::vector<NrrdAxis> axes = volume_axes(fields, read_nrrd_axes(fields), what);
-  for (int i = 0; i < 3; ++i) {
-    // Clamped: a 64-bit size must not wrap into an acceptable one.
-    header.info.dims[i] = std::uint32_t(std::min<std::int64_t>(axes[std::size_t(i)].size, ~0u));
-  }
+  for (int i = 0; i < 3; ++i) header.info.dims[i] = std::uint32_t(axes[std::size_t(i)].size);
   if (const std::optional<glm::dvec3> to_lps = read_nrrd_space(fields)) {
     set_geometry_in_space(fields, axes, *to_lps, header.info);
   } else {
