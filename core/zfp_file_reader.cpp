@@ -83,9 +83,12 @@ class ZfpFileReader {
 
   const std::string &what() const { return file_->what(); }
 
-  [[noreturn]] void refuse_level() const {
-    throw Error("{}: damaged: one of its levels of detail is none", what());
+  template <class... Args>
+  [[noreturn]] void fail(fmt::format_string<Args...> reason, Args &&...args) const {
+    throw Error("{}: {}", what(), fmt::format(reason, std::forward<Args>(args)...));
   }
+
+  [[noreturn]] void refuse_level() const { fail("damaged: one of its levels of detail is none"); }
 
   void read_head() {
     read_header();
@@ -114,7 +117,7 @@ class ZfpFileReader {
       file_->read(at, piece);
       crc = update_crc(crc, piece);
     }
-    if (crc != stream_crc_) throw Error("{}: damaged: the checksum of its stream does not match", what());
+    if (crc != stream_crc_) fail("damaged: the checksum of its stream does not match");
   }
 
   CompressedVolume take(bool keep) {
@@ -135,7 +138,7 @@ class ZfpFileReader {
   void read_index(bool keep) {
     const std::uint64_t num_blocks = volume_.block_count();
     if (volume_.indexed_bits < num_blocks) {  // before memory is taken for them
-      throw Error("{}: truncated: {} blocks cannot come from {} bytes", what(), num_blocks, file_size_);
+      fail("truncated: {} blocks cannot come from {} bytes", num_blocks, file_size_);
     }
     BlockIndexBuilder index;
     if (keep) index.reserve(num_blocks);
@@ -152,11 +155,11 @@ class ZfpFileReader {
       find_block_lengths(volume_, what(), take);
       const std::uint64_t used = (header_bits_ + end + 63) / 64 * 8;
       if (file_size_ > used) {
-        throw Error("{}: damaged: {} unknown bytes after the zfp stream", what(), file_size_ - used);
+        fail("damaged: {} unknown bytes after the zfp stream", file_size_ - used);
       }
     }
     if (!is_whole || (has_trailer_ && end != volume_.indexed_bits)) {
-      throw Error("{}: damaged: the lengths of its blocks are not those of its stream", what());
+      fail("damaged: the lengths of its blocks are not those of its stream");
     }
     volume_.indexed_bits = end;
     if (keep) volume_.index = index.finish();
@@ -180,7 +183,7 @@ class ZfpFileReader {
   }
 
   [[noreturn]] void refuse_bounds() const {
-    throw Error("{}: damaged: a level of detail has no bounds of its errors", what());
+    fail("damaged: the bounds of its blocks are not those of its stream");
   }
 
   void read_header() {
@@ -193,7 +196,7 @@ class ZfpFileReader {
     const ZfpField field(zfp_field_alloc(), &zfp_field_free);
     header_bits_ = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL);
     if (header_bits_ == 0 || header_bits_ > available * 8) {
-      throw Error("{}: not a zfp file: no full zfp header (as `zfp -h` writes it)", what());
+      fail("not a zfp file: no full zfp header (as `zfp -h` writes it)");
     }
     check_kind(*stream, *field);
     volume_.info.dims = glm::uvec3(field->nx, field->ny, field->nz);
@@ -205,8 +208,7 @@ class ZfpFileReader {
 
     if (!fixed_rate) {  // how long the stream is, a trailer tells, or else the file
       if (volume_.block_count() >= std::numeric_limits<std::uint32_t>::max()) {
-        throw Error("{}: {}x{}x{} voxels: too many for blocks of lengths of their own", what(), field->nx,
-                    field->ny, field->nz);
+        fail("{}x{}x{} voxels: too many for blocks of lengths of their own", field->nx, field->ny, field->nz);
       }
       stream_bytes_ = file_size_;
       volume_.indexed_bits = 8 * file_size_ - header_bits_;
@@ -217,8 +219,8 @@ class ZfpFileReader {
     // libzfp can be built with smaller words: its files may end before the 64-bit word does.
     const std::uint64_t least_bytes = (total_bits + 7) / 8;
     if (file_size_ < least_bytes) {
-      throw Error("{}: truncated: {}x{}x{} voxels at {} bits per block need {} bytes, found {}", what(),
-                  field->nx, field->ny, field->nz, volume_.bits_per_block, least_bytes, file_size_);
+      fail("truncated: {}x{}x{} voxels at {} bits per block need {} bytes, found {}", field->nx, field->ny,
+           field->nz, volume_.bits_per_block, least_bytes, file_size_);
     }
     stream_bytes_ = std::min(stream_bytes_, file_size_);
   }
@@ -226,21 +228,21 @@ class ZfpFileReader {
   void check_kind(const zfp_stream &stream, const zfp_field &field) const {
     constexpr std::array<const char *, 5> kTypes{"unknown", "int32", "int64", "float32", "float64"};
     if (field.type != zfp_type_float) {
-      throw Error("{}: zfp values of type {}: only float32 is supported", what(), kTypes.at(field.type));
+      fail("zfp values of type {}: only float32 is supported", kTypes.at(field.type));
     }
     const unsigned axes = zfp_field_dimensionality(&field);
-    if (axes != 3) throw Error("{}: a {}D zfp array: only 3D is supported", what(), axes);
+    if (axes != 3) fail("a {}D zfp array: only 3D is supported", axes);
     constexpr std::array<const char *, 6> kModes{"unknown",         "expert",         "fixed rate",
                                                  "fixed precision", "fixed accuracy", "reversible"};
     const zfp_mode mode = zfp_stream_compression_mode(&stream);
     if (mode == zfp_mode_fixed_accuracy) return;
     if (mode != zfp_mode_fixed_rate) {
-      throw Error("{}: zfp mode '{}': only fixed rate (zfp -r) and fixed accuracy (zfp -a) are supported",
-                  what(), kModes.at(mode));
+      fail("zfp mode '{}': only fixed rate (zfp -r) and fixed accuracy (zfp -a) are supported",
+           kModes.at(mode));
     }
     if (stream.maxbits < kMinBlockBits || stream.maxbits > kMaxBlockBits) {
-      throw Error("{}: {} bits per zfp block: only {} to {} are supported", what(), stream.maxbits,
-                  kMinBlockBits, kMaxBlockBits);
+      fail("{} bits per zfp block: only {} to {} are supported", stream.maxbits, kMinBlockBits,
+           kMaxBlockBits);
     }
   }
 
@@ -253,13 +255,13 @@ class ZfpFileReader {
     if (trailer_bytes >= sizeof(ZfpFooter)) read_at(file_size_ - sizeof(ZfpFooter), footer_bytes);
     if (footer.magic != kZfpFooterMagic) {
       if (volume_.is_indexed()) return;  // a file of zfp's own tool
-      throw Error("{}: damaged: {} unknown bytes after the zfp stream", what(), trailer_bytes);
+      fail("damaged: {} unknown bytes after the zfp stream", trailer_bytes);
     }
     const std::uint32_t known = volume_.is_indexed() ? kIndexedVersion : kVersion;
     if (footer.version != known && footer.version != kBoundlessPyramidVersion &&
         footer.version != kPyramidVersion) {
-      throw Error("{}: its trailer has version {}, this program knows {}, {} and {}", what(), footer.version,
-                  known, kBoundlessPyramidVersion, kPyramidVersion);
+      fail("its trailer has version {}, this program knows {}, {} and {}", footer.version, known,
+           kBoundlessPyramidVersion, kPyramidVersion);
     }
     const std::uint64_t json_end = file_size_ - sizeof(ZfpFooter);
     std::string text;
@@ -268,12 +270,12 @@ class ZfpFileReader {
       read_at(json_end - footer.json_bytes, std::as_writable_bytes(std::span(text)));
     }
     if (text.empty() || json_crc(text, footer) != footer.json_crc) {
-      throw Error("{}: damaged: the checksum of its trailer does not match", what());
+      fail("damaged: the checksum of its trailer does not match");
     }
     try {
       layout_ = apply_zfp_trailer(text, volume_);
     } catch (const Error &error) {
-      throw Error("{}: broken trailer: {}", what(), error.what());
+      fail("broken trailer: {}", error.what());
     }
     check_layout(json_end - footer.json_bytes);
     has_trailer_ = true;
@@ -297,7 +299,7 @@ class ZfpFileReader {
     };
     if (!take(stream_bytes_) || !take(layout_.index_bytes) || !take(layout_.bounds_bytes) ||
         !std::ranges::all_of(layout_.level_bytes, take) || left != 0)
-      throw Error("{}: damaged: its parts are not as long as its trailer says", what());
+      fail("damaged: its parts are not as long as its trailer says");
   }
 
   std::shared_ptr<const InputFile> file_;
