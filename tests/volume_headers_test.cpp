@@ -26,6 +26,7 @@ using test::write_file;
 using test::zlib;
 using testing::Each;
 using testing::HasSubstr;
+using testing::ThrowsMessage;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity(),
                 kNan = std::numeric_limits<float>::quiet_NaN();
@@ -271,6 +272,29 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
        {"a_3x4x5_uint8.raw", "a_3x4x5_uint8.raw.gz", "p.nrrd", "p.mha", "p.nii", "p.nii.gz"}) {
     ASSERT_EQ(::mkfifo((folder_ / name).c_str(), 0600), 0);
     EXPECT_THAT(error_of(folder_ / name), HasSubstr("not a regular file"));
+  }
+}
+
+TEST(OpenVolume, FilesThatBecomeShorterAreOneLine) {
+  const TemporaryFolder folder;
+  std::string noise;  // hardly packed, and larger than any buffer
+  for (std::uint32_t i = 0, bits = 1; i < 1u << 20; ++i, bits = bits * 1664525 + 1013904223)
+    noise += char(bits >> 24);
+  const std::string sizes = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 64\n";
+  std::string hex;
+  for (const char c : noise) hex += fmt::format("{:02x}", static_cast<unsigned char>(c));
+  for (const auto &[name, bytes] : std::vector<std::pair<std::string, std::string>>{
+           {"a_128x128x64_uint8.raw", noise},
+           {"a_128x128x64_uint8.raw.gz", gzip(noise)},
+           {"raw.nrrd", sizes + "encoding: raw\n\n" + noise},
+           {"hex.nrrd", sizes + "encoding: hex\n\n" + hex},
+           {"gzip.nrrd", sizes + "encoding: gzip\n\n" + gzip(noise)}}) {
+    write_file(folder / name, bytes);
+    const auto reader = open_volume(folder / name);
+    std::filesystem::resize_file(folder / name, bytes.size() / 2);
+    EXPECT_THAT([&] { test::read_all(*reader); },
+                ThrowsMessage<Error>(HasSubstr("truncated while it was in use")))
+        << name;
   }
 }
 
