@@ -2,16 +2,11 @@
 
 #include "core/io/png.hpp"
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <cstdint>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <random>
@@ -136,19 +131,7 @@ TEST_F(PngTest, RefusesTruncatedAndBrokenFiles) {
 
 /// Of `isowave compare` of a file with itself [MiB].
 long peak_of_compare(const std::filesystem::path &path) {
-  const char *named = std::getenv("ISOWAVE_PROGRAM");
-  const char *program = named != nullptr ? named : ISOWAVE_PROGRAM;
-  const pid_t child = ::fork();
-  if (child == 0) {
-    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(::open("/dev/null", O_WRONLY), stream);
-    ::execl(program, program, "compare", path.c_str(), path.c_str(), nullptr);
-    ::_exit(127);
-  }
-  int status = 0;
-  rusage usage{};
-  EXPECT_EQ(::wait4(child, &status, 0, &usage), child);
-  EXPECT_NE(WEXITSTATUS(status), 127);
-  return usage.ru_maxrss / 1024;
+  return test::peak_of_isowave({"compare", path.string(), path.string()});
 }
 
 TEST_F(PngTest, TakesNoMoreMemoryThanItsPixelsNeed) {

@@ -275,11 +275,27 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
   }
 }
 
-TEST(OpenVolume, FilesThatBecomeShorterAreOneLine) {
-  const TemporaryFolder folder;
-  std::string noise;  // hardly packed, and larger than any buffer
+/// Hardly packed, and larger than any buffer.
+std::string noise_of_1_mib() {
+  std::string noise;
   for (std::uint32_t i = 0, bits = 1; i < 1u << 20; ++i, bits = bits * 1664525 + 1013904223)
     noise += char(bits >> 24);
+  return noise;
+}
+
+/// 800 million voxels, which the file is long enough to have if they are alike.
+TEST(OpenVolume, TakesNoMoreMemoryThanTheFileHas) {
+  const TemporaryFolder folder;
+  const auto path = folder / "a_20000x20000x2_uint8.raw.gz";
+  write_file(path, gzip(noise_of_1_mib()));
+  const std::string out = (folder / "a.zfp").string();
+  EXPECT_LT(test::peak_of_isowave({"convert", path.string(), "--rate", "4", "-o", out}), 400);
+  EXPECT_LT(test::peak_of_isowave({"convert", path.string(), "--tolerance", "1", "-o", out}), 400);
+}
+
+TEST(OpenVolume, FilesThatBecomeShorterAreOneLine) {
+  const TemporaryFolder folder;
+  const std::string noise = noise_of_1_mib();
   const std::string sizes = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 64\n";
   std::string hex;
   for (const char c : noise) hex += fmt::format("{:02x}", static_cast<unsigned char>(c));
