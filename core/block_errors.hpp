@@ -21,7 +21,8 @@ inline float rounded_up(double error) {
   return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
 }
 
-/// Of voxels that are off by `error` from voxels that are off by `lost` from the source (Chunk::lost). Never below the sum.
+/// error + lost, rounded up: decoded voxels are off by `error` from what was compressed, and that by `lost` from the
+/// source (Chunk::lost).
 inline double with_lost(double error, float lost) {
   const double least = std::min(error, double{lost}), largest = std::max(error, double{lost});
   const double sum = largest + least;
@@ -42,7 +43,7 @@ struct BlockError {
     for (double &largest : at_place) largest = with_lost(largest, lost);
   }
   double largest() const { return std::ranges::max(at_place); }
-  /// Of which no place's share (bound_share()) is exceeded.
+  /// The smallest bound for the whole block such that every voxel stays within its share of it (bound_share()).
   double bound_by_place() const {
     double bound = 0;
     for (std::uint32_t place = 0; place < at_place.size(); ++place)

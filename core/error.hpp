@@ -10,8 +10,8 @@
 
 namespace isowave {
 
-/// The text with \n, \t, \x1b and such for everything that would end a line, move a cursor or is no UTF-8: names of files and
-/// strings from files may hold any byte.
+/// Escapes, as \n, \t or \x1b, what would end a line or move a cursor, and bytes that are not UTF-8: names of files and
+/// strings from files may hold any.
 std::string one_line(std::string_view text);
 
 /// Anything a user can cause or fix: a bad file, a missing device, a budget too small.

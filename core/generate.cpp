@@ -45,24 +45,7 @@ void store_as(std::span<const double> row, std::byte *out) {
 }
 
 void store(VoxelType type, std::span<const double> row, std::byte *out) {
-  switch (type) {
-    case VoxelType::kUint8:
-      return store_as<std::uint8_t>(row, out);
-    case VoxelType::kInt8:
-      return store_as<std::int8_t>(row, out);
-    case VoxelType::kUint16:
-      return store_as<std::uint16_t>(row, out);
-    case VoxelType::kInt16:
-      return store_as<std::int16_t>(row, out);
-    case VoxelType::kUint32:
-      return store_as<std::uint32_t>(row, out);
-    case VoxelType::kInt32:
-      return store_as<std::int32_t>(row, out);
-    case VoxelType::kFloat32:
-      return store_as<float>(row, out);
-    case VoxelType::kFloat64:
-      return store_as<double>(row, out);
-  }
+  with_voxel_type(type, [&]<class T>(T) { store_as<T>(row, out); });
 }
 
 class GeneratedReader : public VolumeReader {

@@ -1,6 +1,6 @@
 #pragma once
-// How far each level of detail is from the volume it stands for: measured block by block while the pyramid is built, and what
-// frames make of it.
+// How far each level of detail is from the volume it stands for: measured block by block while the pyramid is built,
+// and what frames make of it.
 
 #include <array>
 #include <cstddef>
@@ -15,12 +15,14 @@
 
 namespace isowave {
 
-/// Compares a level's field with that of the next coarser level, as it is made and as it is decoded, in memory of a few layers and 8
-/// bytes per coarse block: at once, since what is lost in making it and what is lost in compressing it add up to less than the largest of each.
+/// Measures, block by block, how far the field of the next coarser level is from a level's own: as it was made, and as
+/// it is decoded. The decoded one is compared with the fine level itself: bounds of what making loses and of what
+/// compressing loses, added up, would be larger. Memory: a few layers, and 8 bytes per coarse block.
 ///
-/// The fields are trilinear, and planes of the coarse grid are planes of the fine one: in a fine cell their difference is trilinear,
-/// too, and largest at a voxel. The bound of a coarse block is the largest one in all cells that touch a voxel of it. So the field that
-/// has these bounds at its voxels, piecewise constant there, trilinear between, is at least the difference everywhere.
+/// Both fields are trilinear, and planes of the coarse grid are planes of the fine one. So in a fine cell their
+/// difference is trilinear, too, and largest at a voxel. The bound of a coarse block is the largest difference in all
+/// cells that touch a voxel of it. A field that has these bounds at the coarse voxels, and is trilinear between them,
+/// is nowhere below the difference.
 class LevelBounds {
  public:
   LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims, std::uint32_t num_threads);
@@ -28,11 +30,12 @@ class LevelBounds {
   void add_fine(std::span<const float> layers);
   void add_coarse(std::span<const float> layers, std::span<const float> decoded);
 
-  /// Of blocks, against the source.
+  /// How far the coarse level's blocks are from the source.
   struct Off {
     std::vector<float> made, decoded;
   };
-  /// The coarse level's; finer: those of the fine level as it was made, or, of the finest, what it lost (Chunk::lost); none: nothing.
+  /// After all layers. finer: how far the fine level's blocks are from the source, as they were made; of the finest,
+  /// what their voxels lost (Chunk::lost); none where that is nothing.
   Off finish(std::span<const float> finer) const;
 
  private:
@@ -64,7 +67,8 @@ inline constexpr std::int32_t kMinBoundExponent = -126, kMaxBoundExponent = 127;
 enum class FieldBound { kNone, kLower, kUpper };
 inline constexpr std::size_t kNumFieldBounds = 3;
 
-/// Largest error of a volume's voxels, measured or, at fixed accuracy, as zfp promises; nothing where that is not known.
+/// Largest error of a volume's voxels, measured or, at fixed accuracy, as zfp promises; nothing where that is not
+/// known.
 std::optional<double> known_max_error(const CompressedVolume &volume);
 
 /// How far a level's decoded values may be off.
@@ -81,17 +85,20 @@ float largest_bound(const BlockBounds &bounds);
 /// How far decoded values may be from those of all bit planes where coarser(bound, value_error) leaves planes out.
 double plane_error(const ErrorBound &bound, double value_error);
 
-/// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound, or the voxel's share of it
-/// (StreamLayout).
+/// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound, or the voxel's
+/// share of it (StreamLayout).
 struct ValueOffset {
   float uniform = 0, unit = 0;
 };
-/// plane_error: of values of fewer bit planes, against those of all. value_range: of the volume before compression, of which what sums lose
-/// in float32 counts as error, too. Throws Error where that range or the level's error is not known.
+/// Throws Error where the level's error or the range of values is not known.
+///
+/// plane_error  how far values of fewer bit planes are from those of all
+/// value_range  of the volume before compression: what sums of such values lose in float32 is part of the offset
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,
                          const std::array<float, 2> &value_range);
 
-/// What is added to a voxel's value, voxel: x + 4 y + 16 z in its block: as decode_block() in kernels_cl/block_stream.h adds it up.
+/// What is added to the value of voxel x + 4 y + 16 z of a block, in the order in which decode_block() in
+/// kernels_cl/block_stream.h adds it up.
 float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
                       std::uint32_t voxel);
 

@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/error.hpp"
+#include "core/io/input_file.hpp"
 #include "core/io/meta_image_header.hpp"
 #include "core/io/nifti_header.hpp"
 #include "core/io/nrrd_header.hpp"
 #include "core/io/raw_reader.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;
@@ -92,24 +93,18 @@ void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_la
 }
 
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) throw Error("{}: no such file", path.string());
-  if (!fs::is_regular_file(status)) throw Error("{}: not a regular file", path.string());
-
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
+  const auto file = std::make_shared<const InputFile>(path);
+  const std::string name = lower_case(path.filename().string());
   const auto ends_with = [&](std::initializer_list<std::string_view> endings) {
     return std::any_of(endings.begin(), endings.end(),
                        [&](std::string_view ending) { return name.ends_with(ending); });
   };
-  if (ends_with({".raw", ".raw.gz"})) return open_raw(path, ends_with({".gz"}), overrides);
+  if (ends_with({".raw", ".raw.gz"})) return open_raw(file, ends_with({".gz"}), overrides);
 
   std::optional<VolumeHeader> header;
-  if (ends_with({".nrrd", ".nhdr"})) header = read_nrrd_header(path);
-  if (ends_with({".mha", ".mhd"})) header = read_meta_image_header(path);
-  if (ends_with({".nii", ".nii.gz"})) header = read_nifti_header(path, ends_with({".gz"}));
+  if (ends_with({".nrrd", ".nhdr"})) header = read_nrrd_header(file);
+  if (ends_with({".mha", ".mhd"})) header = read_meta_image_header(file);
+  if (ends_with({".nii", ".nii.gz"})) header = read_nifti_header(file, ends_with({".gz"}));
   if (!header) {
     throw Error("{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
                 path.string());

@@ -28,6 +28,30 @@ bool is_integer(VoxelType type);
 /// Whether float32 holds every value of the type.
 bool fits_float32(VoxelType type);
 
+/// Returns use(T{}), where T is the type of such voxels in C++.
+template <class Use>
+auto with_voxel_type(VoxelType type, const Use &use) {
+  switch (type) {
+    case VoxelType::kUint8:
+      return use(std::uint8_t{});
+    case VoxelType::kInt8:
+      return use(std::int8_t{});
+    case VoxelType::kUint16:
+      return use(std::uint16_t{});
+    case VoxelType::kInt16:
+      return use(std::int16_t{});
+    case VoxelType::kUint32:
+      return use(std::uint32_t{});
+    case VoxelType::kInt32:
+      return use(std::int32_t{});
+    case VoxelType::kFloat32:
+      return use(float{});
+    case VoxelType::kFloat64:
+      break;
+  }
+  return use(double{});
+}
+
 /// The grid of a volume. Plain data; the defaults are a unit grid at the origin.
 struct VolumeInfo {
   glm::uvec3 dims{0};                    ///< voxels along x, y, z

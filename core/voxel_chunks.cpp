@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <future>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,25 @@ namespace isowave {
 namespace {
 
 constexpr std::uint64_t kChunkVoxels = 1ull << 22;  // enough to keep threads busy, 16 MiB
+
+/// Memory that nobody touches before voxels are read into it: a packed file may claim a thousand times more of them than it
+/// has, and ends before they are missed.
+template <class Value>
+class Untouched {
+ public:
+  /// Room for so many values; what was there is lost.
+  std::span<Value> take(std::size_t size) {
+    if (size > values_.size()) {
+      memory_ = std::make_unique_for_overwrite<Value[]>(size);
+      values_ = {memory_.get(), size};
+    }
+    return values_.first(size);
+  }
+
+ private:
+  std::unique_ptr<Value[]> memory_;
+  std::span<Value> values_;  ///< all of it
+};
 
 /// What is learnt of a run of voxels.
 struct Findings {
@@ -54,7 +74,8 @@ void raise_lost(float &lost, double error) {
   if (error > double{lost}) lost = rounded_up(error);
 }
 
-/// Sets voxels to what float32 holds of their source, and those that will be refused or mapped to what is; tiny ones become 0.
+/// Sets voxels to their source as float32, and notes what that loses; of tiny ones, which will become 0, all of it.
+/// Those that will be mapped or refused become NaN, or kMaxMagnitude.
 void cast_line(const Line &line, Findings &found) {
   for (std::size_t x = 0; x < line.source.size(); ++x) {
     const double source = line.source[x];
@@ -65,8 +86,8 @@ void cast_line(const Line &line, Findings &found) {
       value = kMaxMagnitude;
     } else {
       value = static_cast<float>(source);
-      if (std::abs(value) < kMinMagnitude) value = 0.0f;
-      raise_lost(line.lost[x / kBlockEdge], std::abs(double{value} - source));
+      const float stored = std::abs(value) < kMinMagnitude ? 0.0f : value;
+      raise_lost(line.lost[x / kBlockEdge], std::abs(double{stored} - source));
       found.add_source(source, source);
     }
   }
@@ -206,14 +227,16 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
   };
   // Float64, and integers of 32 bits, are read as they are, and cast where what that loses can be noted.
   struct Layers {
-    std::vector<float> voxels;
-    std::vector<double> source;
+    Untouched<float> floats;
+    Untouched<double> doubles;
+    std::span<float> voxels;
+    std::span<double> source;
   };
   const bool is_exact = fits_float32(reader.info().type);
   const auto read_ahead = [&](std::uint64_t z, Layers &layers) {
     return std::async(std::launch::async, [&, z] {
-      layers.voxels.resize(layer * layers_at(z));
-      if (!is_exact) layers.source.resize(layers.voxels.size());
+      layers.voxels = layers.floats.take(layer * layers_at(z));
+      if (!is_exact) layers.source = layers.doubles.take(layers.voxels.size());
       if (layers_at(z) == 0) return;
       if (is_exact) {
         reader.read_layers(std::uint32_t(z), layers_at(z), layers.voxels);

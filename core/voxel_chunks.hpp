@@ -34,8 +34,9 @@ struct Chunk {
   std::uint32_t z = 0, num_layers = 0;
   std::span<float> voxels{};   ///< [num_layers][ny][nx]
   std::uint64_t num_rows = 0;  ///< of blocks along x
-  /// [num_rows][blocks along x]: how far a block's voxels are from the source's, at most: what float32 cannot hold, and tiny
-  /// values that became 0. The source of a mapped NaN is what it was mapped to. Complete when end_chunk() is called.
+  /// [num_rows][blocks along x]: how far a block's voxels are from the source's at most, since float32 cannot hold
+  /// those or they were tiny and became 0. The source of a mapped NaN is what it was mapped to. Complete at
+  /// end_chunk().
   std::span<float> lost{};
 };
 
@@ -71,8 +72,8 @@ struct ValueRange {
   std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
   std::array<double, 2> source{};  ///< as the source has them
 };
-/// Reads the volume from front to back for `coder`. Throws Error: voxels that cannot be compressed, after all of them were
-/// looked at; a bad grid; an unfit map_nan.
+/// Reads the volume from front to back for `coder`. Throws Error: voxels that cannot be compressed, after all of them
+/// were looked at; a bad grid; an unfit map_nan.
 ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder);
 
 }  // namespace isowave

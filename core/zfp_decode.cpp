@@ -64,7 +64,8 @@ void ZfpDecode::decode(const Source &source, const Source &next, const CountsBuf
   });
 }
 
-/// Keeps the first of block_ids for those of this level, as places in it, and tells the device which they were. Returns how many.
+/// Keeps the first of block_ids for those of this level, as places in it, and tells the device which they were. Returns
+/// how many.
 std::size_t ZfpDecode::take_own(std::span<uint> block_ids, const FrameParams &frame) {
   std::vector<uint> places;
   for (std::size_t i = 0; i < block_ids.size(); ++i) {

@@ -14,7 +14,8 @@ namespace isowave {
 class ZfpDecode {
  public:
   /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams to come.
-  /// levels: block ids count on through several levels of detail (FrameParams), and only blocks of the levels at hand are decoded.
+  /// levels: block ids count on through several levels of detail (FrameParams), and only blocks of the levels at hand
+  /// are decoded.
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
             bool levels = false);
 
@@ -30,8 +31,8 @@ class ZfpDecode {
   bool can_join(const DeviceStream &next) const;
 
   /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes in inside
-  /// [slots] which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the stream stays on the host, waits for all that is
-  /// enqueued, and throws Error when the volume's file has become shorter.
+  /// [slots] which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the stream stays on the host,
+  /// waits for all that is enqueued, and throws Error when the volume's file has become shorter.
   void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                   const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
                   ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {

@@ -29,8 +29,9 @@ class ZfpEncode {
                   ocl::Buffer<uint> &words);
 
   static constexpr std::size_t kErrorsPerBlock = 2 * ISO_BOUND_PLACES;
-  /// The largest |decoded - voxel| at each place (bound_place()) of each block b of what operator() wrote, exactly: errors[2 i] +
-  /// errors[2 i + 1], i = ISO_BOUND_PLACES b + place. `words` has one word behind the last block. Else as operator().
+  /// The largest |decoded - voxel| at each place (bound_place()) of each block b of what operator() wrote, exactly:
+  /// errors[2 i] + errors[2 i + 1], i = ISO_BOUND_PLACES b + place. `words` has one word behind the last block. Else as
+  /// operator().
   void measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims, std::uint32_t bits_per_block,
                       const ocl::Buffer<uint> &words, ocl::Buffer<float> &errors);
 

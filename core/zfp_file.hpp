@@ -1,17 +1,6 @@
 #pragma once
-// The `.zfp` file: zfp's header and stream, then a trailer with what zfp cannot say.
-//
-//   bytes  0..11   zfp full header, short form (96 bits)
-//         12..     payload, then zeros to a multiple of 8 bytes: here a file of zfp's own tool ends
-//                  only at fixed accuracy: the length of each block in bits, uint16, deflated (zlib)
-//                  only in a level of detail: the bound of each block's error (block_bound.h), uint8, deflated
-//                  only with levels of detail: a whole such file for each coarser level
-//                  JSON text: spacing, origin, direction, type, value_range, max_error; at fixed accuracy also payload_bits,
-//                  index_bytes (deflated), whole_numbers; with bounds also
-//                  bounds_bytes (deflated), bounds_exponent, bounds_by_place; with levels also level_bytes, a list
-//         the last 24 bytes, little endian:
-//                  uint32 version (1; 2 at fixed accuracy; 4 with levels, or 3, without bounds) | uint32 length of the JSON text | uint32 CRC-32 of all before the
-//                  JSON text | uint32 CRC-32 of the JSON text and the three numbers before | magic "ISOWAVE\n"
+// The `.zfp` file, which README describes byte by byte ("File format"): zfp's header and stream, and behind them index,
+// bounds, levels of detail and trailer (zfp_trailer.hpp). The functions that read it are declared in zfp_stream.hpp.
 
 #include <cstddef>
 #include <cstdint>
@@ -29,8 +18,8 @@ namespace isowave {
 /// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left behind without commit().
 class ZfpFileWriter {
  public:
-  /// Writes the headers of volume and of its coarser levels, from their info.dims and bits_per_block (a multiple of 64), or
-  /// error_bound.
+  /// Writes the headers of volume and of its coarser levels, from their info.dims and bits_per_block (a multiple of
+  /// 64), or error_bound.
   ZfpFileWriter(const std::filesystem::path &path, const CompressedVolume &volume);
   /// Appends payload of the volume (level 0) or of coarser level `level`.
   void write(std::span<const std::byte> payload, std::size_t level = 0);

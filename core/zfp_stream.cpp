@@ -15,7 +15,7 @@
 
 #include "core/block_errors.hpp"
 #include "core/error.hpp"
-#include "core/io/file_bytes.hpp"
+#include "core/io/input_file.hpp"
 #include "core/level_bounds.hpp"
 #include "core/libzfp.hpp"
 #include "core/parallel_for.hpp"
@@ -34,8 +34,8 @@ using Sink = std::function<void(Payload)>;
 /// Compresses the voxels of a level.
 class LevelCoder : public ChunkCoder {
  public:
-  /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be kept of each block's errors, where
-  /// they were measured.
+  /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be kept of each block's
+  /// errors, where they were measured.
   virtual std::vector<float> finish(CompressedVolume &volume) = 0;
   /// The last chunk's voxels as they are decoded, where errors are measured.
   virtual std::span<const float> decoded() const = 0;
@@ -167,8 +167,8 @@ class BoundedCoder : public LevelCoder {
 /// Compresses a level, and makes the voxels of the next from its own.
 class PyramidCoder : public ChunkCoder {
  public:
-  /// volumes, sinks: of this level and all coarser ones. Those are compressed on the host, since they are needed as they are decoded, and
-  /// are a seventh.
+  /// volumes, sinks: of this level and all coarser ones. Those are compressed on the host, since they are needed as
+  /// they are decoded, and are a seventh.
   PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
                std::span<const Sink> sinks, bool is_finest = true)
       : volume_(*volumes[0]), is_finest_(is_finest) {

@@ -1,10 +1,6 @@
 #pragma once
-// Compressed volumes: a standard zfp stream of 4^3 float32 blocks, at a fixed number of bits per block or with as many as a
-// bound of the error needs, and what zfp's header cannot say. See docs in README "File format".
-//
-// File: zfp full header (96 bits) | block payload, block (bx,by,bz) at index bx + nbx*(by + nby*bz) |
-//       zero padding to a whole 64-bit word | trailer (lengths of blocks, levels of detail, JSON, checksums:
-//       see zfp_file.hpp).
+// Compressed volumes: a standard zfp stream of 4^3 float32 blocks, at a fixed number of bits per block or with as many
+// as a bound of the error needs, and what zfp's header cannot say. Block (bx,by,bz) is number bx + nbx*(by + nby*bz).
 
 #include <array>
 #include <cstdint>
@@ -22,7 +18,7 @@
 
 namespace isowave {
 
-class FileBytes;
+class InputFile;
 namespace ocl {
 class Device;
 }
@@ -35,17 +31,16 @@ struct ErrorBound {
   std::optional<double> max_error{};  ///< largest |decoded - source|, measured
 };
 
-/// The bound of the same blocks when they are decoded to the last bit plane that a difference of at most value_error from all of
-/// them needs; 0: all planes, the same bound.
+/// Drops the bit planes that a value error of at most value_error can spare. 0 drops none.
 ErrorBound coarser(const ErrorBound &bound, double value_error);
 
 struct CompressOptions {
   std::uint32_t rate = 8;                   ///< bits per voxel, 1..32; or
   std::optional<ErrorBound> error_bound{};  ///< as many bits as each block needs: see choose_error_bound()
-  ocl::Device *device =
-      nullptr;  ///< encodes there instead of with libzfp: the same result, bit for bit; at a fixed rate
+  /// At a fixed rate, encodes instead of libzfp: the same result, bit for bit.
+  ocl::Device *device = nullptr;
   bool measure_error = false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_error
-  std::uint32_t levels = 1;    ///< of detail, the volume itself among them: at most max_levels(); 0: so many
+  std::uint32_t levels = 1;    ///< of detail, the volume itself among them, 1..max_levels(); 0: max_levels()
   InputOptions input{};
 };
 
@@ -54,32 +49,31 @@ struct CompressOptions {
 struct BlockBounds {
   std::vector<std::uint8_t> codes{};
   std::int32_t exponent = 0;
-  bool by_place =
-      false;  ///< a voxel is off by its share (bound_share()) at most: only where voxels are compared with the source's
+  /// A voxel is off by its share (bound_share()) at most. Only where voxels are compared with the source's.
+  bool by_place = false;
 };
 
 /// Words past its last bit that a decoder reads at most.
 inline constexpr std::uint64_t kDecoderAhead = 2;
 
-/// A zfp volume in host memory, at a fixed rate or of blocks as long as the error allows.
+/// A zfp volume in host memory or in a file, at a fixed rate or of blocks as long as the error allows.
 struct CompressedVolume {
   VolumeInfo info;  ///< type is that of the source before compression
-  std::uint32_t bits_per_block =
-      0;  ///< 64 * rate; 9..2048 from other writers (1 + 8 bits hold the exponent); 0: see index
-  ErrorBound error_bound{};  ///< at a fixed rate, as it is from the start
-  std::vector<std::uint32_t>
-      index{};  ///< where blocks begin that have lengths of their own: kernels_cl/block_index.h
-  std::uint64_t indexed_bits = 0;  ///< and the length of all of them
-  std::vector<std::uint32_t>
-      words;  ///< payload from bit 0, little endian; two zero words follow the last bit; empty where file is set
-  std::shared_ptr<const FileBytes> file{};  ///< holds the payload instead of words ...
-  std::uint64_t file_first_bit = 0;         ///< ... from this bit on
-  std::array<float, 2> value_range{};  ///< [min, max] of the source voxels, as float32 and after map_nan;
-                                       ///< {-inf, inf} when unknown
-  std::optional<double> max_error{};   ///< largest |decoded - source| when it was measured
-  BlockBounds bounds{};                ///< of a level of detail; no codes: not known
-  std::vector<CompressedVolume>
-      coarser{};  ///< levels of detail, each of half the voxels along each axis: pyramid.hpp
+  /// 64 * rate; from other writers 9..2048 (1 + 8 bits hold the exponent). 0: blocks have lengths of their own.
+  std::uint32_t bits_per_block = 0;
+  ErrorBound error_bound{};            ///< at a fixed rate, as it is from the start
+  std::vector<std::uint32_t> index{};  ///< where blocks begin that have lengths of their own: block_index.h
+  std::uint64_t indexed_bits = 0;      ///< length of all of them
+  /// Payload from bit 0, little endian; two zero words follow the last bit. Empty where file is set,
+  std::vector<std::uint32_t> words;
+  std::shared_ptr<const InputFile> file{};  ///< which holds the payload instead,
+  std::uint64_t file_first_bit = 0;         ///< from this bit on.
+  /// [min, max] of the source's voxels, as float32 and after map_nan; {-inf, inf} when unknown.
+  std::array<float, 2> value_range{};
+  std::optional<double> max_error{};  ///< largest |decoded - source| when it was measured
+  BlockBounds bounds{};               ///< of a level of detail; no codes: not known
+  /// Levels of detail, each of half the voxels along each axis: pyramid.hpp.
+  std::vector<CompressedVolume> coarser{};
 
   glm::uvec3 num_blocks() const { return (info.dims + 3u) / 4u; }
   std::uint64_t block_count() const {
@@ -95,8 +89,8 @@ struct CompressedVolume {
   double rate() const { return double(payload_bits()) / (64.0 * double(block_count())); }
   /// Size of words, or what it would be.
   std::uint64_t word_count() const;
-  /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its end. Throws Error where a file is
-  /// shorter than it was, or cannot be read.
+  /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its end. Throws Error
+  /// where a file is shorter than it was, or cannot be read.
   void read_words(std::uint64_t bit, std::span<std::uint32_t> out) const;
 };
 
@@ -107,27 +101,29 @@ void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_
 /// Gives a volume, and its coarser levels, another spacing.
 void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
 
-/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more levels than it can have).
+/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more levels than it can
+/// have).
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
-/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each block, 9 where float32 does not hold all voxels. Writes to a temporary name and renames;
-/// nothing is left behind on an error. Returns what was written, but for the words, which stay empty.
+/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each block, 9 where
+/// float32 does not hold all voxels. Writes to a temporary name and renames; nothing is left behind on an error.
+/// Returns what was written, but for the words, which stay empty.
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
 
-/// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full header (spacing 1 then).
-/// Throws Error in one line on a broken header, other types or modes, truncation, checksum mismatch.
+/// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full header (spacing 1
+/// then). Throws Error in one line on a broken header, other types or modes, truncation, checksum mismatch.
 CompressedVolume read_zfp_file(const std::filesystem::path &path);
-/// As read_zfp_file(), but leaves the payload in the file, to be read when it is needed: words stays empty. The checksum is
-/// checked once, here.
+/// As read_zfp_file(), but leaves the payload in the file, to be read when it is needed: words stays empty. The
+/// checksum is checked once, here.
 CompressedVolume open_zfp_file(const std::filesystem::path &path);
-/// As open_zfp_file(), with all its checks, but keeps nothing that grows with the number of blocks: words and index stay empty, and of a
-/// level's bounds only the largest is there.
+/// As open_zfp_file(), with all its checks, but keeps nothing that grows with the number of blocks: words and index
+/// stay empty, and of a level's bounds only the largest is there.
 CompressedVolume check_zfp_file(const std::filesystem::path &path);
 /// As check_zfp_file(), but neither reads nor checks the payload, index and bounds.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
-/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as value_error allows: see coarser(). The ground
-/// truth of every decoder here.
+/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as value_error allows: see coarser(). The
+/// ground truth of every decoder here.
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double value_error = 0);
 
 }  // namespace isowave

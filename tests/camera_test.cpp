@@ -72,6 +72,8 @@ TEST_F(CameraFileTest, RefusesWhatIsNotACameraFile) {
   EXPECT_THAT(refusal("{\n\"fovy_deg\":60,\n"), HasSubstr("not a camera file"));
   EXPECT_THAT(refusal("[1,2]"), HasSubstr("fovy_deg"));
   EXPECT_THAT(refusal(R"({"fovy_deg":1e999,"cameras":[]})"), HasSubstr("not a camera file"));
+  // Lists within lists, parsed, would take 80 times as much memory.
+  EXPECT_THAT(refusal(std::string(5u << 20, '[')), HasSubstr("it has more than 4194304 bytes"));
 }
 
 TEST_F(CameraFileTest, NamesTheFieldThatIsMissingOrWrong) {

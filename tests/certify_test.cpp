@@ -35,14 +35,14 @@ constexpr ImageSize kSmall{12, 8}, kMedium{96, 64};
 struct Scene {
   Scene(const glm::uvec3 &dims, const test::VoxelFunction &field, CompressOptions options)
       : source(test::sample(dims, field)) {
-    test::ArrayVolume reader(test::grid_info(dims, {1, 1.25, 0.75}), source);
+    ArrayReader reader(test::grid_info(dims, {1, 1.25, 0.75}), source);
     compress_from(reader, options);
   }
   Scene(const std::string &file, const CompressOptions &options) {
     const auto reader = open_volume(fs::path(ISOWAVE_TEST_DATA) / file);
     source.resize(reader->info().num_voxels());
     reader->read_layers(0, reader->info().dims.z, source);
-    test::ArrayVolume array(reader->info(), source);
+    ArrayReader array(reader->info(), source);
     compress_from(array, options);
   }
   void compress_from(VolumeReader &reader, CompressOptions options) {

@@ -28,7 +28,7 @@ constexpr ImageSize kSize{40, 30};
 
 CompressedVolume levelled_volume() {
   const glm::uvec3 dims(33, 30, 31);
-  test::ArrayVolume reader(test::grid_info(dims), test::sample(dims, test::gyroid_field(12)));
+  ArrayReader reader(test::grid_info(dims), test::sample(dims, test::gyroid_field(12)));
   return compress(reader, CompressOptions{.rate = 8, .levels = 0});
 }
 

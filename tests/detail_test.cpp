@@ -35,7 +35,7 @@ std::vector<VolumeInfo> levels_of(const VolumeInfo &finest) {
 
 CompressedVolume pyramid_of(const glm::uvec3 &dims, const test::VoxelFunction &field,
                             CompressOptions options = {.rate = 8}) {
-  test::ArrayVolume reader(test::grid_info(dims), test::sample(dims, field));
+  ArrayReader reader(test::grid_info(dims), test::sample(dims, field));
   options.levels = 0;
   return compress(reader, options);
 }

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "core/error.hpp"
-#include "core/io/file_bytes.hpp"
+#include "core/io/input_file.hpp"
 #include "core/macrocells.hpp"
 #include "core/zfp_decode.hpp"
 #include "kernels_cl/zfp_codec.h"
@@ -127,7 +127,7 @@ TEST(ReadWords, AnyBitOfWordsAndFiles) {
         if ((volume.words[i / 32] >> (i % 32) & 1u) == 0) bytes[to / 8] &= char(~(1u << to % 8));
       }
       test::write_file(folder / "bits", bytes);
-      shifted.file = std::make_shared<FileBytes>(folder / "bits");
+      shifted.file = std::make_shared<InputFile>(folder / "bits");
       shifted.file_first_bit = first_bit;
       for (const CompressedVolume *source : {&volume, static_cast<const CompressedVolume *>(&shifted)}) {
         EXPECT_EQ(source->word_count(), volume.words.size());
@@ -143,27 +143,6 @@ TEST(ReadWords, AnyBitOfWordsAndFiles) {
       }
     }
   }
-}
-
-TEST(FileBytes, MissingShortAndTruncatedFilesAreOneLine) {
-  const test::TemporaryFolder folder;
-  EXPECT_THAT([&] { FileBytes(folder / "none"); }, ThrowsMessage<Error>(HasSubstr("none: cannot open")));
-  EXPECT_THAT([&] { FileBytes(folder.path()); }, ThrowsMessage<Error>(HasSubstr("not a regular file")));
-  test::write_file(folder / "a", std::string(10'000, 'a'));
-  const FileBytes file(folder / "a");
-  EXPECT_EQ(file.size(), 10'000u);
-  std::vector<std::byte> all(10'000);
-  file.read(0, all);
-  EXPECT_EQ(std::ranges::count(all, std::byte{'a'}), 10'000);
-  EXPECT_THAT([&] { file.read(1, all); }, ThrowsMessage<Error>(HasSubstr("truncated")));
-  std::filesystem::resize_file(folder / "a", 9'999);
-  EXPECT_NO_THROW(file.read(0, std::span(all).first(9'999)));
-  EXPECT_THAT([&] { file.read(0, all); },
-              ThrowsMessage<Error>(HasSubstr("10000 bytes were there, now 9999")));
-  test::write_file(folder / "b", std::string(10'000, 'b'));
-  std::filesystem::rename(folder / "b", folder / "a");  // the name of another file now
-  file.read(0, std::span(all).first(9'999));
-  EXPECT_EQ(all[0], std::byte{'a'});
 }
 
 // ---- on devices
@@ -286,7 +265,7 @@ TEST_P(DeviceStreamOnDevice, SmallFilesThatBecomeShorterAreOneLine) {
   const test::TemporaryFolder folder;
   const auto path = folder / "a.zfp";
   for (const bool indexed : {false, true}) {
-    test::ArrayVolume source(test::grid_info({9, 10, 11}), random_voxels({9, 10, 11}, -3, 3, 7));
+    ArrayReader source(test::grid_info({9, 10, 11}), random_voxels({9, 10, 11}, -3, 3, 7));
     CompressOptions options{.rate = 5};
     if (indexed) options.error_bound = ErrorBound{-4};
     compress_to_file(source, options, path);

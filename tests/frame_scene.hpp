@@ -19,6 +19,7 @@
 #include "core/zfp_accuracy.hpp"
 #include "core/zfp_stream.hpp"
 #include "reference/scalar_renderer.hpp"
+#include "tests/array_reader.hpp"
 
 namespace isowave::test {
 
@@ -44,33 +45,18 @@ inline std::vector<float> sample(const glm::uvec3 &dims, const VoxelFunction &fi
   return voxels;
 }
 
-/// Voxels in memory, for compress().
-class ArrayVolume : public VolumeReader {
- public:
-  ArrayVolume(const VolumeInfo &info, std::vector<float> voxels) : voxels_(std::move(voxels)) {
-    info_ = info;
-  }
-  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
-    const std::size_t layer = std::size_t{info_.dims.x} * info_.dims.y;
-    std::copy_n(voxels_.begin() + std::ptrdiff_t(z_begin * layer), num_layers * layer, out.begin());
-  }
-
- private:
-  std::vector<float> voxels_;
-};
-
 /// A compressed volume and what it decodes to.
 struct TestVolume {
   explicit TestVolume(VolumeReader &reader, std::uint32_t rate)
       : compressed(compress(reader, CompressOptions{.rate = rate})), voxels(decode_with_libzfp(compressed)) {}
   /// Blocks as long as the goal demands. info.type: an integer type, where it is exact.
-  TestVolume(const VolumeInfo &info, std::vector<float> source, const ErrorGoal &goal) {
-    ArrayVolume reader(info, std::move(source));
+  TestVolume(const VolumeInfo &info, const std::vector<float> &source, const ErrorGoal &goal) {
+    ArrayReader reader(info, source);
     compressed = compress(reader, CompressOptions{.error_bound = choose_error_bound(reader, goal, {})});
     voxels = decode_with_libzfp(compressed);
   }
-  TestVolume(const VolumeInfo &info, std::vector<float> source, std::uint32_t rate)
-      : TestVolume(ArrayVolume(info, std::move(source)), rate) {}
+  TestVolume(const VolumeInfo &info, const std::vector<float> &source, std::uint32_t rate)
+      : TestVolume(ArrayReader(info, source), rate) {}
   TestVolume(const glm::uvec3 &dims, const VoxelFunction &field, std::uint32_t rate = 8)
       : TestVolume(grid_info(dims), sample(dims, field), rate) {}
 
@@ -83,7 +69,7 @@ struct TestVolume {
   std::vector<float> voxels;  ///< by libzfp: what every renderer must see
 
  private:
-  TestVolume(ArrayVolume &&reader, std::uint32_t rate) : TestVolume(reader, rate) {}
+  TestVolume(ArrayReader &&reader, std::uint32_t rate) : TestVolume(reader, rate) {}
 };
 
 inline std::vector<HitRecord> twin_hits(const TestVolume &volume, const Camera &camera, ImageSize size,

@@ -167,7 +167,7 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
   const test::TemporaryFolder folder;
   const TestVolume volume = medium_volume();
   const auto path = folder / "a.zfp";
-  test::ArrayVolume source(volume.info(), test::sample(volume.info().dims, test::gyroid_field(10)));
+  ArrayReader source(volume.info(), test::sample(volume.info().dims, test::gyroid_field(10)));
   compress_to_file(source, {.rate = 8}, path);
   const CompressedVolume opened = open_zfp_file(path);
   EXPECT_TRUE(opened.words.empty());

@@ -1,13 +1,11 @@
-// Compressed files that lie, with checksums that are right, that become shorter while they are read, or that would take more memory than
-// they are worth: the program says so in one line, or draws what its reference draws.
+// Compressed files that lie, with checksums that are right, that become shorter while they are read, or that would take
+// more memory than they are worth: the program says so in one line, or draws what its reference draws.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <atomic>
 #include <cmath>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -17,7 +15,8 @@
 #include "core/zfp_accuracy.hpp"
 #include "core/zfp_file.hpp"
 #include "tests/frame_scene.hpp"
-#include "tests/run_program.hpp"
+#include "tests/volume_file.hpp"
+#include "tests/zfp_trailer_file.hpp"
 
 namespace isowave {
 namespace {
@@ -26,52 +25,18 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using test::quoted;
 using test::TemporaryFolder;
+using test::TrailerFile;
+using test::with_trailer;
+using testing::AnyOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::ThrowsMessage;
-
-constexpr std::size_t kFooterBytes = 24;
-
-std::uint32_t crc_of(std::string_view bytes) {
-  return static_cast<std::uint32_t>(
-      ::crc32_z(0, reinterpret_cast<const Bytef *>(bytes.data()), bytes.size()));
-}
-
-/// A trailer whose checksums are right, for what stands before it.
-std::string with_trailer(const std::string &before, const std::string &text, std::uint32_t version) {
-  const std::array<std::uint32_t, 3> numbers{version, static_cast<std::uint32_t>(text.size()),
-                                             crc_of(before)};
-  std::string end = text + std::string(reinterpret_cast<const char *>(numbers.data()), sizeof(numbers));
-  const std::uint32_t crc = crc_of(end);
-  return before + end + std::string(reinterpret_cast<const char *>(&crc), sizeof(crc)) + "ISOWAVE\n";
-}
-
-/// A file in its parts.
-struct Parts {
-  explicit Parts(const std::string &bytes) {
-    std::memcpy(&version, &bytes[bytes.size() - kFooterBytes], 4);
-    std::memcpy(&json_bytes, &bytes[bytes.size() - kFooterBytes + 4], 4);
-    before = bytes.substr(0, bytes.size() - kFooterBytes - json_bytes);
-    text = bytes.substr(before.size(), json_bytes);
-  }
-  std::uint32_t version = 0, json_bytes = 0;
-  std::string before, text;
-};
-
-std::string deflated(const std::string &bytes) {
-  uLongf size = ::compressBound(bytes.size());
-  std::string out(size, 0);
-  ::compress(reinterpret_cast<Bytef *>(out.data()), &size, reinterpret_cast<const Bytef *>(bytes.data()),
-             bytes.size());
-  out.resize(size);
-  return out;
-}
 
 class HostileZfp : public testing::Test {
  protected:
   /// A small volume with levels, as a file; fixed rate, or fixed accuracy.
   std::string make(bool indexed) {
-    test::ArrayVolume source(test::grid_info({18, 17, 19}),
-                             test::sample({18, 17, 19}, test::gyroid_field(9)));
+    ArrayReader source(test::grid_info({18, 17, 19}), test::sample({18, 17, 19}, test::gyroid_field(9)));
     CompressOptions options{.rate = 6, .measure_error = true, .levels = 2};
     if (indexed) options.error_bound = ErrorBound{-8};
     compress_to_file(source, options, path_);
@@ -151,7 +116,7 @@ TEST_F(HostileZfp, EmptyAndOtherBlocksAreFoundAlike) {
   std::vector<float> voxels = test::sample({64, 36, 21}, test::gyroid_field(9));
   for (std::size_t i = 0; i < voxels.size(); ++i)
     if (i % 64 / 4 % 5 < 3 || i / 64 % 36 < 13) voxels[i] = 0;
-  test::ArrayVolume source(test::grid_info({64, 36, 21}), voxels);
+  ArrayReader source(test::grid_info({64, 36, 21}), voxels);
   const CompressedVolume volume = compress(source, {.error_bound = ErrorBound{-6}});
   std::uint32_t block = 0;
   find_block_lengths(volume, "a test", [&](std::uint32_t bits, std::uint64_t count) {
@@ -168,10 +133,10 @@ TEST_F(HostileZfp, MoreBlocksThanBitsAreRefusedFirst) {
     const auto result = test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
     EXPECT_EQ(result.status, 1);
     EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
-    json trailer = json::parse(Parts(make(true)).text);
+    json trailer = json::parse(TrailerFile(make(true)).text);
     trailer.erase("level_bytes");
     trailer.erase("bounds_bytes");
-    const std::string index = deflated(std::string(20'000, '\1'));
+    const std::string index = test::zlib(std::string(20'000, '\1'));
     trailer["payload_bits"] = 8 * payload.size();
     trailer["index_bytes"] = index.size();
     test::write_file(path_, with_trailer(head + payload + std::string(4, 0) + index, trailer.dump(), 2));
@@ -201,6 +166,7 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
   const std::vector<std::string> values = {"null",
                                            "true",
                                            "\"x\\ny\"",
+                                           '"' + std::string(5000, 'x') + '"',
                                            "-1",
                                            "0",
                                            "1",
@@ -226,7 +192,7 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
                                            "[1,1]"};
   std::size_t num_read = 0, num_refused = 0;
   for (const bool indexed : {false, true}) {
-    const Parts parts(make(indexed));
+    const TrailerFile parts(make(indexed));
     const json trailer = json::parse(parts.text);
     for (const auto &[key, right] : trailer.items()) {
       for (const std::string &value : values) {
@@ -240,7 +206,8 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
           decode_with_libzfp(volume);
           ++num_read;
         } catch (const Error &error) {
-          EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+          EXPECT_THAT(error.what(), Not(AnyOf(HasSubstr("\n"), HasSubstr("exception"))));
+          EXPECT_LT(std::string_view(error.what()).size(), 300u) << error.what();
           ++num_refused;
         }
       }
@@ -248,6 +215,51 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
   }
   EXPECT_GT(num_read, 10u);
   EXPECT_GT(num_refused, 400u);
+}
+
+/// Deflated parts end where the trailer says, and with the last block.
+TEST_F(HostileZfp, DeflatedPartsEndWithTheirBlocks) {
+  ArrayReader source(test::grid_info({18, 17, 19}), test::sample({18, 17, 19}, test::gyroid_field(9)));
+  compress_to_file(source, {.error_bound = ErrorBound{-8}, .levels = 2}, path_);
+  const TrailerFile parts(test::read_file(path_));
+  const CompressedVolume volume = open_zfp_file(path_);
+  const std::size_t stream_bytes = (96 + volume.payload_bits() + 63) / 64 * 8;
+  const json trailer = json::parse(parts.text);
+  std::string lengths, codes(volume.bounds.codes.begin(), volume.bounds.codes.end());
+  for (std::uint32_t block = 0; block < volume.block_count(); ++block) {
+    const auto length = static_cast<std::uint16_t>(volume.block_bits(block));
+    lengths.append(reinterpret_cast<const char *>(&length), sizeof(length));
+  }
+  const std::size_t old_bytes =
+      trailer["index_bytes"].get<std::size_t>() + trailer["bounds_bytes"].get<std::size_t>();
+  const std::string stream = parts.before.substr(0, stream_bytes),
+                    levels = parts.before.substr(stream_bytes + old_bytes);
+  const auto is_read = [&](const std::string &index, const std::string &bounds) {
+    json changed = trailer;
+    changed["index_bytes"] = index.size();
+    changed["bounds_bytes"] = bounds.size();
+    test::write_file(path_, with_trailer(stream + index + bounds + levels, changed.dump(), parts.version));
+    try {
+      open_zfp_file(path_);
+      return true;
+    } catch (const Error &) {
+      return false;
+    }
+  };
+  const std::string index = test::zlib(lengths), bounds = test::zlib(codes);
+  EXPECT_TRUE(is_read(index, bounds));
+  EXPECT_FALSE(is_read(index + "x", bounds));
+  EXPECT_FALSE(is_read(index, bounds + "x"));
+  EXPECT_FALSE(is_read(test::zlib(lengths + "xx"), bounds));
+  EXPECT_FALSE(is_read(index, test::zlib(codes + "x")));
+  EXPECT_FALSE(is_read(index.substr(0, index.size() - 1), bounds));
+  EXPECT_FALSE(is_read(test::gzip(lengths), bounds));
+  for (std::string *part : {&lengths, &codes}) part->pop_back();
+  EXPECT_FALSE(is_read(test::zlib(lengths), bounds));
+  EXPECT_FALSE(is_read(index, test::zlib(codes)));
+  std::string flipped = index;
+  flipped.back() ^= 1;  // of its checksum
+  EXPECT_FALSE(is_read(flipped, bounds));
 }
 
 /// Files of programs that did not count casts, whose errors are said too small.
@@ -260,7 +272,7 @@ TEST_F(HostileZfp, ErrorsThatLeaveOutTheCastAreNotKnown) {
       const CompressedVolume right = open_zfp_file(path_);
       EXPECT_TRUE(known_max_error(right));
       EXPECT_FALSE(right.bounds.codes.empty());
-      const Parts parts(test::read_file(path_));
+      const TrailerFile parts(test::read_file(path_));
       json trailer = json::parse(parts.text);
       const bool had_casts = trailer.erase("cast_counts") > 0;
       EXPECT_EQ(had_casts, kind != "float32");
@@ -305,7 +317,7 @@ TEST_F(HostileZfp, AdviceCanBeFollowed) {
           continue;
         }
         const std::string all = run.out + run.err, before = "--tolerance ";
-        EXPECT_EQ(all.find("nan"), std::string::npos) << what << all;
+        EXPECT_THAT(all, Not(AnyOf(HasSubstr(" nan"), HasSubstr("-nan")))) << what;
         const std::size_t at = all.find(before);
         if (at == std::string::npos) continue;
         ++num_advised;

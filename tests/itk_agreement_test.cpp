@@ -1,5 +1,5 @@
-// Headers and voxels against ITK, which shares nothing with our readers: the same type, grid and values, bit for bit but for
-// what a test says.
+// Headers and voxels against ITK, which shares nothing with our readers: the same type, grid and values, bit for bit
+// but for what a test says.
 
 #include <gtest/gtest.h>
 #include <itkMetaImageIO.h>

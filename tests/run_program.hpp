@@ -1,7 +1,9 @@
 #pragma once
 // Runs the program isowave as a user would, and folders for what it writes.
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -80,10 +82,33 @@ inline std::string quoted(const std::filesystem::path &path) {
   return "'" + path.string() + "'";
 }
 
-/// The program under test, quoted for the shell: what the environment says, where ctest has it tested with sanitizers.
-inline std::string isowave_program() {
+/// The program under test: what the environment says, where ctest has it tested with sanitizers.
+inline std::filesystem::path program_path() {
   const char *path = std::getenv("ISOWAVE_PROGRAM");
-  return quoted(path ? path : ISOWAVE_PROGRAM);
+  return path ? path : ISOWAVE_PROGRAM;
+}
+/// For the shell.
+inline std::string isowave_program() {
+  return quoted(program_path());
+}
+
+/// The most memory that `isowave ARGUMENTS` had, whatever came of it [MiB].
+inline long peak_of_isowave(std::vector<std::string> arguments) {
+  std::string program = program_path().string();
+  std::vector<char *> argv{program.data()};
+  for (std::string &argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(::open("/dev/null", O_WRONLY), stream);
+    ::execv(program.c_str(), argv.data());
+    ::_exit(127);
+  }
+  int status = 0;
+  rusage usage{};
+  EXPECT_EQ(::wait4(child, &status, 0, &usage), child);
+  EXPECT_NE(WEXITSTATUS(status), 127);
+  return usage.ru_maxrss / 1024;
 }
 
 /// Runs `isowave ARGUMENTS` through the shell.

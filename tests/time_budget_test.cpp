@@ -218,7 +218,7 @@ TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
 /// Coarse levels draw small pictures, the finest the full one.
 TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
   const glm::uvec3 dims(40, 36, 44);
-  test::ArrayVolume reader(test::grid_info(dims), test::sample(dims, test::sphere_field(dims)));
+  ArrayReader reader(test::grid_info(dims), test::sample(dims, test::sphere_field(dims)));
   const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 0});
   const Camera camera = orbit_cameras(volume.info, 1)[0];
   for (const ocl::DeviceInfo &info : devices_under_test()) {

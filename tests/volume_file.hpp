@@ -31,7 +31,7 @@ std::string ramp(bool big_endian = false, std::size_t count = 60) {
   return bytes;
 }
 
-inline std::string deflate(const std::string &bytes, int window_bits) {
+inline std::string deflate(std::string_view bytes, int window_bits) {
   z_stream stream{};
   EXPECT_EQ(::deflateInit2(&stream, 9, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY), Z_OK);
   std::string packed(::deflateBound(&stream, uLong(bytes.size())) + 32, '\0');
@@ -44,10 +44,10 @@ inline std::string deflate(const std::string &bytes, int window_bits) {
   ::deflateEnd(&stream);
   return packed;
 }
-inline std::string gzip(const std::string &bytes) {
+inline std::string gzip(std::string_view bytes) {
   return deflate(bytes, 15 + 16);
 }
-inline std::string zlib(const std::string &bytes) {
+inline std::string zlib(std::string_view bytes) {
   return deflate(bytes, 15);
 }
 

@@ -1,10 +1,9 @@
-// Raw files: names, sizes, types, gzip. The formats with headers are in itk_reader_test.cpp.
+// Raw files: names, sizes, types, gzip. The formats with headers are in volume_headers_test.cpp.
 
 #include "core/volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,30 +12,18 @@
 
 #include "core/error.hpp"
 #include "core/io/raw_reader.hpp"
-#include "tests/run_program.hpp"
+#include "tests/volume_file.hpp"
 
 namespace isowave {
 namespace {
 
+using test::gzip;
+using test::read_all;
 using test::TemporaryFolder;
 using test::write_file;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-std::string gzip(std::string_view bytes) {
-  const TemporaryFolder folder;
-  gzFile file = ::gzopen((folder / "x.gz").c_str(), "wb");
-  ::gzwrite(file, bytes.data(), unsigned(bytes.size()));
-  ::gzclose(file);
-  return test::read_file(folder / "x.gz");
-}
-
-std::vector<float> read_all(VolumeReader &reader) {
-  std::vector<float> voxels(reader.info().num_voxels());
-  reader.read_layers(0, reader.info().dims.z, voxels);
-  return voxels;
-}
 
 TEST(VoxelType, NamesAndSizes) {
   for (int i = 0; i < 8; ++i) {

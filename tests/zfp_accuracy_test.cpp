@@ -1,4 +1,5 @@
-// Volumes with a bound on the error: streams against libzfp, the index, the choice of bit planes, files and what is refused.
+// Volumes with a bound on the error: streams against libzfp, the index, the choice of bit planes, files and what is
+// refused.
 
 #include "core/zfp_accuracy.hpp"
 

@@ -3,36 +3,16 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "core/io/input_file.hpp"
+
 namespace isowave {
-
-/// A regular file, open for reading. Anything else, such as a pipe, is refused without waiting for it.
-class InputFile {
- public:
-  /// what: how messages name the file. Throws Error when it cannot be opened.
-  InputFile(const std::filesystem::path &path, std::string what);
-  ~InputFile();
-  InputFile(const InputFile &) = delete;
-  InputFile &operator=(const InputFile &) = delete;
-
-  const std::string &what() const { return what_; }
-  /// In bytes, when the file was opened.
-  std::uint64_t size() const { return size_; }
-  /// Reads up to bytes.size() bytes from `offset` on; fewer only at the end of the file. Throws Error.
-  std::size_t read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
-
- private:
-  std::string what_;
-  std::uint64_t size_ = 0;
-  int descriptor_ = -1;
-};
 
 class ByteSource {
  public:
@@ -41,26 +21,31 @@ class ByteSource {
   virtual std::size_t read(std::span<std::byte> bytes) = 0;
 };
 
-/// A file from byte `offset` on.
+/// A part of a file, or all that it has from byte `offset` on.
 class FileSource : public ByteSource {
  public:
-  FileSource(std::shared_ptr<const InputFile> file, std::uint64_t offset)
-      : file_(std::move(file)), offset_(offset) {}
+  FileSource(std::shared_ptr<const InputFile> file, std::uint64_t offset, std::uint64_t size);
+  FileSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset)
+      : FileSource(file, offset, file->size() - std::min(offset, file->size())) {}
+
   std::size_t read(std::span<std::byte> bytes) override;
+  /// Bytes that are still to be read.
+  std::uint64_t left() const { return left_; }
+  const InputFile &file() const { return *file_; }
 
  private:
   std::shared_ptr<const InputFile> file_;
-  std::uint64_t offset_;
+  std::uint64_t offset_, left_;
 };
 
 /// gzip: one or more members, as the gzip tool writes and joins them. zlib: one stream.
-enum class Packing { kGzip, kGzipOrZlib };
+enum class Packing { kGzip, kZlib, kGzipOrZlib };
 
-/// Unpacks a compressed file from byte `offset` to its end, where the compressed data must end too. read() throws
-/// Error where it is broken, ends early, has a wrong checksum, or is followed by anything else.
+/// Unpacks compressed data, which must end where the part of the file does. Throws Error where the data are broken, end
+/// early, have a wrong checksum, or are followed by anything else.
 class InflateSource : public ByteSource {
  public:
-  InflateSource(std::shared_ptr<const InputFile> file, std::uint64_t offset, Packing packing);
+  InflateSource(FileSource packed, Packing packing);
   ~InflateSource() override;
   InflateSource(const InflateSource &) = delete;
   InflateSource &operator=(const InflateSource &) = delete;
@@ -68,16 +53,15 @@ class InflateSource : public ByteSource {
   std::size_t read(std::span<std::byte> bytes) override;
 
  private:
-  /// Makes packed bytes available, unless some are left or the file has ended.
+  /// Makes packed bytes available, unless some are left or there are no more.
   void refill();
   void end_stream();
+  const std::string &what() const { return packed_.file().what(); }
 
-  std::shared_ptr<const InputFile> file_;
   FileSource packed_;
   std::vector<std::byte> buffer_;
   z_stream stream_{};
-  bool is_gzip_ = true;
-  bool ended_ = false;
+  bool is_gzip_ = false, ended_ = false;
 };
 
 /// deflate cannot shrink data more than this: a bound on what a compressed file may unpack to.

@@ -8,9 +8,9 @@
 
 #include "core/error.hpp"
 #include "core/io/text_header.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -139,16 +139,13 @@ std::size_t read_meta_dims(const HeaderFields &fields, const std::string &what, 
   if (num_axes < 1 || num_axes > kMaxAxes) fields.fail("NDims", "must be 1 to 10");
   const std::vector<std::int64_t> sizes = fields.integers("DimSize", std::size_t(num_axes));
   for (const std::int64_t size : sizes) {
-    if (size < 1) fields.fail("DimSize", "must be positive");
+    if (size < 1 || size > kMaxDim) fields.fail("DimSize", fmt::format("each must be 1 to {}", kMaxDim));
   }
   if (num_axes < 3 ||
       std::any_of(sizes.begin() + 3, sizes.end(), [](std::int64_t size) { return size != 1; })) {
     throw Error("{}: an image of {} axes, need a volume of 3", what, num_axes);
   }
-  for (int i = 0; i < 3; ++i) {
-    // Clamped: a 64-bit size must not wrap into an acceptable one.
-    info.dims[i] = std::uint32_t(std::min<std::int64_t>(sizes[std::size_t(i)], ~0u));
-  }
+  for (int i = 0; i < 3; ++i) info.dims[i] = std::uint32_t(sizes[std::size_t(i)]);
   return std::size_t(num_axes);
 }
 
@@ -226,9 +223,9 @@ void set_meta_offset(const HeaderFields &fields, std::uint64_t offset, VoxelLayo
 
 }  // namespace
 
-VolumeHeader read_meta_image_header(const fs::path &path) {
-  const std::string what = path.string();
-  HeaderLines lines(std::make_shared<const InputFile>(path, what));
+VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file) {
+  const std::string &what = file->what();
+  HeaderLines lines(file);
   HeaderFields fields(what);
   read_meta_fields(lines, what, fields);
 
@@ -241,14 +238,13 @@ VolumeHeader read_meta_image_header(const fs::path &path) {
   set_meta_encoding(fields, voxels);
   const std::string &name = fields[kLastMetaKey];
   if (lower_case(name) == "local") {
-    voxels.file = path;
-    voxels.what = what;
+    voxels.file = file;
     set_meta_offset(fields, lines.end(), voxels);
   } else if (name.starts_with("LIST") || name.find('%') != name.npos) {
     throw Error("{}: its voxels lie in several files, which is not supported: convert it to one file", what);
   } else {
     if (name.empty()) fields.fail(kLastMetaKey, "need a file's name or LOCAL");
-    set_data_file(voxels, path, name);
+    voxels.file = open_data_file(*file, name);
     set_meta_offset(fields, 0, voxels);
   }
   return header;

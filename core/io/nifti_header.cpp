@@ -12,7 +12,6 @@
 #include "core/io/byte_source.hpp"
 
 namespace isowave {
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -21,24 +20,21 @@ constexpr std::size_t kNiftiHeaderBytes = 348;
 /// The bytes of the header, and their numbers by where they stand.
 class NiftiHeader {
  public:
-  NiftiHeader(const fs::path &path, bool is_gzipped) : what_(path.string()) {
-    const auto file = std::make_shared<const InputFile>(path, what_);
+  NiftiHeader(const std::shared_ptr<const InputFile> &file, bool is_gzipped) : what_(file->what()) {
     std::unique_ptr<ByteSource> source;
     if (is_gzipped) {
-      source = std::make_unique<InflateSource>(file, 0, Packing::kGzip);
+      source = std::make_unique<InflateSource>(FileSource(file, 0), Packing::kGzip);
     } else {
       source = std::make_unique<FileSource>(file, 0);
     }
     if (source->read(bytes_) != kNiftiHeaderBytes) fail("shorter than a NIfTI header");
-    constexpr std::int32_t kNifti2HeaderBytes = 540;
-    const auto size_is = [&](std::int32_t size) { return get<std::int32_t>(0) == size; };
-    is_swapped_ = true;
-    is_swapped_ = size_is(std::int32_t(kNiftiHeaderBytes)) || size_is(kNifti2HeaderBytes);
-    if (size_is(kNifti2HeaderBytes)) fail("NIfTI-2, which is not supported: convert it to NIfTI-1");
-    if (!size_is(std::int32_t(kNiftiHeaderBytes))) fail("not a NIfTI-1 file");
+    constexpr std::int32_t kNifti1 = kNiftiHeaderBytes, kNifti2 = 540;  // each begins with its header's size
+    const auto has_size = [&] { return get<std::int32_t>(0) == kNifti1 || get<std::int32_t>(0) == kNifti2; };
+    is_swapped_ = !has_size();
+    if (!has_size()) fail("not a NIfTI-1 file");
+    if (get<std::int32_t>(0) == kNifti2) fail("NIfTI-2, which is not supported: convert it to NIfTI-1");
   }
 
-  const std::string &what() const { return what_; }
   bool is_big_endian() const { return is_swapped_; }
   bool has_at(std::size_t at, std::string_view text) const {
     return std::memcmp(bytes_.data() + at, text.data(), text.size()) == 0;
@@ -55,11 +51,14 @@ class NiftiHeader {
   }
   double get_finite(std::size_t at, std::string_view name) const {
     const float value = get<float>(at);
-    if (!std::isfinite(value)) throw Error("{}: broken header: {} is {}", what_, name, value);
+    if (!std::isfinite(value)) fail("broken header: {} is {}", name, value);
     return value;
   }
 
-  [[noreturn]] void fail(std::string_view reason) const { throw Error("{}: {}", what_, reason); }
+  template <class... Args>
+  [[noreturn]] void fail(fmt::format_string<Args...> reason, Args &&...args) const {
+    throw Error("{}: {}", what_, fmt::format(reason, std::forward<Args>(args)...));
+  }
 
  private:
   std::string what_;
@@ -85,30 +84,29 @@ VoxelType nifti_voxel_type(const NiftiHeader &header) {
   for (const Code &candidate : kCodes) {
     if (candidate.code != code) continue;
     if (bits != 8 * std::int16_t(size_of(candidate.type))) {
-      throw Error("{}: broken header: bitpix {} does not fit datatype {}", header.what(), bits, code);
+      header.fail("broken header: bitpix {} does not fit datatype {}", bits, code);
     }
     return candidate.type;
   }
-  throw Error(
-      "{}: NIfTI datatype {} is not supported: need one number of at most 32 bits, or float64, per voxel",
-      header.what(), code);
+  header.fail("NIfTI datatype {} is not supported: need one number of at most 32 bits, or float64, per voxel",
+              code);
 }
 
 void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
   constexpr std::size_t kDimsAt = 40;
   const int num_axes = header.get<std::int16_t>(kDimsAt);
-  if (num_axes < 1 || num_axes > 7) throw Error("{}: broken header: {} axes", header.what(), num_axes);
+  if (num_axes < 1 || num_axes > 7) header.fail("broken header: {} axes", num_axes);
   bool is_volume = num_axes >= 3;
   for (int axis = 1; axis <= num_axes; ++axis) {
     const int count = header.get<std::int16_t>(kDimsAt + 2 * std::size_t(axis));
-    if (count <= 0) throw Error("{}: broken header: {} voxels along axis {}", header.what(), count, axis);
+    if (count <= 0) header.fail("broken header: {} voxels along axis {}", count, axis);
     if (axis <= 3) {
       info.dims[axis - 1] = std::uint32_t(count);
     } else if (count != 1) {
       is_volume = false;
     }
   }
-  if (!is_volume) throw Error("{}: an image of {} axes, need a volume of 3", header.what(), num_axes);
+  if (!is_volume) header.fail("an image of {} axes, need a volume of 3", num_axes);
   constexpr std::int16_t kMatrixIntent = 1004;
   if (header.get<std::int16_t>(68) == kMatrixIntent) header.fail("matrices as voxels are not supported");
 }
@@ -118,7 +116,7 @@ glm::dvec3 read_nifti_spacing(const NiftiHeader &header) {
   glm::dvec3 spacing;
   for (int axis = 0; axis < 3; ++axis) {
     const double value = header.get_finite(80 + 4 * std::size_t(axis), "pixdim");
-    if (value < 0) throw Error("{}: broken header: pixdim {}: must be positive", header.what(), value);
+    if (value < 0) header.fail("broken header: pixdim {}: must be positive", value);
     spacing[axis] = value == 0 ? 1.0 : value;
   }
   return spacing;
@@ -179,8 +177,7 @@ std::optional<Placement> read_placement(const NiftiHeader &header, const glm::dv
   constexpr int kLastCode = 5, kScanner = 1;
   const int qform = header.get<std::int16_t>(252), sform = header.get<std::int16_t>(254);
   for (const int code : {qform, sform}) {
-    if (code < 0 || code > kLastCode)
-      throw Error("{}: broken header: code {} of a qform or sform", header.what(), code);
+    if (code < 0 || code > kLastCode) header.fail("broken header: code {} of a qform or sform", code);
   }
   if (qform == 0 && sform == 0) return std::nullopt;
   const std::optional<Placement> by_qform = qform > 0 ? std::optional(read_qform(header)) : std::nullopt;
@@ -222,9 +219,8 @@ void set_nifti_scale(const NiftiHeader &header, VoxelLayout &voxels) {
   if (std::isinf(slope)) header.fail("broken header: scl_slope is infinite");
   if (slope == 0 || std::isnan(slope)) {
     if (intercept == 0 || std::isnan(intercept)) return;  // voxels are not scaled
-    throw Error(
-        "{}: scl_inter {} without a scl_slope, which readers understand differently: set scl_slope to 1",
-        header.what(), intercept);
+    header.fail("scl_inter {} without a scl_slope, which readers understand differently: set scl_slope to 1",
+                intercept);
   }
   voxels.slope = slope;
   voxels.intercept = header.get_finite(116, "scl_inter");
@@ -232,8 +228,8 @@ void set_nifti_scale(const NiftiHeader &header, VoxelLayout &voxels) {
 
 }  // namespace
 
-VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
-  const NiftiHeader bytes(path, is_gzipped);
+VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, bool is_gzipped) {
+  const NiftiHeader bytes(file, is_gzipped);
   constexpr std::size_t kMagicAt = 344;
   if (bytes.has_at(kMagicAt, std::string_view("ni1\0", 4)))
     bytes.fail("its voxels lie in an .img file: convert it to one file");
@@ -242,8 +238,7 @@ VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
   VolumeHeader header;
   read_nifti_dims(bytes, header.info);
   VoxelLayout &voxels = header.voxels;
-  voxels.file = path;
-  voxels.what = bytes.what();
+  voxels.file = file;
   voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;
   voxels.type = nifti_voxel_type(bytes);
   voxels.big_endian = bytes.is_big_endian();
@@ -257,7 +252,7 @@ VolumeHeader read_nifti_header(const fs::path &path, bool is_gzipped) {
   const double offset = bytes.get_finite(108, "vox_offset");
   constexpr double kLeastOffset = 352, kMostOffset = 1e9;
   if (offset < kLeastOffset || offset > kMostOffset || offset != std::floor(offset)) {
-    throw Error("{}: broken header: voxels at byte {}", bytes.what(), offset);
+    bytes.fail("broken header: voxels at byte {}", offset);
   }
   voxels.bytes_to_skip = std::uint64_t(offset);
   return header;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <charconv>
-#include <fstream>
 #include <limits>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -12,7 +12,7 @@
 
 #include "core/error.hpp"
 #include "core/io/atomic_file.hpp"
-#include "core/io/input_file.hpp"
+#include "core/io/byte_source.hpp"
 
 namespace isowave {
 namespace {
@@ -74,11 +74,9 @@ void write_npy(const FloatImage &image, const std::filesystem::path &path) {
 
 FloatImage read_npy(const std::filesystem::path &path) {
   const std::string where = path.string();
-  check_input_file(path);
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw Error("{}: cannot open", where);
-  const auto get = [&](void *to, std::size_t bytes) {
-    return bool(in.read(static_cast<char *>(to), static_cast<std::streamsize>(bytes)));
+  FileSource in(std::make_shared<const InputFile>(path), 0);
+  const auto get = [&in](void *to, std::size_t bytes) {
+    return in.read(std::span(static_cast<std::byte *>(to), bytes)) == bytes;
   };
 
   char magic[kNpyMagic.size()];
@@ -111,17 +109,14 @@ FloatImage read_npy(const std::filesystem::path &path) {
 
   // Compared with the file before memory is asked for: the shape of a broken header may be anything. 64 bits
   // hold the product of two 32-bit extents, and its fourfold is compared by division.
-  const auto begin = static_cast<std::uint64_t>(in.tellg());
-  in.seekg(0, std::ios::end);
-  const std::uint64_t bytes = static_cast<std::uint64_t>(in.tellg()) - begin;
-  in.seekg(static_cast<std::streamoff>(begin));
+  const std::uint64_t bytes = in.left();
   if (bytes % sizeof(float) != 0 || bytes / sizeof(float) != shape[0] * shape[1]) {
     throw Error("{}: shape ({}, {}) needs {} float32 values, the file has {} bytes of them", where, shape[0],
                 shape[1], shape[0] * shape[1], bytes);
   }
   FloatImage image{static_cast<std::uint32_t>(shape[1]), static_cast<std::uint32_t>(shape[0]), {}};
   image.pixels.resize(shape[0] * shape[1]);
-  if (!get(image.pixels.data(), bytes)) throw Error("{}: cannot read", where);
+  in.read(std::as_writable_bytes(std::span(image.pixels)));
   return image;
 }
 

@@ -9,9 +9,9 @@
 
 #include "core/error.hpp"
 #include "core/io/text_header.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -179,7 +179,8 @@ std::vector<NrrdAxis> read_nrrd_axes(const HeaderFields &fields) {
   std::vector<NrrdAxis> axes(count);
   const std::vector<std::int64_t> sizes = fields.integers("sizes", count);
   for (std::size_t i = 0; i < count; ++i) {
-    if (sizes[i] < 1) fields.fail("sizes", "must be positive");
+    if (sizes[i] < 1 || sizes[i] > kMaxDim)
+      fields.fail("sizes", fmt::format("each must be 1 to {}", kMaxDim));
     axes[i].size = sizes[i];
   }
   const auto read_numbers = [&](std::string_view name, double NrrdAxis::*member) {
@@ -283,8 +284,8 @@ void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxi
   if (fields.has("space units")) check_quoted(fields, "space units", 3);
 }
 
-/// Spacing from the field or from where the axis begins and ends; the first sample lies at its beginning or, where samples
-/// are cells, half a spacing further.
+/// Spacing from the field or from where the axis begins and ends; the first sample lies at its beginning or, where
+/// samples are cells, half a spacing further.
 void set_geometry_by_axes(const HeaderFields &fields, const std::vector<NrrdAxis> &axes, VolumeInfo &info) {
   for (const std::string_view name :
        {"space directions", "space origin", "measurement frame", "space units"}) {
@@ -363,19 +364,15 @@ void check_other_nrrd_fields(const HeaderFields &fields, const VolumeInfo &info)
 
 }  // namespace
 
-VolumeHeader read_nrrd_header(const fs::path &path) {
-  const std::string what = path.string();
-  const auto file = std::make_shared<const InputFile>(path, what);
+VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
+  const std::string &what = file->what();
   HeaderLines lines(file);
   HeaderFields fields(what);
   const bool has_end = read_nrrd_fields(lines, what, fields);
 
   VolumeHeader header;
   const std::vector<NrrdAxis> axes = volume_axes(fields, read_nrrd_axes(fields), what);
-  for (int i = 0; i < 3; ++i) {
-    // Clamped: a 64-bit size must not wrap into an acceptable one.
-    header.info.dims[i] = std::uint32_t(std::min<std::int64_t>(axes[std::size_t(i)].size, ~0u));
-  }
+  for (int i = 0; i < 3; ++i) header.info.dims[i] = std::uint32_t(axes[std::size_t(i)].size);
   if (const std::optional<glm::dvec3> to_lps = read_nrrd_space(fields)) {
     set_geometry_in_space(fields, axes, *to_lps, header.info);
   } else {
@@ -393,11 +390,10 @@ VolumeHeader read_nrrd_header(const fs::path &path) {
       throw Error("{}: its voxels lie in several files, which is not supported: convert it to one file",
                   what);
     }
-    set_data_file(voxels, path, fields["data file"]);
+    voxels.file = open_data_file(*file, fields["data file"]);
   } else {
     if (!has_end) throw Error("{}: broken header: no empty line after it, and no 'data file'", what);
-    voxels.file = path;
-    voxels.what = what;
+    voxels.file = file;
     voxels.offset = lines.end();
   }
   return header;

@@ -5,13 +5,13 @@
 // values that are understood to their end. Refused, besides what is broken: voxels in several files, bzip2, blocks,
 // 64-bit integers, more than one value per voxel, spaces of other than 3 dimensions.
 
-#include <filesystem>
+#include <memory>
 
 #include "core/io/volume_header.hpp"
 
 namespace isowave {
 
 /// Reads and judges the header, not the voxels. Throws Error.
-VolumeHeader read_nrrd_header(const std::filesystem::path &path);
+VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file);
 
 }  // namespace isowave

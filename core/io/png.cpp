@@ -72,8 +72,8 @@ bool write_image(Writer &writer, std::FILE *file, const Image8 &image) {
   return true;
 }
 
-/// Reads everything before the pixels and asks for 8-bit RGB or RGBA. Texts, profiles and such are passed over: they may be large,
-/// once they are unpacked.
+/// Reads everything before the pixels and asks for 8-bit RGB or RGBA. Texts, profiles and such are passed over: they
+/// may be large, once they are unpacked.
 bool read_header(Reader &reader, std::FILE *file) {
   png_structp png = reader.png;
   if (setjmp(png_jmpbuf(png)) != 0) return false;

@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cstring>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/error.hpp"
 #include "core/io/byte_source.hpp"
 #include "core/io/text_voxels.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;
@@ -23,6 +22,16 @@ namespace {
 
 void swap_bytes(std::span<std::byte> bytes, std::size_t voxel_bytes) {
   for (; !bytes.empty(); bytes = bytes.subspan(voxel_bytes)) std::ranges::reverse(bytes.first(voxel_bytes));
+}
+
+std::uint64_t num_bytes(const VolumeInfo &info, const VoxelLayout &voxels) {
+  return info.num_voxels() * size_of(voxels.type);
+}
+
+[[noreturn]] void fail_size(const VolumeInfo &info, const VoxelLayout &voxels, std::string_view how,
+                            std::string_view needed, std::string_view found) {
+  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", voxels.file->what(), how, info.dims.x,
+              info.dims.y, info.dims.z, to_string(voxels.type), needed, found);
 }
 
 /// The values of stored voxels, exact.
@@ -127,9 +136,8 @@ class RawReader : public VolumeReader {
   }
 
   [[noreturn]] void fail_size(std::string_view how, std::string_view at_least = "") const {
-    throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}{}", voxels_.what, how, info_.dims.x,
-                info_.dims.y, info_.dims.z, to_string(voxels_.type),
-                info_.num_voxels() * size_of(voxels_.type), at_least, bytes_read_);
+    isowave::fail_size(info_, voxels_, how, fmt::format("{}", num_bytes(info_, voxels_)),
+                       fmt::format("{}{}", at_least, bytes_read_));
   }
 
   VoxelLayout voxels_;
@@ -140,34 +148,20 @@ class RawReader : public VolumeReader {
   bool begun_ = false, end_checked_ = false;
 };
 
-template <class T, class Value>
-void convert(std::span<const std::byte> voxels, std::span<Value> out) {
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    T value;
-    std::memcpy(&value, voxels.data() + i * sizeof(T), sizeof(T));
-    out[i] = static_cast<Value>(value);
-  }
-}
-
 bool is_compressed(VoxelEncoding encoding) {
   return encoding == VoxelEncoding::kGzip || encoding == VoxelEncoding::kGzipOrZlib;
 }
 
-[[noreturn]] void fail_size(const VolumeHeader &header, std::string_view how, std::string_view needed,
-                            std::uint64_t found) {
-  const VolumeInfo &info = header.info;
-  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", header.voxels.what, how, info.dims.x,
-              info.dims.y, info.dims.z, to_string(header.voxels.type), needed, found);
-}
-
 /// Where voxels, or the compressed data that holds them, begin in the file.
-std::uint64_t find_begin(const VolumeHeader &header, const std::shared_ptr<const InputFile> &file) {
+std::uint64_t find_begin(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
-  const std::uint64_t bytes = header.info.num_voxels() * size_of(voxels.type);
+  const std::shared_ptr<const InputFile> &file = voxels.file;
+  const std::uint64_t bytes = num_bytes(header.info, voxels);
   std::uint64_t begin = std::min(voxels.offset, file->size());
   if (voxels.from_end) {
     if (file->size() - begin < bytes)
-      fail_size(header, "truncated", fmt::format("{}", bytes), file->size() - begin);
+      fail_size(header.info, voxels, "truncated", fmt::format("{}", bytes),
+                fmt::format("{}", file->size() - begin));
     return file->size() - bytes;
   }
   CharacterSource characters(file, begin);
@@ -176,7 +170,7 @@ std::uint64_t find_begin(const VolumeHeader &header, const std::shared_ptr<const
     do {
       c = characters.next();
       if (!c)
-        throw Error("{}: truncated: {} lines to skip, found {}", voxels.what, voxels.lines_to_skip, line);
+        throw Error("{}: truncated: {} lines to skip, found {}", file->what(), voxels.lines_to_skip, line);
       ++begin;
     } while (*c != '\n');
   }
@@ -187,7 +181,7 @@ std::uint64_t find_begin(const VolumeHeader &header, const std::shared_ptr<const
 /// Refuses at once what cannot be right: `found` bytes of the file from where voxels begin.
 void check_size(const VolumeHeader &header, std::uint64_t found) {
   const VoxelLayout &voxels = header.voxels;
-  const std::uint64_t bytes = header.info.num_voxels() * size_of(voxels.type);
+  const std::uint64_t bytes = num_bytes(header.info, voxels);
   std::uint64_t least = bytes;
   if (voxels.encoding == VoxelEncoding::kHex) least = bytes * 2;
   if (voxels.encoding == VoxelEncoding::kText)
@@ -195,46 +189,26 @@ void check_size(const VolumeHeader &header, std::uint64_t found) {
   if (is_compressed(voxels.encoding)) {
     least = bytes / kMaxDeflateRatio;
     if (voxels.packed_bytes && *voxels.packed_bytes != found) {
-      throw Error("{}: {} bytes of compressed voxels, but the header says {}", voxels.what, found,
+      throw Error("{}: {} bytes of compressed voxels, but the header says {}", voxels.file->what(), found,
                   *voxels.packed_bytes);
     }
   }
   const bool is_raw = voxels.encoding == VoxelEncoding::kRaw;
-  if (found < least)
-    fail_size(header, "truncated", fmt::format("{}{}", is_raw ? "" : "at least ", least), found);
-  if (is_raw && found > least) fail_size(header, "too long", fmt::format("{}", least), found);
-}
-
-/// Parses a whole string as an unsigned number.
-std::optional<std::uint32_t> parse_uint(std::string_view text) {
-  std::uint32_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
+  if (found >= least && (!is_raw || found == least)) return;
+  fail_size(header.info, voxels, found < least ? "truncated" : "too long",
+            fmt::format("{}{}", is_raw ? "" : "at least ", least), fmt::format("{}", found));
 }
 
 template <class Value>
 void convert_voxels(VoxelType type, std::span<const std::byte> voxels, std::span<Value> out) {
   if (voxels.size() != out.size() * size_of(type))
     throw std::invalid_argument("convert_voxels: sizes differ");
-  switch (type) {
-    case VoxelType::kUint8:
-      return convert<std::uint8_t>(voxels, out);
-    case VoxelType::kInt8:
-      return convert<std::int8_t>(voxels, out);
-    case VoxelType::kUint16:
-      return convert<std::uint16_t>(voxels, out);
-    case VoxelType::kInt16:
-      return convert<std::int16_t>(voxels, out);
-    case VoxelType::kUint32:
-      return convert<std::uint32_t>(voxels, out);
-    case VoxelType::kInt32:
-      return convert<std::int32_t>(voxels, out);
-    case VoxelType::kFloat32:
-      return convert<float>(voxels, out);
-    case VoxelType::kFloat64:
-      return convert<double>(voxels, out);
-  }
+  with_voxel_type(type, [&]<class T>(T voxel) {
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      std::memcpy(&voxel, voxels.data() + i * sizeof(T), sizeof(T));
+      out[i] = static_cast<Value>(voxel);
+    }
+  });
 }
 
 }  // namespace
@@ -263,7 +237,7 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t end = axis < 2 ? dims.find('x') : dims.size();
     if (end == std::string_view::npos) return std::nullopt;
-    const std::optional<std::uint32_t> count = parse_uint(dims.substr(0, end));
+    const std::optional<std::uint32_t> count = parse_all<std::uint32_t>(dims.substr(0, end));
     if (!count) return std::nullopt;
     result.dims[axis] = *count;
     dims.remove_prefix(std::min(end + 1, dims.size()));
@@ -273,8 +247,8 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
 
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
-  const auto file = std::make_shared<const InputFile>(voxels.file, voxels.what);
-  const std::uint64_t begin = find_begin(header, file);
+  const std::shared_ptr<const InputFile> &file = voxels.file;
+  const std::uint64_t begin = find_begin(header);
   check_size(header, file->size() - begin);
   VolumeHeader remaining = header;
   std::unique_ptr<ByteSource> source;
@@ -283,10 +257,10 @@ std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
       source = std::make_unique<FileSource>(file, begin);
       break;
     case VoxelEncoding::kGzip:
-      source = std::make_unique<InflateSource>(file, begin, Packing::kGzip);
+      source = std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzip);
       break;
     case VoxelEncoding::kGzipOrZlib:
-      source = std::make_unique<InflateSource>(file, begin, Packing::kGzipOrZlib);
+      source = std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzipOrZlib);
       break;
     case VoxelEncoding::kHex:
       source = std::make_unique<HexSource>(file, begin);
@@ -300,22 +274,22 @@ std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   return std::make_unique<RawReader>(remaining, std::move(source));
 }
 
-std::unique_ptr<VolumeReader> open_raw(const fs::path &path, bool is_gzipped, const RawOverrides &overrides) {
-  const fs::path stem = is_gzipped ? path.stem().stem() : path.stem();
+std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file, bool is_gzipped,
+                                       const RawOverrides &overrides) {
+  const fs::path stem = is_gzipped ? file->path().stem().stem() : file->path().stem();
   const std::optional<RawName> name = parse_raw_name(stem.string());
   if (!name && !(overrides.dims && overrides.type)) {
     throw Error(
         "{}: the name does not end in _XxYxZ_TYPE (as in head_256x256x113_uint16.raw): give --dims and "
         "--type",
-        path.string());
+        file->what());
   }
   VolumeHeader header;
   header.info.dims = overrides.dims ? *overrides.dims : name->dims;
   header.info.type = overrides.type ? *overrides.type : name->type;
   header.info.spacing = overrides.spacing.value_or(glm::dvec3(1.0));
-  check_volume_info(header.info, path.string());
-  header.voxels.file = path;
-  header.voxels.what = path.string();
+  check_volume_info(header.info, file->what());
+  header.voxels.file = file;
   header.voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;
   header.voxels.type = header.info.type;
   return open_voxels(header);

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
@@ -32,14 +31,14 @@ void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::sp
 /// The same to float64, which holds all of them exactly.
 void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::span<double> out);
 
-/// Opens the voxels that a header describes, whose info has passed check_volume_info(). Layers are read as
-/// they are asked for, in pieces. Throws Error before anything is allocated where the file has too few bytes for the voxels:
-/// by its exact length where they are not packed, by what could become of it where they are. The reader throws Error where
-/// voxels cannot be unpacked or parsed, and with the last layer where the data does not end with it.
+/// Reads the voxels that a header describes, whose info has passed check_volume_info(). Layers are read as
+/// they are asked for, in pieces. Throws Error before anything is allocated where the file has too few bytes for the
+/// voxels: by its exact length where they are not packed, by what could become of it where they are. The reader throws
+/// Error where voxels cannot be unpacked or parsed, and with the last layer where the data does not end with it.
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header);
 
 /// Opens a .raw or .raw.gz file; see open_volume.
-std::unique_ptr<VolumeReader> open_raw(const std::filesystem::path &path, bool is_gzipped,
+std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file, bool is_gzipped,
                                        const RawOverrides &overrides);
 
 }  // namespace isowave

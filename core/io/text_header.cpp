@@ -1,12 +1,11 @@
 #include "core/io/text_header.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
-#include <system_error>
 
 #include "core/error.hpp"
+#include "core/text.hpp"
 
 namespace isowave {
 
@@ -14,26 +13,15 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r";
 
+/// Also with a plus before it.
 template <class T>
 std::optional<T> parse(std::string_view text) {
-  if (text.starts_with('+')) {
-    text.remove_prefix(1);
-    if (text.starts_with('-')) return std::nullopt;
-  }
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
+  if (text.starts_with("+-")) return std::nullopt;
+  if (text.starts_with('+')) text.remove_prefix(1);
+  return parse_all<T>(text);
 }
 
 }  // namespace
-
-std::string lower_case(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
-  return result;
-}
 
 std::string_view trim(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(kBlanks);
@@ -51,16 +39,9 @@ std::vector<std::string_view> split_words(std::string_view text) {
   }
 }
 
-std::string printable(std::string_view text) {
-  std::string result(text);
-  std::replace_if(
-      result.begin(), result.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return result;
-}
-
 std::string quote(std::string_view text) {
   constexpr std::size_t kLongest = 60;
-  return fmt::format("'{}{}'", printable(text.substr(0, kLongest)), text.size() > kLongest ? "..." : "");
+  return fmt::format("'{}{}'", text.substr(0, kLongest), text.size() > kLongest ? "..." : "");
 }
 
 std::optional<double> parse_number(std::string_view text) {
@@ -74,7 +55,7 @@ bool HeaderLines::refill() {
   constexpr std::size_t kBufferBytes = 1u << 16;
   if (position_ < buffer_.size()) return true;
   buffer_.resize(kBufferBytes);
-  buffer_.resize(file_->read_at(end_, buffer_));
+  buffer_.resize(source_.read(buffer_));
   position_ = 0;
   return !buffer_.empty();
 }

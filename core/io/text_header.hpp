@@ -14,18 +14,14 @@
 
 namespace isowave {
 
-/// ASCII letters in lower case; other bytes as they are.
-std::string lower_case(std::string_view text);
 /// Without blanks, tabs and carriage returns at both ends.
 std::string_view trim(std::string_view text);
 /// The parts between blanks and tabs.
 std::vector<std::string_view> split_words(std::string_view text);
-/// A text from a file, with '?' for what is not printable ASCII, for a message of one line.
-std::string printable(std::string_view text);
-/// The start of it, in quotes.
+/// The start of a text, in quotes.
 std::string quote(std::string_view text);
 
-/// The whole text as a number in decimal; NaN and infinities by name. Empty if it is none or does not fit.
+/// As parse_all() in core/text.hpp, also with a plus before the number.
 std::optional<double> parse_number(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
 
@@ -34,7 +30,7 @@ class HeaderLines {
  public:
   static constexpr std::size_t kMaxLength = 1u << 16;
 
-  explicit HeaderLines(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
+  explicit HeaderLines(const std::shared_ptr<const InputFile> &file) : source_(file, 0) {}
 
   /// Goes on to the next line. False at the end of the file.
   bool next();
@@ -52,7 +48,7 @@ class HeaderLines {
   /// Moves at most that many bytes of the buffer to the line. Returns whether it has ended.
   bool add_up_to(std::size_t most);
 
-  std::shared_ptr<const InputFile> file_;
+  FileSource source_;
   std::vector<std::byte> buffer_;
   std::size_t position_ = 0;  ///< of what is next in the buffer
   std::string line_;

@@ -47,39 +47,16 @@ std::optional<T> parse_voxel(std::string_view text) {
   }
 }
 
-template <class T>
-bool store(std::string_view text, std::byte *out) {
-  const std::optional<T> value = parse_voxel<T>(text);
-  if (value) std::memcpy(out, &*value, sizeof(T));
-  return value.has_value();
-}
-
+/// Returns whether the text is a voxel of the type, which then is at `out`.
 bool store(VoxelType type, std::string_view text, std::byte *out) {
-  switch (type) {
-    case VoxelType::kUint8:
-      return store<std::uint8_t>(text, out);
-    case VoxelType::kInt8:
-      return store<std::int8_t>(text, out);
-    case VoxelType::kUint16:
-      return store<std::uint16_t>(text, out);
-    case VoxelType::kInt16:
-      return store<std::int16_t>(text, out);
-    case VoxelType::kUint32:
-      return store<std::uint32_t>(text, out);
-    case VoxelType::kInt32:
-      return store<std::int32_t>(text, out);
-    case VoxelType::kFloat32:
-      return store<float>(text, out);
-    case VoxelType::kFloat64:
-      return store<double>(text, out);
-  }
-  return false;
+  return with_voxel_type(type, [&]<class T>(T) {
+    const std::optional<T> value = parse_voxel<T>(text);
+    if (value) std::memcpy(out, &*value, sizeof(T));
+    return value.has_value();
+  });
 }
 
 }  // namespace
-
-CharacterSource::CharacterSource(std::shared_ptr<const InputFile> file, std::uint64_t offset)
-    : source_(std::move(file), offset) {}
 
 std::optional<char> CharacterSource::next() {
   constexpr std::size_t kBufferBytes = 1u << 16;
@@ -99,7 +76,8 @@ std::optional<unsigned> HexSource::next_digit() {
   if (*c >= '0' && *c <= '9') return unsigned(*c - '0');
   if (*c >= 'a' && *c <= 'f') return unsigned(*c - 'a') + 10u;
   if (*c >= 'A' && *c <= 'F') return unsigned(*c - 'A') + 10u;
-  throw Error("{}: broken: {} among its hexadecimal voxels", file_->what(), quote(std::string_view(&*c, 1)));
+  throw Error("{}: broken: {} among its hexadecimal voxels", characters_.what(),
+              quote(std::string_view(&*c, 1)));
 }
 
 std::size_t HexSource::read(std::span<std::byte> bytes) {
@@ -107,7 +85,7 @@ std::size_t HexSource::read(std::span<std::byte> bytes) {
     const std::optional<unsigned> high = next_digit();
     if (!high) return i;
     const std::optional<unsigned> low = next_digit();
-    if (!low) throw Error("{}: truncated: an odd number of hexadecimal digits", file_->what());
+    if (!low) throw Error("{}: truncated: an odd number of hexadecimal digits", characters_.what());
     bytes[i] = std::byte(*high << 4 | *low);
   }
   return bytes.size();
@@ -121,7 +99,7 @@ std::string_view NumberSource::next_word() {
   while (c && separates(*c)) c = characters_.next();
   for (; c && !separates(*c); c = characters_.next()) {
     word_ += *c;
-    if (word_.size() > kLongest) throw Error("{}: broken: {} is no voxel", file_->what(), quote(word_));
+    if (word_.size() > kLongest) throw Error("{}: broken: {} is no voxel", characters_.what(), quote(word_));
   }
   return word_;
 }
@@ -132,7 +110,7 @@ std::size_t NumberSource::read(std::span<std::byte> bytes) {
     const std::string_view word = next_word();
     if (word.empty()) return done;
     if (!store(type_, word, &bytes[done])) {
-      throw Error("{}: broken: {} is no {} voxel", file_->what(), quote(word), to_string(type_));
+      throw Error("{}: broken: {} is no {} voxel", characters_.what(), quote(word), to_string(type_));
     }
   }
   return bytes.size();

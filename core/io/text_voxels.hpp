@@ -15,9 +15,11 @@ namespace isowave {
 /// The characters of a file from byte `offset` on, one by one.
 class CharacterSource {
  public:
-  CharacterSource(std::shared_ptr<const InputFile> file, std::uint64_t offset);
+  CharacterSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset)
+      : source_(file, offset) {}
   /// Empty at the end.
   std::optional<char> next();
+  const std::string &what() const { return source_.file().what(); }
 
  private:
   FileSource source_;
@@ -28,14 +30,12 @@ class CharacterSource {
 /// Two hexadecimal digits for each byte, the higher first; white space anywhere.
 class HexSource : public ByteSource {
  public:
-  HexSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset)
-      : file_(file), characters_(file, offset) {}
+  HexSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset) : characters_(file, offset) {}
   std::size_t read(std::span<std::byte> bytes) override;
 
  private:
   std::optional<unsigned> next_digit();
 
-  std::shared_ptr<const InputFile> file_;
   CharacterSource characters_;
 };
 
@@ -44,7 +44,7 @@ class HexSource : public ByteSource {
 class NumberSource : public ByteSource {
  public:
   NumberSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset, VoxelType type)
-      : file_(file), characters_(file, offset), type_(type) {}
+      : characters_(file, offset), type_(type) {}
   /// bytes.size() must be a multiple of the type's size.
   std::size_t read(std::span<std::byte> bytes) override;
 
@@ -52,7 +52,6 @@ class NumberSource : public ByteSource {
   /// Empty at the end.
   std::string_view next_word();
 
-  std::shared_ptr<const InputFile> file_;
   CharacterSource characters_;
   VoxelType type_;
   std::string word_;

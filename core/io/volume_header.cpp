@@ -13,13 +13,11 @@ void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &dire
       (spacing < 0 ? -direction : direction) + 0.0;  // no negative zeros in what people read
 }
 
-void set_data_file(VoxelLayout &voxels, const std::filesystem::path &header, const std::string &name) {
-  if (name.find('\0') != name.npos) {  // opening it would open what is named before that
-    throw Error("{}: its data file {}: no file can have this name", header.string(), quote(name));
-  }
-  voxels.file = header.parent_path() / name;
-  voxels.what = fmt::format("{}: its data file {}", header.string(), quote(name));
-  voxels.offset = 0;
+std::shared_ptr<const InputFile> open_data_file(const InputFile &header, const std::string &name) {
+  const std::string what = fmt::format("{}: its data file {}", header.what(), quote(name));
+  // Opening a name with a zero byte would open what is named before that.
+  if (name.find('\0') != name.npos) throw Error("{}: no file can have this name", what);
+  return std::make_shared<const InputFile>(header.path().parent_path() / name, what);
 }
 
 }  // namespace isowave

@@ -7,10 +7,11 @@
 // stored as a flipped direction.
 
 #include <cstdint>
-#include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "core/io/input_file.hpp"
 #include "core/volume.hpp"
 
 namespace isowave {
@@ -19,8 +20,7 @@ enum class VoxelEncoding { kRaw, kGzip, kGzipOrZlib, kHex, kText };
 
 /// Voxels fill their file from where they begin to its end.
 struct VoxelLayout {
-  std::filesystem::path file;  ///< the header's own file or the one it names
-  std::string what;            ///< how messages name that file
+  std::shared_ptr<const InputFile> file;  ///< the header's own or the one it names
   VoxelEncoding encoding = VoxelEncoding::kRaw;
   std::uint64_t offset = 0;         ///< bytes of the file before the voxels, but for what is skipped:
   std::uint64_t lines_to_skip = 0;  ///< lines of the file, and then
@@ -43,7 +43,7 @@ struct VolumeHeader {
 /// Sets direction and spacing of index axis `axis` from a spacing that may be negative and a world direction.
 void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &direction);
 
-/// The data file that a detached header names, relative to the header's folder.
-void set_data_file(VoxelLayout &voxels, const std::filesystem::path &header, const std::string &name);
+/// Opens the data file that a detached header names, relative to the header's folder. Throws Error that names both.
+std::shared_ptr<const InputFile> open_data_file(const InputFile &header, const std::string &name);
 
 }  // namespace isowave

@@ -3,13 +3,12 @@
 #include "core/ocl/device_list.hpp"
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cstdlib>
 #include <optional>
 
 #include "core/error.hpp"
 #include "core/ocl/pocl_environment.hpp"
+#include "core/text.hpp"
 
 namespace isowave::ocl {
 
@@ -28,21 +27,6 @@ std::string trimmed(std::string text) {
   return text;
 }
 
-std::string lower_case(std::string_view text) {
-  std::string result(text);
-  std::ranges::transform(result, result.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
-
-/// The whole text as a number, or nothing.
-std::optional<std::uint32_t> parse_number(std::string_view text) {
-  std::uint32_t number = 0;
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (code != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
 /// "OpenCL 1.2 ..." -> 102; 0 when the text is something else.
 std::uint32_t parse_version(std::string_view text) {
   constexpr std::string_view kPrefix = "OpenCL ";
@@ -51,7 +35,8 @@ std::uint32_t parse_version(std::string_view text) {
   text = text.substr(0, text.find(' '));
   const std::size_t dot = text.find('.');
   if (dot == std::string_view::npos) return 0;
-  const auto major = parse_number(text.substr(0, dot)), minor = parse_number(text.substr(dot + 1));
+  const auto major = parse_all<std::uint32_t>(text.substr(0, dot)),
+             minor = parse_all<std::uint32_t>(text.substr(dot + 1));
   return major && minor ? *major * 100 + *minor : 0;
 }
 
@@ -218,7 +203,7 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
     return devices.front();
   }
   const DeviceInfo *match = nullptr;
-  if (const auto index = parse_number(wanted)) {
+  if (const auto index = parse_all<std::uint32_t>(wanted)) {
     match = first([&](const DeviceInfo &info) { return info.index == *index; });
   } else if (const auto type = type_named(wanted)) {
     match = first_of_type(*type);

@@ -1,4 +1,5 @@
-// Camera files. Input: the file. One that is accepted has cameras that can be drawn, and reads the same when written again.
+// Camera files. Input: the file. One that is accepted has cameras that can be drawn, and reads the same when written
+// again.
 
 #include <fmt/format.h>
 

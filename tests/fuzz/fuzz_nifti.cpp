@@ -1,5 +1,5 @@
-// NIfTI volumes. Input: how to pack what follows ('g': gzip; others: as it is), 'n' for the name volume.nii or another letter for
-// volume.nii.gz, and the file's bytes.
+// NIfTI volumes. Input: how to pack what follows ('g': gzip; others: as it is), 'n' for the name volume.nii or another
+// letter for volume.nii.gz, and the file's bytes.
 
 #include "tests/fuzz/fuzz_target.hpp"
 

@@ -1,5 +1,5 @@
-// PNG pictures. Input: the file. One that is accepted reads the same when written again. Mutations change what is in a chunk, also
-// behind its compression, and make its checksum right.
+// PNG pictures. Input: the file. One that is accepted reads the same when written again. Mutations change what is in a
+// chunk, also behind its compression, and make its checksum right.
 
 #include <random>
 #include <vector>

@@ -1,5 +1,5 @@
-// Raw volumes, gzipped or not. Input: how to pack what follows ('g': gzip; others: as it is), the file's name without its folder,
-// which says dims and type, a newline, and the file's bytes.
+// Raw volumes, gzipped or not. Input: how to pack what follows ('g': gzip; others: as it is), the file's name without
+// its folder, which says dims and type, a newline, and the file's bytes.
 
 #include <algorithm>
 #include <string>

@@ -1,5 +1,6 @@
-// Compressed volumes. Input: the file. Of one that is accepted, our decoder and libzfp decode each block to the same bits, and what
-// is written again reads the same. Mutations change what checksums and compression guard (zfp_parts.hpp).
+// Compressed volumes. Input: the file. Of one that is accepted, our decoder and libzfp decode each block to the same
+// bits, and what is written again reads the same. Mutations change what checksums and compression guard
+// (zfp_parts.hpp).
 
 #include <algorithm>
 #include <array>
