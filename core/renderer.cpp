@@ -114,15 +114,18 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
-/// A frame that freed more than this share of the slots of blocks that it had asked for leaves nothing of use to the next. What is
-/// left of a ray's blocks makes it wait once for each that is gone, and passes take longer than decoding: H100, 512^3, frames that
-/// come again, with blocks kept 1.16 (90,000 slots), 1.40 (85,000), 1.9 ms (70,000); cold 1.22, 1.27 and 1.26 ms.
-constexpr std::uint32_t kTurnover = 8;
+/// A frame that freed so large a share of the slots of blocks that it had asked for leaves nothing of use to the next. What is left of
+/// a ray's blocks makes it wait once for each that is gone. To a GPU such passes cost more than decoding all anew: H100, 512^3,
+/// frames that come again take 1.2 ms with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones
+/// 1.3. PoCL, with 80,000 and 65,536 slots: 123 and 138 ms where they are kept, cold 154 and 146.
+std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type) {
+  return num_slots / (type == ocl::DeviceType::kCpu ? 2 : 8);
+}
 
-bool turned_over(const std::vector<PassStats> &passes, std::uint32_t num_slots) {
+bool turned_over(const std::vector<PassStats> &passes, std::uint32_t most) {
   std::uint64_t num_recycled = 0;
   for (const PassStats &pass : passes) num_recycled += pass.counts.recycled_count;
-  return num_recycled > num_slots / kTurnover;
+  return num_recycled > most;
 }
 
 }  // namespace
@@ -198,7 +201,8 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
   if (!stats.cancelled) {
     pipeline_->end_frame();
-    if (turned_over(stats.passes, state_.cache.num_slots)) state_.cache.clear();
+    if (turned_over(stats.passes, most_recycled(state_.cache.num_slots, device_.info().type)))
+      state_.cache.clear();
   }
   state_.rays.frame = state_.levels[0].frame;  // for shading
   const Uploads uploaded = uploads();
