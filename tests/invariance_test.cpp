@@ -328,7 +328,7 @@ TEST_P(InvarianceOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
   Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kTiny, .cache_slots = 20, .max_speculation = 2}));
+                    GetParam().with({.size = kTiny, .cache_slots = 8, .max_speculation = 2}));
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
