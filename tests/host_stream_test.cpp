@@ -135,7 +135,7 @@ TEST_P(HostStreamOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
   Renderer renderer = renderer_of(
-      volume.compressed, {.size = kTiny, .cache_slots = 20, .max_speculation = 2, .window_blocks = 8});
+      volume.compressed, {.size = kTiny, .cache_slots = 8, .max_speculation = 2, .window_blocks = 8});
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
