@@ -114,12 +114,13 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
-/// A frame that freed so large a share of the slots of blocks that it had asked for leaves nothing of use to the next. What is left of
-/// a ray's blocks makes it wait once for each that is gone. To a GPU such passes cost more than decoding all anew: H100, 512^3,
+/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use to the next. What is left of a
+/// ray's blocks makes it wait once for each that is gone. To a GPU such passes cost more than decoding all anew: H100, 512^3,
 /// frames that come again take 1.2 ms with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones
-/// 1.3. PoCL, with 80,000 and 65,536 slots: 123 and 138 ms where they are kept, cold 154 and 146.
-std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type) {
-  return num_slots / (type == ocl::DeviceType::kCpu ? 2 : 8);
+/// 1.3. Where blocks take longer, since a CPU decodes them or they must be uploaded first, more are worth keeping: PoCL, 80,000
+/// and 65,536 slots, 123 and 138 ms, cold 154 and 146.
+std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, StreamPlace stream) {
+  return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
 }
 
 bool turned_over(const std::vector<PassStats> &passes, std::uint32_t most) {
@@ -201,7 +202,8 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
   if (!stats.cancelled) {
     pipeline_->end_frame();
-    if (turned_over(stats.passes, most_recycled(state_.cache.num_slots, device_.info().type)))
+    if (turned_over(stats.passes,
+                    most_recycled(state_.cache.num_slots, device_.info().type, options_.stream)))
       state_.cache.clear();
   }
   state_.rays.frame = state_.levels[0].frame;  // for shading

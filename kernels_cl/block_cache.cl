@@ -128,7 +128,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ra
     const uint block_id = slot_block_ids[slot], stamp = slot_stamps[slot];
     if (block_id != ISO_INVALID_ID) {
       if (is_short) {
-        const uint rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
+        uint rank = eviction_rank(stamp, counts);
+        if (rank >=
+            ISO_RANKS_OF_FRAME) /* older, so that the others decide whether it is freed before this frame's */
+          rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
         slot_ranks[slot] = (uchar)rank;
         atomic_inc(&histogram[rank]);
       }

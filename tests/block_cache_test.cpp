@@ -159,7 +159,7 @@ class CacheModel {
     num_stolen += stole;
   }
 
-  /// Who reads in a block reads its dual grid.
+  /// Who reads in a block reads its dual grid. Not of blocks that are of this frame by their own stamp.
   void find_last_uses() {
     last_uses_ = used_;
     for (uint slot = 0; slot < slots_.size(); ++slot) {
@@ -168,7 +168,8 @@ class CacheModel {
         const auto at = std::ranges::find(slots_, block) - slots_.begin();
         if (std::cmp_less(at, slots_.size())) {
           uint &last = last_uses_[static_cast<std::size_t>(at)];
-          last = std::max(last, used_[slot] - used_[slot] % 2);
+          if (used_[static_cast<std::size_t>(at)] < frame_begin_)
+            last = std::max(last, used_[slot] - used_[slot] % 2);
         }
       }
     }
