@@ -22,8 +22,9 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
 
 }  // namespace
 
-/// Twice as many entries as slots, an eighth of them with evicted blocks' keys at most before the table is rebuilt (H100, 512^3,
-/// 65,536 slots: frames take 1.26 ms; with a quarter, 1.45); not a multiple of 3, so that ISO_TABLE_STEP reaches every entry.
+/// Twice as many entries as slots, an eighth of them with evicted blocks' keys at most before the table is rebuilt
+/// (H100, 512^3, 65,536 slots: frames take 1.26 ms; with a quarter, 1.45); not a multiple of 3, so that
+/// ISO_TABLE_STEP reaches every entry.
 std::uint32_t BlockCache::table_groups_for(std::uint32_t num_slots) {
   const std::uint32_t groups = num_slots / 4 + 1;
   return groups % 3 == 0 ? groups + 1 : groups;

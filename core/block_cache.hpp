@@ -13,16 +13,18 @@ inline constexpr std::uint32_t kMinCacheSlots = 8;
 
 /// What the stages of one pass read of the cache, and add to its requests.
 struct BlockCache {
-  /// num_slots is at least kMinCacheSlots; num_rays bounds a pass's pairs. `grid`: its blocks are used, those of the finest
-  /// level where frames may have several levels of detail. Throws Error when there are too few slots, or more than ISO_MAX_CACHE_SLOTS.
+  /// num_slots is at least kMinCacheSlots; num_rays bounds a pass's pairs. `grid`: its blocks are used, those of the
+  /// finest level where frames may have several levels of detail. Throws Error when there are too few slots, or more
+  /// than ISO_MAX_CACHE_SLOTS.
   BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots, std::uint64_t num_rays,
              std::uint32_t group_size, bool levels = false);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones. Out:
   /// counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request_ahead.)
   void request(Wavefront &rays);
-  /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the free ones, but none that the
-  /// pass uses; the block served first gets what it takes. asked: the counts that hold requested_count. Asynchronous.
+  /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the free ones, but none
+  /// that the pass uses; the block served first gets what it takes. asked: the counts that hold requested_count.
+  /// Asynchronous.
   void evict(const CountsBuffer &asked, Wavefront &rays);
   /// Gives the free slots to requests. Out: counts.decoded_count; request_block_ids and decode_slots hold that many.
   /// Asynchronous.

@@ -72,16 +72,18 @@ void check_image_size(ImageSize size) {
 }
 
 void check_drawable(const VolumeInfo &info, std::string_view what) {
-  // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied to become it (below). An eye is
-  // at most 1e7 voxels off and dims are at most 2^16, so t is at most 2^25 voxels' longest edges; and nothing that matters is
-  // nearer than 2^-24 of the shortest. Within 2^+-100, neither reaches float32's ends, nor do a level of detail's voxels.
+  // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied to become it
+  // (below). An eye is at most 1e7 voxels off and dims are at most 2^16, so t is at most 2^25 voxels' longest edges;
+  // and nothing that matters is nearer than 2^-24 of the shortest. Within 2^+-100, neither reaches float32's ends,
+  // nor do a level of detail's voxels.
   const std::array<double, 3> voxel = edges(info);
   const double shortest = std::ranges::min(voxel), longest = std::ranges::max(voxel);
   if (!(shortest >= 0x1p-100 && longest <= 0x1p100)) {
     throw Error("{}: spacing {}: distances in float32 allow 2^-100 (8e-31) to 2^100 (1e30)", what,
                 spacing_text(info));
   }
-  // Rays along the longest edge move that much slower in index space than along the shortest, and directions below 2^-60 are 0.
+  // Rays along the longest edge move that much slower in index space than along the shortest, and directions below
+  // 2^-60 are 0.
   if (longest > 0x1p36 * shortest) {
     throw Error("{}: spacing {}: directions in float32 allow one to be 2^36 (7e10) times another", what,
                 spacing_text(info));
@@ -158,7 +160,8 @@ void set_screen_box(FrameParams &frame) {
   const double pixel = 2.0 * frame.pixel_scale;  // step of u and v
   const glm::dvec2 border = 0.5 * pixel * size;  // largest |u|, |v|
 
-  // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of that basis: by how much?
+  // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of that basis: by how
+  // much?
   const glm::dmat3 sizes(glm::abs(basis[0]), glm::abs(basis[1]), glm::abs(basis[2]));
   const glm::dmat3 to_sizes(glm::abs(to_view[0]), glm::abs(to_view[1]), glm::abs(to_view[2]));
   const double length = glm::length(glm::dvec3(1, border.x, border.y));

@@ -114,11 +114,11 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
-/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use to the next. What is left of a
-/// ray's blocks makes it wait once for each that is gone. To a GPU such passes cost more than decoding all anew: H100, 512^3,
-/// frames that come again take 1.2 ms with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones
-/// 1.3. Where blocks take longer, since a CPU decodes them or they must be uploaded first, more are worth keeping: PoCL, 80,000
-/// and 65,536 slots, 123 and 138 ms, cold 154 and 146.
+/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use to the next. What
+/// is left of a ray's blocks makes it wait once for each that is gone. To a GPU such passes cost more than decoding
+/// all anew: H100, 512^3, frames that come again take 1.2 ms with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000
+/// where blocks are kept, cold ones 1.3. Where blocks take longer, since a CPU decodes them or they must be uploaded
+/// first, more are worth keeping: PoCL, 80,000 and 65,536 slots, 123 and 138 ms, cold 154 and 146.
 std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, StreamPlace stream) {
   return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
 }
@@ -153,10 +153,11 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
   setup_ms_ = ms_since(setup_begin_) - (device.compile_ms() - compile_ms_before_);
 }
 
-/// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first, PoCL for each work-group
-/// size, and anew for more than 65,535 work-items. So the passes themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ from what frames launch,
-/// and all kernels leave by the exits they have for empty lists. Costs no time that grows with the volume; all that it leaves is
-/// one hit, which every frame clears.
+/// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first, PoCL for each
+/// work-group size, and anew for more than 65,535 work-items. So the passes themselves run, of a frame of one pixel
+/// that meets nothing: what is launched here cannot differ from what frames launch, and all kernels leave by the
+/// exits they have for empty lists. Costs no time that grows with the volume; all that it leaves is one hit, which
+/// every frame clears.
 void Renderer::compile_kernels() {
   const auto compiling = device_.compiling();
   Wavefront &rays = state_.rays;
@@ -275,8 +276,8 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
       std::min(counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
   if (rays_looking != 0) stats.n_spec = static_cast<double>(counts.ahead_count) / rays_looking;
   if (is_blocks) stats.visible_blocks = counts.visible_count;
-  // A launch that is not needed costs more than a pass that finds slots missing now and then. The counts are a pass old: its
-  // requests have taken slots since, and the pass after it may have asked for as many.
+  // A launch that is not needed costs more than a pass that finds slots missing now and then. The counts are a pass
+  // old: its requests have taken slots since, and the pass after it may have asked for as many.
   const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
   const std::uint32_t num_slots = state_.cache.num_slots;
   state_.slots_are_scarce =

@@ -1,16 +1,16 @@
 /// block_cache.cl -- gives cache slots to the blocks that a pass needs (Sec. 3.4, 3.5).
 ///
-/// table: block -> slot (block_table.h). slot_block_ids [slots]: the block in each slot, or ISO_INVALID_ID. slot_stamps
-/// [slots]: when it was used last (slot_stamps.h). free_slots [slots]: the first cache.free_count hold no block. requested_bits: one
-/// per block, 0 between passes.
+/// table: block -> slot (block_table.h). slot_block_ids [slots]: the block in each slot, or ISO_INVALID_ID.
+/// slot_stamps [slots]: when it was used last (slot_stamps.h). free_slots [slots]: the first cache.free_count hold no
+/// block. requested_bits: one per block, 0 between passes.
 ///
 /// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may not
 /// suffice: cache_rank -> cache_select (how many, which) -> cache_evict -> cache_rebuild -> then cache_assign. All
 /// cost O(slots) or O(requests), never O(blocks). Which block gets which slot is left to chance; no hit depends on it.
 ///
-/// Progress is certain: the first block of the first active ray is served before all others. If old slots are too few even
-/// for it, slots that other rays use in this very pass are taken; those rays wait for the next. (Not in the paper, whose
-/// cache grows instead.)
+/// Progress is certain: the first block of the first active ray is served before all others. If old slots are too few
+/// even for it, slots that other rays use in this very pass are taken; those rays wait for the next. (Not in the
+/// paper, whose cache grows instead.)
 #include "block_requests.h"
 
 #define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
@@ -85,9 +85,9 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
   }
 }
 
-/// Who reads a block's cells reads its dual grid, but march stamps just that block, which costs a GPU less in each pass than
-/// eight stamps. So a block was also read when one was whose dual grid it is in; or may have been, where that was needed since.
-/// Returns the stamp of a cached block's last use.
+/// Who reads a block's cells reads its dual grid, but march stamps just that block, which costs a GPU less in each
+/// pass than eight stamps. So a block was also read when one was whose dual grid it is in; or may have been, where
+/// that was needed since. Returns the stamp of a cached block's last use.
 ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *table,
                          global const uint *slot_stamps, uint block_id, uint stamp) {
   const BlockCoords b = block_coords(frame, block_id);
@@ -106,10 +106,10 @@ ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *tabl
   return latest;
 }
 
-/// Of slots with blocks. Unless free slots suffice: slot_ranks [slots], eviction_rank() of each, and how many there are of each
-/// rank. Where the table may be rebuilt: slot_changing [slots], what it knows of the blocks' cells. Were that lost, a view that
-/// comes again could need blocks that were not worth keeping. rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over
-/// slots.
+/// Of slots with blocks. Unless free slots suffice: slot_ranks [slots], eviction_rank() of each, and how many there
+/// are of each rank. Where the table may be rebuilt: slot_changing [slots], what it knows of the blocks' cells. Were
+/// that lost, a view that comes again could need blocks that were not worth keeping. rank_histogram
+/// [ISO_EVICTION_RANKS]: zero before. Grid-stride over slots.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots, uint capacity,
     global const CacheState *cache, global const BlockEntry *table, global const uint *slot_block_ids,
@@ -290,9 +290,9 @@ kernel void cache_classify(const FrameParams frame_params, uint num_slots, globa
   }
 }
 
-/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free slot from
-/// the end; requests past the last are dropped. decode_slots [requests]: the slots.
-/// Takes the marks of all requests back. Grid-stride over requests.
+/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free
+/// slot from the end; requests past the last are dropped. decode_slots [requests]: the slots. Takes the marks of all
+/// requests back. Grid-stride over requests.
 kernel void cache_assign(const FrameParams frame_params, global const PassCounts *asked,
                          global PassCounts *counts, global const uint *request_block_ids, uint capacity,
                          global const uint *free_slots, global BlockEntry *table, global uint *slot_block_ids,

@@ -1,8 +1,8 @@
 /// block_table.h -- which cache slot a block is in: a hash table of O(slots), not of O(blocks).
 ///
-/// Open addressing. The eight blocks of a 2^3 group begin their search side by side, for a ray asks for neighbours. An entry
-/// whose block was evicted keeps its key until the table is rebuilt (block_cache.cl); at least three eighths of the entries
-/// have no key, so every search ends, and most soon.
+/// Open addressing. The eight blocks of a 2^3 group begin their search side by side, for a ray asks for neighbours.
+/// An entry whose block was evicted keeps its key until the table is rebuilt (block_cache.cl); at least three eighths
+/// of the entries have no key, so every search ends, and most soon.
 #ifndef ISOWAVE_BLOCK_TABLE_H
 #define ISOWAVE_BLOCK_TABLE_H
 
@@ -18,8 +18,8 @@ typedef struct BlockEntry {
 } BlockEntry;
 ISO_CHECK_SIZE(BlockEntry, 16);
 
-/// Both halves of the changing cells of a block while nobody has looked. A work-item that reads while another writes may get one
-/// half of each: cells too many, which does no harm.
+/// Both halves of the changing cells of a block while nobody has looked. A work-item that reads while another writes
+/// may get one half of each: cells too many, which does no harm.
 #define ISO_CHANGING_UNKNOWN 0xFFFFFFFFFFFFFFFFul
 
 ISO_INLINE ulong changing_of(ISO_GLOBAL const BlockEntry *entry) {
@@ -72,8 +72,8 @@ ISO_INLINE uint find_entry(const FrameParams *frame, ISO_GLOBAL const BlockEntry
   return key == block_id ? i : ISO_INVALID_ID;
 }
 
-/// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT where a block is not cached. All
-/// eight are read before one is looked at: a GPU waits once, not eight times.
+/// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT where a block is not
+/// cached. All eight are read before one is looked at: a GPU waits once, not eight times.
 ISO_INLINE void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x, uint y,
                                uint z, BlockEntry *entries) {
   uint corner;

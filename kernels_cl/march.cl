@@ -1,8 +1,8 @@
-/// march.cl -- pipeline `rays`: each ray walks through the active blocks and intersects those that are cached; at the first
-/// that is not it waits, and asks for that block and its next candidates (Sec. 3.3, 4).
+/// march.cl -- pipeline `rays`: each ray walks through the active blocks and intersects those that are cached; at the
+/// first that is not it waits, and asks for that block and its next candidates (Sec. 3.3, 4).
 ///
-/// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort and no composite: a ray's blocks come in ray order, so its
-/// first change is its hit.
+/// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort and no composite:
+/// a ray's blocks come in ray order, so its first change is its hit.
 #define ISO_FOUND local
 #include "block_requests.h"
 #include "level_borders.h"
@@ -70,8 +70,8 @@ ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCoun
 
 #define ISO_HIT_WORDS ((uint)(sizeof(HitRecord) / sizeof(uint)))
 
-/// hits [count] = no_hit(), by a work-group. Seen as words, in fours, of which neighbours write neighbours: records are 36 bytes
-/// long, so that the nine stores of each would be scattered.
+/// hits [count] = no_hit(), by a work-group. Seen as words, in fours, of which neighbours write neighbours: records
+/// are 36 bytes long, so that the nine stores of each would be scattered.
 ISO_INLINE void clear_hits(global uint *words, uint count) {
   const uint num_words = ISO_HIT_WORDS * count;
   for (uint i = 4 * get_local_id(0); i < num_words; i += 4 * ISO_GROUP_SIZE) {
@@ -89,11 +89,12 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
-/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the frame's screen
-/// box, the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel]. counts: of the frame's last
-/// pass, next_active_count 0 before; *next: of the first pass of this frame. frames [num_frames]: with levels of detail, those
-/// that draw, the finest first; frame_params is the first of them. ranges: of their blocks. A kernel of its own, since it is so much leaner than march
-/// that far more of its work-items fit a device at a time. Groups stride over the tiles.
+/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the
+/// frame's screen box, the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel].
+/// counts: of the frame's last pass, next_active_count 0 before; *next: of the first pass of this frame. frames
+/// [num_frames]: with levels of detail, those that draw, the finest first; frame_params is the first of them. ranges:
+/// of their blocks. A kernel of its own, since it is so much leaner than march that far more of its work-items fit a
+/// device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const ushort *ranges, global PassCounts *counts,
@@ -137,14 +138,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   }
 }
 
-/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids [pixel], an
-/// active block. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait, and in ray_block_ids the
-/// block they wait at; *next, opened. macrocell_masks: as traverse(). frame_params, frames, ranges: as start_rays; a ray that leaves
-/// the band of its level waits behind the border.
+/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids
+/// [pixel], an active block. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait,
+/// and in ray_block_ids the block they wait at; *next, opened. macrocell_masks: as traverse(). frame_params, frames,
+/// ranges: as start_rays; a ray that leaves the band of its level waits behind the border.
 ///
-/// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so few that a device would
-/// wait for the longest of them, each has more work-items, up to one for each block of a round; the first block in which anything
-/// happens decides, which an atomic_min of its place tells.
+/// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so few that a device
+/// would wait for the longest of them, each has more work-items, up to one for each block of a round; the first block
+/// in which anything happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const ushort *ranges, global BlockEntry *table,
@@ -272,9 +273,9 @@ typedef struct Requests {
   volatile local uint *num_staged;
 } Requests;
 
-/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps for all
-/// corners, so that a GPU waits for memory twice, not sixteen times. Most have been asked for by another ray: their bits tell,
-/// and cost neither a search in the table nor an atomic, for whose result one would wait.
+/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps
+/// for all corners, so that a GPU waits for memory twice, not sixteen times. Most have been asked for by another ray:
+/// their bits tell, and cost neither a search in the table nor an atomic, for whose result one would wait.
 ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
                                 global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
                                 Requests requests) {
@@ -310,10 +311,11 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
   }
 }
 
-/// Of the rays that wait, active_ray_ids [counts->next_active_count], the first counts->window_count ask for the blocks that
-/// they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of frame->per_ray_speculation. Out:
-/// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over the rays; when these are few, each has
-/// more work-items, which share its blocks out among them.
+/// Of the rays that wait, active_ray_ids [counts->next_active_count], the first counts->window_count ask for the
+/// blocks that they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of
+/// frame->per_ray_speculation. Out: request_block_ids [counts->requested_count, at most capacity]. The other
+/// arguments as in march. Groups stride over the rays; when these are few, each has more work-items, which share its
+/// blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,

@@ -1,4 +1,5 @@
-/// march_block.h -- a ray through the cells of a block whose dual grid is in the cache, as far as it is (march.cl). OpenCL C 1.2.
+/// march_block.h -- a ray through the cells of a block whose dual grid is in the cache, as far as it is (march.cl).
+/// OpenCL C 1.2.
 #ifndef ISOWAVE_MARCH_BLOCK_H
 #define ISOWAVE_MARCH_BLOCK_H
 
@@ -44,9 +45,10 @@ ISO_INLINE ulong cells_of_corners(uint corners) {
   return cells;
 }
 
-/// Which cells of block b a ray must look into: those in which inside changes, and those that need a block that is not cached.
-/// What is found out stays in the block's table entry for the next who asks. Out: slots [8] of the dual grid, ISO_GROUP_SIZE apart;
-/// *have: which of its corners are cached, or beyond the volume, where no cell of the domain reaches.
+/// Which cells of block b a ray must look into: those in which inside changes, and those that need a block that is
+/// not cached. What is found out stays in the block's table entry for the next who asks. Out: slots [8] of the dual
+/// grid, ISO_GROUP_SIZE apart; *have: which of its corners are cached, or beyond the volume, where no cell of the
+/// domain reaches.
 ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
                             BlockCoords b, local uint *slots, uint *have) {
   BlockEntry entries[8];
@@ -87,10 +89,10 @@ ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
   return ends_band(frame, exit) ? border_event(frame->end_t) : exit;
 }
 
-/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a block of
-/// the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE apart. If b is
-/// cached, its slot's stamp becomes `stamp`. precise: settle doubts on the spot. side: where the ray was before the border at
-/// which its band begins in this block. may_end: its band may end in this one.
+/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a
+/// block of the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE
+/// apart. If b is cached, its slot's stamp becomes `stamp`. precise: settle doubts on the spot. side: where the ray
+/// was before the border at which its band begins in this block. may_end: its band may end in this one.
 ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
                            global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
                            local uint *slots, global uint *slot_stamps, uint stamp, int precise, uint side,

@@ -64,8 +64,8 @@ inline uint popcount(uint x) {
 #define ISO_LEVELS 0 /* 1: frames are drawn in bands of several levels of detail (core/detail.hpp) */
 #endif
 
-/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's compiler reads a pointer to
-/// constant memory through the cache, again in every turn of a loop.
+/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's compiler reads a
+/// pointer to constant memory through the cache, again in every turn of a loop.
 typedef struct FrameParams {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
   uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted
@@ -84,30 +84,32 @@ typedef struct FrameParams {
   /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
   uint screen_begin_x, screen_begin_y, screen_end_x, screen_end_y;
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
-  uint table_groups;  ///< entries / 8 of the block cache's table (block_table.h)
-  /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z) of this one is number x +
-  /// id_blocks_x (y + id_blocks_y (id_begin_z + z)).
+  uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
+  /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z) of this one is
+  /// number x + id_blocks_x (y + id_blocks_y (id_begin_z + z)).
   uint id_blocks_x, id_blocks_y, id_begin_z;
   uint ranges_begin, masks_begin;  ///< this level's among those of all levels (macrocells.cl) [entries]
   float begin_t, end_t;            ///< the band of the rays that is drawn at this level [t of the kernels]
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 176);
 
-/// How many of the active rays take part in the next pass, after one in which `asked` rays asked for `requested` blocks and got
-/// `granted`. Not in the paper. Where blocks were missing, about as many as can be served: otherwise all would hold on to parts
-/// of their dual grids, none would get the rest, and only the ray that is served first would move. Else a quarter more.
+/// How many of the active rays take part in the next pass, after one in which `asked` rays asked for `requested`
+/// blocks and got `granted`. Not in the paper. Where blocks were missing, about as many as can be served: otherwise
+/// all would hold on to parts of their dual grids, none would get the rest, and only the ray that is served first
+/// would move. Else a quarter more.
 ISO_INLINE uint next_window(uint asked, uint requested, uint granted) {
   uint window = asked + asked / 4 + 1;
   if (requested > granted) {
     window = (uint)((ulong)asked * granted / requested);
-    if (window < asked / 4) window = asked / 4; /* nothing was freed, perhaps, since the host took slots for ample */
+    if (window < asked / 4)
+      window = asked / 4; /* nothing was freed, perhaps, since the host took slots for ample */
     if (window == 0) window = 1;
   }
   return window;
 }
 
-/// Most blocks that a ray looks ahead while only num_rays take part: for all together as many as there are slots, but for each
-/// one. Not in the paper. What rays look at in vain costs slots whose blocks other rays would read.
+/// Most blocks that a ray looks ahead while only num_rays take part: for all together as many as there are slots, but
+/// for each one. Not in the paper. What rays look at in vain costs slots whose blocks other rays would read.
 ISO_INLINE uint scarce_speculation(const FrameParams *frame, uint num_rays) {
   const uint each = 4 * frame->table_groups / (num_rays + 1);
   return each < 1 ? 1 : each;
@@ -162,8 +164,8 @@ typedef struct StreamLayout {
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
   int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES: with the block's bits
   uint whole_numbers;  ///< not 0: decoded values are rounded to integers
-  /// Added to a block's values, to draw a bound of the volume: value_offset + bound_unit * block_bound() of its code, of
-  /// codes that begin with word bounds_begin of the index. Both 0: nothing.
+  /// Added to a block's values, to draw a bound of the volume: value_offset + bound_unit * block_bound() of its code,
+  /// of codes that begin with word bounds_begin of the index. Both 0: nothing.
   float value_offset, bound_unit;
   uint bounds_begin;
   uint bounds_by_place;  ///< not 0: of its block's bound, a voxel has bound_share() of its place
