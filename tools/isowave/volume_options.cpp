@@ -2,15 +2,14 @@
 
 #include <unistd.h>
 
-#include <charconv>
 #include <cstdio>
 
 #include "core/error.hpp"
 #include "core/frame.hpp"
 #include "core/generate.hpp"
-#include "core/io/input_file.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
+#include "core/text.hpp"
 #include "core/zfp_accuracy.hpp"
 #include "tools/isowave/strict_options.hpp"
 
@@ -32,9 +31,9 @@ GenerateOptions parse_generator(std::string_view text) {
   options.dims = name->dims;
   options.type = name->type;
   if (colon != std::string_view::npos) {
-    const std::string_view seed = text.substr(colon + 1);
-    const auto [end, error] = std::from_chars(seed.data(), seed.data() + seed.size(), options.seed);
-    if (error != std::errc{} || end != seed.data() + seed.size()) fail();
+    const auto seed = parse_all<decltype(options.seed)>(text.substr(colon + 1));
+    if (!seed) fail();
+    options.seed = *seed;
   }
   return options;
 }
@@ -162,11 +161,12 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   if (is_zfp_name(path)) {
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
     refuse_compression(compression, path);
-    check_input_file(path);
+    VolumeInfo info = read_zfp_file_info(path).info;
+    if (overrides.spacing) info.spacing = *overrides.spacing;
+    check_volume_info(info, path);
+    check_drawable(info, path);  // before an index of all blocks is built
     CompressedVolume volume = open_zfp_file(path);
     if (overrides.spacing) set_spacing(volume, *overrides.spacing);
-    check_volume_info(volume.info, path);
-    check_drawable(volume.info, path);
     return volume;
   }
   const std::unique_ptr<VolumeReader> reader = open_any_volume(path, overrides);
