@@ -135,8 +135,8 @@ TEST_F(CliOutputs, FilesThatMayNotGrowAreAnErrorLikeOthers) {
   for (const auto &arguments :
        {"convert generate:gyroid_64x64x64_uint8 -o " + name("a.zfp"),
         "generate gyroid --dims 64 -o " + name("a.raw"), render(raw()) + "--stats " + name("a.json")}) {
-    const auto result = test::run_command("ulimit -f 0; { " + test::isowave_program() + " " + arguments +
-                                          " 2>&1; echo status $?; } | cat");
+    const auto result = test::run_command("{ ( ulimit -f 0; " + test::isowave_program() + " " + arguments +
+                                          " ) 2>&1; echo status $?; } | cat");
     EXPECT_THAT(result.out, testing::HasSubstr("cannot write")) << arguments;
     EXPECT_THAT(result.out, testing::HasSubstr("status 1")) << arguments;
     EXPECT_EQ(folder_.num_files(), before) << arguments;

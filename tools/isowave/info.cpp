@@ -47,7 +47,10 @@ ordered_json describe_grid(const VolumeInfo &info) {
 ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
   if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
   CompressedVolume volume = no_scan ? read_zfp_file_info(path) : check_zfp_file(path);
-  if (overrides.spacing) set_spacing(volume, *overrides.spacing);
+  if (overrides.spacing) {
+    set_spacing(volume, *overrides.spacing);
+    check_volume_info(volume.info, path);
+  }
   ordered_json result = describe_grid(volume.info);
   const glm::uvec3 blocks = volume.num_blocks();
   result["blocks"] = {blocks.x, blocks.y, blocks.z};

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
 
 #include "core/error.hpp"
@@ -34,6 +35,8 @@ GenerateOptions parse_generator(std::string_view text) {
     const auto seed = parse_all<decltype(options.seed)>(text.substr(colon + 1));
     if (!seed) fail();
     options.seed = *seed;
+    if (options.field != Field::kMixingLayer)
+      throw Error("'{}{}': a seed is of mixing_layer's noise alone: leave it out", kGenerate, text);
   }
   return options;
 }
@@ -142,6 +145,11 @@ bool says_levels(const CompressionOptions &options) {
 std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
                                            const CompressionOptions &options, InputOptions input) {
   if (!options.bounded()) return {};
+  const auto check = [](const char *option, const std::optional<double> &tolerance) {
+    if (tolerance && !(*tolerance > 0)) throw Error("{} {}: must be above 0", option, *tolerance);
+  };
+  check("--tolerance", options.tolerance);
+  check("--tolerance-relative", options.relative_tolerance);
   ErrorGoal goal{options.tolerance.value_or(0), options.exact};
   if (options.relative_tolerance) {
     ChunkCoder nothing;
@@ -151,6 +159,9 @@ std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOve
     if (range[0] == range[1])
       throw Error("{}: all voxels are {}: there is no range that an error is relative to", path, range[0]);
     goal.tolerance = *options.relative_tolerance * (range[1] - range[0]);
+    if (!(goal.tolerance > 0 && std::isfinite(goal.tolerance)))
+      throw Error("--tolerance-relative {}: of values from {} to {}, that is {}: need above 0 and finite",
+                  *options.relative_tolerance, range[0], range[1], goal.tolerance);
   }
   input.progress = make_progress_bar("measuring errors");
   return choose_error_bound(*open_any_volume(path, overrides), goal, input);
