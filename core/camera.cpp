@@ -4,8 +4,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <set>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/error.hpp"
 #include "core/io/input_file.hpp"
@@ -62,8 +64,18 @@ json parse_file(const std::filesystem::path &path) {
     throw Error("{}: not a camera file: it has more than {} bytes", file.what(), kMostBytes);
   std::string text(file.size(), '\0');
   file.read(0, std::as_writable_bytes(std::span(text)));
+  if (const std::size_t zero = text.find('\0'); zero != text.npos)  // the parser would take it for the end
+    throw Error("{}: not a camera file: no JSON from byte {} on", file.what(), zero + 1);
+  std::vector<std::set<std::string>> keys;  // of the objects that have begun, and not ended
+  const auto refuse_twice = [&](int, json::parse_event_t event, const json &parsed) {
+    if (event == json::parse_event_t::object_start) keys.emplace_back();
+    if (event == json::parse_event_t::object_end) keys.pop_back();
+    if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
+      throw Error("{}: {} is given twice", file.what(), parsed.dump().substr(0, 60));
+    return true;
+  };
   try {
-    return json::parse(text);
+    return json::parse(text, refuse_twice);
   } catch (const json::parse_error &error) {
     throw Error("{}: not a camera file: no JSON from byte {} on", file.what(), error.byte);
   } catch (const json::out_of_range &) {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/error.hpp"
+#include "kernels_cl/block_grid.h"
 #include "kernels_cl/grid_dda.h"
 
 namespace isowave {
@@ -72,6 +73,10 @@ void check_image_size(ImageSize size) {
 }
 
 void check_drawable(const VolumeInfo &info, std::string_view what) {
+  const glm::u64vec3 blocks((info.dims + 3u) / 4u);
+  if (const std::uint64_t count = blocks.x * blocks.y * blocks.z; count >= ISO_MAX_BLOCK_IDS)
+    throw Error("{}: a volume of {} blocks cannot be drawn: block ids end at {}", what, count,
+                ISO_MAX_BLOCK_IDS);
   // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied to become it
   // (below). An eye is at most 1e7 voxels off and dims are at most 2^16, so t is at most 2^25 voxels' longest edges;
   // and nothing that matters is nearer than 2^-24 of the shortest. Within 2^+-100, neither reaches float32's ends,

@@ -37,6 +37,21 @@ const TypeEntry &entry(VoxelType type) {
   return kVoxelTypes.at(std::size_t(type));
 }
 
+bool has_ending(const fs::path &path, std::initializer_list<std::string_view> endings) {
+  const std::string name = lower_case(path.filename().string());
+  return std::any_of(endings.begin(), endings.end(),
+                     [&](std::string_view ending) { return name.ends_with(ending); });
+}
+
+/// Nothing for kinds of files that have none.
+std::optional<VolumeHeader> read_header(const std::shared_ptr<const InputFile> &file) {
+  const fs::path &path = file->path();
+  if (has_ending(path, {".nrrd", ".nhdr"})) return read_nrrd_header(file);
+  if (has_ending(path, {".mha", ".mhd"})) return read_meta_image_header(file);
+  if (has_ending(path, {".nii", ".nii.gz"})) return read_nifti_header(file, has_ending(path, {".gz"}));
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::string_view to_string(VoxelType type) {
@@ -92,19 +107,16 @@ void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_la
   std::ranges::copy(voxels, out.begin());
 }
 
+std::filesystem::path voxel_file(const fs::path &path) {
+  const auto file = std::make_shared<const InputFile>(path);
+  const std::optional<VolumeHeader> header = read_header(file);
+  return header ? header->voxels.file->path() : path;
+}
+
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {
   const auto file = std::make_shared<const InputFile>(path);
-  const std::string name = lower_case(path.filename().string());
-  const auto ends_with = [&](std::initializer_list<std::string_view> endings) {
-    return std::any_of(endings.begin(), endings.end(),
-                       [&](std::string_view ending) { return name.ends_with(ending); });
-  };
-  if (ends_with({".raw", ".raw.gz"})) return open_raw(file, ends_with({".gz"}), overrides);
-
-  std::optional<VolumeHeader> header;
-  if (ends_with({".nrrd", ".nhdr"})) header = read_nrrd_header(file);
-  if (ends_with({".mha", ".mhd"})) header = read_meta_image_header(file);
-  if (ends_with({".nii", ".nii.gz"})) header = read_nifti_header(file, ends_with({".gz"}));
+  if (has_ending(path, {".raw", ".raw.gz"})) return open_raw(file, has_ending(path, {".gz"}), overrides);
+  std::optional<VolumeHeader> header = read_header(file);
   if (!header) {
     throw Error("{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
                 path.string());

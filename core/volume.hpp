@@ -103,5 +103,7 @@ struct RawOverrides {
 /// name, a header that is not understood, zero dims, truncated or oversized data, more than one component.
 std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path,
                                           const RawOverrides &overrides = {});
+/// The file that has the voxels: where the volume's header names another, that one. Throws Error as open_volume().
+std::filesystem::path voxel_file(const std::filesystem::path &path);
 
 }  // namespace isowave

@@ -148,7 +148,9 @@ std::array<std::int32_t, 2> exponents_to_try(VoxelType type, const ErrorGoal &go
   if (goal.exact) return {-2, -2 + kNumFewer};  // a quarter at most
   // Values that became 0 may have taken nearly all of it.
   if (goal.tolerance <= 4 * double{kMinMagnitude}) return {kAllPlanes, kAllPlanes};
-  const std::int32_t promised = std::ilogb(goal.tolerance);  // zfp's error is 2^promised at most
+  // zfp's error is 2^promised at most. No voxel has planes beyond kLastPlane, and not all exponents fit a file's header.
+  constexpr std::int32_t kLastPlane = 130;
+  const std::int32_t promised = std::min(std::ilogb(goal.tolerance), kLastPlane);
   // Where the cast to float32, or to 0, may have taken a part of the tolerance, half of the rest is enough: a block
   // that does not have all its planes by then has lost a quarter at most.
   const bool may_lose = !fits_float32(type) || goal.tolerance < 0x1p-80;

@@ -76,6 +76,16 @@ TEST_F(CameraFileTest, RefusesWhatIsNotACameraFile) {
   EXPECT_THAT(refusal(std::string(5u << 20, '[')), HasSubstr("it has more than 4194304 bytes"));
 }
 
+TEST_F(CameraFileTest, RefusesWhatIsGivenTwice) {
+  const std::string camera = R"({"eye":[1,2,3],"at":[4,5,6],"up":[0,1,0]})";
+  EXPECT_THAT(refusal(R"({"fovy_deg":50,"width":8,"width":9,"cameras":[)" + camera + "]}"),
+              HasSubstr("\"width\" is given twice"));
+  EXPECT_THAT(refusal(R"({"fovy_deg":50,"cameras":[{"eye":[0,0,0],)" + camera.substr(1) + "]}"),
+              HasSubstr("\"eye\" is given twice"));
+  EXPECT_THAT(refusal(R"({"fovy_deg":50,"cameras":[)" + camera + "]}" + std::string(1, '\0') + "[]"),
+              HasSubstr("no JSON from byte"));
+}
+
 TEST_F(CameraFileTest, NamesTheFieldThatIsMissingOrWrong) {
   const std::string one = R"([{"eye":[0,0,9],"at":[0,0,0],"up":[0,1,0]}])";
   EXPECT_THAT(refusal(R"({"cameras":)" + one + "}"), HasSubstr("\"fovy_deg\" is missing"));

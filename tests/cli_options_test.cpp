@@ -76,6 +76,13 @@ TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
   for (const char *option :
        {"--value-error", "--max-pixel-error", "--max-error", "--time-budget", "--tolerance", "--spacing"})
     expect_one_line_error(kRender + option + " inf", option);
+  for (const std::string option : {"--tolerance", "--tolerance-relative"}) {
+    for (const char *value : {"0", "-1"})
+      expect_one_line_error("convert " + kNucleon + " -o a.zfp " + option + " " + value,
+                            option + " " + value);
+  }
+  expect_one_line_error("convert " + kNucleon + " -o a.zfp --tolerance-relative 1e308",
+                        "--tolerance-relative 1e+308");
   expect_one_line_error(kRender + "--levels 0", "--levels: ");
   expect_one_line_error(kRender + "--levels -1", "--levels: ");
   expect_one_line_error(kRender + "--orbit 99999999999", "--orbit");
@@ -97,6 +104,12 @@ TEST(CliOptions, SpacingsAndPlacesThatFloatsCannotHoldAreRefused) {
   expect_failure(run_isowave(kRender + "--spacing 1e31"), "float32");
   expect_failure(run_isowave(kRender + "--spacing 1 1 1e11"), "float32");
   const TemporaryFolder folder;
+  const std::string zfp = quoted(folder / "n.zfp");
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " -o " + zfp).status, 0);
+  for (const std::string &volume : {kNucleon, zfp}) {
+    for (const char *spacing : {"0", "-1", "1 1 0"})
+      expect_one_line_error("info " + volume + " --spacing " + spacing, "each must be finite and above 0");
+  }
   write_file(folder / "far.nhdr",
              std::string_view("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspace: "
                               "left-posterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
@@ -139,6 +152,8 @@ TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   expect_one_line_error("verify " + kNucleon, "give --isovalue");
   expect_one_line_error("verify " + kNucleon + " -i 80 --levels 2", "--levels: ");
   expect_one_line_error("generate sphere --dims 8 --seed 3", "--seed: ");
+  expect_one_line_error("info generate:sphere_8x8x8_uint8:3", "a seed is of mixing_layer's noise alone");
+  expect_one_line_error(kRender + "--no-stage-times", "--no-stage-times: ");
   expect_one_line_error("convert " + kNucleon + " --exact --no-verify -o " + quoted(folder / "a.zfp"),
                         "--no-verify: ");
 }

@@ -1,6 +1,7 @@
 // Files that the program writes, run as a user runs it: none takes the place of an input or of another output, names of any length
 // and links work, and what cannot be written is said before any work.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -88,7 +89,20 @@ TEST_F(CliOutputs, NeverTakeThePlaceOfDetachedVoxels) {
   write_file(folder_ / "v.mhd",
              std::string_view("ObjectType = Image\nNDims = 3\nDimSize = 8 8 8\nElementType = MET_UCHAR\n"
                               "ElementDataFile = v_8x8x8_uint8.raw\n"));
-  for (const char *header : {"v.nhdr", "v.mhd"}) {
+  // What only looks like the end of a header, or like the name, is for the reader of headers to tell.
+  write_file(
+      folder_ / "pairs.nhdr",
+      std::string_view("NRRD0004\ndatafile:=none\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n"
+                       "data file: v_8x8x8_uint8.raw\n"));
+  write_file(folder_ / "blank.mhd",
+             std::string_view("ObjectType = Image\nNDims = 3\n\ndatafile = none\nDimSize = 8 8 8\n\n"
+                              "ElementType = MET_UCHAR\nElementDataFile = v_8x8x8_uint8.raw\n"));
+  std::string comments = "NRRD0004\n";
+  while (comments.size() < (1u << 20)) comments += "#" + std::string(1000, 'x') + "\n";
+  write_file(
+      folder_ / "long.nhdr",
+      comments + "type: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\ndata file: v_8x8x8_uint8.raw\n");
+  for (const char *header : {"v.nhdr", "v.mhd", "pairs.nhdr", "blank.mhd", "long.nhdr"}) {
     ASSERT_EQ(run_isowave("info " + name(header)).status, 0) << "else this proves nothing";
     expect_refused(render(name(header)) + "--depth " + raw(), "take the place of the input");
     expect_refused(render(name(header)) + "--depth " + name(header), "take the place of the input");
@@ -114,6 +128,19 @@ TEST_F(CliOutputs, NeverTakeEachOthersPlace) {
   fs::create_symlink("b", folder_ / "l2");
   expect_refused(render(raw()) + "--depth " + name("l1") + " --stats " + name("l2"), "take the place of");
   EXPECT_EQ(run_isowave(render(raw()) + "-i 41 -o " + one + " --depth " + name("a.npy")).status, 0);
+}
+
+TEST_F(CliOutputs, FilesThatMayNotGrowAreAnErrorLikeOthers) {
+  const std::size_t before = folder_.num_files();
+  for (const auto &arguments :
+       {"convert generate:gyroid_64x64x64_uint8 -o " + name("a.zfp"),
+        "generate gyroid --dims 64 -o " + name("a.raw"), render(raw()) + "--stats " + name("a.json")}) {
+    const auto result = test::run_command("{ ( ulimit -f 0; " + test::isowave_program() + " " + arguments +
+                                          " ) 2>&1; echo status $?; } | cat");
+    EXPECT_THAT(result.out, testing::HasSubstr("cannot write")) << arguments;
+    EXPECT_THAT(result.out, testing::HasSubstr("status 1")) << arguments;
+    EXPECT_EQ(folder_.num_files(), before) << arguments;
+  }
 }
 
 TEST_F(CliOutputs, NamesMayBeAsLongAsTheSystemAllows) {

@@ -321,11 +321,11 @@ TEST(CliRender, MaxError) {
 
 TEST(CliRender, TimeBudget) {
   const TemporaryFolder folder;
-  const std::string scene = kNucleon + " -i 80 --size 64x48 --no-stage-times ";
+  const std::string scene = kNucleon + " -i 80 --size 64x48 ";
   const auto picture = [&](const std::string &name) { return quoted(folder / (name + ".png")); };
   ASSERT_EQ(render(scene + "-o " + picture("plain")).status, 0);
   const auto run = render(scene + "--time-budget 0.001 -o " + picture("quick") + " --refined " +
-                          picture("refined") + " --stats " + quoted(folder / "a.json"));
+                          picture("refined") + " --no-stage-times --stats " + quoted(folder / "a.json"));
   EXPECT_EQ(run.status, 0) << run.err;
   const json frame = json::parse(test::read_file(folder / "a.json"))["frames"][0]["time_budget"];
   EXPECT_EQ(frame["budget_ms"], 0.001);

@@ -139,6 +139,8 @@ TEST_F(NpyTest, RefusesOtherArrays) {
   EXPECT_THAT(refusal(with("'<f4'", "False", "(4294967295, 4294967295)")), HasSubstr("needs"));
   EXPECT_THAT(refusal(with("'<f4'", "False", "(4294967296, 0)")), HasSubstr("too large"));
   EXPECT_THAT(refusal(file(1, "{'descr': '<f4', 'shape': (2, 3)}\n", 24)), HasSubstr("fortran_order"));
+  EXPECT_THAT(refusal(with("'<f4'", "False", "(2, 3), \"shape\": (3, 2)")),
+              HasSubstr("'shape' is given twice"));
 }
 
 TEST_F(NpyTest, LeavesNothingBehindWhenItCannotWrite) {

@@ -46,6 +46,7 @@ TEST(Readme, EveryStageHasItsFiles) {
 TEST(Readme, AutoIsTheSamePipelineEverywhere) {
   EXPECT_THAT(test::read_file(kRoot / "README.md"), testing::HasSubstr("`--pipeline auto` takes `rays`"));
   EXPECT_THAT(test::run_isowave("render --help").out, testing::HasSubstr("auto (rays,"));
+  EXPECT_THAT(test::run_isowave("render --help").out, testing::HasSubstr("what the driver takes for itself"));
   const test::TemporaryFolder folder;
   const std::string stats = test::quoted(folder / "stats.json");
   const auto run =

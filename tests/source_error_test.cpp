@@ -286,6 +286,17 @@ TEST(SourceErrorOfTheProgram, RelativeTolerancesAreOfTheSourcesRange) {
   EXPECT_EQ(info.out.find("1000000000.0,"), std::string::npos) << info.out;
 }
 
+TEST(SourceErrorOfTheProgram, TolerancesMayBeAsLargeAsNumbersAre) {
+  const TemporaryFolder folder;
+  const auto path = folder / "a.zfp";
+  for (const std::string tolerance : {"1e38", "1e39", "1e200", "1.7e308"}) {
+    const auto run = test::run_isowave("convert generate:gyroid_21x18x17_float32 --levels 2 -o " +
+                                       test::quoted(path) + " --tolerance " + tolerance);
+    EXPECT_EQ(run.status, 0) << tolerance << run.err;
+    EXPECT_LE(*known_max_error(open_zfp_file(path)), std::stod(tolerance));
+  }
+}
+
 TEST(SourceErrorOfTheProgram, PrintedErrorsAreNotBelow) {
   const TemporaryFolder folder;
   ArrayReader reader = sources()[0].reader();

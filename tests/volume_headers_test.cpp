@@ -291,6 +291,7 @@ TEST(OpenVolume, TakesNoMoreMemoryThanTheFileHas) {
   const std::string out = (folder / "a.zfp").string();
   EXPECT_LT(test::peak_of_isowave({"convert", path.string(), "--rate", "4", "-o", out}), 400);
   EXPECT_LT(test::peak_of_isowave({"convert", path.string(), "--tolerance", "1", "-o", out}), 400);
+  EXPECT_LT(test::peak_of_isowave({"info", path.string()}), 400);
 }
 
 TEST(OpenVolume, FilesThatBecomeShorterAreOneLine) {
@@ -499,6 +500,44 @@ TEST_F(NiftiFile, OriginInTheUnitOfTheSpacings) {
     EXPECT_EQ(info.spacing, glm::dvec3(0.5, 2, 3) * millimetres);
     EXPECT_EQ(info.origin, glm::dvec3(-10, -20, 30) * millimetres);
   }
+}
+
+/// float32 does not hold them: what it loses is an error like any other.
+TEST_F(NiftiFile, ScaledVoxelsAreFloat64) {
+  const auto path = folder_ / "a.nii";
+  const auto check = [&](const NiftiFields &fields, const auto &voxels) {
+    const std::string bytes(reinterpret_cast<const char *>(voxels.data()), voxels.size() * sizeof(voxels[0]));
+    write_file(path, fields.bytes() + bytes);
+    const auto reader = open_volume(path);
+    EXPECT_EQ(reader->info().type, VoxelType::kFloat64);
+    std::vector<double> read(60), expected(60);
+    std::vector<float> read_floats(60), expected_floats(60);
+    for (std::size_t i = 0; i < 60; ++i) {
+      expected[i] = double{fields.scl_slope} * double(voxels[i]) + double{fields.scl_inter};
+      expected_floats[i] = float(expected[i]);
+    }
+    reader->read_exact_layers(0, 5, read);
+    EXPECT_EQ(read, expected);
+    open_volume(path)->read_layers(0, 5, read_floats);
+    EXPECT_EQ(read_floats, expected_floats);
+  };
+  std::vector<std::int16_t> shorts(60);
+  std::vector<std::int32_t> ints(60);
+  std::vector<float> floats(60);
+  for (int i = 0; i < 60; ++i) {
+    shorts[std::size_t(i)] = std::int16_t(i * 541 - 16000);
+    ints[std::size_t(i)] = (1 << 30) + 7 * i;
+    floats[std::size_t(i)] = 0.37f * float(i);
+  }
+  check({.datatype = 8, .bitpix = 32, .scl_slope = 0.3f, .scl_inter = 5}, ints);
+  check({.datatype = 16, .bitpix = 32, .scl_slope = 3, .scl_inter = 1e6f}, floats);
+  check({.datatype = 4, .bitpix = 16, .scl_slope = 1e-3f, .scl_inter = 1e6f}, shorts);
+  // Up to 1e6, float32's steps are of 1/16.
+  const auto run =
+      test::run_isowave("convert " + test::quoted(path) + " --rate 32 -o " + test::quoted(folder_ / "a.zfp"));
+  const std::size_t at = run.out.find("max error ");
+  ASSERT_NE(at, std::string::npos) << run.out << run.err;
+  EXPECT_GT(std::stod(run.out.substr(at + 10)), 0.02) << run.out;
 }
 
 TEST_F(NiftiFile, NumbersThatAreNoneAreRefused) {

@@ -243,10 +243,8 @@ VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, boo
   voxels.type = nifti_voxel_type(bytes);
   voxels.big_endian = bytes.is_big_endian();
   set_nifti_scale(bytes, voxels);
-  header.info.type = voxels.type;
-  if (voxels.is_scaled() &&
-      is_integer(voxels.type))  // values are not whole; float32 holds those of 8 and 16 bits to its precision
-    header.info.type = fits_float32(voxels.type) ? VoxelType::kFloat32 : VoxelType::kFloat64;
+  // Scaled values are not whole, nor those of float32.
+  header.info.type = voxels.is_scaled() ? VoxelType::kFloat64 : voxels.type;
   set_nifti_geometry(bytes, header.info);
 
   const double offset = bytes.get_finite(108, "vox_offset");

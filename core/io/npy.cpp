@@ -30,7 +30,10 @@ std::string_view value_of(std::string_view header, std::string_view key, const s
   std::size_t at = header.find(key);
   if (at != header.npos) at = header.find(':', at + key.size());
   if (at != header.npos) at = header.find_first_not_of(" \t", at + 1);
-  if (at == header.npos) throw Error("{}: broken .npy header: no '{}'", where, key);
+  if (at == header.npos) throw Error("{}: broken .npy header: no {}", where, key);
+  const std::string_view name = key.substr(1, key.size() - 2);  // Python takes quotes of either kind
+  if (header.find(name, header.find(name) + 1) != header.npos)
+    throw Error("{}: broken .npy header: {} is given twice", where, key);
   return header.substr(at);
 }
 

@@ -41,17 +41,12 @@ void to_double(const VoxelLayout &voxels, std::span<const std::byte> bytes, std:
   for (double &value : out) value = value * voxels.slope + voxels.intercept;
 }
 
-/// The same in float32. As ITK scales: voxels but float64 become float32 first.
+/// The same, rounded to float32.
 void to_float(const VoxelLayout &voxels, std::span<const std::byte> bytes, std::span<float> out) {
-  if (voxels.is_scaled() && voxels.type == VoxelType::kFloat64) {
-    std::vector<double> values(out.size());
-    to_double(voxels, bytes, values);
-    std::ranges::transform(values, out.begin(), [](double value) { return static_cast<float>(value); });
-    return;
-  }
-  convert_to_float(voxels.type, bytes, out);
-  if (!voxels.is_scaled()) return;
-  for (float &value : out) value = static_cast<float>(double(value) * voxels.slope + voxels.intercept);
+  if (!voxels.is_scaled()) return convert_to_float(voxels.type, bytes, out);
+  std::vector<double> values(out.size());
+  to_double(voxels, bytes, values);
+  std::ranges::transform(values, out.begin(), [](double value) { return static_cast<float>(value); });
 }
 
 /// Reads the voxels of a layout from a source that begins with them.

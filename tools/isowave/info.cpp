@@ -12,7 +12,6 @@
 #include <system_error>
 
 #include "core/error.hpp"
-#include "core/io/input_file.hpp"
 #include "core/level_bounds.hpp"
 #include "core/zfp_stream.hpp"
 #include "tools/isowave/commands.hpp"
@@ -47,9 +46,11 @@ ordered_json describe_grid(const VolumeInfo &info) {
 
 ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
   if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
-  check_input_file(path);
   CompressedVolume volume = no_scan ? read_zfp_file_info(path) : check_zfp_file(path);
-  if (overrides.spacing) set_spacing(volume, *overrides.spacing);
+  if (overrides.spacing) {
+    set_spacing(volume, *overrides.spacing);
+    check_volume_info(volume.info, path);
+  }
   ordered_json result = describe_grid(volume.info);
   const glm::uvec3 blocks = volume.num_blocks();
   result["blocks"] = {blocks.x, blocks.y, blocks.z};
@@ -85,13 +86,14 @@ void add_value_range(VolumeReader &reader, ordered_json &result) {
   const std::uint64_t layer_size = std::uint64_t(dims.x) * dims.y;
   const auto chunk = std::uint32_t(std::clamp<std::uint64_t>((1u << 22) / layer_size, 1, dims.z));
   const Progress progress = make_progress_bar("reading");
-  std::vector<Value> voxels;
+  const auto memory =
+      std::make_unique_for_overwrite<Value[]>(layer_size * chunk);  // a file may have fewer than it claims
   std::uint64_t bad_count = 0;
   Value min = std::numeric_limits<Value>::infinity(), max = -min;
   for (std::uint32_t z = 0; z < dims.z; z += chunk) {
     const std::uint32_t layers = std::min(chunk, dims.z - z);
-    voxels.resize(layer_size * layers);
-    read(reader, z, layers, std::span(voxels));
+    const std::span voxels(memory.get(), layer_size * layers);
+    read(reader, z, layers, voxels);
     for (const Value value : voxels) {
       if (!std::isfinite(value)) {
         ++bad_count;

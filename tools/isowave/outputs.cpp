@@ -5,15 +5,14 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <string_view>
 #include <system_error>
 
 #include "core/error.hpp"
 #include "core/io/atomic_file.hpp"
+#include "core/volume.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {
@@ -34,26 +33,6 @@ std::string key_of(const fs::path &path) {
   throw Error("{}: cannot write: {}", path.string(), std::strerror(reason));
 }
 
-/// The file of voxels that the header of an NRRD or MetaImage names, or nothing.
-fs::path detached_voxels(const fs::path &header) {
-  std::error_code failure;
-  if (!fs::is_regular_file(header, failure)) return {};
-  constexpr std::size_t kLongestHeader = 1u << 20;
-  std::ifstream in(header, std::ios::binary);
-  std::string line;
-  for (std::size_t read = 0; read < kLongestHeader && std::getline(in, line); read += line.size() + 1) {
-    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back())) != 0) line.pop_back();
-    if (line.empty()) return {};
-    const std::size_t separator = line.find_first_of(":=");
-    std::string key = CLI::detail::to_lower(line.substr(0, separator));
-    std::erase_if(key, [](unsigned char c) { return std::isspace(c) != 0; });
-    if (key != "datafile" && key != "elementdatafile") continue;
-    const std::size_t begin = line.find_first_not_of(" \t", separator + 1);
-    return begin == std::string::npos ? fs::path{} : header.parent_path() / line.substr(begin);
-  }
-  return {};
-}
-
 }  // namespace
 
 void Outputs::read(const fs::path &path) {
@@ -63,11 +42,10 @@ void Outputs::read(const fs::path &path) {
 
 void Outputs::read_volume(const std::string &path) {
   if (path.starts_with("generate:")) return;
+  std::error_code failure;
+  if (!fs::exists(path, failure)) return;
   read(path);
-  constexpr std::string_view kWithHeader[] = {".nrrd", ".nhdr", ".mha", ".mhd"};
-  const std::string extension = CLI::detail::to_lower(fs::path(path).extension().string());
-  if (std::ranges::find(kWithHeader, extension) == std::end(kWithHeader)) return;
-  if (const fs::path voxels = detached_voxels(path); !voxels.empty()) read(voxels);
+  read(voxel_file(path));  // of a header that names it
 }
 
 void Outputs::write(const std::string &option, const fs::path &path) {

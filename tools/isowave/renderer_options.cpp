@@ -22,7 +22,8 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option("--max-speculation", flags.values.max_speculation, "most blocks a ray looks ahead, 1..64")
       ->capture_default_str();
   app.add_option("--memory-budget", flags.values.memory_budget,
-                 "bound on all device memory, e.g. 600MB (1000^2) or 1GiB (1024^3) [3/4 of the device's]")
+                 "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB (1024^3); "
+                 "what the driver takes for itself comes on top [3/4 of the device's memory]")
       ->transform(byte_count())
       ->type_name("BYTES");
   app.add_option("--cache-slots", flags.values.cache_slots,

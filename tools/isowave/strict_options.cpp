@@ -3,25 +3,17 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include "core/error.hpp"
+#include "core/text.hpp"
 
 namespace isowave::tools {
 
 namespace {
-
-template <class Number>
-std::optional<Number> parse_all(std::string_view text) {
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{} || end != text.data() + text.size()) return {};
-  return number;
-}
 
 /// Returns what is wrong with the value, or nothing. Writes whole numbers anew: CLI11 reads 010 as 8.
 std::string check_number(const std::string &type, std::string &value) {

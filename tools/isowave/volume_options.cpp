@@ -2,15 +2,15 @@
 
 #include <unistd.h>
 
-#include <charconv>
+#include <cmath>
 #include <cstdio>
 
 #include "core/error.hpp"
 #include "core/frame.hpp"
 #include "core/generate.hpp"
-#include "core/io/input_file.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
+#include "core/text.hpp"
 #include "core/zfp_accuracy.hpp"
 #include "tools/isowave/strict_options.hpp"
 
@@ -32,9 +32,11 @@ GenerateOptions parse_generator(std::string_view text) {
   options.dims = name->dims;
   options.type = name->type;
   if (colon != std::string_view::npos) {
-    const std::string_view seed = text.substr(colon + 1);
-    const auto [end, error] = std::from_chars(seed.data(), seed.data() + seed.size(), options.seed);
-    if (error != std::errc{} || end != seed.data() + seed.size()) fail();
+    const auto seed = parse_all<decltype(options.seed)>(text.substr(colon + 1));
+    if (!seed) fail();
+    options.seed = *seed;
+    if (options.field != Field::kMixingLayer)
+      throw Error("'{}{}': a seed is of mixing_layer's noise alone: leave it out", kGenerate, text);
   }
   return options;
 }
@@ -143,6 +145,11 @@ bool says_levels(const CompressionOptions &options) {
 std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
                                            const CompressionOptions &options, InputOptions input) {
   if (!options.bounded()) return {};
+  const auto check = [](const char *option, const std::optional<double> &tolerance) {
+    if (tolerance && !(*tolerance > 0)) throw Error("{} {}: must be above 0", option, *tolerance);
+  };
+  check("--tolerance", options.tolerance);
+  check("--tolerance-relative", options.relative_tolerance);
   ErrorGoal goal{options.tolerance.value_or(0), options.exact};
   if (options.relative_tolerance) {
     ChunkCoder nothing;
@@ -152,6 +159,9 @@ std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOve
     if (range[0] == range[1])
       throw Error("{}: all voxels are {}: there is no range that an error is relative to", path, range[0]);
     goal.tolerance = *options.relative_tolerance * (range[1] - range[0]);
+    if (!(goal.tolerance > 0 && std::isfinite(goal.tolerance)))
+      throw Error("--tolerance-relative {}: of values from {} to {}, that is {}: need above 0 and finite",
+                  *options.relative_tolerance, range[0], range[1], goal.tolerance);
   }
   input.progress = make_progress_bar("measuring errors");
   return choose_error_bound(*open_any_volume(path, overrides), goal, input);
@@ -162,11 +172,12 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   if (is_zfp_name(path)) {
     if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
     refuse_compression(compression, path);
-    check_input_file(path);
+    VolumeInfo info = read_zfp_file_info(path).info;
+    if (overrides.spacing) info.spacing = *overrides.spacing;
+    check_volume_info(info, path);
+    check_drawable(info, path);  // before an index of all blocks is built
     CompressedVolume volume = open_zfp_file(path);
     if (overrides.spacing) set_spacing(volume, *overrides.spacing);
-    check_volume_info(volume.info, path);
-    check_drawable(volume.info, path);
     return volume;
   }
   const std::unique_ptr<VolumeReader> reader = open_any_volume(path, overrides);
