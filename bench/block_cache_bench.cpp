@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "bench/block_pairs.hpp"
-#include "core/block_cache.hpp"
+#include "core/stages/block_cache.hpp"
 
 namespace isowave::bench {
 namespace {

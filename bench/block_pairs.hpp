@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bench/harness.hpp"
-#include "core/wavefront.hpp"
+#include "core/stages/wavefront.hpp"
 
 namespace isowave::bench {
 

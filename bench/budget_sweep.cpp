@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "bench/run_info.hpp"
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tools/isowave/render_stats.hpp"
 
 namespace isowave::bench {

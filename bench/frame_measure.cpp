@@ -3,8 +3,8 @@
 #include <cstring>
 #include <glm/gtc/quaternion.hpp>
 
-#include "core/error.hpp"
-#include "core/resident.hpp"
+#include "core/base/error.hpp"
+#include "core/stages/resident.hpp"
 
 namespace isowave::bench {
 

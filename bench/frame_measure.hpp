@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 
 namespace isowave::bench {
 
@@ -33,7 +33,7 @@ std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camer
 
 double num_passes(const FrameStats &frame);
 
-/// Whole volume decoded, one kernel (core/resident.hpp).
+/// Whole volume decoded, one kernel (core/stages/resident.hpp).
 struct FloorTimes {
   std::vector<std::vector<double>> ms;  ///< [views][rounds]; empty if not measured
   std::string why_not;                  ///< one line, if not measured

@@ -2,17 +2,17 @@
 // The stages of one frame with nothing hidden: for benchmarks that stop between two of them.
 
 #include "bench/harness.hpp"
-#include "core/block_cache.hpp"
-#include "core/composite.hpp"
-#include "core/frame.hpp"
-#include "core/group.hpp"
-#include "core/initial_rays.hpp"
-#include "core/intersect.hpp"
-#include "core/macrocells.hpp"
-#include "core/speculation.hpp"
-#include "core/traverse.hpp"
-#include "core/wavefront.hpp"
-#include "core/zfp_decode.hpp"
+#include "core/stages/block_cache.hpp"
+#include "core/stages/composite.hpp"
+#include "core/stages/group.hpp"
+#include "core/stages/initial_rays.hpp"
+#include "core/stages/intersect.hpp"
+#include "core/stages/macrocells.hpp"
+#include "core/stages/speculation.hpp"
+#include "core/stages/traverse.hpp"
+#include "core/stages/wavefront.hpp"
+#include "core/stages/zfp_decode.hpp"
+#include "core/view/frame.hpp"
 
 namespace isowave::bench {
 

@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "bench/block_pairs.hpp"
-#include "core/group.hpp"
+#include "core/stages/group.hpp"
 
 namespace isowave::bench {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bench/run_info.hpp"
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/ocl/kernel.hpp"
 
 namespace isowave::bench {

@@ -22,7 +22,7 @@
 #include <typeinfo>
 
 #include "core/ocl/device.hpp"
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 
 namespace isowave::bench {
 

@@ -5,9 +5,9 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/frame.hpp"
-#include "core/macrocells.hpp"
-#include "core/zfp_decode.hpp"
+#include "core/stages/macrocells.hpp"
+#include "core/stages/zfp_decode.hpp"
+#include "core/view/frame.hpp"
 
 namespace isowave::bench {
 namespace {

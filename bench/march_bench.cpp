@@ -3,7 +3,7 @@
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
-#include "core/march.hpp"
+#include "core/stages/march.hpp"
 
 namespace isowave::bench {
 namespace {

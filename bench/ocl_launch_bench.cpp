@@ -5,7 +5,7 @@
 
 #include "bench/harness.hpp"
 #include "core/ocl/kernel.hpp"
-#include "kernels_cl/shared_types.h"
+#include "kernels_cl/portable/shared_types.h"
 
 namespace isowave::bench {
 namespace {

@@ -24,7 +24,7 @@
 
 #include "bench/peer_sides.hpp"
 #include "bench/run_info.hpp"
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"

@@ -23,8 +23,8 @@
 
 #include "bench/frame_measure.hpp"
 #include "bench/peer_sides.hpp"
-#include "core/error.hpp"
-#include "core/volume.hpp"
+#include "core/base/error.hpp"
+#include "core/volume/volume.hpp"
 
 namespace isowave::bench {
 

@@ -5,7 +5,7 @@
 
 #include "bench/frame_measure.hpp"
 #include "bench/peer_sides.hpp"
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 
 namespace isowave::bench {
 

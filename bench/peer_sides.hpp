@@ -8,10 +8,10 @@
 #include <memory>
 #include <string>
 
-#include "core/camera.hpp"
-#include "core/frame.hpp"
-#include "core/pipeline.hpp"
-#include "core/zfp_stream.hpp"
+#include "core/render/pipeline.hpp"
+#include "core/view/camera.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::bench {
 

@@ -5,7 +5,7 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/radix_sort.hpp"
+#include "core/stages/radix_sort.hpp"
 
 namespace isowave::bench {
 namespace {

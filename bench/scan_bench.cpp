@@ -5,7 +5,7 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/scan.hpp"
+#include "core/stages/scan.hpp"
 
 namespace isowave::bench {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "core/generate.hpp"
+#include "core/generate/generate.hpp"
 
 namespace isowave::bench {
 

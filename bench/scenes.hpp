@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/zfp_stream.hpp"
+#include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::bench {
 

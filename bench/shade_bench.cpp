@@ -2,7 +2,7 @@
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
-#include "core/shade.hpp"
+#include "core/stages/shade.hpp"
 
 namespace isowave::bench {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/zfp_decode.hpp"
+#include "core/stages/zfp_decode.hpp"
 
 namespace isowave::bench {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/generate.hpp"
-#include "core/zfp_encode.hpp"
+#include "core/generate/generate.hpp"
+#include "core/zfp/zfp_encode.hpp"
 
 namespace isowave::bench {
 namespace {

@@ -11,7 +11,7 @@
 /// Progress is certain: the first block of the first active ray is served before all others. If old slots are too few
 /// even for it, slots that other rays use in this very pass are taken; those rays wait for the next. (Not in the
 /// paper, whose cache grows instead.)
-#include "block_requests.h"
+#include "device/block_requests.h"
 
 #define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
 

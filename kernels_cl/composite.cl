@@ -1,7 +1,7 @@
 /// composite.cl -- the closest of a ray's N_Spec results becomes its hit; the other rays go on (Sec. 4.4).
-#include "cached_cell.h"
-#include "cell_intersect.h"
-#include "closest_pair.h"
+#include "device/cached_cell.h"
+#include "device/closest_pair.h"
+#include "portable/cell_intersect.h"
 
 /// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block without slots;
 /// ray_active_mask [active_count] = 1 where it goes on. active_ray_ids: a ray that moved on looks twice as far ahead.

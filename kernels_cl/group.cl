@@ -9,9 +9,9 @@
 /// lists the slot as a candidate. Only then is each candidate's dual grid looked up: eight blocks a block,
 /// not eight a pair. The visible ones draw places for their pairs, in whatever order they come. Nothing here
 /// costs more than O(pairs), whatever the number of slots or blocks.
-#include "block_table.h"
-#include "closest_pair.h"
-#include "work_group.h"
+#include "device/closest_pair.h"
+#include "device/work_group.h"
+#include "portable/block_table.h"
 
 /// Whether every block of the dual grid of block b is cached: all or nothing. slot: its own.
 ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b, global const BlockEntry *table,

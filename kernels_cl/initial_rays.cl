@@ -1,7 +1,7 @@
 /// initial_rays.cl -- camera -> where each pixel's ray starts (Sec. 3.2).
 #define ISO_FOUND global
-#include "block_walk.h"
-#include "cell_intersect.h"
+#include "device/block_walk.h"
+#include "portable/cell_intersect.h"
 
 /// One entry per pixel [height * width]: no hit yet, the first block of the ray, whether it meets any
 /// that may be active. ray_ids[i] = i, for the compaction that follows. Grid-stride.

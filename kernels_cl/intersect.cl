@@ -1,8 +1,8 @@
 /// intersect.cl -- a block's rays against its dual grid (Sec. 3.7, 4.3).
-#include "block_cells.h"
-#include "cached_cell.h"
-#include "cell_intersect.h"
-#include "closest_pair.h"
+#include "device/block_cells.h"
+#include "device/cached_cell.h"
+#include "device/closest_pair.h"
+#include "portable/cell_intersect.h"
 
 /// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk came into doubt.
 /// dual_grid [125]: vertex x + 5y + 25z minus the isovalue.

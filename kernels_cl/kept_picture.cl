@@ -1,5 +1,5 @@
 /// kept_picture.cl -- a smaller picture of the same frame stands in where a larger one has nothing yet.
-#include "shared_types.h"
+#include "portable/shared_types.h"
 
 /// hits [height * width] takes from kept [kept_height * kept_width] the hit whose pixel lies nearest in the frame: where it has none itself, or
 /// everywhere. Both pictures have the same vertical field of view. Grid-stride.

@@ -10,8 +10,8 @@
 /// `above` the first >= isovalue - f, where the frame's voxels may be lower by e and higher by f than those that ranges were made of,
 /// some value may be below the isovalue iff low < below, and some at or above iff high >= above. Both: active. e and f may be
 /// larger for blocks of larger bounds (block_bound.h). Coarse macrocells of 4^3 blocks hold the union of their blocks.
-#include "block_grid.h"
-#include "block_stream.h"
+#include "device/block_stream.h"
+#include "portable/block_grid.h"
 
 typedef struct ValueRange {
   float min, max; /* min > max: empty */

@@ -4,10 +4,10 @@
 /// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort and no composite:
 /// a ray's blocks come in ray order, so its first change is its hit.
 #define ISO_FOUND local
-#include "block_requests.h"
-#include "level_borders.h"
-#include "march_block.h"
-#include "touched_blocks.h"
+#include "device/block_requests.h"
+#include "device/level_borders.h"
+#include "device/march_block.h"
+#include "portable/touched_blocks.h"
 
 /// Appends the rays that go on to next_active_ray_ids. Called by whole work-groups.
 /// goes_on: this work-item has one. counters [2] of the work-group: 0 on entry and on return.

@@ -10,8 +10,8 @@
 /// Two ways to rank the pairs of a tile, by -D ISO_RADIX_SERIAL: 0, all work-items of a group together
 /// (place_round); 1, the first work-item alone, one after the other: four times as fast on a CPU, where
 /// work-items are turns of a loop and atomics are dear (PoCL).
-#include "radix_sort.h"
-#include "work_group.h"
+#include "device/work_group.h"
+#include "portable/radix_sort.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_RADIX_ITEMS)
 

@@ -6,10 +6,10 @@
 /// values [num_blocks * 64]: block after block in the order of their ids, x + 4y + 16z in a block. Against rows of the whole
 /// volume, a cell's corners lie in two to four cache lines instead of four to eight, and a ray's next cell mostly in the same.
 #define ISO_FOUND local
-#include "block_cells.h"
-#include "block_stream.h"
-#include "block_walk.h"
-#include "cell_intersect.h"
+#include "device/block_cells.h"
+#include "device/block_stream.h"
+#include "device/block_walk.h"
+#include "portable/cell_intersect.h"
 
 /// Decodes blocks [first_block, first_block + num_blocks) of the zfp stream, see block_stream.h. Once per volume. Grid-stride.
 kernel void resident_decode(global const uint *part_0, global const uint *part_1, global const uint *part_2,

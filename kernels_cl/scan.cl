@@ -4,7 +4,7 @@
 /// = compact_count -> scan_exclusive of the tile sums -> compact_values. A tile is
 /// ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever waits for another
 /// one.
-#include "work_group.h"
+#include "device/work_group.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
 

@@ -1,5 +1,5 @@
 /// shade.cl -- hit buffer -> framebuffer. Never changes which hit was chosen.
-#include "shade.h"
+#include "portable/shade.h"
 
 /// hits [height * width]. image [(height / samples) * (width / samples)]: RGBA, 8 bits each. Grid-stride.
 kernel void shade(const FrameParams frame_params, constant ShadeParams *params, uint samples,

@@ -1,5 +1,5 @@
 /// speculation.cl -- the pass's N_Spec from the rays still at work (Sec. 4).
-#include "shared_types.h"
+#include "portable/shared_types.h"
 
 /// Opens a pass: N_Spec = min(max_spec_count, floor(W H / N_Act)), next_window(), counters at 0. One work-item.
 kernel void begin_pass(const FrameParams frame_params, global PassCounts *counts) {

@@ -1,6 +1,6 @@
 /// traverse.cl -- each active ray's next N_Spec blocks that may hold the isosurface (Sec. 3.3, 4.1).
 #define ISO_FOUND global
-#include "block_walk.h"
+#include "device/block_walk.h"
 
 /// pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k ascending along the ray; ISO_INVALID_ID behind
 /// the last. They are N_Spec at most, fewer where a ray has its own number (frame->per_ray_speculation). closest_pairs

@@ -1,7 +1,7 @@
 /// zfp_decode.cl -- decodes the pass's new blocks into their cache slots (Sec. 3.5).
-#include "block_grid.h"
-#include "block_stream.h"
-#include "shared_types.h"
+#include "device/block_stream.h"
+#include "portable/block_grid.h"
+#include "portable/shared_types.h"
 
 #define ISO_STAGED_VALUES 16u  ///< of each block that go to the cache together: 64 bytes
 

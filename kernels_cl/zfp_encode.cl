@@ -1,7 +1,7 @@
 /// zfp_encode.cl -- voxels -> zfp blocks, and how far the blocks are from the voxels.
-#include "block_bound.h"
-#include "two_float.h"
-#include "zfp_encode.h"
+#include "portable/block_bound.h"
+#include "portable/two_float.h"
+#include "portable/zfp_encode.h"
 
 /// Voxels of block b of a grid of voxels, along each axis: 1..4.
 typedef struct BlockPlace {

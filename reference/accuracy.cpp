@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/parallel_for.hpp"
+#include "core/base/parallel_for.hpp"
 
 namespace isowave {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "kernels_cl/grid_dda.h"
+#include "kernels_cl/portable/grid_dda.h"
 #include "reference/hit_oracle.hpp"
 
 namespace isowave {

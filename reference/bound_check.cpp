@@ -3,8 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/parallel_for.hpp"
-#include "kernels_cl/grid_dda.h"
+#include "core/base/parallel_for.hpp"
+#include "kernels_cl/portable/grid_dda.h"
 #include "reference/accuracy.hpp"
 
 namespace isowave {

@@ -1,11 +1,11 @@
 #pragma once
-// The bounds of a frame's error (core/certify.hpp) against an oracle of the volume before compression.
+// The bounds of a frame's error (core/accuracy/certify.hpp) against an oracle of the volume before compression.
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "kernels_cl/shared_types.h"
+#include "kernels_cl/portable/shared_types.h"
 #include "reference/hit_oracle.hpp"
 
 namespace isowave {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/pyramid.hpp"
+#include "core/volume/pyramid.hpp"
 
 namespace isowave {
 

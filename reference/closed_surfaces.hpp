@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/frame.hpp"
+#include "core/view/frame.hpp"
 
 namespace isowave {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "reference/embree_reach.hpp"
 #include "reference/embree_scene.hpp"
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/camera.hpp"
-#include "core/frame.hpp"
+#include "core/view/camera.hpp"
+#include "core/view/frame.hpp"
 
 namespace isowave {
 

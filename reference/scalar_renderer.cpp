@@ -9,8 +9,8 @@
 #include <thread>
 #include <utility>
 
-#include "core/detail.hpp"
-#include "kernels_cl/cell_intersect.h"
+#include "core/view/detail.hpp"
+#include "kernels_cl/portable/cell_intersect.h"
 
 namespace isowave {
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <limits>
 
-#include "core/zfp_stream.hpp"
+#include "core/zfp/zfp_stream.hpp"
 #include "reference/random.hpp"
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/solvers.hpp"
-#include "kernels_cl/grid_dda.h"
+#include "core/stages/solvers.hpp"
+#include "kernels_cl/portable/grid_dda.h"
 #include "reference/accuracy.hpp"
 
 namespace isowave {

@@ -3,10 +3,10 @@
 
 #include <vector>
 
-#include "core/detail.hpp"
-#include "core/level_bounds.hpp"
-#include "core/solvers.hpp"
-#include "core/zfp_stream.hpp"
+#include "core/stages/solvers.hpp"
+#include "core/view/detail.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "core/zfp/zfp_stream.hpp"
 
 namespace isowave {
 

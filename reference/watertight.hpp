@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/solvers.hpp"
+#include "core/stages/solvers.hpp"
 
 namespace isowave {
 

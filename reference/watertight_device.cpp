@@ -4,8 +4,8 @@
 #include <atomic>
 #include <cmath>
 
-#include "core/detail.hpp"
-#include "core/parallel_for.hpp"
+#include "core/base/parallel_for.hpp"
+#include "core/view/detail.hpp"
 #include "reference/closed_surfaces.hpp"
 #include "reference/random.hpp"
 #include "reference/scalar_renderer.hpp"

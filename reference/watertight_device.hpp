@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 #include "reference/watertight.hpp"
 
 namespace isowave {

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "core/volume.hpp"
+#include "core/volume/volume.hpp"
 
 namespace isowave {
 

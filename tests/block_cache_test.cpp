@@ -1,7 +1,7 @@
 // core/block_cache over many passes and frames, against a model that knows when and how each slot was used last. Which block
 // gets which slot is left to chance, so the model follows what the device chose and checks that it may.
 
-#include "core/block_cache.hpp"
+#include "core/stages/block_cache.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/stage_world.hpp"
 #include "tests/test_devices.hpp"

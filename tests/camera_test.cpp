@@ -1,6 +1,6 @@
 // Camera files, degenerate cameras, and the default orbit.
 
-#include "core/camera.hpp"
+#include "core/view/camera.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <limits>
 #include <string>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {

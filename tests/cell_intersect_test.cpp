@@ -1,6 +1,6 @@
-// kernels_cl/cell_intersect.h on the host against long double: signs, faces, first changes, whole cells.
+// kernels_cl/portable/cell_intersect.h on the host against long double: signs, faces, first changes, whole cells.
 
-#include "kernels_cl/cell_intersect.h"
+#include "kernels_cl/portable/cell_intersect.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <random>
 #include <vector>
 
-#include "core/solvers.hpp"
+#include "core/stages/solvers.hpp"
 #include "tests/cubic_oracle.hpp"
 #include "tests/stage_support.hpp"
 

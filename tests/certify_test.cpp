@@ -1,6 +1,7 @@
 // Bounds of a frame's error: never exceeded against the volume before compression, in double precision; and what is chosen by them.
 
-#include "core/certify.hpp"
+#include "core/accuracy/certify.hpp"
+#include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,12 +9,12 @@
 #include <array>
 #include <filesystem>
 
-#include "core/choose_detail.hpp"
-#include "core/error.hpp"
-#include "core/level_bounds.hpp"
-#include "core/pyramid.hpp"
-#include "kernels_cl/block_bound.h"
-#include "kernels_cl/grid_dda.h"
+#include "core/accuracy/choose_detail.hpp"
+#include "core/base/error.hpp"
+#include "core/volume/pyramid.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "kernels_cl/portable/block_bound.h"
+#include "kernels_cl/portable/grid_dda.h"
 #include "reference/accuracy.hpp"
 #include "reference/bound_check.hpp"
 #include "reference/cell_oracle.hpp"

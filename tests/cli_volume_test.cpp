@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/zfp_stream.hpp"
+#include "core/zfp/zfp_stream.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {

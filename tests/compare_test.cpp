@@ -1,6 +1,6 @@
 // What `isowave compare` counts, and its exit status.
 
-#include "core/compare.hpp"
+#include "core/accuracy/compare.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {

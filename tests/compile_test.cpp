@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/ocl/kernel_cache.hpp"
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
 #include "tests/test_devices.hpp"

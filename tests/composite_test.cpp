@@ -1,6 +1,6 @@
 // core/composite: results made up at random, against a plain loop over each ray's pairs.
 
-#include "core/composite.hpp"
+#include "core/stages/composite.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <vector>
 
-#include "kernels_cl/cell_intersect.h"
+#include "kernels_cl/portable/cell_intersect.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/stage_world.hpp"

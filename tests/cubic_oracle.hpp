@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "kernels_cl/cell_intersect.h"
+#include "kernels_cl/portable/cell_intersect.h"
 
 namespace isowave {
 

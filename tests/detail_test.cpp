@@ -1,6 +1,7 @@
 // Frames in bands of several levels of detail: where the borders are, and that every device draws what the twin draws.
 
-#include "core/detail.hpp"
+#include "core/view/detail.hpp"
+#include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +10,9 @@
 #include <numeric>
 #include <random>
 
-#include "core/error.hpp"
-#include "core/pyramid.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/render/renderer.hpp"
+#include "core/volume/pyramid.hpp"
 #include "reference/twin.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"

@@ -1,6 +1,6 @@
 // The compressed volume in one buffer, in several, and on the host behind a window: decoders see the same bits.
 
-#include "core/device_stream.hpp"
+#include "core/stream/device_stream.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,11 +8,11 @@
 #include <cstring>
 #include <numeric>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/io/input_file.hpp"
-#include "core/macrocells.hpp"
-#include "core/zfp_decode.hpp"
-#include "kernels_cl/zfp_codec.h"
+#include "core/stages/macrocells.hpp"
+#include "core/stages/zfp_decode.hpp"
+#include "kernels_cl/portable/zfp_codec.h"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
 #include "tests/stage_support.hpp"

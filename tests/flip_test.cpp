@@ -1,6 +1,6 @@
 // FLIP against what its authors' program says.
 
-#include "core/flip.hpp"
+#include "core/accuracy/flip.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <array>
 #include <functional>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 
 namespace isowave {
 namespace {

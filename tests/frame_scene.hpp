@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/frame.hpp"
-#include "core/zfp_accuracy.hpp"
-#include "core/zfp_stream.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+#include "core/zfp/zfp_stream.hpp"
 #include "reference/scalar_renderer.hpp"
 #include "tests/array_reader.hpp"
 

@@ -1,6 +1,6 @@
 // Frame constants: which pixels may see the active blocks.
 
-#include "core/frame.hpp"
+#include "core/view/frame.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "kernels_cl/grid_dda.h"
+#include "kernels_cl/portable/grid_dda.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 

@@ -1,6 +1,7 @@
 // Synthetic fields: closed forms, every type, the same bytes for any number of threads.
 
-#include "core/generate.hpp"
+#include "core/generate/generate.hpp"
+#include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +12,7 @@
 #include <cstring>
 #include <limits>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {

@@ -1,7 +1,7 @@
-// kernels_cl/grid_dda.h: crossings and positions against long double, walks of one size against those of
+// kernels_cl/portable/grid_dda.h: crossings and positions against long double, walks of one size against those of
 // another.
 
-#include "kernels_cl/grid_dda.h"
+#include "kernels_cl/portable/grid_dda.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <random>
 #include <vector>
 
-#include "kernels_cl/touched_blocks.h"
+#include "kernels_cl/portable/touched_blocks.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 

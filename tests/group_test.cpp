@@ -1,6 +1,6 @@
 // core/group: pairs gathered by block, exactly those whose dual grid is cached, against plain loops, by either grouping.
 
-#include "core/group.hpp"
+#include "core/stages/group.hpp"
 
 #include <gtest/gtest.h>
 

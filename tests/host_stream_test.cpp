@@ -7,8 +7,8 @@
 
 #include <numeric>
 
-#include "core/error.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
 #include "tests/test_pipelines.hpp"

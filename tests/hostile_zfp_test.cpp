@@ -9,11 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "core/error.hpp"
-#include "core/level_bounds.hpp"
-#include "core/libzfp.hpp"
-#include "core/zfp_accuracy.hpp"
-#include "core/zfp_file.hpp"
+#include "core/base/error.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "core/zfp/libzfp.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+#include "core/zfp/zfp_file.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/volume_file.hpp"
 #include "tests/zfp_trailer_file.hpp"

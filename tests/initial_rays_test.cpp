@@ -1,6 +1,6 @@
 // core/initial_rays: each pixel's first block and the first wavefront, against a walk over every cell.
 
-#include "core/initial_rays.hpp"
+#include "core/stages/initial_rays.hpp"
 
 #include <gtest/gtest.h>
 

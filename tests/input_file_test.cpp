@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {

@@ -1,7 +1,7 @@
 // core/intersect: every pair against the portable headers on the host (equal bits), and rays against closed
 // forms in double on a plane and on a saddle, which are trilinear.
 
-#include "core/intersect.hpp"
+#include "core/stages/intersect.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "kernels_cl/cell_intersect.h"
+#include "kernels_cl/portable/cell_intersect.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/stage_world.hpp"

@@ -6,7 +6,7 @@
 
 #include <numeric>
 
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 

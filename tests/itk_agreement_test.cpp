@@ -9,6 +9,7 @@
 #include <limits>
 #include <random>
 
+#include "core/io/open_volume.hpp"
 #include "core/io/raw_reader.hpp"
 #include "tests/volume_file.hpp"
 

@@ -1,6 +1,6 @@
 // core/macrocells: ranges and masks against plain loops over the voxels that libzfp decodes.
 
-#include "core/macrocells.hpp"
+#include "core/stages/macrocells.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <set>
 #include <vector>
 
-#include "core/frame.hpp"
-#include "core/level_bounds.hpp"
-#include "core/zfp_decode.hpp"
-#include "kernels_cl/block_grid.h"
+#include "core/stages/zfp_decode.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "kernels_cl/portable/block_grid.h"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 

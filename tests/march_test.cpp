@@ -1,7 +1,7 @@
 // core/march, stage by stage: which rays start and where, what they ask for, and when they hit. Whole frames are in
 // render_test.cpp and invariance_test.cpp.
 
-#include "core/march.hpp"
+#include "core/stages/march.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <map>
 #include <set>
 
-#include "core/zfp_decode.hpp"
-#include "kernels_cl/touched_blocks.h"
+#include "core/stages/zfp_decode.hpp"
+#include "kernels_cl/portable/touched_blocks.h"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_cases.hpp"
 #include "tests/test_devices.hpp"

@@ -1,14 +1,14 @@
 // The plan of all device memory against what is really booked, and budgets that are kept or refused.
 
-#include "core/memory_plan.hpp"
+#include "core/render/memory_plan.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "core/error.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 

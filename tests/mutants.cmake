@@ -8,10 +8,11 @@ target_link_libraries(mutant_main PRIVATE isowave_reference)
 target_compile_options(mutant_main PRIVATE -w $<$<CONFIG:Release>:-O1>)  # what a bug leaves unused is no matter
 target_precompile_headers(mutant_main PRIVATE <CL/opencl.hpp> <algorithm> <fmt/format.h> <glm/glm.hpp> <thread> <vector>)
 
-# copy_with_bug(<name> <files> <file> <line as it stands> <line with the bug>): into mutants/<name>/kernels_cl.
-function(copy_with_bug name files file from to)
+# copy_with_bug(<name> <pattern> <file> <line as it stands> <line with the bug>): files of kernels_cl into
+# mutants/<name>/kernels_cl.
+function(copy_with_bug name pattern file from to)
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name}/kernels_cl)
-  file(COPY ${files} DESTINATION ${folder})
+  file(COPY ${CMAKE_SOURCE_DIR}/kernels_cl/ DESTINATION ${folder} FILES_MATCHING REGEX ${pattern})
   file(READ ${CMAKE_SOURCE_DIR}/kernels_cl/${file} text)
   string(FIND "${text}" "${from}" place)
   if(place EQUAL -1)
@@ -19,13 +20,13 @@ function(copy_with_bug name files file from to)
   endif()
   string(REPLACE "${from}" "${to}" text "${text}")
   file(CONFIGURE OUTPUT ${folder}/${file} CONTENT "${text}" @ONLY)
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${files})
+  file(GLOB_RECURSE originals ${CMAKE_SOURCE_DIR}/kernels_cl/*.h ${CMAKE_SOURCE_DIR}/kernels_cl/*.cl)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${originals})
 endfunction()
 
-# add_mutant(<name> <header> <line as it stands> <line with the bug>)
+# add_mutant(<name> <header of portable/> <line as it stands> <line with the bug>)
 function(add_mutant name header from to)
-  file(GLOB headers ${CMAKE_SOURCE_DIR}/kernels_cl/*.h)
-  copy_with_bug(${name} "${headers}" ${header} "${from}" "${to}")
+  copy_with_bug(${name} "\\.h$" portable/${header} "${from}" "${to}")
   add_executable(mutant_${name} $<TARGET_OBJECTS:mutant_main> ${CMAKE_SOURCE_DIR}/reference/scalar_renderer.cpp)
   target_include_directories(mutant_${name} BEFORE PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name})
   target_link_libraries(mutant_${name} PRIVATE isowave_reference)
@@ -71,12 +72,11 @@ target_link_libraries(device_mutant_main PRIVATE isowave_reference)
 function(add_device_mutant name pipelines file from to)
   set(mutant device_${name})
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${mutant})
-  file(GLOB kernel_sources ${CMAKE_SOURCE_DIR}/kernels_cl/*.h ${CMAKE_SOURCE_DIR}/kernels_cl/*.cl)
-  copy_with_bug(${mutant} "${kernel_sources}" ${file} "${from}" "${to}")
-  file(GLOB kernels ${folder}/kernels_cl/*.cl)
+  copy_with_bug(${mutant} "\\.(h|cl)$" ${file} "${from}" "${to}")
+  file(GLOB_RECURSE kernels ${folder}/kernels_cl/*.cl)
   add_custom_command(
     OUTPUT ${folder}/kernels.cpp
-    COMMAND ${CMAKE_COMMAND} -D "output=${folder}/kernels.cpp" -D "kernels=${kernels}" -P ${embed_kernels_script}
+    COMMAND ${CMAKE_COMMAND} -D "output=${folder}/kernels.cpp" -D "folder=${folder}/kernels_cl" -D "kernels=${kernels}" -P ${embed_kernels_script}
     DEPENDS ${kernels} ${folder}/kernels_cl/${file} ${embed_kernels_script} VERBATIM)
   # The linker takes these kernels, and not those of isowave_kernels behind them.
   add_executable(mutant_${mutant} $<TARGET_OBJECTS:device_mutant_main> ${folder}/kernels.cpp)
@@ -90,6 +90,6 @@ add_device_mutant(none_at_all "rays;blocks" macrocells.cl "/// macrocells.cl" "/
 set_tests_properties(mutant.device_none_at_all PROPERTIES WILL_FAIL TRUE)
 add_device_mutant(own_voxels_only "rays;blocks" macrocells.cl "    range = join(range, (corner & 4 ?"
   "    if (corner == 0) range = join(range, (corner & 4 ?")
-add_device_mutant(half_of_macrocells "rays;blocks" block_walk.h
+add_device_mutant(half_of_macrocells "rays;blocks" device/block_walk.h
   "(bit < 32 ? low >> bit : high >> (bit - 32)) & 1u" "(bit < 32 ? low >> bit : 0u) & 1u")
-add_device_mutant(lost_results blocks closest_pair.h "atomic_min(" "atomic_max(")
+add_device_mutant(lost_results blocks device/closest_pair.h "atomic_min(" "atomic_max(")

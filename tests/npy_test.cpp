@@ -15,7 +15,7 @@
 #include <random>
 #include <string>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/ocl/kernel.hpp"
 #include "tests/test_devices.hpp"
 

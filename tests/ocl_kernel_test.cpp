@@ -12,8 +12,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "core/error.hpp"
-#include "kernels_cl/shared_types.h"
+#include "core/base/error.hpp"
+#include "kernels_cl/portable/shared_types.h"
 #include "tests/test_devices.hpp"
 
 namespace isowave {

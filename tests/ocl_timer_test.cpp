@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/ocl/kernel.hpp"
-#include "kernels_cl/shared_types.h"
+#include "kernels_cl/portable/shared_types.h"
 #include "tests/test_devices.hpp"
 
 namespace isowave {

@@ -12,7 +12,7 @@
 #include <random>
 #include <string>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/volume_file.hpp"
 
 namespace isowave {

@@ -1,6 +1,6 @@
 // Levels of detail: their voxels against a plain triple loop, and volumes that have them in memory and in files.
 
-#include "core/pyramid.hpp"
+#include "core/volume/pyramid.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/error.hpp"
-#include "core/zfp_accuracy.hpp"
+#include "core/base/error.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
 #include "tests/zfp_trailer_file.hpp"

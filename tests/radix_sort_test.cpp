@@ -1,7 +1,7 @@
 // core/radix_sort against std::stable_sort. Values are the places of their keys before sorting, so that a
 // swap of equal keys shows.
 
-#include "core/radix_sort.hpp"
+#include "core/stages/radix_sort.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "kernels_cl/radix_sort.h"
+#include "kernels_cl/portable/radix_sort.h"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 

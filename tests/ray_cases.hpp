@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "core/camera.hpp"
-#include "core/frame.hpp"
-#include "kernels_cl/grid_dda.h"
+#include "core/view/camera.hpp"
+#include "core/view/frame.hpp"
+#include "kernels_cl/portable/grid_dda.h"
 
 namespace isowave {
 

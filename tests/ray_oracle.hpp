@@ -12,8 +12,8 @@
 #include <limits>
 #include <vector>
 
-#include "core/camera.hpp"
-#include "core/frame.hpp"
+#include "core/view/camera.hpp"
+#include "core/view/frame.hpp"
 
 namespace isowave::test {
 

@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "core/error.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 

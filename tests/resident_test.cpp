@@ -1,12 +1,12 @@
 // The floor of the benchmarks draws what the pipelines draw: the twin's hit buffer, bit for bit.
 
-#include "core/resident.hpp"
+#include "core/stages/resident.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 

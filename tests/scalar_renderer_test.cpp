@@ -9,8 +9,8 @@
 #include <numbers>
 #include <optional>
 
-#include "core/error.hpp"
-#include "core/shade.hpp"
+#include "core/base/error.hpp"
+#include "core/stages/shade.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_oracle.hpp"
 

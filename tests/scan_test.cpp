@@ -1,6 +1,6 @@
 // core/scan: prefix sums and compaction against std::exclusive_scan and a plain loop.
 
-#include "core/scan.hpp"
+#include "core/stages/scan.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
 // Pictures of hit buffers: one colour for each pixel, of one ray or the mean of several.
 
-#include "core/shade.hpp"
+#include "core/stages/shade.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/error.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/render/renderer.hpp"
 #include "reference/twin.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"

@@ -1,6 +1,6 @@
-// The device's compiler must lay out kernels_cl/shared_types.h as the host's does.
+// The device's compiler must lay out kernels_cl/portable/shared_types.h as the host's does.
 
-#include "kernels_cl/shared_types.h"
+#include "kernels_cl/portable/shared_types.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/ocl/kernel.hpp"
-#include "kernels_cl/shared_types_fields.h"
+#include "kernels_cl/portable/shared_types_fields.h"
 #include "tests/test_devices.hpp"
 
 namespace isowave {

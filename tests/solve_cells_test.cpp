@@ -1,7 +1,7 @@
 // core/solve_cells: every solver of the family gives the same bits on the device as on the host, also where it fails; and
 // whole frames drawn with each.
 
-#include "core/solve_cells.hpp"
+#include "core/stages/solve_cells.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <cmath>
 #include <vector>
 
-#include "core/error.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/render/renderer.hpp"
 #include "reference/random.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"

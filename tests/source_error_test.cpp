@@ -7,12 +7,13 @@
 #include <cmath>
 #include <limits>
 
-#include "core/error.hpp"
-#include "core/generate.hpp"
-#include "core/level_bounds.hpp"
-#include "core/zfp_accuracy.hpp"
-#include "core/zfp_encode.hpp"
-#include "kernels_cl/block_bound.h"
+#include "core/base/error.hpp"
+#include "core/generate/generate.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+#include "core/zfp/zfp_encode.hpp"
+#include "kernels_cl/portable/block_bound.h"
 #include "reference/cell_oracle.hpp"
 #include "reference/random.hpp"
 #include "tests/array_reader.hpp"

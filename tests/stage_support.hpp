@@ -14,12 +14,12 @@
 #include <stdexcept>
 #include <vector>
 
-#include "core/device_counts.hpp"
-#include "core/libzfp.hpp"
-#include "core/zfp_accuracy.hpp"
-#include "core/zfp_stream.hpp"
-#include "kernels_cl/shared_types.h"
-#include "kernels_cl/shared_types_fields.h"
+#include "core/stages/device_counts.hpp"
+#include "core/zfp/libzfp.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+#include "core/zfp/zfp_stream.hpp"
+#include "kernels_cl/portable/shared_types.h"
+#include "kernels_cl/portable/shared_types_fields.h"
 
 namespace isowave {
 

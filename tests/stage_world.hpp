@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "core/block_cache.hpp"
-#include "core/frame.hpp"
-#include "core/scan.hpp"
-#include "core/wavefront.hpp"
-#include "kernels_cl/block_grid.h"
+#include "core/stages/block_cache.hpp"
+#include "core/stages/scan.hpp"
+#include "core/stages/wavefront.hpp"
+#include "core/view/frame.hpp"
+#include "kernels_cl/portable/block_grid.h"
 #include "tests/stage_support.hpp"
 
 namespace isowave {

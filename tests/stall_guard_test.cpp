@@ -1,6 +1,6 @@
 // A frame without progress is an error; slow progress is not.
 
-#include "core/stall_guard.hpp"
+#include "core/render/stall_guard.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

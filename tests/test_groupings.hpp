@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/group.hpp"
+#include "core/stages/group.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave {

@@ -1,13 +1,13 @@
 // Frames within a time: the steps that are drawn, what shows where time was over, and a clock that this file winds itself.
 
-#include "core/time_budget.hpp"
+#include "core/render/time_budget.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 

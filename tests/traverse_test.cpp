@@ -1,7 +1,7 @@
 // core/traverse: the blocks of each ray against a walk over every cell (the same
 // arithmetic, so equal), and against slabs in double (its own, so every block that a ray crosses must be there).
 
-#include "core/traverse.hpp"
+#include "core/stages/traverse.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <cmath>
 #include <vector>
 
-#include "core/initial_rays.hpp"
-#include "core/zfp_decode.hpp"
-#include "kernels_cl/grid_dda.h"
+#include "core/stages/initial_rays.hpp"
+#include "core/stages/zfp_decode.hpp"
+#include "kernels_cl/portable/grid_dda.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"

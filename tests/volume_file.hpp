@@ -11,8 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "core/error.hpp"
-#include "core/volume.hpp"
+#include "core/base/error.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/volume/volume.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave::test {

@@ -9,8 +9,9 @@
 #include <limits>
 #include <thread>
 
-#include "core/error.hpp"
-#include "core/volume.hpp"
+#include "core/base/error.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/volume/volume.hpp"
 #include "tests/run_program.hpp"
 #include "tests/volume_file.hpp"
 

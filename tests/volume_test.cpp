@@ -1,6 +1,7 @@
 // Raw files: names, sizes, types, gzip. The formats with headers are in volume_headers_test.cpp.
 
-#include "core/volume.hpp"
+#include "core/volume/volume.hpp"
+#include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +11,7 @@
 #include <limits>
 #include <numeric>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/io/raw_reader.hpp"
 #include "tests/volume_file.hpp"
 

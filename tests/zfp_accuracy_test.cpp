@@ -1,7 +1,7 @@
 // Volumes with a bound on the error: streams against libzfp, the index, the choice of bit planes, files and what is
 // refused.
 
-#include "core/zfp_accuracy.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,9 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/error.hpp"
-#include "core/zfp_file.hpp"
-#include "kernels_cl/zfp_codec.h"
+#include "core/base/error.hpp"
+#include "core/zfp/zfp_file.hpp"
+#include "kernels_cl/portable/zfp_codec.h"
 #include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 #include "tests/stage_support.hpp"

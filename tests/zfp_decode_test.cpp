@@ -1,6 +1,6 @@
-// kernels_cl/zfp_codec.h, on the host and through core/zfp_decode, against libzfp: the same bits.
+// kernels_cl/portable/zfp_codec.h, on the host and through core/zfp_decode, against libzfp: the same bits.
 
-#include "core/zfp_decode.hpp"
+#include "core/stages/zfp_decode.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "kernels_cl/zfp_codec.h"
+#include "kernels_cl/portable/zfp_codec.h"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 #include "tests/zfp_values.hpp"

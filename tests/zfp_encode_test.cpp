@@ -1,7 +1,7 @@
-// kernels_cl/zfp_encode.h, on the host and through core/zfp_encode, against libzfp: the same bits. Then whole
+// kernels_cl/portable/zfp_encode.h, on the host and through core/zfp_encode, against libzfp: the same bits. Then whole
 // volumes compressed on a device against the host.
 
-#include "core/zfp_encode.hpp"
+#include "core/zfp/zfp_encode.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@
 #include <limits>
 #include <vector>
 
-#include "core/error.hpp"
-#include "kernels_cl/zfp_encode.h"
+#include "core/base/error.hpp"
+#include "kernels_cl/portable/zfp_encode.h"
 #include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 #include "tests/stage_support.hpp"

@@ -1,6 +1,7 @@
 // Compression against libzfp on the whole array, zfp's own tool, and files by other writers.
 
-#include "core/zfp_stream.hpp"
+#include "core/zfp/zfp_stream.hpp"
+#include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +12,7 @@
 #include <limits>
 #include <random>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 

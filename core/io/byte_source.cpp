@@ -4,7 +4,7 @@
 #include <new>
 #include <utility>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 
 namespace isowave {
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <optional>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/io/byte_source.hpp"
 
 namespace isowave {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/io/text_header.hpp"
-#include "core/text.hpp"
 
 namespace isowave {
 

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/io/byte_source.hpp"
 #include "core/io/text_voxels.hpp"
-#include "core/text.hpp"
 
 namespace isowave {
 namespace fs = std::filesystem;

@@ -11,9 +11,16 @@
 #include <string_view>
 
 #include "core/io/volume_header.hpp"
-#include "core/volume.hpp"
+#include "core/volume/volume.hpp"
 
 namespace isowave {
+
+/// What a raw file's name does not say, or says wrongly. Unset fields come from the name.
+struct RawOverrides {
+  std::optional<glm::uvec3> dims;
+  std::optional<VoxelType> type;
+  std::optional<glm::dvec3> spacing;  ///< also replaces the spacing of other formats
+};
 
 /// What an Open-SciVis file name says. name is what stands before the dims.
 struct RawName {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/error.hpp"
-#include "core/text.hpp"
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
 
 namespace isowave {
 

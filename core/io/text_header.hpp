@@ -21,7 +21,7 @@ std::vector<std::string_view> split_words(std::string_view text);
 /// The start of a text, in quotes.
 std::string quote(std::string_view text);
 
-/// As parse_all() in core/text.hpp, also with a plus before the number.
+/// As parse_all() in core/base/text.hpp, also with a plus before the number.
 std::optional<double> parse_number(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
 

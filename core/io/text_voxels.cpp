@@ -7,7 +7,7 @@
 #include <system_error>
 #include <type_traits>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/io/text_header.hpp"
 
 namespace isowave {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/io/byte_source.hpp"
-#include "core/volume.hpp"
+#include "core/volume/volume.hpp"
 
 namespace isowave {
 

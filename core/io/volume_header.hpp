@@ -12,7 +12,7 @@
 #include <string>
 
 #include "core/io/input_file.hpp"
-#include "core/volume.hpp"
+#include "core/volume/volume.hpp"
 
 namespace isowave {
 

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 
 namespace isowave::ocl {
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/ocl/device_list.hpp"
 #include "core/ocl/kernel_sources.hpp"
 #include "core/ocl/pocl_environment.hpp"

@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <optional>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/ocl/pocl_environment.hpp"
-#include "core/text.hpp"
 
 namespace isowave::ocl {
 

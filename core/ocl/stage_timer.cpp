@@ -1,6 +1,6 @@
 #include "core/ocl/stage_timer.hpp"
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/ocl/device.hpp"
 
 namespace isowave::ocl {

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "core/camera.hpp"
+#include "core/view/camera.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 using namespace isowave;

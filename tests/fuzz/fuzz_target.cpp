@@ -13,8 +13,9 @@
 #include <system_error>
 #include <vector>
 
-#include "core/error.hpp"
-#include "core/volume.hpp"
+#include "core/base/error.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/volume/volume.hpp"
 
 namespace isowave::fuzz {
 namespace fs = std::filesystem;

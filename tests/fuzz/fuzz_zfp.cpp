@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "core/zfp_file.hpp"
-#include "core/zfp_stream.hpp"
-#include "kernels_cl/zfp_codec.h"
+#include "core/zfp/zfp_file.hpp"
+#include "core/zfp/zfp_stream.hpp"
+#include "kernels_cl/portable/zfp_codec.h"
 #include "tests/fuzz/fuzz_target.hpp"
 #include "tests/fuzz/zfp_parts.hpp"
 

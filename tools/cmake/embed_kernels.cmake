@@ -6,10 +6,11 @@ set(embed_kernels_script ${CMAKE_CURRENT_LIST_DIR}/embed_kernels_script.cmake)
 
 function(embed_kernels target)
   set(generated ${CMAKE_CURRENT_BINARY_DIR}/generated/${target}.cpp)
-  file(GLOB headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/kernels_cl/*.h)
+  set(folder ${CMAKE_CURRENT_SOURCE_DIR}/kernels_cl)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${folder}/*.h)
   add_custom_command(
     OUTPUT ${generated}
-    COMMAND ${CMAKE_COMMAND} -D "output=${generated}" -D "kernels=${ARGN}" -P ${embed_kernels_script}
+    COMMAND ${CMAKE_COMMAND} -D "output=${generated}" -D "folder=${folder}" -D "kernels=${ARGN}" -P ${embed_kernels_script}
     DEPENDS ${ARGN} ${headers} ${embed_kernels_script}
     COMMENT "Embedding OpenCL kernels" VERBATIM)
   add_library(${target} STATIC ${generated})

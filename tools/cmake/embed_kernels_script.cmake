@@ -1,10 +1,11 @@
-# Run by embed_kernels(): -D output=<file.cpp> -D kernels=<a.cl;b.cl>.
+# Run by embed_kernels(): -D output=<file.cpp> -D folder=<kernels_cl> -D kernels=<a.cl;b.cl>.
 cmake_minimum_required(VERSION 3.25)  # a script has no policies of its own
 
-# Appends `file` to `result` with each `#include "x.h"` replaced, the first time, by that header's text.
+# Appends `file` to `result` with each `#include "x.h"` replaced, the first time, by that header's text. As a compiler with
+# -I<folder> does, looks beside the file first, then in the folder.
 function(expand file)
-  get_filename_component(name ${file} NAME)
-  get_filename_component(folder ${file} DIRECTORY)
+  file(RELATIVE_PATH name ${folder} ${file})
+  get_filename_component(beside ${file} DIRECTORY)
   file(READ ${file} text)
   # Brackets and semicolons would be taken as CMake list syntax.
   string(REPLACE "[" "@OPEN@" text "${text}")
@@ -16,11 +17,14 @@ function(expand file)
   set(line_number 0)
   foreach(line IN LISTS lines)
     math(EXPR line_number "${line_number} + 1")
-    if(line MATCHES "^#include \"([a-z0-9_]+\\.h)\"")
-      set(header ${CMAKE_MATCH_1})
+    if(line MATCHES "^#include \"([a-z0-9_/]+\\.h)\"")
+      set(header ${beside}/${CMAKE_MATCH_1})
+      if(NOT EXISTS ${header})
+        set(header ${folder}/${CMAKE_MATCH_1})
+      endif()
       if(NOT header IN_LIST included)
         list(APPEND included ${header})
-        expand(${folder}/${header})
+        expand(${header})
       endif()
       math(EXPR next_line "${line_number} + 1")
       string(APPEND result "#line ${next_line} \"${name}\"\n")

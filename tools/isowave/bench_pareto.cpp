@@ -13,12 +13,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/choose_detail.hpp"
-#include "core/compare.hpp"
-#include "core/error.hpp"
-#include "core/flip.hpp"
-#include "core/parallel_for.hpp"
-#include "core/renderer.hpp"
+#include "core/accuracy/choose_detail.hpp"
+#include "core/accuracy/compare.hpp"
+#include "core/accuracy/flip.hpp"
+#include "core/base/error.hpp"
+#include "core/base/parallel_for.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/render/renderer.hpp"
 #include "reference/accuracy.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/outputs.hpp"

@@ -14,11 +14,11 @@
 #include <optional>
 #include <utility>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/io/png.hpp"
-#include "core/parallel_for.hpp"
-#include "core/renderer.hpp"
-#include "core/solve_cells.hpp"
+#include "core/render/renderer.hpp"
+#include "core/stages/solve_cells.hpp"
 #include "reference/accuracy.hpp"
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"

@@ -1,6 +1,6 @@
 // `isowave compare A B`: two depth images (.npy) or two PNGs.
 
-#include "core/compare.hpp"
+#include "core/accuracy/compare.hpp"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "core/error.hpp"
-#include "core/flip.hpp"
+#include "core/accuracy/flip.hpp"
+#include "core/base/error.hpp"
 #include "core/io/input_file.hpp"
 #include "tools/isowave/commands.hpp"
 

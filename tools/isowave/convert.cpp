@@ -7,10 +7,11 @@
 #include <optional>
 #include <string>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
+#include "core/base/printed_bound.hpp"
+#include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
-#include "core/printed_bound.hpp"
-#include "core/zfp_accuracy.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/outputs.hpp"

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/ocl/device.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/render_stats.hpp"

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <optional>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {

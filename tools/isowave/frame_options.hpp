@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/camera.hpp"
-#include "core/frame.hpp"
-#include "core/zfp_stream.hpp"
+#include "core/view/camera.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/zfp_stream.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {

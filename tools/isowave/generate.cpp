@@ -1,6 +1,6 @@
 // isowave generate: writes a synthetic volume in the Open-SciVis naming.
 
-#include "core/generate.hpp"
+#include "core/generate/generate.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <memory>
 #include <system_error>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"

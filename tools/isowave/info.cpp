@@ -11,9 +11,10 @@
 #include <span>
 #include <system_error>
 
-#include "core/error.hpp"
-#include "core/level_bounds.hpp"
-#include "core/zfp_stream.hpp"
+#include "core/base/error.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "core/zfp/zfp_stream.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/volume_options.hpp"

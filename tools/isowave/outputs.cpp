@@ -10,9 +10,10 @@
 #include <string_view>
 #include <system_error>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/io/atomic_file.hpp"
-#include "core/volume.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/volume/volume.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {

@@ -19,7 +19,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "core/ocl/device.hpp"
 #include "core/ocl/pocl_environment.hpp"
 #include "tools/isowave/strict_options.hpp"

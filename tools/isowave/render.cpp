@@ -10,12 +10,12 @@
 #include <memory>
 #include <optional>
 
-#include "core/choose_detail.hpp"
-#include "core/detail.hpp"
-#include "core/error.hpp"
+#include "core/accuracy/choose_detail.hpp"
+#include "core/base/error.hpp"
 #include "core/io/npy.hpp"
-#include "core/renderer.hpp"
-#include "core/time_budget.hpp"
+#include "core/render/renderer.hpp"
+#include "core/render/time_budget.hpp"
+#include "core/view/detail.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"

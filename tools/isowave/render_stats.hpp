@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/camera.hpp"
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
+#include "core/view/camera.hpp"
 
 namespace isowave::tools {
 

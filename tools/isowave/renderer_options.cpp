@@ -1,6 +1,6 @@
 #include "tools/isowave/renderer_options.hpp"
 
-#include "core/error.hpp"
+#include "core/base/error.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/renderer.hpp"
+#include "core/render/renderer.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::tools {

@@ -8,8 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "core/error.hpp"
-#include "core/text.hpp"
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
 
 namespace isowave::tools {
 

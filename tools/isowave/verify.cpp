@@ -6,8 +6,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "core/error.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/render/renderer.hpp"
 #include "reference/stability_suite.hpp"
 #include "reference/watertight.hpp"
 #include "reference/watertight_device.hpp"

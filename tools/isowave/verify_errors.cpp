@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "core/choose_detail.hpp"
-#include "core/error.hpp"
+#include "core/accuracy/choose_detail.hpp"
+#include "core/base/error.hpp"
 #include "reference/accuracy.hpp"
 #include "reference/bound_check.hpp"
 #include "reference/cell_oracle.hpp"

@@ -7,8 +7,8 @@
 #include <memory>
 #include <span>
 
-#include "core/error.hpp"
-#include "core/renderer.hpp"
+#include "core/base/error.hpp"
+#include "core/render/renderer.hpp"
 #include "reference/cell_oracle.hpp"
 #include "reference/embree_reach.hpp"
 #include "reference/mesh_oracle.hpp"

@@ -5,13 +5,14 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/error.hpp"
-#include "core/frame.hpp"
-#include "core/generate.hpp"
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
+#include "core/generate/generate.hpp"
+#include "core/io/open_volume.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
-#include "core/text.hpp"
-#include "core/zfp_accuracy.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {

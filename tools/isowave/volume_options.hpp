@@ -10,8 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "core/volume.hpp"
-#include "core/zfp_stream.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/volume/volume.hpp"
+#include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::tools {
 

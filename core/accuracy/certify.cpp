@@ -1,0 +1,191 @@
+#include "core/accuracy/certify.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+#include "core/base/error.hpp"
+#include "core/base/parallel_for.hpp"
+#include "core/view/detail.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/zfp_codec.h"
+
+namespace isowave {
+
+namespace {
+
+constexpr float kNotCertain = std::numeric_limits<float>::infinity();
+/// What the t of a drawn hit and that of a bound's may have lost in float32 (make_hit()): each half an ulp of itself, and eight roundings of
+/// the ray's length in the cell: two of the step between its faces, one of the sum, and those of the root (ISO_ROOT_STEP).
+constexpr double kDistanceRounding = 2 * 0x1p-24, kCellRounding = 2 * 0x1p-21;
+
+/// A level's decoded voxels, block by block as they are asked for. Not thread-safe.
+class BlockValues {
+ public:
+  BlockValues(const CompressedVolume &volume, double value_error, const ValueOffset &upper)
+      : volume_(volume), bound_(coarser(volume.error_bound, value_error)), upper_(upper) {}
+
+  /// Of a dual cell: both bounds of the field, minus the isovalue, as kernels compute them.
+  void corners(const glm::ivec3 &cell, float isovalue, std::array<float, 8> &lower,
+               std::array<float, 8> &upper) {
+    const glm::uvec3 blocks = volume_.num_blocks();
+    for (std::uint32_t corner = 0; corner < 8; ++corner) {
+      const glm::uvec3 at = glm::uvec3(cell) + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
+      const std::uint32_t id = at.x / 4 + blocks.x * (at.y / 4 + blocks.y * (at.z / 4));
+      const std::uint32_t voxel = at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4);
+      const float value = decoded(id)[voxel], offset = offset_of_voxel(upper_, volume_.bounds, id, voxel);
+      lower[corner] = value - offset - isovalue;
+      upper[corner] = value + offset - isovalue;
+    }
+  }
+
+ private:
+  const std::array<float, 64> &decoded(std::uint32_t id) {
+    const auto [entry, is_new] = blocks_.try_emplace(id);
+    if (!is_new) return entry->second;
+    const std::uint32_t bits = volume_.block_bits(id);
+    std::array<std::uint32_t, ISO_MAX_BLOCK_BITS / 32 + 1 + kDecoderAhead> words{};
+    volume_.read_words(volume_.block_begin(id), std::span(words).first((bits + 31) / 32 + kDecoderAhead));
+    std::array<float, 64> &values = entry->second;
+    zfp_decode_block(words.data(), 0, bits, bound_.min_exponent, values.data());
+    if (bound_.whole_numbers)
+      std::ranges::transform(values, values.begin(), [](float v) { return std::rint(v) + 0.0f; });
+    return values;
+  }
+
+  const CompressedVolume &volume_;
+  ErrorBound bound_;
+  ValueOffset upper_;
+  std::unordered_map<std::uint32_t, std::array<float, 64>> blocks_;
+};
+
+/// Whether a ray begins inside or outside, of both bounds alike; or it misses the volume.
+bool starts_certainly(std::span<const FrameParams> frames, std::span<BlockValues> values,
+                      std::uint32_t pixel) {
+  for (std::size_t level = 0; level < frames.size(); ++level) {
+    const FrameParams &frame = frames[level];
+    if (!draws(frame)) continue;
+    const Ray ray = make_ray(&frame, pixel);
+    const LastPlanes last = last_planes(&frame), zero{};
+    RayEvent enter = border_event(frame.begin_t), exit = border_event(frame.end_t);
+    if (!clip_to_box(&ray, zero, last, &enter, &exit)) continue;
+    const glm::ivec3 cell(locate(ray.x, 0, enter, 1, 0, last.x - 1),
+                          locate(ray.y, 1, enter, 1, 0, last.y - 1),
+                          locate(ray.z, 2, enter, 1, 0, last.z - 1));
+    std::array<float, 8> lower{}, upper{};
+    values[level].corners(cell, frame.isovalue, lower, upper);
+    return inside_at(&ray, lower.data(), enter, cell.x, cell.y, cell.z, 0) ==
+           inside_at(&ray, upper.data(), enter, cell.x, cell.y, cell.z, 0);
+  }
+  return true;
+}
+
+/// From where to where a ray is in the finest level's domain [world units]; empty if it misses it.
+std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel) {
+  const Ray ray = make_ray(&finest, pixel);
+  const LastPlanes last = last_planes(&finest), zero{};
+  RayEvent enter = start_event(), exit = border_event(std::numeric_limits<float>::infinity());
+  if (!clip_to_box(&ray, zero, last, &enter, &exit)) return {1, 0};
+  return {double{enter.t.hi} * double{finest.t_scale}, double{exit.t.hi} * double{finest.t_scale}};
+}
+
+}  // namespace
+
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Camera &camera, float isovalue,
+                    std::span<const HitRecord> drawn) {
+  const auto begin = std::chrono::steady_clock::now();
+  const RendererOptions &options = renderer.options();
+  if (!finds_all(options.solver)) {
+    throw Error(
+        "the error of frames drawn with solver {} has no bound, since it may miss a surface: take bernstein",
+        to_string(options.solver));
+  }
+  Certificate certificate;
+  const auto draw = [&](FieldBound bound) {
+    renderer.draw_bound(bound);
+    for (const PassStats &pass : renderer.render(camera, isovalue).passes)
+      certificate.decoded_blocks += pass.counts.decoded_count;
+    return renderer.hits();
+  };
+  std::vector<HitRecord> lower, upper;
+  try {
+    lower = draw(FieldBound::kLower);
+    upper = draw(FieldBound::kUpper);
+  } catch (...) {
+    renderer.draw_bound(FieldBound::kNone);
+    throw;
+  }
+  renderer.draw_bound(FieldBound::kNone);
+
+  const std::vector<const CompressedVolume *> levels = levels_of(volume, options.max_pixel_error > 0);
+  std::vector<ValueOffset> offsets;
+  std::vector<double> value_errors;
+  for (const CompressedVolume *level : levels) {
+    value_errors.push_back(value_error_of(renderer.value_error(), value_errors.size()));
+    offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
+                                   plane_error(level->error_bound, value_errors.back()), volume.value_range));
+  }
+  const std::vector<FrameParams> frames =
+      make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size, isovalue,
+                        options.max_pixel_error);
+  std::size_t coarsest = levels.size() - 1;
+  while (!draws(frames[coarsest])) --coarsest;
+  const glm::dmat3 voxel = levels[coarsest]->info.index_to_world();
+  const double cell_rounding =
+      kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
+  const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / options.size.height;
+  certificate.bounds.assign(drawn.size(), kNotCertain);
+  constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks
+  parallel_for((options.size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
+    std::vector<BlockValues> values;
+    for (std::size_t i = 0; i < levels.size(); ++i)
+      values.emplace_back(*levels[i], value_errors[i], offsets[i]);
+    const auto first = static_cast<std::uint32_t>(part * kRows * options.size.ray_columns());
+    const std::uint32_t end =
+        std::min(first + kRows * options.size.ray_columns(), static_cast<std::uint32_t>(drawn.size()));
+    for (std::uint32_t pixel = first; pixel < end; ++pixel) {
+      const double t = double{drawn[pixel].t}, first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
+                   last_t = double{std::max(lower[pixel].t, upper[pixel].t)};
+      const std::array<double, 2> way = way_through(frames[0], pixel);
+      float &bound = certificate.bounds[pixel];
+      if (std::isinf(t) && std::isinf(first_t)) {
+        if (way[0] > way[1] || starts_certainly(frames, values, pixel)) bound = 0;
+      } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] && last_t <= way[1] &&
+                 starts_certainly(frames, values, pixel)) {
+        const double rounding = kDistanceRounding * last_t + cell_rounding;
+        const double distance = std::max(t - first_t, last_t - t) + rounding;
+        bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
+      }
+    }
+  });
+  certificate.total_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return certificate;
+}
+
+CertificateSummary summarize(const Certificate &certificate, double limit) {
+  CertificateSummary summary;
+  std::vector<float> bounds;
+  for (const float bound : certificate.bounds) {
+    if (bound == 0) continue;
+    ++summary.num_pixels;
+    if (std::isinf(bound)) {
+      ++summary.num_uncertain;
+    } else {
+      bounds.push_back(bound);
+    }
+    summary.num_certified += double{bound} <= limit;
+  }
+  if (bounds.empty()) return summary;
+  std::ranges::sort(bounds);
+  summary.median = double{bounds[bounds.size() / 2]};
+  summary.p99 = double{bounds[(bounds.size() - 1) * 99 / 100]};
+  summary.max = double{bounds.back()};
+  return summary;
+}
+
+}  // namespace isowave

@@ -1,0 +1,173 @@
+#include "core/accuracy/choose_detail.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "core/base/error.hpp"
+#include "core/view/detail.hpp"
+
+namespace isowave {
+
+namespace {
+
+/// Of the small picture: a pixel for so many of the frame along each axis, but no fewer rows.
+constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
+/// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave less.
+constexpr int kNumPixelErrors = 41;
+std::vector<double> pixel_errors() {
+  std::vector<double> errors;
+  errors.reserve(kNumPixelErrors);
+  for (int i = 0; i < kNumPixelErrors; ++i) errors.push_back(std::exp2(3.0 - 0.125 * i));
+  return errors;
+}
+
+/// What values may lose: an eighth of their range, and so many times half of it, as long as that matters beside the error that the volume
+/// has anyway, and leaves out bit planes.
+constexpr int kNumValueErrors = 8;
+std::vector<double> value_errors(const CompressedVolume &volume, double error) {
+  const double range = double{volume.value_range[1]} - double{volume.value_range[0]};
+  double value_error = std::exp2(std::floor(std::log2(std::max(range, 1e-30) / 8)));
+  std::vector<double> errors;
+  errors.reserve(kNumValueErrors);
+  for (int i = 0; i < kNumValueErrors && value_error > error / 2; ++i, value_error /= 2) {
+    if (plane_error(volume.error_bound, value_error) != 0) errors.push_back(value_error);
+  }
+  return errors;
+}
+
+/// Blocks that frames of levels of detail decode for these hits, against those of the finest level alone: a pixel covers blocks by the
+/// square of its distance, and of each level a quarter as many.
+double blocks_share(std::span<const HitRecord> hits, std::span<const FrameParams> frames) {
+  double with_levels = 0, finest = 0;
+  for (const HitRecord &hit : hits) {
+    if (std::isinf(hit.t)) continue;
+    int level = 0;
+    for (std::size_t i = 1; i < frames.size(); ++i) {
+      if (draws(frames[i]) && frames[i].begin_t * frames[i].t_scale <= hit.t) level = static_cast<int>(i);
+    }
+    const double blocks = double{hit.t} * double{hit.t};
+    finest += blocks;
+    with_levels += std::ldexp(blocks, -2 * level);
+  }
+  return finest == 0 ? 1.0 : with_levels / finest;
+}
+
+/// An error of at least so much can be kept in any volume of these values: 2^-24 of the next power of two above them is lost by the cast
+/// to float32 and another by zfp, at most, or all of a value that is flushed to 0.
+double least_tolerance(const std::array<float, 2> &range) {
+  return std::max(std::ldexp(double{std::max(std::abs(range[0]), std::abs(range[1]))}, -22),
+                  2 * double{kMinMagnitude});
+}
+
+/// Two digits, which are not more.
+double rounded_down(double value) {
+  const double digit = std::pow(10.0, std::floor(std::log10(value)) - 1);
+  return std::floor(value / digit) * digit;
+}
+
+/// Says what would help where most pixels do not keep max_error. error: of the volume's voxels.
+void advise(const CompressedVolume &volume, double error, double max_error, DetailChoice &choice) {
+  const double least = least_tolerance(volume.value_range);
+  if (choice.median > max_error && error > 0) {
+    const double tolerance = rounded_down(error * max_error / choice.median);
+    if (tolerance >= least && tolerance < error) choice.tolerance = tolerance;
+  }
+  const std::string half =
+      fmt::format("at full detail half of those with a bound are within {:.3g}", choice.median);
+  if (choice.tolerance) {
+    choice.advice =
+        fmt::format("{}; a volume converted with --tolerance {:.2g} would do", half, *choice.tolerance);
+  } else if (error <= least) {
+    choice.advice = "voxels can hardly be stored with a smaller error than these have";
+  } else if (choice.median > max_error) {
+    choice.advice = fmt::format("{}; no error that voxels can be stored with would do", half);
+  } else {
+    choice.advice = fmt::format(
+        "most have no bound at all; with voxels that are off by less than these, by up to {:.3g}, more would",
+        error);
+  }
+}
+
+}  // namespace
+
+void check_max_error(double max_error) {
+  if (!(max_error > 0) || !std::isfinite(max_error))
+    throw Error("an error of {} pixels cannot be kept: give more than 0", max_error);
+}
+
+RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume) {
+  options.with_bounds = true;
+  options.max_pixel_error = volume.coarser.empty() ? 0 : 1;
+  return options;
+}
+
+DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
+                           float isovalue, double max_error) {
+  check_max_error(max_error);
+  const auto begin = std::chrono::steady_clock::now();
+  const ImageSize size = renderer.options().size;
+  const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
+  const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
+  const double stride = double(size.height) / small.height;
+  const auto set = [&](const Detail &detail, double scale) {
+    renderer.set_max_pixel_error(detail.max_pixel_error / scale);
+    renderer.set_value_error(detail.value_error);
+  };
+  // Neither is known: certify() throws.
+  const double error = known_max_error(volume).value_or(double{largest_bound(volume.bounds)});
+  DetailChoice choice;
+  const auto try_out = [&](const Detail &detail) {
+    set(detail, stride);
+    renderer.render(camera, isovalue);
+    std::vector<HitRecord> hits = renderer.hits();
+    const CertificateSummary summary =
+        summarize(certify(renderer, volume, camera, isovalue, hits), max_error / stride);
+    const double all = std::max<double>(double(summary.num_pixels), 1);
+    choice.tries.push_back({detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
+    return std::pair(summary, std::move(hits));
+  };
+  renderer.set_size(small);
+  try {
+    const auto [at_full_detail, finest_hits] = try_out({});
+    choice.median = stride * at_full_detail.median;
+    const double best = choice.tries.front().certified;
+    choice.reachable = best >= 0.5;
+    if (!choice.reachable) advise(volume, error, max_error, choice);
+    const auto suffices = [&](const Detail &detail) {
+      try_out(detail);
+      return choice.tries.back().certified >= best - kLostShare;
+    };
+    // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with any less, too: a bisection.
+    const auto first_to_suffice = [&](const std::vector<double> &numbers, const auto &detail_of) {
+      const auto found =
+          std::ranges::partition_point(numbers, [&](double number) { return !suffices(detail_of(number)); });
+      return found == numbers.end() ? 0.0 : *found;
+    };
+    if (choice.reachable && renderer.has_levels()) {
+      const double coarsest = first_to_suffice(pixel_errors(), [](double pixel_error) {
+        return Detail{pixel_error, 0};
+      });
+      const std::vector<FrameParams> frames =
+          make_level_frames(level_infos(volume, true), camera, size, isovalue, coarsest);
+      if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.max_pixel_error = coarsest;
+    }
+    if (choice.reachable && volume.rate() > kMinPlaneRate) {
+      choice.detail.value_error = first_to_suffice(value_errors(volume, error), [&](double value_error) {
+        return Detail{choice.detail.max_pixel_error, value_error};
+      });
+    }
+  } catch (...) {
+    renderer.set_size(size);
+    set({}, 1);
+    throw;
+  }
+  renderer.set_size(size);
+  set(choice.detail, 1);
+  choice.total_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return choice;
+}
+
+}  // namespace isowave

@@ -1,0 +1,61 @@
+#include "core/io/open_volume.hpp"
+
+#include <algorithm>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
+#include "core/io/input_file.hpp"
+#include "core/io/meta_image_header.hpp"
+#include "core/io/nifti_header.hpp"
+#include "core/io/nrrd_header.hpp"
+#include "core/io/raw_reader.hpp"
+
+namespace isowave {
+namespace fs = std::filesystem;
+
+namespace {
+
+bool has_ending(const fs::path &path, std::initializer_list<std::string_view> endings) {
+  const std::string name = lower_case(path.filename().string());
+  return std::any_of(endings.begin(), endings.end(),
+                     [&](std::string_view ending) { return name.ends_with(ending); });
+}
+
+/// Nothing for kinds of files that have none.
+std::optional<VolumeHeader> read_header(const std::shared_ptr<const InputFile> &file) {
+  const fs::path &path = file->path();
+  if (has_ending(path, {".nrrd", ".nhdr"})) return read_nrrd_header(file);
+  if (has_ending(path, {".mha", ".mhd"})) return read_meta_image_header(file);
+  if (has_ending(path, {".nii", ".nii.gz"})) return read_nifti_header(file, has_ending(path, {".gz"}));
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::filesystem::path voxel_file(const fs::path &path) {
+  const auto file = std::make_shared<const InputFile>(path);
+  const std::optional<VolumeHeader> header = read_header(file);
+  return header ? header->voxels.file->path() : path;
+}
+
+std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {
+  const auto file = std::make_shared<const InputFile>(path);
+  if (has_ending(path, {".raw", ".raw.gz"})) return open_raw(file, has_ending(path, {".gz"}), overrides);
+  std::optional<VolumeHeader> header = read_header(file);
+  if (!header) {
+    throw Error("{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
+                path.string());
+  }
+  if (overrides.dims || overrides.type) {
+    throw Error("{}: --dims and --type are for raw files; this file's header gives its own", path.string());
+  }
+  if (overrides.spacing) header->info.spacing = *overrides.spacing;
+  check_volume_info(header->info, path.string());
+  return open_voxels(*header);
+}
+
+}  // namespace isowave

@@ -1,0 +1,141 @@
+#include "core/render/pipeline.hpp"
+
+#include "core/stages/composite.hpp"
+#include "core/stages/group.hpp"
+#include "core/stages/initial_rays.hpp"
+#include "core/stages/intersect.hpp"
+#include "core/stages/march.hpp"
+#include "core/stages/speculation.hpp"
+#include "core/stages/traverse.hpp"
+
+namespace isowave {
+
+namespace {
+
+class BlocksPipeline : public Pipeline {
+ public:
+  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping,
+                 ClosestHit closest)
+      : state_(state),
+        compaction_(state.device, state.rays.num_rays, group_size),
+        initial_rays_(state.device, state.rays.num_rays),
+        speculation_(state.device),
+        traverse_(state.device, state.rays.num_rays, group_size),
+        group_(state.device, state.rays.num_rays, state.cache.num_slots, group_size, grouping, closest),
+        intersect_(state.device, state.rays.num_rays, group_size, solver, closest),
+        composite_(state.device, state.rays.num_rays, closest) {}
+
+  void begin_frame() override {
+    const auto stage = state_.device.timer().stage("initial_rays");
+    initial_rays_(state_.rays, compaction_);
+  }
+
+  void enqueue_pass() override {
+    ocl::StageTimer &timer = state_.device.timer();
+    const auto pass = timer.stage("speculation");
+    speculation_.begin_pass(state_.rays);
+    {
+      const auto stage = timer.stage("traverse");
+      traverse_(state_.levels[0].macrocells, state_.rays);
+    }
+    {
+      const auto stage = timer.stage("request");
+      state_.cache.request(state_.rays);
+    }
+    state_.provide_blocks(state_.rays.counts, state_.drawing);
+    {
+      const auto stage = timer.stage("group");
+      group_(state_.cache, state_.rays);
+    }
+    {
+      const auto stage = timer.stage("intersect");
+      intersect_(state_.cache, group_.groups(), state_.rays);
+    }
+    {
+      const auto stage = timer.stage("composite");
+      composite_(state_.cache, state_.rays, compaction_);
+    }
+  }
+
+ private:
+  FrameState &state_;
+  Compaction compaction_;
+  InitialRays initial_rays_;
+  Speculation speculation_;
+  Traverse traverse_;
+  Group group_;
+  Intersect intersect_;
+  Composite composite_;
+};
+
+class RaysPipeline : public Pipeline {
+ public:
+  RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
+      : state_(state),
+        march_(state.device, state.rays.num_rays, group_size, solver, state.levels.size() > 1) {}
+
+  void begin_frame() override {
+    const auto stage = state_.device.timer().stage("start_rays");
+    if (unanswered_) state_.rays.forget_rays();
+    march_.start_rays(macrocells(), state_.rays);
+  }
+
+  void enqueue_pass() override {
+    Wavefront &rays = state_.rays;
+    rays.open_pass();
+    if (unanswered_) state_.provide_blocks(rays.previous_counts, asked_);
+    {
+      const auto stage = state_.device.timer().stage("march");
+      march_(macrocells(), state_.cache, rays);
+    }
+    const auto stage = state_.device.timer().stage("request");
+    march_.request_ahead(macrocells(), state_.cache, rays);
+    unanswered_ = true;
+    asked_ = state_.drawing;
+  }
+
+  void end_frame() override { unanswered_ = false; }
+
+ private:
+  const Macrocells &macrocells() const { return state_.levels[0].macrocells; }
+
+  FrameState &state_;
+  March march_;
+  bool unanswered_ = false;  ///< the last pass may have asked for blocks, and left rays
+  LevelRange asked_;         ///< of these levels
+};
+
+}  // namespace
+
+std::string_view to_string(PipelineKind kind) {
+  return kind == PipelineKind::kBlocks ? "blocks" : "rays";
+}
+
+void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
+  {
+    const auto stage = device.timer().stage("cache");
+    if (slots_are_scarce) cache.evict(asked, rays);
+    cache.assign(asked, rays);
+  }
+  const auto stage = device.timer().stage("decode");
+  try {
+    for (std::size_t i = of.first; i < of.end; ++i) {
+      Level &level = levels[i];
+      // Two in one launch: it takes as long as one block, mostly.
+      if (i + 1 < of.end && level.decode.can_join(levels[i + 1].stream)) ++i;
+      level.decode({level.stream, level.frame}, {levels[i].stream, levels[i].frame}, rays.counts, cache);
+    }
+  } catch (...) {  // blocks have slots, but no values
+    cache.clear();
+    throw;
+  }
+}
+
+std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
+                                        Solver solver, Grouping grouping, ClosestHit closest) {
+  if (kind == PipelineKind::kBlocks)
+    return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping, closest);
+  return std::make_unique<RaysPipeline>(state, group_size, solver);
+}
+
+}  // namespace isowave

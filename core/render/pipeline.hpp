@@ -1,0 +1,77 @@
+#pragma once
+// The passes of a frame: two ways to arrange the same stages, with the same finished picture bit for bit.
+//
+//   blocks  [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]*   the paper's (Sec. 3.3 to 4.4)
+//   rays    start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
+//           each ray intersects what it meets, as far as it is cached
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "core/stages/block_cache.hpp"
+#include "core/stages/group.hpp"
+#include "core/stages/macrocells.hpp"
+#include "core/stages/solvers.hpp"
+#include "core/stages/wavefront.hpp"
+#include "core/stages/zfp_decode.hpp"
+#include "core/zfp/level_bounds.hpp"
+
+namespace isowave {
+
+enum class PipelineKind {
+  kAuto,  ///< kRays, which was faster in nearly all that was measured (README "Results")
+  kBlocks,
+  kRays
+};
+std::string_view to_string(PipelineKind kind);
+
+/// The volume on the device, or one of its levels of detail.
+struct Level {
+  VolumeInfo info;
+  ErrorBound error_bound;  ///< of its blocks
+  LevelError error;        ///< of its field against the volume's
+  DeviceStream stream;
+  Macrocells macrocells;
+  ZfpDecode decode;
+  FrameParams frame{};     ///< its part of the frame at work
+  double range_error = 0;  ///< of voxels of fewer bit planes, at most
+};
+
+/// Levels of detail: from `first` to below `end`.
+struct LevelRange {
+  std::size_t first = 0, end = 1;
+};
+
+/// What every pipeline works on.
+struct FrameState {
+  ocl::Device &device;
+  std::vector<Level> levels;  ///< the finest first
+  Wavefront rays;
+  BlockCache cache;
+  LevelRange drawing{};          ///< the frame at work
+  bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
+
+  /// Cache and decode: the blocks asked for, asked.requested_count, of those levels, get slots and values. Asynchronous but where the stream
+  /// stays on the host: see ZfpDecode. Where that throws, the cache is empty.
+  void provide_blocks(const CountsBuffer &asked, LevelRange of);
+};
+
+class Pipeline {
+ public:
+  virtual ~Pipeline() = default;
+  /// Makes the frame's rays from state.rays.frame. Asynchronous.
+  virtual void begin_frame() = 0;
+  /// Enqueues one pass: a chain of launches whose sizes live on the device. Asynchronous.
+  virtual void enqueue_pass() = 0;
+  /// Says that no ray is left in the frame. Without it, the next frame knows that passes of this one were not followed up.
+  virtual void end_frame() {}
+};
+
+/// `state` must outlive the pipeline.
+std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
+                                        Solver solver, Grouping grouping, ClosestHit closest);
+
+}  // namespace isowave

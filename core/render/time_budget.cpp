@@ -1,0 +1,107 @@
+#include "core/render/time_budget.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/base/error.hpp"
+
+namespace isowave {
+
+namespace {
+
+/// Pixels of a step for each of the step before.
+constexpr double kGrowth = 4;
+
+void add(FrameStats &sum, FrameStats step) {
+  step.passes.insert(step.passes.begin(), sum.passes.begin(), sum.passes.end());
+  step.uploaded_blocks += sum.uploaded_blocks;
+  step.uploaded_bytes += sum.uploaded_bytes;
+  sum = std::move(step);
+}
+
+}  // namespace
+
+void check_time_budget(double budget_ms) {
+  if (!(budget_ms > 0) || !std::isfinite(budget_ms))
+    throw Error("no picture can be drawn in {} ms: give more than 0", budget_ms);
+}
+
+double TimedFrames::steady_clock_ms() {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+TimedFrames::TimedFrames(Renderer &renderer, Clock now) : renderer_(renderer), now_(std::move(now)) {
+  if (!renderer.options().with_kept_picture) throw std::logic_error("the renderer keeps no picture");
+}
+
+TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budget_ms) {
+  check_time_budget(budget_ms);
+  const double begin = now_();
+  const ImageSize full = renderer_.options().size;
+  const double full_error = renderer_.options().max_pixel_error;
+  TimedFrame frame;
+  std::size_t step = kNumSteps - 1;
+  try {
+    for (;;) {
+      const double scale = std::ldexp(1.0, static_cast<int>(step)) / full.samples;  // of its pixels
+      const double pixel_error = step == 0                ? full_error
+                                 : renderer_.has_levels() ? std::max(1.0, full_error / scale)
+                                                          : 0.0;
+      renderer_.set_size(halved(full, static_cast<unsigned>(step)));
+      renderer_.set_max_pixel_error(pixel_error);
+      const double step_begin = now_();
+      double pass_begin = step_begin, first_pass_ms = 0;
+      const bool may_be_cancelled = !frame.steps.empty();
+      // Further passes have fewer rays, so the next one takes no longer than the last, mostly.
+      const OnPass in_time = [&](const PassStats &) {
+        const double now = now_(), pass_ms = now - pass_begin;
+        if (first_pass_ms == 0) first_pass_ms = pass_ms;
+        pass_begin = now;
+        return !may_be_cancelled || now + pass_ms - begin <= budget_ms;
+      };
+      const FrameStats stats = renderer_.render(camera, isovalue, in_time);
+      const bool whole = !stats.cancelled;
+      const double now = now_(), step_ms = now - step_begin;
+      frame.steps.push_back({renderer_.options().size, pixel_error, step_ms,
+                             stats.passes.back().completed_percent, stats.cancelled});
+      add(frame.stats, stats);
+      frame.complete = whole && step == 0;
+      last_ms_[step] = whole ? step_ms : 2 * step_ms;
+      if (!whole) renderer_.fill_from_kept();
+      if (step == 0) break;
+      renderer_.keep_picture();
+      const std::size_t next =
+          whole ? next_step(step, step_ms, first_pass_ms, budget_ms - (now - begin)) : step;
+      if (next == step) break;
+      step = next;
+    }
+  } catch (...) {
+    renderer_.set_size(full);
+    renderer_.set_max_pixel_error(full_error);
+    throw;
+  }
+  renderer_.set_size(full);
+  renderer_.set_max_pixel_error(full_error);
+  if (step != 0) renderer_.enlarge_kept(camera, isovalue);
+  frame.stats.total_ms = now_() - begin;
+  return frame;
+}
+
+/// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms, or `step` where there is no time.
+std::size_t TimedFrames::next_step(std::size_t step, double step_ms, double first_pass_ms,
+                                   double left_ms) const {
+  std::size_t next = step;
+  double expected = step_ms;
+  for (std::size_t finer = step; finer-- > 0;) {
+    expected = last_ms_[finer] > 0 ? last_ms_[finer] : kGrowth * expected;
+    if (expected <= left_ms) next = finer;
+  }
+  // Part of a better picture is better than none.
+  if (next == step && step > 0 && kGrowth * first_pass_ms <= left_ms) next = step - 1;
+  return next;
+}
+
+}  // namespace isowave

@@ -1,0 +1,26 @@
+#include "core/stages/kept_picture.hpp"
+
+namespace isowave {
+
+KeptPicture::KeptPicture(ocl::Device &device, ImageSize largest)
+    : device_(device),
+      hits_(device, "kept hits", largest.num_rays()),
+      show_(device, "kept_picture", "show_kept") {}
+
+void KeptPicture::compile(Wavefront &rays) {
+  for (const std::uint64_t num_rays : {std::uint64_t{1}, rays.num_rays})  // PoCL compiles large ones anew
+    show_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_), FrameParams{}, 1, 1, hits_, 0u, rays.hits);
+}
+
+void KeptPicture::keep(const Wavefront &rays, ImageSize size) {
+  hits_.copy(rays.hits, size.num_rays());
+  size_ = size;
+}
+
+void KeptPicture::show(Wavefront &rays, bool everywhere) {
+  const std::uint64_t num_rays = std::uint64_t{rays.frame.width} * rays.frame.height;
+  show_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_), rays.frame, size_.ray_columns(),
+        size_.ray_rows(), hits_, everywhere ? 1u : 0u, rays.hits);
+}
+
+}  // namespace isowave

@@ -1,0 +1,39 @@
+#pragma once
+// A picture put aside while the same frame is drawn again with more pixels, whose place it takes until they are there. See
+// kernels_cl/kept_picture.cl.
+
+#include <cstdint>
+
+#include "core/ocl/kernel.hpp"
+#include "core/stages/wavefront.hpp"
+#include "core/view/frame.hpp"
+
+namespace isowave {
+
+/// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel. 0 times: the picture itself.
+inline ImageSize halved(ImageSize size, unsigned times) {
+  if (times == 0) return size;
+  const auto half = [times](std::uint32_t rays) { return ((rays - 1) >> times) + 1; };
+  return {half(size.ray_columns()), half(size.ray_rows())};
+}
+
+class KeptPicture {
+ public:
+  /// Largest size of a picture that can be kept.
+  KeptPicture(ocl::Device &device, ImageSize largest);
+
+  /// Launches the kernel without a pixel to show, see Device::Compiling.
+  void compile(Wavefront &rays);
+  /// Copies the hit buffer, a picture of that size. Asynchronous. Throws std::invalid_argument: a larger picture.
+  void keep(const Wavefront &rays, ImageSize size);
+  /// The hit buffer, a picture as large as rays.frame says, takes the kept hits: where it has none, or everywhere. Asynchronous.
+  void show(Wavefront &rays, bool everywhere);
+
+ private:
+  ocl::Device &device_;
+  ImageSize size_{0, 0};
+  ocl::Buffer<HitRecord> hits_;
+  ocl::Kernel<FrameParams, uint, uint, ocl::In<HitRecord>, uint, ocl::Out<HitRecord>> show_;
+};
+
+}  // namespace isowave

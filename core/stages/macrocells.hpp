@@ -1,0 +1,114 @@
+#pragma once
+// Which blocks may hold the isosurface (Sec. 3.1): value ranges of blocks and of coarse macrocells of 4^3
+// blocks, built once per volume from decoded data, and one bit per block for the isovalue at hand. See
+// kernels_cl/macrocells.cl.
+
+#include <array>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/ocl/kernel.hpp"
+#include "core/stages/device_counts.hpp"
+#include "core/stream/device_stream.hpp"
+
+namespace isowave {
+
+/// Of one level of detail or of several, one behind the other: FrameParams::ranges_begin, masks_begin.
+struct MacrocellBuffers {
+  /// num_selections: masks are kept of so many, for whoever draws the volume, and its lower and upper bound, by turns.
+  MacrocellBuffers(ocl::Device &device, std::uint64_t num_blocks, std::uint64_t num_macrocells,
+                   std::size_t num_selections = 1)
+      : ranges(device, "block ranges", num_blocks) {
+    masks.reserve(num_selections);
+    for (std::size_t i = 0; i < num_selections; ++i)
+      masks.emplace_back(device, "macrocell masks", 2 * num_macrocells);
+  }
+  ocl::Buffer<cl_ushort> ranges;
+  std::vector<ocl::Buffer<uint>> masks;  ///< [selections]
+  std::size_t selection = 0;             ///< the one in use, at all levels
+};
+
+class Macrocells {
+ public:
+  /// Decodes every block once, beside a sample for the quantile table, and waits.
+  /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z layer.
+  /// buffers: shared with other levels; none: its own.
+  Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
+             std::shared_ptr<MacrocellBuffers> buffers = {});
+
+  /// Bytes that building needs beside what stays.
+  static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
+
+  /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the ranges were made of. moved: the stream,
+  /// if its layout raises or lowers voxels as it did not when the ranges were made. Does nothing where the masks in use are those.
+  void select(const FrameParams &frame, double value_error = 0, const DeviceStream *moved = nullptr);
+  /// Sets what a frame of the isovalue selected last needs: its isovalue_index ...
+  void set_index(FrameParams &frame) { frame.isovalue_index = selection().isovalue_index; }
+  /// ... and its active box, for which the first call waits.
+  void set_active_box(FrameParams &frame);
+
+  /// Takes other masks, of all levels that share the buffers, for select() and all that follows.
+  void use(std::size_t selection) { buffers_->selection = selection; }
+
+  /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
+  const ocl::Buffer<uint> &masks() const { return buffers_->masks[buffers_->selection]; }
+  /// [blocks]: low in bits 0..7, high in bits 8..15, indices into thresholds(); low > high: owns no dual
+  /// cell.
+  const ocl::Buffer<cl_ushort> &ranges() const { return buffers_->ranges; }
+  /// [256], ascending from -inf to +inf.
+  const std::vector<float> &thresholds() const { return thresholds_; }
+
+ private:
+  struct ValueRange {
+    float min, max;
+  };
+  using PartialsKernel =
+      ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+                  StreamLayout, uint, uint, uint, uint, ocl::Out<ValueRange>>;
+  /// Decodes blocks sampled_block(first + i * stride, stride), i in [0, count): partials [8 * count].
+  struct Partials {
+    void operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
+                    ocl::Buffer<ValueRange> &partials);
+    ocl::Device &device;
+    const FrameParams &frame;
+    const DeviceStream &stream;
+    PartialsKernel &kernel;
+  };
+
+  /// What masks are made of, and what belongs to them.
+  struct Selection {
+    /// Isovalue, value_error, uniform and per-block offset of the layout; none: nothing yet.
+    std::optional<std::array<double, 4>> of{};
+    std::uint32_t isovalue_index = 0;
+    ocl::Buffer<int> box;
+    /// Begin x, y, z, end x, y, z [macrocells]; none: still on the device.
+    std::optional<std::array<int, 6>> active_box{};
+  };
+  Selection &selection() { return selections_[buffers_->selection]; }
+
+  struct BuildKernels {
+    PartialsKernel partials;
+    ocl::Kernel<FrameParams, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
+                ocl::Out<cl_ushort>>
+        ranges;
+    ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_ranges;
+  };
+  void compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels);
+  void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
+  std::vector<float> sample_thresholds(ocl::Device &device, std::uint32_t num_blocks, Partials &decode);
+
+  std::uint32_t num_coarse_;
+  ocl::Range coarse_range_;
+  std::shared_ptr<MacrocellBuffers> buffers_;
+  ocl::Buffer<cl_ushort> coarse_ranges_;
+  ocl::Buffer<uint> limits_;
+  std::vector<Selection> selections_;
+  std::vector<float> thresholds_;
+  ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::In<uint>,
+              uint, ocl::Out<uint>, ocl::Out<int>>
+      masks_kernel_;
+};
+
+}  // namespace isowave

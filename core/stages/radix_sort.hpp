@@ -1,0 +1,47 @@
+#pragma once
+// Stable radix sort of (key, value) pairs on the device (Sec. 3.6).
+
+#include "core/ocl/kernel.hpp"
+#include "core/stages/device_counts.hpp"
+
+namespace isowave {
+
+/// Who ranks the pairs of a tile (radix_sort.cl). The result is the same.
+enum class RadixRanking {
+  kTogether,  ///< all work-items of a group, a bit for each pair
+  kSerial     ///< one work-item of a group: where these are turns of a loop
+};
+
+class RadixSort {
+ public:
+  /// max_count: the largest number of pairs any call may sort; scratch is O(max_count).
+  RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size, RadixRanking ranking);
+  /// Ranks as suits the device.
+  RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size);
+
+  /// Sorts pairs [0, n) by key, ascending; equal keys keep their order; n is the count in `count_field`.
+  ///
+  /// keys, values  at least max_count entries. Entries past n are undefined afterwards: the buffers trade
+  ///               places with scratch ones.
+  /// key_bits      1..32; every key must be < 2^key_bits. O(n * key_bits).
+  /// Throws std::invalid_argument when buffers are smaller than max_count or key_bits is out of range.
+  /// Asynchronous: enqueues and does not wait.
+  void operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field,
+                  uint key_bits);
+
+  /// Entries of the table of digits.
+  static std::uint64_t table_size(std::uint64_t max_count, std::uint32_t group_size);
+
+ private:
+  std::size_t max_count_;
+  std::uint32_t group_size_;
+  ocl::Range tiles_range_;
+  ocl::Buffer<uint> other_keys_, other_values_, table_;
+  ocl::Kernel<ocl::In<uint>, ocl::In<PassCounts>, uint, uint, uint, ocl::Out<uint>> histogram_;
+  ocl::Kernel<ocl::In<PassCounts>, uint, uint, ocl::Out<uint>> scan_;
+  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<PassCounts>, uint, uint, uint, ocl::In<uint>,
+              ocl::Out<uint>, ocl::Out<uint>>
+      scatter_;
+};
+
+}  // namespace isowave

@@ -1,0 +1,45 @@
+#pragma once
+// Hit buffer -> framebuffer: headlight Blinn-Phong on the gradient of the trilinear field.
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "core/io/png.hpp"
+#include "core/ocl/kernel.hpp"
+#include "core/stages/wavefront.hpp"
+#include "kernels_cl/portable/shade.h"
+
+namespace isowave {
+
+/// Colours are display values, [0,1].
+struct Appearance {
+  glm::vec3 surface{0.86f, 0.74f, 0.53f};
+  glm::vec3 background{1.0f, 1.0f, 1.0f};
+  float ambient = 0.15f, diffuse = 0.75f, specular = 0.25f;
+};
+
+ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
+
+/// The picture of a frame's hit buffer on the host, of so many rays a pixel along each axis: the twin's. Same bits as Shade.
+Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits,
+                    std::uint32_t samples = 1);
+
+class Shade {
+ public:
+  /// max_pixels: of a picture.
+  Shade(ocl::Device &device, std::uint64_t max_pixels);
+
+  /// Launches the kernel without a pixel to shade, see Device::Compiling.
+  void compile(Wavefront &rays);
+
+  /// Shades rays.hits, of so many rays a pixel along each axis, and waits. RGB.
+  Image8 operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples = 1);
+
+ private:
+  ocl::Device &device_;
+  ocl::Buffer<ShadeParams> params_;
+  ocl::Buffer<uint> image_;
+  ocl::Kernel<FrameParams, ocl::In<ShadeParams>, uint, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
+};
+
+}  // namespace isowave

@@ -1,0 +1,31 @@
+#pragma once
+// The family of root finders by name (kernels_cl/portable/solver.h says what each guarantees and where it fails).
+
+#include <array>
+#include <string_view>
+
+#include "core/ocl/device.hpp"
+#include "kernels_cl/portable/solver.h"
+
+namespace isowave {
+
+/// The cheapest that passes the whole stability suite (README "Solvers").
+inline constexpr Solver kDefaultSolver{ISO_SOLVER_BERNSTEIN, 32};
+
+inline constexpr std::array<std::string_view, 4> kSolverNames{"linear", "marmitt", "analytic", "bernstein"};
+
+/// "linear", "marmitt", "analytic", "bernstein".
+std::string_view to_string(Solver solver);
+/// The solver of that name with the steps its authors use: linear and marmitt 4, bernstein 32 (it stops by
+/// itself after 3 to 5). Throws Error naming the solvers.
+Solver solver_from_string(std::string_view name);
+
+/// Whether it misses no crossing, and converges.
+inline bool finds_all(Solver solver) {
+  return solver.kind == kDefaultSolver.kind && solver.max_steps >= kDefaultSolver.max_steps;
+}
+
+/// What a kernel that includes solver.h is built with: it is built for one solver, so that the others cost it nothing.
+ocl::Defines solver_defines(Solver solver);
+
+}  // namespace isowave

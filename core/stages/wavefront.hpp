@@ -1,0 +1,92 @@
+#pragma once
+// The rays of a frame on the device and the arrays of one pass. R = rays; nothing here grows with the
+// volume.
+
+#include <string_view>
+#include <utility>
+
+#include "core/stages/device_counts.hpp"
+#include "core/view/frame.hpp"
+
+namespace isowave {
+
+/// How the closest of a ray's results is found (pipeline `blocks`). The picture has the same bits either way.
+enum class ClosestHit {
+  kScan,      ///< composite looks at each of them
+  kAtomicMin  ///< whoever has a result offers its index: one word a ray to look at
+};
+inline constexpr ClosestHit kDefaultClosestHit = ClosestHit::kAtomicMin;
+
+/// "scan", "atomic-min".
+std::string_view to_string(ClosestHit closest);
+/// Throws Error naming both.
+ClosestHit closest_hit_from_string(std::string_view name);
+
+/// The macro for the kernels that take part.
+inline ocl::Defines closest_defines(ClosestHit closest) {
+  return {{"ISO_CLOSEST_BY_ATOMICS", closest == ClosestHit::kAtomicMin ? "1" : "0"}};
+}
+
+struct Wavefront {
+  /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not. levels: of detail.
+  explicit Wavefront(ocl::Device &device, std::uint64_t rays, bool with_pairs = true, std::size_t levels = 1)
+      : num_rays(rays),
+        level_frames(device, "level frames", levels),
+        counts(device, "pass counts", 1),
+        previous_counts(device, "pass counts, previous", 1),
+        next_counts(device, "pass counts, next", 1),
+        hits(device, "hits", rays),
+        ray_block_ids(device, "ray states", rays),
+        active_ray_ids(device, "active ray ids", rays),
+        next_active_ray_ids(device, "active ray ids, next", rays),
+        mask(device, "mask", with_pairs ? rays : 0),
+        pair_block_ids(device, "pair block ids", with_pairs ? rays : 0),
+        pair_hits(device, "pair hits", with_pairs ? rays : 0),
+        closest_pairs(device, "closest pairs", with_pairs ? rays : 0) {
+    reset_counts();
+  }
+
+  /// As before the first pass of all. Waits.
+  void reset_counts() {
+    PassCounts start{};
+    start.ray_count = static_cast<uint>(num_rays);
+    start.window_count = start.ray_count;
+    start.pass = 1;
+    counts.write({&start, 1});
+    previous_counts.write({&start, 1});
+    next_counts.write({&start, 1});
+  }
+
+  /// Pipeline `rays`: no ray goes on from the last pass. Waits.
+  void forget_rays() {
+    PassCounts last = counts.read().front();
+    last.next_active_count = 0;
+    counts.write({&last, 1});
+  }
+
+  /// Pipeline `rays`: the counts and the rays left by one pass go to the next.
+  void open_pass() {
+    std::swap(previous_counts, counts);
+    std::swap(counts, next_counts);
+    std::swap(active_ray_ids, next_active_ray_ids);
+  }
+
+  std::uint64_t num_rays;  ///< R
+  FrameParams frame{};     ///< of the frame at work; of several levels of detail, the finest that draws
+  ocl::Buffer<FrameParams>
+      level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
+  std::uint32_t num_level_frames = 1;
+  CountsBuffer counts;                    ///< [1] of the pass at work
+  CountsBuffer previous_counts;           ///< [1] of the pass before (pipeline `rays`)
+  CountsBuffer next_counts;               ///< [1] of the next pass, opened by this one (pipeline `rays`)
+  ocl::Buffer<HitRecord> hits;            ///< [R] by pixel: the picture so far
+  ocl::Buffer<uint> ray_block_ids;        ///< [R] by pixel: the block a ray goes on from (R_BID)
+  ocl::Buffer<uint> active_ray_ids;       ///< [active_count] rays at work: ISO_RAY_PIXEL, flags (R_ID)
+  ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
+  ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
+  ocl::Buffer<uint> pair_block_ids;       ///< [window_count * spec_count] blocks asked for, in ray order
+  ocl::Buffer<PairHit> pair_hits;         ///< [window_count * spec_count] what intersection found
+  ocl::Buffer<uint> closest_pairs;  ///< [window_count] by active ray: its pair that decides (closest_pair.h)
+};
+
+}  // namespace isowave

@@ -1,0 +1,111 @@
+#include "core/stream/device_stream.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/base/error.hpp"
+
+namespace isowave {
+
+namespace {
+
+StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_part) {
+  return {volume.bits_per_block,
+          words_per_part,
+          volume.error_bound.min_exponent,
+          volume.error_bound.whole_numbers ? 1u : 0u,
+          0.0f,
+          0.0f,
+          0,
+          volume.bounds.by_place ? 1u : 0u};
+}
+
+/// Uploads the volume's words from word `first` on.
+void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffer<uint> &part) {
+  if (!volume.file) return part.write(std::span(volume.words).subspan(first, part.size()));
+  constexpr std::size_t kChunkWords = 1u << 22;
+  std::vector<uint> chunk(std::min(kChunkWords, part.size()));
+  for (std::size_t done = 0; done < part.size(); done += chunk.size()) {
+    chunk.resize(std::min(chunk.size(), part.size() - done));
+    volume.read_words(32 * (first + done), chunk);
+    part.write(chunk, done);
+  }
+}
+
+}  // namespace
+
+StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part) {
+  const std::uint64_t largest_words = largest_part / sizeof(uint), all = volume.word_count();
+  if (all <= largest_words) return {1, 0, {all}};
+  // A block may begin with the last bit of a part.
+  const std::uint64_t beyond = (volume.max_block_bits() + 30) / 32 + kDecoderAhead;
+  const std::uint64_t begins = all - kDecoderAhead;  // blocks begin in that many words
+  const std::uint64_t per_part = std::min<std::uint64_t>(largest_words - std::min(largest_words, beyond),
+                                                         std::numeric_limits<std::uint32_t>::max());
+  if (per_part == 0 || (begins + per_part - 1) / per_part > kMaxStreamParts) return {};
+  StreamSplit split;
+  split.words_per_part = static_cast<std::uint32_t>(per_part);
+  for (std::uint64_t first = 0; first < begins; first += per_part, ++split.num_parts) {
+    split.words.push_back(std::min(per_part + beyond, all - first));
+  }
+  return split;
+}
+
+std::uint64_t bound_words(const CompressedVolume &volume) {
+  return (volume.bounds.codes.size() + 3) / 4;
+}
+
+DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part,
+                           bool with_bounds)
+    : indexed_(volume.is_indexed()) {
+  const std::uint64_t largest = largest_part != 0 ? largest_part : device.capabilities().largest_allocation;
+  const StreamSplit split = split_stream(volume, largest);
+  if (split.num_parts == 0) {
+    throw Error("the compressed volume of {} bytes does not fit {} buffers of {} bytes on device '{}'",
+                volume.word_count() * sizeof(uint), kMaxStreamParts, largest, device.info().name);
+  }
+  layout = layout_of(volume, split.words_per_part);
+  std::uint64_t first = 0;
+  for (const std::uint64_t words : split.words) {
+    parts.emplace_back(device, "zfp stream", words);
+    write_words(volume, first, parts.back());
+    first += split.words_per_part;
+  }
+  add_index(device, indexed_ ? volume.index : std::span<const std::uint32_t>{},
+            with_bounds ? volume.bounds.codes : std::span<const std::uint8_t>{});
+}
+
+DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host, bool with_bounds)
+    : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks, host.max_copy)),
+      layout(layout_of(volume, 0)),
+      indexed_(volume.is_indexed()) {
+  if (with_bounds) add_index(device, {}, volume.bounds.codes);  // a window brings where its blocks begin
+}
+
+void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t> index,
+                             std::span<const std::uint8_t> bounds) {
+  layout.bounds_begin = static_cast<std::uint32_t>(index.size());
+  std::vector<std::uint32_t> both;
+  if (!bounds.empty()) {
+    both.assign(index.begin(), index.end());
+    both.resize(index.size() + (bounds.size() + 3) / 4);
+    for (std::size_t block = 0; block < bounds.size(); ++block)
+      both[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
+    index = both;
+  }
+  if (!index.empty()) block_index.emplace(device, "block index", index);
+}
+
+ocl::Defines DeviceStream::defines() const {
+  ocl::Defines defines;  // none: as kernels are built without a word
+  if (parts.size() != 1) defines.emplace("ISO_STREAM_PARTS", parts.empty() ? "0" : "4");
+  if (indexed_) defines.emplace("ISO_STREAM_INDEXED", "1");
+  return defines;
+}
+
+bool DeviceStream::is_window(const ocl::Defines &defines) {
+  const auto parts = defines.find("ISO_STREAM_PARTS");
+  return parts != defines.end() && parts->second == "0";
+}
+
+}  // namespace isowave

@@ -1,0 +1,161 @@
+#include "core/view/camera.hpp"
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/error.hpp"
+#include "core/io/input_file.hpp"
+
+namespace isowave {
+namespace {
+
+using nlohmann::json;
+
+/// sin of the smallest angle between view and up: below it the image's right is rounding noise.
+constexpr double kMinSinViewUp = 1e-6;
+/// Of eye to at, and of up: squares of longer vectors, and of those as much shorter than 1, leave double's range.
+constexpr double kLongest = 0x1p500;
+
+const json &member(const json &object, const char *key, const std::string &where) {
+  if (!object.is_object()) throw Error("{}: expected an object with \"{}\"", where, key);
+  const auto found = object.find(key);
+  if (found == object.end()) throw Error("{}: \"{}\" is missing", where, key);
+  return *found;
+}
+
+double number(const json &value, const char *key, const std::string &where) {
+  if (!value.is_number()) throw Error("{}: \"{}\" must be a number", where, key);
+  return value.get<double>();
+}
+
+std::uint32_t positive_uint(const json &value, const char *key, const std::string &where) {
+  const bool fits = value.is_number_unsigned() && value.get<std::uint64_t>() >= 1 &&
+                    value.get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max();
+  if (!fits) throw Error("{}: \"{}\" must hold whole numbers of at least 1", where, key);
+  return value.get<std::uint32_t>();
+}
+
+const json &triple(const json &value, const char *key, const std::string &where) {
+  if (!value.is_array() || value.size() != 3) throw Error("{}: \"{}\" must be [x, y, z]", where, key);
+  return value;
+}
+
+glm::dvec3 vector3(const json &value, const char *key, const std::string &where) {
+  const json &v = triple(value, key, where);
+  return {number(v[0], key, where), number(v[1], key, where), number(v[2], key, where)};
+}
+
+glm::uvec3 size3(const json &value, const char *key, const std::string &where) {
+  const json &v = triple(value, key, where);
+  return {positive_uint(v[0], key, where), positive_uint(v[1], key, where), positive_uint(v[2], key, where)};
+}
+
+json parse_file(const std::filesystem::path &path) {
+  constexpr std::uint64_t kMostBytes = 4u
+                                       << 20;  // 30,000 cameras. Parsed, it may take 80 times as much memory
+  const InputFile file(path);
+  if (file.size() > kMostBytes)
+    throw Error("{}: not a camera file: it has more than {} bytes", file.what(), kMostBytes);
+  std::string text(file.size(), '\0');
+  file.read(0, std::as_writable_bytes(std::span(text)));
+  if (const std::size_t zero = text.find('\0'); zero != text.npos)  // the parser would take it for the end
+    throw Error("{}: not a camera file: no JSON from byte {} on", file.what(), zero + 1);
+  std::vector<std::set<std::string>> keys;  // of the objects that have begun, and not ended
+  const auto refuse_twice = [&](int, json::parse_event_t event, const json &parsed) {
+    if (event == json::parse_event_t::object_start) keys.emplace_back();
+    if (event == json::parse_event_t::object_end) keys.pop_back();
+    if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
+      throw Error("{}: {} is given twice", file.what(), parsed.dump().substr(0, 60));
+    return true;
+  };
+  try {
+    return json::parse(text, refuse_twice);
+  } catch (const json::parse_error &error) {
+    throw Error("{}: not a camera file: no JSON from byte {} on", file.what(), error.byte);
+  } catch (const json::out_of_range &) {
+    throw Error("{}: not a camera file: it holds a number that is too large", file.what());
+  }
+}
+
+bool finite(const glm::dvec3 &v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+}  // namespace
+
+void check_camera(const Camera &camera, std::string_view what) {
+  if (!finite(camera.eye) || !finite(camera.at) || !finite(camera.up)) {
+    throw Error("{}: eye, at and up must be finite", what);
+  }
+  if (!(camera.fovy_deg > 0.0 && camera.fovy_deg < 180.0)) {
+    throw Error("{}: fovy_deg is {}, must be between 0 and 180", what, camera.fovy_deg);
+  }
+  const glm::dvec3 view = camera.at - camera.eye;
+  const double view_length = glm::length(view), up_length = glm::length(camera.up);
+  if (view_length > kLongest || up_length > kLongest) throw Error("{}: eye, at and up are too large", what);
+  if (view_length < 1 / kLongest) throw Error("{}: eye and at are the same point", what);
+  if (up_length < 1 / kLongest) throw Error("{}: up is the zero vector", what);
+  if (glm::length(glm::cross(view / view_length, camera.up / up_length)) < kMinSinViewUp) {
+    throw Error("{}: up is parallel to the view; choose another up", what);
+  }
+}
+
+CameraFile read_camera_file(const std::filesystem::path &path) {
+  const std::string where = path.string();
+  const json root = parse_file(path);
+
+  CameraFile file;
+  const double fovy_deg = number(member(root, "fovy_deg", where), "fovy_deg", where);
+  if (root.contains("dims")) file.dims = size3(root["dims"], "dims", where);
+  if (root.contains("spacing")) {
+    file.spacing = vector3(root["spacing"], "spacing", where);
+    if (!finite(*file.spacing) || !glm::all(glm::greaterThan(*file.spacing, glm::dvec3(0.0)))) {
+      throw Error("{}: \"spacing\" must be finite and positive", where);
+    }
+  }
+  if (root.contains("width")) file.width = positive_uint(root["width"], "width", where);
+  if (root.contains("height")) file.height = positive_uint(root["height"], "height", where);
+
+  const json &cameras = member(root, "cameras", where);
+  if (!cameras.is_array() || cameras.empty()) {
+    throw Error("{}: \"cameras\" must be a list of at least one camera", where);
+  }
+  for (const json &entry : cameras) {
+    const std::string what = fmt::format("{}: camera {}", where, file.cameras.size());
+    const Camera camera{vector3(member(entry, "eye", what), "eye", what),
+                        vector3(member(entry, "at", what), "at", what),
+                        vector3(member(entry, "up", what), "up", what), fovy_deg};
+    check_camera(camera, what);
+    file.cameras.push_back(camera);
+  }
+  return file;
+}
+
+std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
+  constexpr double kPi = std::numbers::pi;
+  const double elevation = 20.0 * kPi / 180.0;
+  const glm::dmat3 index_to_world = info.index_to_world();
+  const glm::dvec3 extent(info.dims - 1u);
+  const glm::dvec3 centre = info.origin + index_to_world * (0.5 * extent);
+  // Of the four diagonals of a sheared box the one from its first to its last voxel counts; all are equal
+  // otherwise.
+  const double distance = 0.8 * glm::length(index_to_world * extent);
+
+  std::vector<Camera> cameras;
+  cameras.reserve(n);
+  for (std::uint32_t k = 0; k < n; ++k) {
+    const double azimuth = 2.0 * kPi * k / n + 0.3;
+    const glm::dvec3 towards_eye(std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
+                                 std::cos(elevation) * std::cos(azimuth));
+    cameras.push_back({centre + distance * towards_eye, centre, {0.0, 1.0, 0.0}, 60.0});
+  }
+  return cameras;
+}
+
+}  // namespace isowave

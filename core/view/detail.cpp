@@ -1,0 +1,128 @@
+#include "core/view/detail.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/gtc/matrix_access.hpp>
+#include <limits>
+
+#include "core/base/error.hpp"
+#include "core/volume/pyramid.hpp"
+
+namespace isowave {
+
+namespace {
+
+/// Distances from the eye: none to a point of the volume's domain is less than the first or more than the second, a little apart so that no
+/// rounding matters [world units].
+std::array<double, 2> reach(const VolumeInfo &info, const glm::dvec3 &eye) {
+  const glm::dmat3 to_world = info.index_to_world(), to_index = glm::inverse(to_world);
+  const glm::dvec3 last = glm::dvec3(info.dims) - 1.0, at = to_index * (eye - info.origin);
+  double farthest = 0, radius = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 side(corner & 1, corner >> 1 & 1, corner >> 2);
+    farthest = std::max(farthest, glm::length(to_world * (last * side - at)));
+    radius = std::max(radius, glm::length(to_world * (last * (side - 0.5))));
+  }
+  double nearest = glm::length(to_world * (0.5 * last - at)) - radius;  // to a ball around it
+  for (int axis = 0; axis < 3; ++axis) {                                // and to the planes of its faces
+    const double beyond = std::max(-at[axis], at[axis] - last[axis]);
+    nearest = std::max(nearest, beyond / glm::length(glm::row(to_index, axis)));
+  }
+  return {0.999 * std::max(0.0, nearest), 1.001 * farthest};
+}
+
+/// Lets each level's ids, ranges and masks begin where those of the one before end.
+void place_levels(std::span<FrameParams> frames) {
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const FrameParams &finer = frames[i - 1];
+    FrameParams &frame = frames[i];
+    frame.id_blocks_x = finer.id_blocks_x;
+    frame.id_blocks_y = finer.id_blocks_y;
+    frame.id_begin_z = finer.id_begin_z + finer.blocks_z;
+    frame.ranges_begin = finer.ranges_begin + static_cast<uint>(block_count(finer));
+    frame.masks_begin = finer.masks_begin + 2 * static_cast<uint>(num_macrocells(finer));
+  }
+}
+
+}  // namespace
+
+std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels) {
+  std::vector<const CompressedVolume *> levels = {&volume};
+  for (std::size_t i = 0; with_levels && i < volume.coarser.size(); ++i) levels.push_back(&volume.coarser[i]);
+  return levels;
+}
+
+std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels) {
+  std::vector<VolumeInfo> infos;
+  for (const CompressedVolume *level : levels_of(volume, with_levels)) infos.push_back(level->info);
+  return infos;
+}
+
+std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels) {
+  std::vector<FrameParams> grids;
+  for (const VolumeInfo &info : levels) grids.push_back(make_grid_params(info));
+  place_levels(grids);
+  return grids;
+}
+
+FrameParams make_id_grid(std::span<const FrameParams> level_grids) {
+  FrameParams grid = level_grids.front();
+  grid.blocks_z = level_grids.back().id_begin_z + level_grids.back().blocks_z;
+  return grid;
+}
+
+void check_max_pixel_error(double max_pixel_error) {
+  if (!(max_pixel_error >= 0) || !std::isfinite(max_pixel_error))
+    throw Error("a distance of {} pixels between voxels cannot be allowed: give 0 or more", max_pixel_error);
+}
+
+void check_levels(const CompressedVolume &volume, double max_pixel_error) {
+  check_max_pixel_error(max_pixel_error);
+  if (max_pixel_error > 0 && volume.coarser.empty() && max_levels(volume.info.dims) > 1) {
+    throw Error(
+        "the volume has no levels of detail, which {} pixels between voxels need: convert it with --levels",
+        max_pixel_error);
+  }
+}
+
+std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
+                                           ImageSize size, float isovalue, double max_pixel_error) {
+  check_max_pixel_error(max_pixel_error);
+  std::vector<FrameParams> frames;
+  for (const VolumeInfo &info : levels) frames.push_back(make_frame_params(info, camera, size, isovalue));
+  place_levels(frames);
+  for (std::size_t i = 1; i < frames.size(); ++i) frames[i].begin_t = frames[i].end_t = 0.0f;
+  if (max_pixel_error == 0 || levels.size() == 1) return frames;
+
+  const VolumeInfo &finest = levels[0];
+  const glm::dmat3 to_world = finest.index_to_world();
+  const double voxel =
+      std::max({glm::length(to_world[0]), glm::length(to_world[1]), glm::length(to_world[2])});
+  const double pixel = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / size.height;  // at distance 1
+  const auto [nearest, farthest] = reach(levels.back(), camera.eye);
+  // Levels' t differ by powers of two, so that their borders are the same in all bits.
+  const auto border = [&](std::size_t level, const FrameParams &frame) {
+    const double t = std::ldexp(voxel, static_cast<int>(level)) / (max_pixel_error * pixel);
+    return static_cast<float>(t / frames[0].t_scale) * (frames[0].t_scale / frame.t_scale);
+  };
+  const auto world_border = [&](std::size_t level) {
+    return double{border(level, frames[0])} * double{frames[0].t_scale};
+  };
+  std::size_t first = 0, last = levels.size() - 1;
+  while (first + 1 < levels.size() && world_border(first + 1) <= nearest) ++first;
+  while (last > first && world_border(last) >= farthest) --last;
+  frames[0].end_t = 0.0f;
+  for (std::size_t level = first; level <= last; ++level) {
+    FrameParams &frame = frames[level];
+    frame.begin_t = level == first ? 0.0f : border(level, frame);
+    frame.end_t = level == last ? std::numeric_limits<float>::infinity() : border(level + 1, frame);
+    frames[first].screen_begin_x = std::min(frames[first].screen_begin_x, frame.screen_begin_x);
+    frames[first].screen_begin_y = std::min(frames[first].screen_begin_y, frame.screen_begin_y);
+    frames[first].screen_end_x = std::max(frames[first].screen_end_x, frame.screen_end_x);
+    frames[first].screen_end_y = std::max(frames[first].screen_end_y, frame.screen_end_y);
+  }
+  return frames;
+}
+
+}  // namespace isowave

@@ -1,0 +1,212 @@
+#include "core/view/frame.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.hpp"
+#include "kernels_cl/portable/block_grid.h"
+#include "kernels_cl/portable/grid_dda.h"
+
+namespace isowave {
+
+namespace {
+
+/// Denormals and near-denormals of an eye next to a voxel plane would make devices disagree; they are 0.
+float flush_tiny(double x) {
+  return std::abs(x) < 0x1p-60 ? 0.0f : static_cast<float>(x);
+}
+
+double largest_component(const glm::dvec3 &v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// Lengths of a voxel's edges [world units].
+std::array<double, 3> edges(const VolumeInfo &info) {
+  const glm::dmat3 to_world = info.index_to_world();
+  return {glm::length(to_world[0]), glm::length(to_world[1]), glm::length(to_world[2])};
+}
+
+std::string spacing_text(const VolumeInfo &info) {
+  return fmt::format("{} {} {}", info.spacing.x, info.spacing.y, info.spacing.z);
+}
+
+/// Throws Error where float64 tells places beside `place`, a vector of the world, apart only by more than 2^-10 voxels.
+void check_places(const VolumeInfo &info, const glm::dvec3 &place, std::string_view what) {
+  const double farthest = largest_component(place);
+  const double shortest = std::ranges::min(edges(info));
+  if (farthest * 0x1p-52 <= shortest * 0x1p-10) return;
+  throw Error(
+      "{}: {:.3g} world units from the world's origin, float64 cannot tell voxels apart that are {:.3g} wide",
+      what, farthest, shortest);
+}
+
+}  // namespace
+
+FrameParams make_grid_params(const VolumeInfo &info) {
+  FrameParams frame{};
+  const glm::uvec3 dims = info.dims, blocks = (dims + 3u) / 4u;
+  frame.dims_x = dims.x;
+  frame.dims_y = dims.y;
+  frame.dims_z = dims.z;
+  frame.blocks_x = blocks.x;
+  frame.blocks_y = blocks.y;
+  frame.blocks_z = blocks.z;
+  frame.id_blocks_x = blocks.x;
+  frame.id_blocks_y = blocks.y;
+  frame.end_t = std::numeric_limits<float>::infinity();
+  return frame;
+}
+
+void check_image_size(ImageSize size) {
+  constexpr std::uint64_t kMaxRays = 1u << 28;
+  if (size.samples < 1 || size.samples > ImageSize::kMaxSamples) {
+    throw Error("{} x {} rays a pixel cannot be drawn: 1 to {} along each axis can", size.samples,
+                size.samples, ImageSize::kMaxSamples);
+  }
+  const std::uint64_t most = kMaxRays / (size.samples * size.samples);
+  if (size.num_pixels() == 0 || size.num_pixels() > most) {
+    throw Error("an image of {} x {} pixels cannot be drawn: 1 to {} pixels can", size.width, size.height,
+                most);
+  }
+}
+
+void check_drawable(const VolumeInfo &info, std::string_view what) {
+  const glm::u64vec3 blocks((info.dims + 3u) / 4u);
+  if (const std::uint64_t count = blocks.x * blocks.y * blocks.z; count >= ISO_MAX_BLOCK_IDS)
+    throw Error("{}: a volume of {} blocks cannot be drawn: block ids end at {}", what, count,
+                ISO_MAX_BLOCK_IDS);
+  // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied to become it
+  // (below). An eye is at most 1e7 voxels off and dims are at most 2^16, so t is at most 2^25 voxels' longest edges;
+  // and nothing that matters is nearer than 2^-24 of the shortest. Within 2^+-100, neither reaches float32's ends,
+  // nor do a level of detail's voxels.
+  const std::array<double, 3> voxel = edges(info);
+  const double shortest = std::ranges::min(voxel), longest = std::ranges::max(voxel);
+  if (!(shortest >= 0x1p-100 && longest <= 0x1p100)) {
+    throw Error("{}: spacing {}: distances in float32 allow 2^-100 (8e-31) to 2^100 (1e30)", what,
+                spacing_text(info));
+  }
+  // Rays along the longest edge move that much slower in index space than along the shortest, and directions below
+  // 2^-60 are 0.
+  if (longest > 0x1p36 * shortest) {
+    throw Error("{}: spacing {}: directions in float32 allow one to be 2^36 (7e10) times another", what,
+                spacing_text(info));
+  }
+  check_places(info, info.origin, what);
+}
+
+FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue) {
+  check_volume_info(info, "the volume");
+  check_camera(camera, "the camera");
+  check_image_size(size);
+  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number in the volume's value range");
+
+  check_drawable(info, "the volume");
+
+  const glm::dmat3 world_to_index = glm::inverse(info.index_to_world());
+  const glm::dvec3 eye = world_to_index * (camera.eye - info.origin);
+  const glm::dvec3 world_fwd = glm::normalize(camera.at - camera.eye);
+  const glm::dvec3 world_right = glm::normalize(glm::cross(world_fwd, camera.up));
+  const glm::dvec3 world_up = glm::cross(world_right, world_fwd);
+  glm::dvec3 fwd = world_to_index * world_fwd;
+  glm::dvec3 right = world_to_index * world_right;
+  glm::dvec3 up = world_to_index * world_up;
+  if (!std::isfinite(largest_component(eye)) || largest_component(eye) > 1e7) {
+    throw Error(
+        "the camera's eye is {:.3g} voxels from the volume's origin: up to 1e7 can be drawn in float32",
+        largest_component(eye));
+  }
+  check_places(info, camera.eye, "the camera's eye");
+
+  // A power of two takes the voxel size out of t, so that neither tiny nor huge spacings reach float32's
+  // ends.
+  const double largest = std::max({largest_component(fwd), largest_component(right), largest_component(up)});
+  const double t_scale = std::exp2(-std::floor(std::log2(largest)));
+  fwd *= t_scale;
+  right *= t_scale;
+  up *= t_scale;
+
+  FrameParams frame = make_grid_params(info);
+  frame.active_end_x = static_cast<int>(num_owning_blocks(info.dims.x));
+  frame.active_end_y = static_cast<int>(num_owning_blocks(info.dims.y));
+  frame.active_end_z = static_cast<int>(num_owning_blocks(info.dims.z));
+  frame.width = size.ray_columns();
+  frame.height = size.ray_rows();
+  frame.eye_x = flush_tiny(eye.x);
+  frame.eye_y = flush_tiny(eye.y);
+  frame.eye_z = flush_tiny(eye.z);
+  frame.fwd_x = flush_tiny(fwd.x);
+  frame.fwd_y = flush_tiny(fwd.y);
+  frame.fwd_z = flush_tiny(fwd.z);
+  frame.right_x = flush_tiny(right.x);
+  frame.right_y = flush_tiny(right.y);
+  frame.right_z = flush_tiny(right.z);
+  frame.up_x = flush_tiny(up.x);
+  frame.up_y = flush_tiny(up.y);
+  frame.up_z = flush_tiny(up.z);
+  frame.pixel_scale = static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows());
+  frame.t_scale = static_cast<float>(t_scale);
+  frame.isovalue = isovalue;
+  frame.max_spec_count = 1;
+  set_screen_box(frame);
+  return frame;
+}
+
+void set_screen_box(FrameParams &frame) {
+  frame.screen_begin_x = frame.screen_begin_y = frame.screen_end_x = frame.screen_end_y = 0;
+  if (frame.active_end_x == 0) return;
+  const glm::dvec2 size(frame.width, frame.height);
+  const glm::dmat3 basis(glm::dvec3(frame.fwd_x, frame.fwd_y, frame.fwd_z),
+                         glm::dvec3(frame.right_x, frame.right_y, frame.right_z),
+                         glm::dvec3(frame.up_x, frame.up_y, frame.up_z));
+  const glm::dmat3 to_view = glm::inverse(basis);
+  const glm::dvec3 eye(frame.eye_x, frame.eye_y, frame.eye_z);
+  const double pixel = 2.0 * frame.pixel_scale;  // step of u and v
+  const glm::dvec2 border = 0.5 * pixel * size;  // largest |u|, |v|
+
+  // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of that basis: by how
+  // much?
+  const glm::dmat3 sizes(glm::abs(basis[0]), glm::abs(basis[1]), glm::abs(basis[2]));
+  const glm::dmat3 to_sizes(glm::abs(to_view[0]), glm::abs(to_view[1]), glm::abs(to_view[2]));
+  const double length = glm::length(glm::dvec3(1, border.x, border.y));
+  const glm::dvec3 off = to_sizes * (0x1p-21 * (sizes * glm::dvec3(1, border.x, border.y)) +
+                                     double{ISO_SMALLEST_DIRECTION} * length);
+  const glm::dvec2 margin = 1.0 + (glm::dvec2(off.y, off.z) + border * off.x) / pixel;
+
+  glm::dvec2 begin(std::numeric_limits<double>::infinity()), end = -begin;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto plane = [corner](int axis, int first, int behind, uint dim) {
+      return (corner >> axis & 1) == 0 ? 4.0 * first : std::min(4.0 * behind, dim - 1.0);
+    };
+    const glm::dvec3 at(plane(0, frame.active_begin_x, frame.active_end_x, frame.dims_x),
+                        plane(1, frame.active_begin_y, frame.active_end_y, frame.dims_y),
+                        plane(2, frame.active_begin_z, frame.active_end_z, frame.dims_z));
+    const glm::dvec3 view = to_view * (at - eye);
+    if (!(view.x > 1e-3 && margin.x < size.x &&
+          margin.y < size.y)) {  // beside or behind the eye, or all rounded
+      begin = glm::dvec2(0);
+      end = size;
+      break;
+    }
+    // See make_ray(): u = (2 column + 1 - width) pixel_scale, v = (height - 1 - 2 row) pixel_scale.
+    const glm::dvec2 projected = 0.5 * (size - 1.0) + glm::dvec2(view.y, -view.z) / (view.x * pixel);
+    begin = glm::min(begin, projected - margin);
+    end = glm::max(end, projected + margin + 1.0);
+  }
+  begin = glm::clamp(glm::floor(begin), glm::dvec2(0), size);
+  end = glm::clamp(glm::ceil(end), glm::dvec2(0), size);
+  if (begin.x >= end.x || begin.y >= end.y) return;
+  frame.screen_begin_x = static_cast<uint>(begin.x) / 8 * 8;
+  frame.screen_begin_y = static_cast<uint>(begin.y) / 4 * 4;
+  frame.screen_end_x = static_cast<uint>(end.x);
+  frame.screen_end_y = static_cast<uint>(end.y);
+}
+
+std::vector<float> depth_of(const std::vector<HitRecord> &hits) {
+  std::vector<float> depth(hits.size());
+  std::transform(hits.begin(), hits.end(), depth.begin(), [](const HitRecord &hit) { return hit.t; });
+  return depth;
+}
+
+}  // namespace isowave

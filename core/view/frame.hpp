@@ -1,0 +1,65 @@
+#pragma once
+// One frame's constants for kernels and twin: grid, camera in index space, isovalue.
+
+#include <cstdint>
+#include <vector>
+
+#include "core/view/camera.hpp"
+#include "core/volume/volume.hpp"
+#include "kernels_cl/portable/shared_types.h"
+
+namespace isowave {
+
+/// A picture, and the grid of its rays: that of a picture with samples times as many pixels along both axes. Frames
+/// and hit buffers count rays; the picture has the mean colour of each pixel's (kernels_cl/shade.cl).
+struct ImageSize {
+  std::uint32_t width = 1280, height = 720;  ///< pixels
+  std::uint32_t samples = 1;                 ///< rays of a pixel along each axis, 1..kMaxSamples
+
+  static constexpr std::uint32_t kMaxSamples = 8;
+  std::uint64_t num_pixels() const { return std::uint64_t(width) * height; }
+  std::uint32_t ray_columns() const { return width * samples; }
+  std::uint32_t ray_rows() const { return height * samples; }
+  std::uint64_t num_rays() const { return num_pixels() * samples * samples; }
+};
+
+/// Throws Error: an image of 0 pixels, more than 2^28 rays, samples out of range.
+void check_image_size(ImageSize size);
+
+/// Blocks along an axis of `dim` voxels that own dual cells: all but a last one of a single voxel layer.
+inline std::uint32_t num_owning_blocks(std::uint32_t dim) {
+  return (dim + 2) / 4;
+}
+
+inline std::uint64_t block_count(const FrameParams &grid) {
+  return std::uint64_t{grid.blocks_x} * grid.blocks_y * grid.blocks_z;
+}
+
+/// Coarse macrocells (kernels_cl/macrocells.cl).
+inline std::uint64_t num_macrocells(const FrameParams &grid) {
+  const auto cells = [](std::uint32_t blocks) {
+    return (std::uint64_t{blocks} + ISO_MACROCELL_BLOCKS - 1) / ISO_MACROCELL_BLOCKS;
+  };
+  return cells(grid.blocks_x) * cells(grid.blocks_y) * cells(grid.blocks_z);
+}
+
+/// Throws Error where distances within the volume, or directions, do not fit float32, or its origin is so far away
+/// that voxels are lost beside it. `what` names the volume.
+void check_drawable(const VolumeInfo &info, std::string_view what);
+
+/// Of the grid only, for what is done before there is a camera.
+FrameParams make_grid_params(const VolumeInfo &info);
+
+/// Sets the frame's screen box: a rectangle of the pixels whose rays, as make_ray() rounds them, may meet its active
+/// box.
+void set_screen_box(FrameParams &frame);
+
+/// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume;
+/// isovalue_index, speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, or one
+/// too far away, what check_drawable() or check_image_size() refuses, a NaN isovalue.
+FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue);
+
+/// Depth of each hit, world units, INFINITY where nothing is hit.
+std::vector<float> depth_of(const std::vector<HitRecord> &hits);
+
+}  // namespace isowave

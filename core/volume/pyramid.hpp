@@ -1,0 +1,55 @@
+#pragma once
+// Levels of detail: a pyramid of grids, each with half the voxels of the one before along each axis.
+//
+// Voxel k of a level lies where voxel 2k of the level before does, so planes of a coarse grid are planes of the fine one, and a
+// ray crosses both at the same t, bit for bit. Its value is a mean of five along each axis, by -1/16, 1/4, 5/8, 1/4, -1/16, held to the
+// least and the largest of them. So a field that bends evenly keeps its values there, and surfaces their place, where positive weights would
+// shrink them. Behind the last voxel lie copies of it, and a coarse grid may end up to a voxel of its own behind the fine one.
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "core/volume/voxel_chunks.hpp"
+
+namespace isowave {
+
+inline constexpr std::uint32_t kMaxLevels = 16;
+
+/// The grid of the next coarser level: n / 2 + 1 voxels along an axis of n, twice the spacing, float32.
+VolumeInfo coarser_level(const VolumeInfo &fine);
+/// How many levels a volume can have, itself among them: halved while the shortest axis keeps at least 8 voxels.
+std::uint32_t max_levels(const glm::uvec3 &dims);
+
+/// Makes the voxels of the next coarser level from those of a level, in memory O(nx * ny).
+class Downsampler {
+ public:
+  /// Takes the coarse level's chunks in order.
+  using Sink = std::function<void(const Chunk &)>;
+  /// num_threads: 0: one per processor; the result is the same for any number.
+  Downsampler(const glm::uvec3 &fine_dims, std::uint32_t num_threads, Sink sink);
+  /// The next layers [n][ny][nx] of the fine level.
+  void add(std::span<const float> layers);
+
+ private:
+  void add_plane(std::uint32_t z, std::span<const float> plane);
+  void emit(std::uint32_t last);
+
+  glm::uvec3 fine_, coarse_;
+  std::uint32_t num_threads_;
+  Sink sink_;
+  std::uint32_t z_ = 0;                    ///< of the next fine layer
+  std::uint32_t num_emitted_ = 0;          ///< coarse layers
+  std::uint32_t chunk_begin_ = 0;          ///< the first of them in chunk_
+  std::vector<float> planes_;              ///< fine layers, downsampled along x and y
+  std::deque<std::vector<float>> recent_;  ///< the last of them
+  std::vector<float> chunk_;
+};
+
+/// The voxels of the next coarser level of voxels [nz][ny][nx].
+std::vector<float> downsample(const glm::uvec3 &dims, std::span<const float> voxels);
+
+}  // namespace isowave

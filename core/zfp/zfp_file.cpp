@@ -1,0 +1,124 @@
+#include "core/zfp/zfp_file.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <new>
+#include <string>
+
+#include "core/zfp/libzfp.hpp"
+#include "core/zfp/zfp_trailer.hpp"
+
+namespace isowave {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kItemsAtOnce = 1u << 15;
+
+/// zlib's stream, closed whatever happens.
+struct Deflater : z_stream {
+  Deflater() : z_stream{} {
+    if (::deflateInit(this, Z_DEFAULT_COMPRESSION) != Z_OK) throw std::bad_alloc();
+  }
+  ~Deflater() { ::deflateEnd(this); }
+  Deflater(const Deflater &) = delete;
+  Deflater &operator=(const Deflater &) = delete;
+};
+
+std::uint32_t version_of(const CompressedVolume &volume, bool has_levels) {
+  return has_levels ? kPyramidVersion : volume.is_indexed() ? kIndexedVersion : kVersion;
+}
+
+}  // namespace
+
+ZfpFileWriter::ZfpFileWriter(const fs::path &path, const CompressedVolume &volume) {
+  for (std::size_t level = 0; level <= volume.coarser.size(); ++level) {
+    const CompressedVolume &at = level == 0 ? volume : volume.coarser[level - 1];
+    const ZfpHeader header = make_zfp_header(at.info.dims, at.bits_per_block, at.error_bound.min_exponent);
+    parts_.emplace_back(path).write(std::as_bytes(std::span(header)));
+  }
+}
+
+void ZfpFileWriter::write(std::span<const std::byte> payload, std::size_t level) {
+  parts_[level].write(payload);
+}
+
+void ZfpFileWriter::commit(const CompressedVolume &volume) {
+  Part &all = parts_.front();
+  ZfpLayout layout{all.write_index(volume), all.write_bounds(volume)};
+  for (std::size_t level = 1; level < parts_.size(); ++level) {
+    Part &part = parts_[level];
+    const CompressedVolume &coarse = volume.coarser[level - 1];
+    const ZfpLayout part_layout{part.write_index(coarse), part.write_bounds(coarse)};
+    part.write_trailer(zfp_trailer_text(coarse, part_layout), version_of(coarse, false));
+    layout.level_bytes.push_back(part.size);
+    part.file.read_back([&all](std::span<const std::byte> bytes) { all.write(bytes); });
+  }
+  all.write_trailer(zfp_trailer_text(volume, layout), version_of(volume, !layout.level_bytes.empty()));
+  all.file.commit();
+}
+
+void ZfpFileWriter::Part::write(std::span<const std::byte> bytes) {
+  file.write(bytes);
+  crc = update_crc(crc, bytes);
+  size += bytes.size();
+}
+
+void ZfpFileWriter::Part::write_trailer(const std::string &text, std::uint32_t version) {
+  ZfpFooter footer{version, std::uint32_t(text.size()), crc, 0, kZfpFooterMagic};
+  footer.json_crc = json_crc(text, footer);
+  write(std::as_bytes(std::span(text)));
+  write(std::as_bytes(std::span(&footer, 1)));
+}
+
+/// Deflates what next() returns, again and again, until that is empty; returns its size.
+template <typename T>
+std::uint64_t ZfpFileWriter::Part::write_deflated(const std::function<std::span<const T>()> &next) {
+  const std::uint64_t begin = size;
+  Deflater deflater;
+  std::vector<std::byte> out(1u << 16);
+  for (bool last = false; !last;) {
+    const std::span<const T> items = next();
+    last = items.empty();
+    deflater.next_in = const_cast<Bytef *>(reinterpret_cast<const Bytef *>(items.data()));
+    deflater.avail_in = static_cast<uInt>(items.size_bytes());
+    do {
+      deflater.next_out = reinterpret_cast<Bytef *>(out.data());
+      deflater.avail_out = static_cast<uInt>(out.size());
+      ::deflate(&deflater, last ? Z_FINISH : Z_NO_FLUSH);
+      write(std::span(out).first(out.size() - deflater.avail_out));
+    } while (deflater.avail_out == 0);
+  }
+  return size - begin;
+}
+
+/// Behind the padding of the payload; returns its size, 0 at a fixed rate.
+std::uint64_t ZfpFileWriter::Part::write_index(const CompressedVolume &volume) {
+  const std::array<std::byte, 8> zeros{};
+  write(std::span(zeros).first((8 - size % 8) % 8));
+  if (!volume.is_indexed()) return 0;
+  const std::uint64_t num_blocks = volume.block_count();
+  std::uint64_t done = 0;
+  std::vector<std::uint16_t> lengths;
+  return write_deflated<std::uint16_t>([&] {
+    lengths.resize(std::min<std::uint64_t>(kItemsAtOnce, num_blocks - done));
+    for (std::uint16_t &length : lengths)
+      length = static_cast<std::uint16_t>(volume.block_bits(static_cast<std::uint32_t>(done++)));
+    return std::span<const std::uint16_t>(lengths);
+  });
+}
+
+/// Behind the index; returns its size, 0 where there are none.
+std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) {
+  std::span<const std::uint8_t> left = volume.bounds.codes;
+  if (left.empty()) return 0;
+  return write_deflated<std::uint8_t>([&] {
+    const std::span<const std::uint8_t> some = left.first(std::min(kItemsAtOnce, left.size()));
+    left = left.subspan(some.size());
+    return some;
+  });
+}
+
+}  // namespace isowave

@@ -1,0 +1,48 @@
+#pragma once
+// The `.zfp` file, which README describes byte by byte ("File format"): zfp's header and stream, and behind them index,
+// bounds, levels of detail and trailer (zfp_trailer.hpp). The functions that read it are declared in zfp_stream.hpp.
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+
+#include "core/io/atomic_file.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave {
+
+/// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left behind without commit().
+class ZfpFileWriter {
+ public:
+  /// Writes the headers of volume and of its coarser levels, from their info.dims and bits_per_block (a multiple of
+  /// 64), or error_bound.
+  ZfpFileWriter(const std::filesystem::path &path, const CompressedVolume &volume);
+  /// Appends payload of the volume (level 0) or of coarser level `level`.
+  void write(std::span<const std::byte> payload, std::size_t level = 0);
+  /// Pads, writes indices and trailers from all fields but words, and renames the file into place.
+  void commit(const CompressedVolume &volume);
+
+ private:
+  /// A level's file.
+  struct Part {
+    explicit Part(const std::filesystem::path &path) : file(path) {}
+    void write(std::span<const std::byte> bytes);
+    std::uint64_t write_index(const CompressedVolume &volume);
+    std::uint64_t write_bounds(const CompressedVolume &volume);
+    template <typename T>
+    std::uint64_t write_deflated(const std::function<std::span<const T>()> &next);
+    void write_trailer(const std::string &text, std::uint32_t version);
+
+    AtomicFile file;
+    std::uint32_t crc = 0;
+    std::uint64_t size = 0;
+  };
+
+  std::deque<Part> parts_;  ///< the coarser ones only until they are joined to the first
+};
+
+}  // namespace isowave

@@ -1,0 +1,337 @@
+// Reads `.zfp` files, trusting nothing that they say. The functions are declared in zfp_stream.hpp.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "core/base/error.hpp"
+#include "core/io/byte_source.hpp"
+#include "core/volume/pyramid.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "core/zfp/libzfp.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+#include "core/zfp/zfp_trailer.hpp"
+
+namespace isowave {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uint64_t kMaxJsonBytes = 1u << 20;
+constexpr std::uint32_t kMinBlockBits = 9;  // "not empty" and the exponent; libzfp reads them at any rate
+constexpr std::uint32_t kMaxBlockBits = 2048;
+
+/// Calls take(items) with `total` items of a deflated part of a file, a few at a time, until it returns false. Returns
+/// whether all of that worked, and the part has no more items.
+template <typename T, typename Take>
+bool inflate_items(const FileSource &part, std::uint64_t total, const Take &take) {
+  constexpr std::uint64_t kMostItems = 1u << 15;
+  InflateSource source(part, Packing::kZlib);
+  std::vector<T> items;
+  for (std::uint64_t done = 0; done < total; done += items.size()) {
+    items.resize(std::min(kMostItems, total - done));
+    const auto bytes = std::as_writable_bytes(std::span(items));
+    if (source.read(bytes) != bytes.size() || !take(std::span<const T>(items))) return false;
+  }
+  std::byte another{};
+  return source.read(std::span(&another, 1)) == 0;
+}
+
+/// Calls take(length) for so many blocks, whose lengths are deflated. Returns whether they are.
+template <typename Take>
+bool inflate_lengths(const FileSource &deflated, std::uint64_t num_blocks, const Take &take) {
+  return inflate_items<std::uint16_t>(deflated, num_blocks, [&](std::span<const std::uint16_t> lengths) {
+    for (const std::uint16_t length : lengths) {
+      if (length < 1 || length > ISO_MAX_BLOCK_BITS) return false;
+      take(length);
+    }
+    return true;
+  });
+}
+
+/// A `.zfp` file being read: the checks in the order in which the file is trusted.
+class ZfpFileReader {
+ public:
+  explicit ZfpFileReader(const fs::path &path)
+      : file_(std::make_shared<InputFile>(path)), file_size_(file_->size()) {
+    read_head();
+  }
+
+  CompressedVolume take_info() {
+    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take_info());
+    return std::move(volume_);
+  }
+
+  /// keep: the index and bounds, and the file.
+  CompressedVolume take_checked(bool keep) {
+    check_sum();
+    return take(keep);
+  }
+
+ private:
+  /// A level of detail: a file in the file.
+  ZfpFileReader(const ZfpFileReader &finer, std::uint64_t begin, std::uint64_t size)
+      : file_(finer.file_), begin_(begin), file_size_(size), is_level_(true) {
+    read_head();
+    if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims) refuse_level();
+    volume_.info = coarser_level(finer.volume_.info);
+    layout_.counts_casts = finer.layout_.counts_casts;
+  }
+
+  const std::string &what() const { return file_->what(); }
+
+  template <class... Args>
+  [[noreturn]] void fail(fmt::format_string<Args...> reason, Args &&...args) const {
+    throw Error("{}: {}", what(), fmt::format(reason, std::forward<Args>(args)...));
+  }
+
+  [[noreturn]] void refuse_level() const { fail("damaged: one of its levels of detail is none"); }
+
+  void read_head() {
+    read_header();
+    read_trailer();
+    check_volume_info(volume_.info, what());
+    if (layout_.level_bytes.size() > (is_level_ ? 0 : max_levels(volume_.info.dims) - 1)) refuse_level();
+    std::uint64_t begin = begin_ + stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes;
+    for (const std::uint64_t bytes : layout_.level_bytes) {
+      levels_.push_back(ZfpFileReader(levels_.empty() ? *this : levels_.back(), begin, bytes));
+      begin += bytes;
+    }
+  }
+
+  std::uint64_t bytes_before_trailer() const {
+    return std::accumulate(layout_.level_bytes.begin(), layout_.level_bytes.end(),
+                           stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes);
+  }
+
+  /// That of everything before the trailer.
+  void check_sum() const {
+    if (!has_trailer_) return;
+    std::vector<std::byte> piece(1u << 16);
+    std::uint32_t crc = 0;
+    for (std::uint64_t at = 0, end = bytes_before_trailer(); at < end; at += piece.size()) {
+      piece.resize(std::min<std::uint64_t>(piece.size(), end - at));
+      file_->read(at, piece);
+      crc = update_crc(crc, piece);
+    }
+    if (crc != stream_crc_) fail("damaged: the checksum of its stream does not match");
+  }
+
+  CompressedVolume take(bool keep) {
+    volume_.file = file_;
+    volume_.file_first_bit = 8 * begin_ + header_bits_;
+    if (volume_.is_indexed()) read_index(keep);
+    if (layout_.bounds_bytes != 0) read_bounds(keep);
+    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take(keep));
+    if (!keep) volume_.file.reset();
+    return std::move(volume_);
+  }
+
+  void read_at(std::uint64_t offset, std::span<std::byte> bytes) const {
+    file_->read(begin_ + offset, bytes);
+  }
+
+  /// A file of zfp's own tool has no index: its blocks must be decoded to know where they are.
+  void read_index(bool keep) {
+    const std::uint64_t num_blocks = volume_.block_count();
+    if (volume_.indexed_bits < num_blocks) {  // before memory is taken for them
+      fail("truncated: {} blocks cannot come from {} bytes", num_blocks, file_size_);
+    }
+    BlockIndexBuilder index;
+    if (keep) index.reserve(num_blocks);
+    std::uint64_t end = 0;
+    const auto take = [&](std::uint32_t bits, std::uint64_t count) {
+      end += bits * count;
+      for (std::uint64_t i = 0; keep && i < count; ++i) index.add(bits);
+    };
+    bool is_whole = true;
+    if (has_trailer_) {
+      is_whole = inflate_lengths({file_, begin_ + stream_bytes_, layout_.index_bytes}, num_blocks,
+                                 [&](std::uint32_t bits) { take(bits, 1); });
+    } else {
+      find_block_lengths(volume_, what(), take);
+      const std::uint64_t used = (header_bits_ + end + 63) / 64 * 8;
+      if (file_size_ > used) {
+        fail("damaged: {} unknown bytes after the zfp stream", file_size_ - used);
+      }
+    }
+    if (!is_whole || (has_trailer_ && end != volume_.indexed_bits)) {
+      fail("damaged: the lengths of its blocks are not those of its stream");
+    }
+    volume_.indexed_bits = end;
+    if (keep) volume_.index = index.finish();
+  }
+
+  void read_bounds(bool keep) {
+    const std::uint64_t num_blocks = volume_.block_count();
+    std::vector<std::uint8_t> &codes = volume_.bounds.codes;
+    const FileSource deflated(file_, begin_ + stream_bytes_ + layout_.index_bytes, layout_.bounds_bytes);
+    if (num_blocks / kMaxDeflateRatio > layout_.bounds_bytes) refuse_bounds();
+    if (keep) codes.reserve(num_blocks);
+    const bool whole =
+        inflate_items<std::uint8_t>(deflated, num_blocks, [&](std::span<const std::uint8_t> some) {
+          codes.insert(codes.end(), some.begin(), some.end());
+          if (!keep) codes = {std::ranges::max(codes)};
+          return true;
+        });
+    const std::int32_t exponent = volume_.bounds.exponent;
+    if (!whole || exponent < kMinBoundExponent || exponent > kMaxBoundExponent) refuse_bounds();
+    if (!layout_.counts_casts) volume_.bounds = {};
+  }
+
+  [[noreturn]] void refuse_bounds() const {
+    fail("damaged: the bounds of its blocks are not those of its stream");
+  }
+
+  void read_header() {
+    std::array<std::uint64_t, (ZFP_HEADER_MAX_BITS + 63) / 64 + 1> buffer{};
+    const std::size_t available = std::min<std::uint64_t>(file_size_, ZFP_HEADER_MAX_BITS / 8 + 1);
+    read_at(0, std::as_writable_bytes(std::span(buffer)).first(available));
+
+    const ZfpBits bits(stream_open(buffer.data(), sizeof(buffer)), &stream_close);
+    const ZfpStream stream(zfp_stream_open(bits.get()), &zfp_stream_close);
+    const ZfpField field(zfp_field_alloc(), &zfp_field_free);
+    header_bits_ = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL);
+    if (header_bits_ == 0 || header_bits_ > available * 8) {
+      fail("not a zfp file: no full zfp header (as `zfp -h` writes it)");
+    }
+    check_kind(*stream, *field);
+    volume_.info.dims = glm::uvec3(field->nx, field->ny, field->nz);
+    volume_.info.type = VoxelType::kFloat32;
+    const bool fixed_rate = zfp_stream_compression_mode(stream.get()) == zfp_mode_fixed_rate;
+    volume_.bits_per_block = fixed_rate ? stream->maxbits : 0;
+    if (!fixed_rate) volume_.error_bound.min_exponent = stream->minexp;
+    volume_.value_range = {-std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity()};
+
+    if (!fixed_rate) {  // how long the stream is, a trailer tells, or else the file
+      if (volume_.block_count() >= std::numeric_limits<std::uint32_t>::max()) {
+        fail("{}x{}x{} voxels: too many for blocks of lengths of their own", field->nx, field->ny, field->nz);
+      }
+      stream_bytes_ = file_size_;
+      volume_.indexed_bits = 8 * file_size_ - header_bits_;
+      return;
+    }
+    const std::uint64_t total_bits = header_bits_ + volume_.block_count() * volume_.bits_per_block;
+    stream_bytes_ = (total_bits + 63) / 64 * 8;
+    // libzfp can be built with smaller words: its files may end before the 64-bit word does.
+    const std::uint64_t least_bytes = (total_bits + 7) / 8;
+    if (file_size_ < least_bytes) {
+      fail("truncated: {}x{}x{} voxels at {} bits per block need {} bytes, found {}", field->nx, field->ny,
+           field->nz, volume_.bits_per_block, least_bytes, file_size_);
+    }
+    stream_bytes_ = std::min(stream_bytes_, file_size_);
+  }
+
+  void check_kind(const zfp_stream &stream, const zfp_field &field) const {
+    constexpr std::array<const char *, 5> kTypes{"unknown", "int32", "int64", "float32", "float64"};
+    if (field.type != zfp_type_float) {
+      fail("zfp values of type {}: only float32 is supported", kTypes.at(field.type));
+    }
+    const unsigned axes = zfp_field_dimensionality(&field);
+    if (axes != 3) fail("a {}D zfp array: only 3D is supported", axes);
+    constexpr std::array<const char *, 6> kModes{"unknown",         "expert",         "fixed rate",
+                                                 "fixed precision", "fixed accuracy", "reversible"};
+    const zfp_mode mode = zfp_stream_compression_mode(&stream);
+    if (mode == zfp_mode_fixed_accuracy) return;
+    if (mode != zfp_mode_fixed_rate) {
+      fail("zfp mode '{}': only fixed rate (zfp -r) and fixed accuracy (zfp -a) are supported",
+           kModes.at(mode));
+    }
+    if (stream.maxbits < kMinBlockBits || stream.maxbits > kMaxBlockBits) {
+      fail("{} bits per zfp block: only {} to {} are supported", stream.maxbits, kMinBlockBits,
+           kMaxBlockBits);
+    }
+  }
+
+  void read_trailer() {
+    if (!volume_.is_indexed() && file_size_ == stream_bytes_) return;
+    const std::uint64_t trailer_bytes =
+        file_size_ - (volume_.is_indexed() ? header_bits_ / 8 : stream_bytes_);
+    ZfpFooter footer{};
+    const auto footer_bytes = std::as_writable_bytes(std::span(&footer, 1));
+    if (trailer_bytes >= sizeof(ZfpFooter)) read_at(file_size_ - sizeof(ZfpFooter), footer_bytes);
+    if (footer.magic != kZfpFooterMagic) {
+      if (volume_.is_indexed()) return;  // a file of zfp's own tool
+      fail("damaged: {} unknown bytes after the zfp stream", trailer_bytes);
+    }
+    const std::uint32_t known = volume_.is_indexed() ? kIndexedVersion : kVersion;
+    if (footer.version != known && footer.version != kBoundlessPyramidVersion &&
+        footer.version != kPyramidVersion) {
+      fail("its trailer has version {}, this program knows {}, {} and {}", footer.version, known,
+           kBoundlessPyramidVersion, kPyramidVersion);
+    }
+    const std::uint64_t json_end = file_size_ - sizeof(ZfpFooter);
+    std::string text;
+    if (footer.json_bytes <= kMaxJsonBytes && footer.json_bytes + sizeof(ZfpFooter) <= trailer_bytes) {
+      text.resize(footer.json_bytes);
+      read_at(json_end - footer.json_bytes, std::as_writable_bytes(std::span(text)));
+    }
+    if (text.empty() || json_crc(text, footer) != footer.json_crc) {
+      fail("damaged: the checksum of its trailer does not match");
+    }
+    try {
+      layout_ = apply_zfp_trailer(text, volume_);
+    } catch (const Error &error) {
+      fail("broken trailer: {}", error.what());
+    }
+    check_layout(json_end - footer.json_bytes);
+    has_trailer_ = true;
+    stream_crc_ = footer.stream_crc;
+  }
+
+  /// Header, payload, padding, index, bounds and levels end where the JSON text begins.
+  void check_layout(std::uint64_t json_begin) {
+    if (volume_.is_indexed()) {
+      // Neither sum overflows: a block has at least a bit, and not too many.
+      const std::uint64_t bits = volume_.indexed_bits, blocks = volume_.block_count();
+      const bool possible = bits >= blocks && bits <= blocks * ISO_MAX_BLOCK_BITS;
+      stream_bytes_ =
+          possible ? (header_bits_ + bits + 63) / 64 * 8 : std::numeric_limits<std::uint64_t>::max();
+    }
+    std::uint64_t left = json_begin;
+    const auto take = [&left](std::uint64_t bytes) {
+      if (bytes > left) return false;
+      left -= bytes;
+      return true;
+    };
+    if (!take(stream_bytes_) || !take(layout_.index_bytes) || !take(layout_.bounds_bytes) ||
+        !std::ranges::all_of(layout_.level_bytes, take) || left != 0)
+      fail("damaged: its parts are not as long as its trailer says");
+  }
+
+  std::shared_ptr<const InputFile> file_;
+  std::uint64_t begin_ = 0;  ///< of this level in the file
+  std::uint64_t file_size_ = 0, header_bits_ = 0;
+  bool is_level_ = false;
+  std::uint64_t stream_bytes_ = 0;     ///< header, payload and padding
+  ZfpLayout layout_;                   ///< of what is behind them
+  std::vector<ZfpFileReader> levels_;  ///< coarser ones
+  bool has_trailer_ = false;
+  std::uint32_t stream_crc_ = 0;
+  CompressedVolume volume_;
+};
+
+}  // namespace
+
+CompressedVolume read_zfp_file(const fs::path &path) {
+  CompressedVolume volume = open_zfp_file(path);
+  std::vector<std::uint32_t> words(volume.word_count());
+  volume.read_words(0, words);
+  volume.words = std::move(words);
+  volume.file.reset();
+  return volume;
+}
+CompressedVolume open_zfp_file(const fs::path &path) {
+  return ZfpFileReader(path).take_checked(true);
+}
+CompressedVolume check_zfp_file(const fs::path &path) {
+  return ZfpFileReader(path).take_checked(false);
+}
+CompressedVolume read_zfp_file_info(const fs::path &path) {
+  return ZfpFileReader(path).take_info();
+}
+
+}  // namespace isowave

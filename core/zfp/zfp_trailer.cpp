@@ -1,0 +1,133 @@
+#include "core/zfp/zfp_trailer.hpp"
+
+#include <zlib.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <type_traits>
+
+#include "core/base/error.hpp"
+#include "kernels_cl/portable/block_bound.h"
+
+namespace isowave {
+using nlohmann::json;
+
+namespace {
+
+/// A number of the trailer. json would turn others than T has into some T.
+template <typename T>
+T number_from(const json &value) {
+  if constexpr (std::is_unsigned_v<T>) {
+    if (!value.is_number_unsigned()) throw Error("a count is a {}", value.type_name());
+  } else if constexpr (std::is_integral_v<T>) {
+    if (!value.is_number_integer() || value.get<std::int64_t>() != std::int64_t{value.get<T>()})
+      throw Error("an integer is a {}, or too large", value.type_name());
+  } else if (!value.is_number() ||
+             !(std::abs(value.get<double>()) <= double{std::numeric_limits<T>::max()})) {
+    throw Error("a number is a {}, or too large", value.type_name());
+  }
+  return value.get<T>();
+}
+
+glm::dvec3 vector_from(const json &value) {
+  if (value.size() != 3) throw Error("{} numbers where 3 must be", value.size());
+  return {number_from<double>(value.at(0)), number_from<double>(value.at(1)),
+          number_from<double>(value.at(2))};
+}
+
+VoxelType type_from(const json &value) {
+  constexpr std::size_t kMostShown = 20;  // no type is as long, and a file may have any
+  return voxel_type_from_string(value.get<std::string>().substr(0, kMostShown));
+}
+
+void apply_errors(const json &trailer, bool counts_casts, CompressedVolume &volume) {
+  if (trailer.contains("value_range")) {
+    const json &range = trailer["value_range"];
+    volume.value_range = {number_from<float>(range.at(0)), number_from<float>(range.at(1))};
+    if (volume.value_range[0] > volume.value_range[1])
+      throw Error("{} to {} is no range", volume.value_range[0], volume.value_range[1]);
+  }
+  if (trailer.contains("max_error")) {
+    const auto max_error = number_from<double>(trailer["max_error"]);
+    if (max_error < 0) throw Error("{} is no error", max_error);
+    if (counts_casts) volume.max_error = max_error;
+  }
+  if (volume.is_indexed()) volume.error_bound.max_error = volume.max_error;
+}
+
+ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
+  volume.info.spacing = vector_from(trailer.at("spacing"));
+  volume.info.origin = vector_from(trailer.at("origin"));
+  for (int column = 0; column < 3; ++column) {
+    volume.info.direction[column] = vector_from(trailer.at("direction").at(std::size_t(column)));
+  }
+  volume.info.type = type_from(trailer.at("type"));
+  ZfpLayout layout;
+  layout.counts_casts = fits_float32(volume.info.type) || trailer.value("cast_counts", json(false)) == true;
+  apply_errors(trailer, layout.counts_casts, volume);
+  if (trailer.contains("level_bytes")) {
+    for (const json &bytes : trailer["level_bytes"])
+      layout.level_bytes.push_back(number_from<std::uint64_t>(bytes));
+  }
+  if (trailer.contains("bounds_bytes")) {
+    layout.bounds_bytes = number_from<std::uint64_t>(trailer["bounds_bytes"]);
+    volume.bounds.exponent = number_from<std::int32_t>(trailer.at("bounds_exponent"));
+    // Of another rule, all voxels of a block have its whole bound.
+    volume.bounds.by_place = trailer.value("bounds_by_place", json(0)) == ISO_BOUND_PLACES_RULE;
+  }
+  if (!volume.is_indexed()) return layout;
+  volume.indexed_bits = number_from<std::uint64_t>(trailer.at("payload_bits"));
+  volume.error_bound.whole_numbers = trailer.at("whole_numbers").get<bool>();
+  layout.index_bytes = number_from<std::uint64_t>(trailer.at("index_bytes"));
+  return layout;
+}
+
+}  // namespace
+
+std::uint32_t update_crc(std::uint32_t crc, std::span<const std::byte> bytes) {
+  if (bytes.empty()) return crc;  // zlib takes a null pointer for the wish to begin
+  return std::uint32_t(::crc32_z(crc, reinterpret_cast<const Bytef *>(bytes.data()), bytes.size()));
+}
+
+std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer) {
+  const std::array<std::uint32_t, 3> numbers{footer.version, footer.json_bytes, footer.stream_crc};
+  return update_crc(update_crc(0, std::as_bytes(std::span(text))), std::as_bytes(std::span(numbers)));
+}
+
+std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &layout) {
+  const VolumeInfo &info = volume.info;
+  json trailer;
+  trailer["spacing"] = {info.spacing.x, info.spacing.y, info.spacing.z};
+  trailer["origin"] = {info.origin.x, info.origin.y, info.origin.z};
+  for (int column = 0; column < 3; ++column) {
+    trailer["direction"].push_back(
+        {info.direction[column].x, info.direction[column].y, info.direction[column].z});
+  }
+  trailer["type"] = to_string(info.type);
+  if (std::isfinite(volume.value_range[0])) trailer["value_range"] = volume.value_range;
+  if (volume.max_error) trailer["max_error"] = *volume.max_error;
+  if (!fits_float32(info.type)) trailer["cast_counts"] = true;
+  if (volume.is_indexed()) {
+    trailer["payload_bits"] = volume.indexed_bits;
+    trailer["index_bytes"] = layout.index_bytes;
+    trailer["whole_numbers"] = volume.error_bound.whole_numbers;
+  }
+  if (layout.bounds_bytes != 0) {
+    trailer["bounds_bytes"] = layout.bounds_bytes;
+    trailer["bounds_exponent"] = volume.bounds.exponent;
+    if (volume.bounds.by_place) trailer["bounds_by_place"] = ISO_BOUND_PLACES_RULE;
+  }
+  if (!layout.level_bytes.empty()) trailer["level_bytes"] = layout.level_bytes;
+  return trailer.dump();
+}
+
+ZfpLayout apply_zfp_trailer(const std::string &text, CompressedVolume &volume) {
+  try {
+    return apply_json(json::parse(text), volume);
+  } catch (const json::exception &) {  // its own words are for programmers
+    throw Error("it is not JSON, or a field is missing or of another kind");
+  }
+}
+
+}  // namespace isowave

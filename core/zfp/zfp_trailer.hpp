@@ -1,0 +1,46 @@
+#pragma once
+// The end of a `.zfp` file: JSON text and footer. README describes them ("File format").
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave {
+
+inline constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2, kPyramidVersion = 4;
+inline constexpr std::uint32_t kBoundlessPyramidVersion =
+    3;  ///< before levels had bounds: is read, not written
+inline constexpr std::array<char, 8> kZfpFooterMagic{'I', 'S', 'O', 'W', 'A', 'V', 'E', '\n'};
+
+/// The file's last bytes.
+struct ZfpFooter {
+  std::uint32_t version, json_bytes, stream_crc, json_crc;
+  std::array<char, 8> magic;
+};
+static_assert(sizeof(ZfpFooter) == 24);
+
+std::uint32_t update_crc(std::uint32_t crc, std::span<const std::byte> bytes);
+/// Of the JSON text and the footer's numbers before its own.
+std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer);
+
+/// What the JSON text says of the file itself.
+struct ZfpLayout {
+  std::uint64_t index_bytes = 0, bounds_bytes = 0;
+  std::vector<std::uint64_t> level_bytes{};  ///< of the coarser levels' files
+  /// Whether the errors are those against the source. In older files they leave out the cast to float32.
+  bool counts_casts = true;
+};
+
+std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &layout);
+
+/// Sets what the text says of the volume, whose kind and dims the stream's header has said. Throws Error, which does
+/// not name the file: no JSON, a field that is missing or of another kind, a number that no such volume has.
+ZfpLayout apply_zfp_trailer(const std::string &text, CompressedVolume &volume);
+
+}  // namespace isowave

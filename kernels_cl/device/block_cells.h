@@ -1,0 +1,54 @@
+/// block_cells.h -- a ray among the cells of one block, and pixels in an order in which neighbours share blocks. OpenCL C 1.2.
+#ifndef ISOWAVE_BLOCK_CELLS_H
+#define ISOWAVE_BLOCK_CELLS_H
+
+#include "portable/block_grid.h"
+#include "portable/grid_dda.h"
+
+/// The cell of block b in which the ray is just after `enter`, by which it entered the block.
+ISO_INLINE GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, LastPlanes last) {
+  const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
+  return walk_from(ray, locate(ray->x, 0, enter, 1, x0, min(x0 + 3, last.x - 1)),
+                   locate(ray->y, 1, enter, 1, y0, min(y0 + 3, last.y - 1)),
+                   locate(ray->z, 2, enter, 1, z0, min(z0 + 3, last.z - 1)), 1, last);
+}
+
+/// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which voxels of the blocks of
+/// its dual grid are inside; where one is not known, the cells that need it have any bit.
+ISO_INLINE ulong changing_cells(const ulong *inside) {
+  /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The same for +y, +z. */
+  const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul, not_z3 = 0x0000FFFFFFFFFFFFul;
+  ulong v[8], any = 0, all = ~0ul;
+  for (int i = 0; i < 8; ++i) v[i] = inside[i];
+  for (int i = 0; i < 8; i += 2) v[i + 1] = (v[i] >> 1 & not_x3) | (v[i + 1] << 3 & ~not_x3);
+  for (int i = 0; i < 8; i += 4) {
+    v[i + 2] = (v[i] >> 4 & not_y3) | (v[i + 2] << 12 & ~not_y3);
+    v[i + 3] = (v[i + 1] >> 4 & not_y3) | (v[i + 3] << 12 & ~not_y3);
+  }
+  for (int i = 0; i < 4; ++i) v[i + 4] = (v[i] >> 16 & not_z3) | (v[i + 4] << 48 & ~not_z3);
+  for (int i = 0; i < 8; ++i) {
+    any |= v[i];
+    all &= v[i];
+  }
+  return any & ~all;
+}
+
+/// Part of the image, in whole tiles of 8 x 4 pixels but for its end.
+typedef struct PixelBox {
+  uint begin_x, begin_y, end_x, end_y;
+} PixelBox;
+
+/// Number of work-items laid over a box, tile by tile, so that neighbours share blocks.
+ISO_INLINE uint num_tiled_pixels(PixelBox box) {
+  return 32 * ((box.end_x - box.begin_x + 7) / 8) * ((box.end_y - box.begin_y + 3) / 4);
+}
+
+/// The pixel of such a work-item i, or ISO_INVALID_ID beyond the box.
+ISO_INLINE uint tiled_pixel(const FrameParams *frame, PixelBox box, uint i) {
+  const uint tiles_x = (box.end_x - box.begin_x + 7) / 8, tile = i / 32;
+  const uint x = box.begin_x + 8 * (tile % tiles_x) + (i & 7);
+  const uint y = box.begin_y + 4 * (tile / tiles_x) + (i >> 3 & 3);
+  return x < box.end_x && y < box.end_y ? x + frame->width * y : ISO_INVALID_ID;
+}
+
+#endif

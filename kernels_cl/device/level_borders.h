@@ -1,0 +1,97 @@
+/// level_borders.h -- a ray from one level of detail to the next (core/view/detail.hpp). OpenCL C 1.2.
+///
+/// Define ISO_FOUND local before including this.
+#ifndef ISOWAVE_LEVEL_BORDERS_H
+#define ISOWAVE_LEVEL_BORDERS_H
+
+#include "block_walk.h"
+
+/// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the block with this id.
+ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint block_id) {
+  const uint layer = block_id / (frames[0].id_blocks_x * frames[0].id_blocks_y);
+  uint level = 0;
+  while (level + 1 < num_frames && layer >= frames[level + 1].id_begin_z) ++level;
+  return level;
+}
+
+/// The side on which a whole block is; unknown if it is active. See macrocells.cl: the range of one that is not is on its side, too.
+ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
+                              global const ushort *ranges, BlockCoords b) {
+  if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
+  return ranges[frame->ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >= frame->isovalue_index
+             ? ISO_SIDE_INSIDE
+             : ISO_SIDE_OUTSIDE;
+}
+
+/// Does the ray reach the border at t within the domain? If so, *b is the block it is in just behind it.
+ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
+  const LastPlanes last = last_planes(frame);
+  LastPlanes zero;
+  RayEvent enter = border_event(t), exit = border_event(INFINITY);
+  zero.x = zero.y = zero.z = 0;
+  if (!clip_to_box(ray, zero, last, &enter, &exit) || enter.axis != ISO_AXIS_START) return 0;
+  b->x = (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4);
+  b->y = (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4);
+  b->z = (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4);
+  return 1;
+}
+
+/// Where a ray goes on that leaves the band of frames[level]: its next block, and its side if it stands there for that; or
+/// ISO_INVALID_ID. side: on which it left, or else the border is in a block that is as a whole on one. Where the block behind the border
+/// is not as a whole on that side, the ray stands there; else at the next active block, in this band or one behind. ranges: of all
+/// levels' blocks. found [1]: scratch.
+ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
+                              global const uint *macrocell_masks, global const ushort *ranges, uint pixel,
+                              uint level, uint side, local uint *found) {
+  uint state = ISO_INVALID_ID;
+  for (; level + 1 < num_frames && state == ISO_INVALID_ID; ++level) {
+    const FrameParams behind = frames[level + 1];
+    const Ray ray = make_ray(&behind, pixel);
+    BlockCoords b;
+    const int is_at_border = block_at_border(&behind, &ray, behind.begin_t, &b);
+    if (is_at_border && side == ISO_SIDE_UNKNOWN) {
+      const FrameParams before = frames[level];
+      const Ray ray_before = make_ray(&before, pixel);
+      BlockCoords left;
+      if (block_at_border(&before, &ray_before, before.end_t, &left))
+        side = side_of_block(&before, macrocell_masks, ranges, left);
+    }
+    if (is_at_border && side != ISO_SIDE_UNKNOWN &&
+        side_of_block(&behind, macrocell_masks, ranges, b) != side) {
+      state = block_id_at(&behind, b.x, b.y, b.z) | side << ISO_RAY_SIDE_SHIFT;
+    } else {
+      uint block_id = first_block(&behind, &ray);
+      if (block_id != ISO_INVALID_ID &&
+          find_blocks(&behind, macrocell_masks, &ray, &block_id, 1, found, 1) != 0)
+        state = found[0];
+    }
+    side = ISO_SIDE_UNKNOWN;
+  }
+  return state;
+}
+
+/// `frame`: that of the level which has block block_id, as a copy of the work-item's own.
+#if ISO_LEVELS
+#define ISO_FRAME_OF(frame, block_id)                                                \
+  const FrameParams frame##_params = frames[level_of(frames, num_frames, block_id)]; \
+  const FrameParams *frame = &frame##_params
+#else
+#define ISO_FRAME_OF(frame, block_id) \
+  const FrameParams *frame = ((void)frames, (void)num_frames, &frame_params)
+#endif
+
+/// find_blocks() for a ray that stands at block *block_id, which it looks into though it may not be active where it has a side.
+ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
+                                 uint side, uint *block_id, uint wanted, local uint *found) {
+  uint first = 0;
+  if (side != ISO_SIDE_UNKNOWN) {
+    found[0] = *block_id;
+    first = 1;
+    *block_id = block_behind(frame, ray, block_coords(frame, *block_id), last_planes(frame));
+    if (wanted == 1 || *block_id == ISO_INVALID_ID) return 1;
+  }
+  return first + find_blocks(frame, macrocell_masks, ray, block_id, wanted - first,
+                             found + first * ISO_GROUP_SIZE, ISO_GROUP_SIZE);
+}
+
+#endif

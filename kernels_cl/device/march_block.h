@@ -1,0 +1,159 @@
+/// march_block.h -- a ray through the cells of a block whose dual grid is in the cache, as far as it is (march.cl).
+/// OpenCL C 1.2.
+#ifndef ISOWAVE_MARCH_BLOCK_H
+#define ISOWAVE_MARCH_BLOCK_H
+
+#include "block_cells.h"
+#include "block_walk.h"
+#include "portable/block_table.h"
+#include "portable/cell_intersect.h"
+
+/// What became of a ray.
+#define ISO_RAY_LEFT 0   ///< it left the volume
+#define ISO_RAY_HIT 1    ///< equal to what isolate() returns, as is
+#define ISO_RAY_DOUBT 2  ///< the next march settles it
+#define ISO_RAY_WAITS 3  ///< for a block that is not cached
+#define ISO_RAY_ENDS 4   ///< its band ends here; + 1: inside
+#if ISO_RAY_DOUBT != ISO_DOUBTFUL
+#error "a result of isolate() must stand for itself"
+#endif
+
+/// The corners of the dual grid (bits 0..7, corner x + 2y + 4z) whose blocks the voxels of local cell (x,y,z) lie in.
+ISO_INLINE uint cell_blocks(int x, int y, int z) {
+  const int border = (x == 3 ? 1 : 0) + (y == 3 ? 2 : 0) + (z == 3 ? 4 : 0);
+  return (uint)(0xFF5533110F050301ul >> (8 * border)) & 0xFFu;
+}
+
+/// A change of inside, or doubt, in a cell of a block.
+typedef struct BlockChange {
+  CellChange change;
+  GridWalk cell;
+  RayEvent enter;
+  float w[8];
+  int at_border;  ///< it is where the cell is entered: a level of detail has another opinion than the one before
+} BlockChange;
+
+/// The cells of a block that have voxels of any of those corners.
+ISO_INLINE ulong cells_of_corners(uint corners) {
+  const ulong x3 = 0x8888888888888888ul, y3 = 0xF000F000F000F000ul, z3 = 0xFFFF000000000000ul;
+  ulong cells = 0;
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((corners >> corner & 1u) != 0)
+      cells |=
+          ((corner & 1) != 0 ? x3 : ~0ul) & ((corner & 2) != 0 ? y3 : ~0ul) & ((corner & 4) != 0 ? z3 : ~0ul);
+  }
+  return cells;
+}
+
+/// Which cells of block b a ray must look into: those in which inside changes, and those that need a block that is
+/// not cached. What is found out stays in the block's table entry for the next who asks. Out: slots [8] of the dual
+/// grid, ISO_GROUP_SIZE apart; *have: which of its corners are cached, or beyond the volume, where no cell of the
+/// domain reaches.
+ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
+                            BlockCoords b, local uint *slots, uint *have) {
+  BlockEntry entries[8];
+  ulong cells;
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  *have = (b.x + 1 == frame->blocks_x ? 0xAAu : 0u) | (b.y + 1 == frame->blocks_y ? 0xCCu : 0u) |
+          (b.z + 1 == frame->blocks_z ? 0xF0u : 0u);
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    slots[corner * ISO_GROUP_SIZE] = entries[corner].slot;
+    *have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
+  }
+  cells = (ulong)entries[0].changing_high << 32 | entries[0].changing_low;
+  if ((*have & 1u) != 0 && cells == ISO_CHANGING_UNKNOWN) {
+    ulong voxels[8];
+    ISO_UNROLL
+    for (uint corner = 0; corner < 8; ++corner) {
+      voxels[corner] = entries[corner].slot == ISO_BLOCK_ABSENT ? 0 : inside[entries[corner].slot];
+    }
+    cells = changing_cells(voxels) | cells_of_corners(~*have & 0xFFu);
+    if (!ISO_CHECK_RACES && *have == 0xFFu) {
+      global BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
+      entry->changing_low = (uint)cells;
+      entry->changing_high = (uint)(cells >> 32);
+    }
+  }
+  return cells;
+}
+
+/// Where the ray's band begins, if it has not entered the region before.
+ISO_INLINE RayEvent band_entry(const FrameParams *frame, RayEvent entry) {
+  const RayEvent begin = border_event(ISO_LEVELS ? frame->begin_t : 0.0f);
+  return ISO_LEVELS && event_before(entry, begin) ? begin : entry;
+}
+
+/// Where it ends, if it does before the ray leaves the region.
+ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
+  return ends_band(frame, exit) ? border_event(frame->end_t) : exit;
+}
+
+/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a
+/// block of the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE
+/// apart. If b is cached, its slot's stamp becomes `stamp`. precise: settle doubts on the spot. side: where the ray
+/// was before the border at which its band begins in this block. may_end: its band may end in this one.
+ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
+                           global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
+                           local uint *slots, global uint *slot_stamps, uint stamp, int precise, uint side,
+                           int may_end, BlockChange *found) {
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  uint have; /* corners of the dual grid */
+  int result = ISO_RAY_LEFT, left = 0;
+  const ulong cells = open_block(frame, table, inside, b, slots, &have);
+  if ((have & 1u) == 0) return ISO_RAY_WAITS;
+  slot_stamps[slots[0]] = stamp; /* for all of the dual grid: see last_use() in block_cache.cl */
+  const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
+  const int ends = may_end && ends_band(frame, walk_exit(&block, ray));
+  if (cells == 0 && side == ISO_SIDE_UNKNOWN && !ends) return ISO_RAY_LEFT;
+  found->enter = band_entry(frame, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
+  found->cell = enter_block(ray, b, found->enter, last);
+  found->at_border = 0;
+  while (result == ISO_RAY_LEFT && !left) {
+    const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
+    const RayEvent cell_exit = walk_exit(&found->cell, ray);
+    const int ends_here = ends && ends_band(frame, cell_exit);
+    const RayEvent exit = ends_here ? border_event(frame->end_t) : cell_exit;
+    if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0 || side != ISO_SIDE_UNKNOWN || ends_here) {
+      if ((cell_blocks(x, y, z) & ~have) != 0) {
+        result = ISO_RAY_WAITS;
+      } else {
+        for (int corner = 0; corner < 8; ++corner) {
+          const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
+          const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+          found->w[corner] =
+              cache_values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
+              frame->isovalue;
+        }
+        if (ISO_LEVELS && side != ISO_SIDE_UNKNOWN)
+          found->at_border = inside_at(ray, found->w, found->enter, found->cell.x, found->cell.y,
+                                       found->cell.z, 0) != (side == ISO_SIDE_INSIDE);
+        result = found->at_border ? ISO_RAY_HIT
+                 : precise        ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                                   found->cell.z, found->enter, exit, &found->change)
+                           : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                                     found->cell.z, found->enter, exit, &found->change);
+        if (result == ISO_RAY_LEFT && ends_here)
+          result =
+              ISO_RAY_ENDS + inside_at(ray, found->w, exit, found->cell.x, found->cell.y, found->cell.z, 1);
+      }
+    }
+    if (result == ISO_RAY_LEFT) {
+      left = leaves(&found->cell, &block, cell_exit);
+      walk_step(&found->cell, ray, cell_exit, 1, last);
+      found->enter = cell_exit;
+      side = ISO_SIDE_UNKNOWN;
+    }
+  }
+  return result;
+}
+
+ISO_INLINE HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  const float s =
+      ISO_LEVELS && found->at_border ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);
+  return make_hit(frame, ray, found->w, found->cell.x, found->cell.y, found->cell.z, found->enter,
+                  band_exit(frame, walk_exit(&found->cell, ray)), s);
+}
+
+#endif

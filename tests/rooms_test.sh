@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# rooms_test.sh <source folder>: the table of core/README.md names every room of core/, and no room includes a header of
+# a room below it in the table. kernels_cl/portable includes nothing but itself.
+set -euo pipefail
+cd "$1"
+
+failed=0
+fail() {
+  echo "$*"
+  failed=1
+}
+
+mapfile -t rooms < <(sed -n 's/^| `\([a-z]*\)` |.*/\1/p' core/README.md)
+declare -A place
+for i in "${!rooms[@]}"; do place[${rooms[i]}]=$i; done
+[ "${#rooms[@]}" -gt 0 ] || fail "core/README.md has no table of rooms"
+
+for folder in core/*/; do
+  room=$(basename "$folder")
+  [ -n "${place[$room]:-}" ] || fail "core/README.md does not name the room $room"
+done
+while IFS=: read -r file include; do
+  from=$(cut -d/ -f2 <<<"$file")
+  to=$(sed 's|#include "core/\([a-z]*\)/.*|\1|' <<<"$include")
+  if [ -z "${place[$to]:-}" ] || [ "${place[$to]}" -gt "${place[$from]}" ]; then
+    fail "$file: $include: $to is not above $from in core/README.md"
+  fi
+done < <(grep -roE '^#include "core/[^"]*"' core)
+while IFS=: read -r file include; do
+  name=$(sed 's|.*"\(.*\)"|\1|' <<<"$include")
+  [ -f "kernels_cl/portable/$name" ] || fail "$file: $include: a portable header includes portable ones alone"
+done < <(grep -roE '^#include "[^"]*"' kernels_cl/portable)
+while IFS=: read -r file include; do
+  fail "$file: $include: the host includes portable headers alone"
+done < <(grep -rnoE '^#include "kernels_cl/(device|probes)?/?[a-z_]*\.[a-z]*"' core reference tests tools bench --include=*.?pp | grep -v 'kernels_cl/portable/' | sed 's/:[0-9]*:/:/')
+exit "$failed"
