@@ -1,5 +1,5 @@
-// Requests and slots: block_cache.cl. key_bits 18 and 27 are the blocks of 256^3 and 2048^3 voxels; only
-// their page table exists here.
+// Requests and slots: block_cache.cl. key_bits 18 and 27 are the blocks of 256^3 and 2048^3 voxels;
+// only their page table exists here.
 //
 //   request_cold  every block that the pairs' dual grids need is missing
 //   request_warm  every one is cached
@@ -19,10 +19,12 @@ constexpr std::size_t kNumVisible = 1u << 14;
 /// Two sets of pairs that fill the cache in turn.
 class CacheInput {
  public:
-  CacheInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t key_bits, Distribution distribution)
-      : sets_{make_block_pairs(distribution, num_pairs, kNumVisible, static_cast<std::uint32_t>(key_bits), 0),
-              make_block_pairs(distribution, num_pairs, kNumVisible, static_cast<std::uint32_t>(key_bits),
-                               1)},
+  CacheInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t key_bits,
+             Distribution distribution)
+      : sets_{make_block_pairs(distribution, num_pairs, kNumVisible,
+                               static_cast<std::uint32_t>(key_bits), 0),
+              make_block_pairs(distribution, num_pairs, kNumVisible,
+                               static_cast<std::uint32_t>(key_bits), 1)},
         rays_(device, num_pairs),
         cache_(device, cube_params(static_cast<std::uint32_t>(key_bits)),
                static_cast<std::uint32_t>(num_needed()), num_pairs, kGroupSize) {
@@ -114,10 +116,12 @@ void register_parts(Distribution distribution, std::int64_t width, std::int64_t 
   for (const auto &[part, name] : {std::pair(Part::kRequestCold, "request_cold"),
                                    {Part::kRequestWarm, "request_warm"},
                                    {Part::kAssign, "assign"}}) {
-    if (part == Part::kAssign && distribution == Distribution::kHot) continue;  // 8 blocks: launches, no work
-    stage_benchmark(
-        fmt::format("block_cache/{}/{}", name, to_string(distribution)),
-        [part = part, distribution](benchmark::State &state) { use_cache(state, part, distribution); })
+    if (part == Part::kAssign && distribution == Distribution::kHot)
+      continue;  // 8 blocks: launches, no work
+    stage_benchmark(fmt::format("block_cache/{}/{}", name, to_string(distribution)),
+                    [part = part, distribution](benchmark::State &state) {
+                      use_cache(state, part, distribution);
+                    })
         ->ArgNames({"width", "key_bits"})
         ->Args({width, key_bits});
   }

@@ -19,10 +19,11 @@ using nlohmann::ordered_json;
 
 using Pictures = std::vector<std::vector<HitRecord>>;
 
-/// Draws every view and the next one of each; whether no frame took more than max_passes. The first call fills `expected`;
-/// the pictures of all others must equal it.
-bool check_pictures(Renderer &renderer, const FrameReport &common, const std::vector<Camera> &cameras,
-                    std::uint32_t max_passes, Pictures &expected) {
+/// Draws every view and the next one of each; whether no frame took more than max_passes. The first
+/// call fills `expected`; the pictures of all others must equal it.
+bool check_pictures(Renderer &renderer, const FrameReport &common,
+                    const std::vector<Camera> &cameras, std::uint32_t max_passes,
+                    Pictures &expected) {
   const bool first = expected.empty();
   std::size_t index = 0;
   for (const Camera &camera : cameras) {
@@ -57,13 +58,16 @@ double num_decoded(const FrameStats &frame) {
 }
 
 ordered_json budget_json(const BudgetTimes &budget) {
-  ordered_json json = {
-      {"bytes", budget.bytes}, {"cache_slots", budget.cache_slots}, {"peak_bytes", budget.peak_bytes}};
+  ordered_json json = {{"bytes", budget.bytes},
+                       {"cache_slots", budget.cache_slots},
+                       {"peak_bytes", budget.peak_bytes}};
   for (const auto &[kind, member] : kKinds) {
     json[fmt::format("{}_ms", kind)] =
-        budget.views.empty() ? ordered_json() : spread_json(spread_of(all_times(budget.views, member)));
+        budget.views.empty() ? ordered_json()
+                             : spread_json(spread_of(all_times(budget.views, member)));
   }
-  json["passes"] = budget.views.empty() ? ordered_json() : ordered_json(median_of_frames(budget, num_passes));
+  json["passes"] =
+      budget.views.empty() ? ordered_json() : ordered_json(median_of_frames(budget, num_passes));
   json["decoded_blocks"] =
       budget.views.empty() ? ordered_json() : ordered_json(median_of_frames(budget, num_decoded));
   return json;
@@ -72,33 +76,35 @@ ordered_json budget_json(const BudgetTimes &budget) {
 }  // namespace
 
 std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
-                                             const CompressedVolume &volume, const RendererOptions &options,
-                                             std::uint32_t count) {
+                                             const CompressedVolume &volume,
+                                             const RendererOptions &options, std::uint32_t count) {
   ocl::Device device(device_info);
   const Renderer ample(device, volume, options);
   const RendererOptions &chosen = ample.options();
-  MemoryRequest request{chosen.size.num_rays(), chosen.pipeline, chosen.grouping, chosen.group_size};
+  MemoryRequest request{chosen.size.num_rays(), chosen.pipeline, chosen.grouping,
+                        chosen.group_size};
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     if (options.stream != StreamPlace::kAuto && options.stream != place) continue;
     request.stream = place;
     least = std::min(least, plan_memory(volume, request, kMinCacheSlots).peak());
   }
-  // In equal ratios of what lies above the least: the same at every budget, that would hide the rest.
+  // In equal ratios of what lies above the least: the same at every budget, that would hide the
+  // rest.
   constexpr double kSmallest = 0.01;
   const auto above = static_cast<double>(ample.memory_plan().peak() - least);
   std::vector<std::uint64_t> budgets;
   for (std::uint32_t i = 0; i < count; ++i) {
-    budgets.push_back(least +
-                      static_cast<std::uint64_t>(above * std::pow(kSmallest, double(i) / (count - 1))));
+    budgets.push_back(
+        least + static_cast<std::uint64_t>(above * std::pow(kSmallest, double(i) / (count - 1))));
   }
   budgets.erase(std::unique(budgets.begin(), budgets.end()), budgets.end());
   return budgets;
 }
 
 BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVolume &volume,
-                          FrameReport common, std::vector<std::uint64_t> budgets, std::uint32_t max_passes,
-                          bool with_floor) {
+                          FrameReport common, std::vector<std::uint64_t> budgets,
+                          std::uint32_t max_passes, bool with_floor) {
   std::sort(budgets.begin(), budgets.end(), std::greater<>());
   budgets.erase(std::unique(budgets.begin(), budgets.end()), budgets.end());
   const std::vector<Camera> cameras = orbit_cameras(volume.info, common.num_views);
@@ -121,15 +127,16 @@ BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVo
       budget.views = measure_views(renderer, cameras, common.isovalue, common.rounds);
     } else if (sweep.budgets.empty()) {
       throw Error(
-          "the largest budget, {} bytes, takes more than {} passes a frame: allow more by --max-passes",
+          "the largest budget, {} bytes, takes more than {} passes a frame: allow more by "
+          "--max-passes",
           bytes, max_passes);
     }
     budget.peak_bytes = device.ledger().peak();
     sweep.budgets.push_back(std::move(budget));
   }
   if (with_floor) {
-    common.floor = measure_floor(device_info, volume, common.options, cameras, common.isovalue, common.rounds,
-                                 pictures.front());
+    common.floor = measure_floor(device_info, volume, common.options, cameras, common.isovalue,
+                                 common.rounds, pictures.front());
   }
   sweep.common = std::move(common);
   return sweep;

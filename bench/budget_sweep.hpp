@@ -23,18 +23,18 @@ struct BudgetSweep {
   std::uint32_t max_passes = 0;
 };
 
-/// `count` budgets, at least 2, from what drawing takes without a budget down to near the smallest that is accepted, in equal
-/// ratios of what lies above that. Descending, each once.
+/// `count` budgets, at least 2, from what drawing takes without a budget down to near the smallest
+/// that is accepted, in equal ratios of what lies above that. Descending, each once.
 std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
-                                             const CompressedVolume &volume, const RendererOptions &options,
-                                             std::uint32_t count);
+                                             const CompressedVolume &volume,
+                                             const RendererOptions &options, std::uint32_t count);
 
-/// `common` says volume, isovalue, options and rounds; budgets [bytes] in any order. Every view, and the next one of each,
-/// must be the same bit for bit at every budget: throws Error if not. A budget at which a frame takes more than max_passes
-/// gets no times.
+/// `common` says volume, isovalue, options and rounds; budgets [bytes] in any order. Every view,
+/// and the next one of each, must be the same bit for bit at every budget: throws Error if not. A
+/// budget at which a frame takes more than max_passes gets no times.
 BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVolume &volume,
-                          FrameReport common, std::vector<std::uint64_t> budgets, std::uint32_t max_passes,
-                          bool with_floor);
+                          FrameReport common, std::vector<std::uint64_t> budgets,
+                          std::uint32_t max_passes, bool with_floor);
 
 void print_sweep(const BudgetSweep &sweep);
 

@@ -1,4 +1,5 @@
-// The closest of each ray's results -> hits, and the next wavefront: composite.cl with its compaction.
+// The closest of each ray's results -> hits, and the next wavefront: composite.cl with its
+// compaction.
 
 #include <cmath>
 
@@ -14,7 +15,8 @@ constexpr std::int64_t kEdge = 128;
 struct CompositeInput : FrameRig {
   CompositeInput(ocl::Device &device, std::int64_t width, std::int64_t spec_count, ClosestHit how)
       : FrameRig(device, mixing_layer(kEdge),
-                 mixing_layer_setup(kEdge, image_of_width(width), static_cast<std::uint32_t>(spec_count))),
+                 mixing_layer_setup(kEdge, image_of_width(width),
+                                    static_cast<std::uint32_t>(spec_count))),
         closest(how),
         composite(device, rays.num_rays, how) {
     start();
@@ -23,8 +25,9 @@ struct CompositeInput : FrameRig {
     find_blocks();
     intersect(cache, group.groups(), rays);
     before.emplace(rays);
-    bytes_of_pairs = closest == ClosestHit::kScan ? double(count_pairs_looked_at()) * (4.0 + sizeof(PairHit))
-                                                  : 4.0 * read_counts().active_count;
+    bytes_of_pairs = closest == ClosestHit::kScan
+                         ? double(count_pairs_looked_at()) * (4.0 + sizeof(PairHit))
+                         : 4.0 * read_counts().active_count;
     run();
     verify();
   }
@@ -41,7 +44,8 @@ struct CompositeInput : FrameRig {
     for (std::size_t ray = 0; ray < pass.window_count; ++ray) {
       std::size_t pair = ray * pass.spec_count;
       const std::size_t end = pair + pass.spec_count;
-      while (pair < end && blocks[pair] != ISO_INVALID_ID && results[pair].cell == ISO_NO_HIT) ++pair;
+      while (pair < end && blocks[pair] != ISO_INVALID_ID && results[pair].cell == ISO_NO_HIT)
+        ++pair;
       count += std::min(pair + 1, end) - ray * pass.spec_count;
     }
     return count;
@@ -50,7 +54,8 @@ struct CompositeInput : FrameRig {
   /// What is hit so far has the twin's bits.
   void verify() {
     counts = read_counts();
-    const std::vector<HitRecord> expected = render_scalar(params, decode_with_libzfp(mixing_layer(kEdge)));
+    const std::vector<HitRecord> expected =
+        render_scalar(params, decode_with_libzfp(mixing_layer(kEdge)));
     const std::vector<HitRecord> got = rays.hits.read();
     uint num_hits = 0;
     for (std::size_t pixel = 0; pixel < got.size(); ++pixel) {
@@ -70,10 +75,11 @@ struct CompositeInput : FrameRig {
 
 void composite_pairs(benchmark::State &state, ClosestHit closest) {
   auto &in = input<CompositeInput>(state.range(0), state.range(1), closest);
-  const double bytes =
-      in.bytes_of_pairs + 12.0 * in.counts.active_count + in.counts.hit_count * (sizeof(HitRecord) + 32.0);
+  const double bytes = in.bytes_of_pairs + 12.0 * in.counts.active_count +
+                       in.counts.hit_count * (sizeof(HitRecord) + 32.0);
   measure(
-      state, {double(in.counts.active_count), bytes}, [&] { in.before->restore(); }, [&] { in.run(); });
+      state, {double(in.counts.active_count), bytes}, [&] { in.before->restore(); },
+      [&] { in.run(); });
   state.counters["hits"] = in.counts.hit_count;
 }
 

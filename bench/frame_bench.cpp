@@ -1,5 +1,6 @@
-// frame_bench: whole frames of one volume from an orbit of cameras. Total times without profiling; a second
-// run with profiling gives the milliseconds per stage. With --budgets: the total times at several memory budgets.
+// frame_bench: whole frames of one volume from an orbit of cameras. Total times without profiling;
+// a second run with profiling gives the milliseconds per stage. With --budgets: the total times at
+// several memory budgets.
 
 #include <fmt/format.h>
 
@@ -48,8 +49,8 @@ float isovalue_of(const Options &options, const CompressedVolume &volume) {
 /// On a device of its own, so that the memory reported is that of drawing.
 CompressedVolume load(const Options &options, const ocl::DeviceInfo &device_info) {
   ocl::Device device(device_info);
-  return tools::load_volume(options.volume, tools::to_overrides(options.volume_options), options.compression,
-                            &device);
+  return tools::load_volume(options.volume, tools::to_overrides(options.volume_options),
+                            options.compression, &device);
 }
 
 /// Stage -> ms of a cold frame, for each view.
@@ -69,15 +70,16 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, R
 }
 
 /// What does not depend on measurements.
-FrameReport make_report(const Options &options, const CompressedVolume &volume, std::string command) {
+FrameReport make_report(const Options &options, const CompressedVolume &volume,
+                        std::string command) {
   FrameReport report;
   report.command = std::move(command);
   report.volume = options.volume;
   report.grid.info = volume.info;
   report.grid.bits_per_block = volume.bits_per_block;
   report.isovalue = isovalue_of(options, volume);
-  report.options =
-      tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1), options.samples});
+  report.options = tools::to_renderer_options(
+      options.renderer, {options.size.at(0), options.size.at(1), options.samples});
   report.num_views = options.orbit;
   report.rounds = options.rounds;
   return report;
@@ -116,12 +118,14 @@ FrameReport measure(const Options &options, std::string command) {
 
 /// "auto:N", or bytes separated by commas.
 std::vector<std::uint64_t> budgets_of(const Options &options, const ocl::DeviceInfo &device_info,
-                                      const CompressedVolume &volume, const RendererOptions &renderer) {
+                                      const CompressedVolume &volume,
+                                      const RendererOptions &renderer) {
   constexpr std::string_view kAuto = "auto:";
   if (renderer.memory_budget != 0 || renderer.cache_slots != 0)
     throw Error("--budgets stands for --memory-budget and --cache-slots: give it alone");
   if (options.budgets.starts_with(kAuto)) {
-    const std::uint64_t count = tools::parse_whole(options.budgets.substr(kAuto.size())).value_or(0);
+    const std::uint64_t count =
+        tools::parse_whole(options.budgets.substr(kAuto.size())).value_or(0);
     if (count < 2 || count > 1000)
       throw Error("--budgets {}: auto:N makes 2 to 1000 budgets", options.budgets);
     return geometric_budgets(device_info, volume, renderer, static_cast<std::uint32_t>(count));
@@ -140,8 +144,8 @@ BudgetSweep measure_budgets(const Options &options, std::string command) {
   const CompressedVolume volume = load(options, device_info);
   FrameReport common = make_report(options, volume, std::move(command));
   std::vector<std::uint64_t> budgets = budgets_of(options, device_info, volume, common.options);
-  return sweep_budgets(device_info, volume, std::move(common), std::move(budgets), options.max_passes,
-                       options.resident);
+  return sweep_budgets(device_info, volume, std::move(common), std::move(budgets),
+                       options.max_passes, options.resident);
 }
 
 /// What can be told from the options alone.
@@ -158,7 +162,8 @@ void check_options(const CLI::App &app, const Options &options) {
 void run(const CLI::App &app, Options options, const std::string &command) {
   check_options(app, options);
   tools::want_levels(options.renderer, options.compression);
-  if (options.renderer.values.max_pixel_error > 0) options.resident = false;  // it draws the finest level
+  if (options.renderer.values.max_pixel_error > 0)
+    options.resident = false;  // it draws the finest level
   nlohmann::ordered_json json;
   if (options.budgets.empty()) {
     const FrameReport report = measure(options, command);
@@ -173,12 +178,15 @@ void run(const CLI::App &app, Options options, const std::string &command) {
 }
 
 void add_options(CLI::App &app, Options &options) {
-  app.add_option("VOLUME", options.volume, "a .zfp file, or " + std::string(tools::kVolumeHelp))->required();
+  app.add_option("VOLUME", options.volume, "a .zfp file, or " + std::string(tools::kVolumeHelp))
+      ->required();
   tools::add_volume_options(app, options.volume_options);
   app.add_option("--isovalue,-i", options.isovalue, "isovalue [the middle of the volume's values]")
       ->check(tools::fits_float32());
   tools::add_compression_options(app, options.compression);
-  app.add_option("--size", options.size, "picture size WxH [1280x720]")->delimiter('x')->expected(2);
+  app.add_option("--size", options.size, "picture size WxH [1280x720]")
+      ->delimiter('x')
+      ->expected(2);
   app.add_option("--samples", options.samples, "N: N x N rays for each pixel")
       ->check(CLI::Range(1u, ImageSize::kMaxSamples))
       ->capture_default_str();
@@ -190,13 +198,15 @@ void add_options(CLI::App &app, Options &options) {
       ->capture_default_str();
   app.add_flag("!--no-resident", options.resident,
                "leave out the floor: the whole volume decoded, one kernel");
-  app.add_option("--device", options.device,
-                 "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
-  tools::add_renderer_options(app, options.renderer);
   app.add_option(
-      "--budgets", options.budgets,
-      "draw the same orbit at each of these memory budgets, e.g. 200MB,400MB,1GB, or auto:N for N from "
-      "the smallest to an ample one, in equal ratios of what lies above that; the pictures must be the same");
+      "--device", options.device,
+      "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
+  tools::add_renderer_options(app, options.renderer);
+  app.add_option("--budgets", options.budgets,
+                 "draw the same orbit at each of these memory budgets, e.g. 200MB,400MB,1GB, or "
+                 "auto:N for N from "
+                 "the smallest to an ample one, in equal ratios of what lies above that; the "
+                 "pictures must be the same");
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")
       ->check(CLI::PositiveNumber)
@@ -213,7 +223,8 @@ int main(int argc, char **argv) {
                "frame_bench");
   isowave::bench::Options options;
   isowave::bench::add_options(app, options);
-  app.callback(
-      [&] { isowave::bench::run(app, options, fmt::format("{}", fmt::join(argv, argv + argc, " "))); });
+  app.callback([&] {
+    isowave::bench::run(app, options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
+  });
   return isowave::tools::run_program(app, argc, argv);
 }

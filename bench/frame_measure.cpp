@@ -8,7 +8,8 @@
 
 namespace isowave::bench {
 
-std::vector<double> all_times(const std::vector<ViewTimes> &views, std::vector<FrameStats> ViewTimes::*kind) {
+std::vector<double> all_times(const std::vector<ViewTimes> &views,
+                              std::vector<FrameStats> ViewTimes::*kind) {
   std::vector<double> times;
   for (const ViewTimes &view : views) {
     for (const FrameStats &frame : view.*kind) times.push_back(frame.total_ms);
@@ -22,8 +23,8 @@ Camera turned(Camera camera) {
   return camera;
 }
 
-std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras, float isovalue,
-                                     std::uint32_t rounds) {
+std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
+                                     float isovalue, std::uint32_t rounds) {
   std::vector<ViewTimes> views(cameras.size());
   for (std::uint32_t round = 0; round < rounds; ++round) {
     for (std::size_t view = 0; view < cameras.size(); ++view) {
@@ -47,8 +48,9 @@ std::vector<double> FloorTimes::all() const {
 }
 
 FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVolume &volume,
-                         const RendererOptions &options, const std::vector<Camera> &cameras, float isovalue,
-                         std::uint32_t rounds, const std::vector<HitRecord> &first_hits) {
+                         const RendererOptions &options, const std::vector<Camera> &cameras,
+                         float isovalue, std::uint32_t rounds,
+                         const std::vector<HitRecord> &first_hits) {
   ocl::Device device(device_info);
   FloorTimes times;
   if (const auto obstacle = Resident::obstacle(device, volume, options.size)) {
@@ -58,7 +60,8 @@ FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVol
   Resident resident(device, volume, options.size, options.solver);
   resident.render(cameras.front(), isovalue);
   if (!same_hits(resident.hits(), first_hits)) {
-    throw Error("the resident floor draws another picture than the renderer: its time means nothing");
+    throw Error(
+        "the resident floor draws another picture than the renderer: its time means nothing");
   }
   times.ms.resize(cameras.size());
   for (std::uint32_t round = 0; round < rounds; ++round) {

@@ -21,15 +21,16 @@ inline constexpr std::pair<const char *, std::vector<FrameStats> ViewTimes::*> k
     {"cold", &ViewTimes::cold}, {"warm", &ViewTimes::warm}, {"next", &ViewTimes::next}};
 
 /// ms of all frames of one kind.
-std::vector<double> all_times(const std::vector<ViewTimes> &views, std::vector<FrameStats> ViewTimes::*kind);
+std::vector<double> all_times(const std::vector<ViewTimes> &views,
+                              std::vector<FrameStats> ViewTimes::*kind);
 
 /// The camera one degree further around the vertical through the point it looks at.
 Camera turned(Camera camera);
 
-/// The renderer must have drawn a frame of the isovalue before: a driver may compile a kernel when it first runs, and an
-/// isovalue's first frame finds its blocks.
-std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras, float isovalue,
-                                     std::uint32_t rounds);
+/// The renderer must have drawn a frame of the isovalue before: a driver may compile a kernel when
+/// it first runs, and an isovalue's first frame finds its blocks.
+std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
+                                     float isovalue, std::uint32_t rounds);
 
 double num_passes(const FrameStats &frame);
 
@@ -41,11 +42,12 @@ struct FloorTimes {
   std::vector<double> all() const;
 };
 
-/// On a device of its own: nothing else should be on it. first_hits: the picture from cameras.front(), which the floor must
-/// draw too; throws Error if it differs.
+/// On a device of its own: nothing else should be on it. first_hits: the picture from
+/// cameras.front(), which the floor must draw too; throws Error if it differs.
 FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVolume &volume,
-                         const RendererOptions &options, const std::vector<Camera> &cameras, float isovalue,
-                         std::uint32_t rounds, const std::vector<HitRecord> &first_hits);
+                         const RendererOptions &options, const std::vector<Camera> &cameras,
+                         float isovalue, std::uint32_t rounds,
+                         const std::vector<HitRecord> &first_hits);
 
 /// Every bit.
 bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b);

@@ -76,15 +76,20 @@ const Column kColumns[] = {
      [](const FrameReport &report, const FrameStats &frame) {
        return 100.0 * double(frame.rays_hit) / double(report.options.size.num_rays());
      }},
-    {"passes", "passes", 0, [](const FrameReport &, const FrameStats &frame) { return num_passes(frame); }},
+    {"passes", "passes", 0,
+     [](const FrameReport &, const FrameStats &frame) { return num_passes(frame); }},
     {"ms/pass", "ms_per_pass", 2,
-     [](const FrameReport &, const FrameStats &frame) { return frame.total_ms / num_passes(frame); }},
+     [](const FrameReport &, const FrameStats &frame) {
+       return frame.total_ms / num_passes(frame);
+     }},
     {"visible %", "visible_blocks_percent", 2,
      [](const FrameReport &report, const FrameStats &frame) {
        return 100.0 * sum_of_visible(frame) / double(report.grid.block_count());
      }},
     {"decoded", "decoded_blocks", 0,
-     [](const FrameReport &, const FrameStats &frame) { return sum_of(frame, &PassCounts::decoded_count); }},
+     [](const FrameReport &, const FrameStats &frame) {
+       return sum_of(frame, &PassCounts::decoded_count);
+     }},
     {"N_spec", "median_n_spec", 1,
      [](const FrameReport &, const FrameStats &frame) { return median_n_spec(frame); }},
     {"util %", "utilization_percent", 1,
@@ -93,7 +98,8 @@ const Column kColumns[] = {
 
 /// The medians over a view's rounds.
 double column_of(const FrameReport &report, const ViewTimes &view, const Column &column) {
-  return median(each(view.cold, [&](const FrameStats &frame) { return column.value(report, frame); }));
+  return median(
+      each(view.cold, [&](const FrameStats &frame) { return column.value(report, frame); }));
 }
 
 /// How many times the floor a kind of frame takes, of the medians.
@@ -145,7 +151,8 @@ std::map<std::string, std::vector<double>> times_by_stage(const FrameReport &rep
   }
   std::map<std::string, std::vector<double>> times;
   for (const auto &view : report.stage_ms) {
-    for (const std::string &name : names) times[name].push_back(view.contains(name) ? view.at(name) : 0.0);
+    for (const std::string &name : names)
+      times[name].push_back(view.contains(name) ? view.at(name) : 0.0);
   }
   return times;
 }
@@ -159,9 +166,11 @@ void print_stages(const FrameReport &report) {
     sum += rows.back().first;
   }
   std::sort(rows.rbegin(), rows.rend());
-  fmt::print("\nms per stage of a cold frame, medians over the views, from a run with profiling ({}):\n",
-             report.stage_clock);
-  for (const auto &[ms, stage] : rows) fmt::print("  {:<14}{:>9.2f}{:>7.1f} %\n", stage, ms, 100 * ms / sum);
+  fmt::print(
+      "\nms per stage of a cold frame, medians over the views, from a run with profiling ({}):\n",
+      report.stage_clock);
+  for (const auto &[ms, stage] : rows)
+    fmt::print("  {:<14}{:>9.2f}{:>7.1f} %\n", stage, ms, 100 * ms / sum);
   fmt::print("  {:<14}{:>9.2f}\n", "sum", sum);
 }
 
@@ -183,12 +192,12 @@ void print_run(const FrameReport &report) {
   const glm::uvec3 dims = report.grid.info.dims;
   fmt::print("{}\n", report.command);
   for (const auto &[name, value] : report.run_info) fmt::print("  {:<16}{}\n", name, value);
-  fmt::print("  {:<16}{} x {} x {} {}, {} blocks, rate {}, isovalue {}\n", "volume", dims.x, dims.y, dims.z,
-             to_string(report.grid.info.type), report.grid.block_count(), report.grid.rate(),
-             report.isovalue);
+  fmt::print("  {:<16}{} x {} x {} {}, {} blocks, rate {}, isovalue {}\n", "volume", dims.x, dims.y,
+             dims.z, to_string(report.grid.info.type), report.grid.block_count(),
+             report.grid.rate(), report.isovalue);
   const ImageSize &size = report.options.size;
-  fmt::print("  {:<16}{} x {}, {} rays a pixel, {} views, {} rounds, N_spec up to {}\n", "frames", size.width,
-             size.height, size.samples * size.samples, report.num_views, report.rounds,
+  fmt::print("  {:<16}{} x {}, {} rays a pixel, {} views, {} rounds, N_spec up to {}\n", "frames",
+             size.width, size.height, size.samples * size.samples, report.num_views, report.rounds,
              report.options.max_speculation);
 }
 
@@ -238,17 +247,22 @@ void print_report(const FrameReport &report) {
   print_views(report);
   print_floor(report, report.views);
   fmt::print(
-      "Times are wall clock, median (min..max) over the rounds, and in the last row over views and rounds.\n"
-      "cold: nothing decoded before; warm: the same view again; next: then one degree further. The other\n"
-      "columns are a cold frame's. visible: blocks with rays, summed over the passes, of all blocks; "
+      "Times are wall clock, median (min..max) over the rounds, and in the last row over views and "
+      "rounds.\n"
+      "cold: nothing decoded before; warm: the same view again; next: then one degree further. The "
+      "other\n"
+      "columns are a cold frame's. visible: blocks with rays, summed over the passes, of all "
+      "blocks; "
       "decoded:\n"
-      "blocks; N_spec: median over the passes; util: intersected ray-block pairs per pass, of all pixels. "
+      "blocks; N_spec: median over the passes; util: intersected ray-block pairs per pass, of all "
+      "pixels. "
       "resident\nfloor: the whole volume decoded, one kernel, no cache.\n");
   print_stages(report);
 }
 
 ordered_json to_json(const FrameReport &report) {
-  ordered_json json = {{"program", "frame_bench"}, {"command", report.command}, {"date", utc_now()}};
+  ordered_json json = {
+      {"program", "frame_bench"}, {"command", report.command}, {"date", utc_now()}};
   for (const auto &[name, value] : report.run_info) json["context"][name] = value;
   json["options"] = options_json(report);
   for (const auto &[kind, member] : kKinds) {
@@ -261,13 +275,15 @@ ordered_json to_json(const FrameReport &report) {
   }
   json["resident_floor"] = floor_json(report, report.views);
   json["stage_clock"] = report.stage_clock;
-  for (const auto &[stage, ms] : times_by_stage(report)) json["stage_ms"][stage] = spread_json(spread_of(ms));
+  for (const auto &[stage, ms] : times_by_stage(report))
+    json["stage_ms"][stage] = spread_json(spread_of(ms));
   json["setup_ms"] = report.setup_ms;
   json["memory"] = report.memory;
   for (const ViewTimes &view : report.views) {
     ordered_json frames;
     for (const auto &[kind, member] : kKinds) {
-      for (const FrameStats &frame : view.*member) frames[kind].push_back(frame_json(report, frame));
+      for (const FrameStats &frame : view.*member)
+        frames[kind].push_back(frame_json(report, frame));
     }
     json["frames"].push_back(std::move(frames));
   }

@@ -24,7 +24,8 @@ struct FrameReport {
   std::vector<ViewTimes> views;
   std::optional<FloorTimes> floor;  ///< if asked for
   std::string stage_clock;
-  std::vector<std::map<std::string, double>> stage_ms;  ///< per view: a cold frame's stages, with profiling
+  std::vector<std::map<std::string, double>>
+      stage_ms;  ///< per view: a cold frame's stages, with profiling
   double setup_ms = 0;
   std::uint64_t peak_bytes = 0;  ///< device memory
   nlohmann::ordered_json memory;

@@ -31,8 +31,8 @@ class FrameRig {
 
   /// Makes the rays of the frame.
   void start();
-  /// Keeps every n-th ray, n = rays / (pixels / spec_count), so that the next pass has N_Spec = spec_count
-  /// (as long as max_speculation allows it). Waits.
+  /// Keeps every n-th ray, n = rays / (pixels / spec_count), so that the next pass has N_Spec =
+  /// spec_count (as long as max_speculation allows it). Waits.
   void thin_wavefront(std::uint32_t spec_count);
   /// The pass's stages from N_Spec on, up to (and without) traverse, intersect, composite.
   void begin_pass() { speculation.begin_pass(rays); }

@@ -1,6 +1,6 @@
-// Gathering a pass's ray-block pairs by block, by radix sort and by counting: group.cl, with its sort.
-// The cache has 2^slot_bits slots (the length of the radix sort's keys); the pairs are those of 2^visible_bits
-// blocks, or of one (hot).
+// Gathering a pass's ray-block pairs by block, by radix sort and by counting: group.cl, with its
+// sort. The cache has 2^slot_bits slots (the length of the radix sort's keys); the pairs are those
+// of 2^visible_bits blocks, or of one (hot).
 
 #include <algorithm>
 #include <unordered_map>
@@ -14,10 +14,11 @@ namespace {
 constexpr std::uint32_t kKeyBits = 18;  // blocks of 256^3 voxels
 
 struct GroupInput {
-  GroupInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t slot_bits, std::int64_t visible_bits,
-             Distribution distribution, Grouping how)
+  GroupInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t slot_bits,
+             std::int64_t visible_bits, Distribution distribution, Grouping how)
       : num_slots(1u << slot_bits),
-        pairs(make_block_pairs(distribution, num_pairs, std::size_t{1} << visible_bits, kKeyBits, 0)),
+        pairs(
+            make_block_pairs(distribution, num_pairs, std::size_t{1} << visible_bits, kKeyBits, 0)),
         rays(device, num_pairs),
         cache(device, cube_params(kKeyBits), num_slots, num_pairs, kGroupSize),
         group(device, num_pairs, num_slots, kGroupSize, how) {
@@ -56,7 +57,8 @@ struct GroupInput {
       check(begin < end && end <= got.size(), "places of a block's pairs");
       std::sort(got.begin() + begin, got.begin() + end);
       const std::vector<uint> &own = expected[pairs.pair_block_ids.at(got[begin])];
-      check(std::equal(got.begin() + begin, got.begin() + end, own.begin(), own.end()), "pairs of a block");
+      check(std::equal(got.begin() + begin, got.begin() + end, own.begin(), own.end()),
+            "pairs of a block");
     }
   }
 
@@ -79,11 +81,12 @@ void group_pairs(benchmark::State &state, Grouping grouping, Distribution distri
 const bool kRegistered = [] {
   for (const Distribution distribution : kDistributions) {
     for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
-      auto *benchmark =
-          stage_benchmark(fmt::format("group/{}/{}", to_string(grouping), to_string(distribution)),
-                          [=](benchmark::State &state) { group_pairs(state, grouping, distribution); });
+      auto *benchmark = stage_benchmark(
+          fmt::format("group/{}/{}", to_string(grouping), to_string(distribution)),
+          [=](benchmark::State &state) { group_pairs(state, grouping, distribution); });
       benchmark->ArgNames({"width", "slot_bits", "visible_bits"});
-      for (const std::int64_t width : kWidths) benchmark->Args({width, 14, 10})->Args({width, 18, 14});
+      for (const std::int64_t width : kWidths)
+        benchmark->Args({width, 14, 10})->Args({width, 18, 14});
       benchmark->Args({kSortWidth, 18, 14});
       if (distribution == Distribution::kHot) continue;
       benchmark->Args({kWidths.front(), 18, 16});  // few rays a block: most keys are distinct

@@ -48,7 +48,8 @@ Ceiling measure_ceiling(ocl::Device &device) {
   const auto count = static_cast<uint>(bytes / sizeof(uint));
   const ocl::Buffer<uint> source(device, "copy source", count);
   ocl::Buffer<uint> target(device, "copy target", count);
-  ocl::Kernel<ocl::In<uint>, uint, uint, ocl::Out<uint>> scale(device, "launch_probe", "scale_values");
+  ocl::Kernel<ocl::In<uint>, uint, uint, ocl::Out<uint>> scale(device, "launch_probe",
+                                                               "scale_values");
   ocl::Kernel<> empty(device, "launch_probe", "launch_empty");
   const ocl::Range range = ocl::Range::strided(count, 256, device);
   const double copy = best_seconds(device, [&] {
@@ -131,14 +132,15 @@ void measure(benchmark::State &state, const Work &work, const Step &prepare, con
   state.counters["wall_ms"] = 1e3 * median(wall_seconds);
   if (has_events) state.counters["event_ms"] = 1e3 * median(event_seconds);
   state.counters["spread_%"] = spread_percent(timed);
-  const double ceiling_seconds = session.ceiling().seconds(work.bytes, static_cast<double>(launches));
+  const double ceiling_seconds =
+      session.ceiling().seconds(work.bytes, static_cast<double>(launches));
   state.counters["launches"] = static_cast<double>(launches);
   state.counters["ceiling_ms"] = 1e3 * ceiling_seconds;
   state.counters["of_ceiling_%"] = 100.0 * ceiling_seconds / median(timed);
 }
 
-benchmark::internal::Benchmark *stage_benchmark(const std::string &name,
-                                                const std::function<void(benchmark::State &)> &body) {
+benchmark::internal::Benchmark *stage_benchmark(
+    const std::string &name, const std::function<void(benchmark::State &)> &body) {
   const auto guarded = [body](benchmark::State &state) {
     try {
       body(state);
@@ -148,7 +150,9 @@ benchmark::internal::Benchmark *stage_benchmark(const std::string &name,
       state.SkipWithError(error.what());
     }
   };
-  return benchmark::RegisterBenchmark(name.c_str(), guarded)->UseManualTime()->Unit(benchmark::kMillisecond);
+  return benchmark::RegisterBenchmark(name.c_str(), guarded)
+      ->UseManualTime()
+      ->Unit(benchmark::kMillisecond);
 }
 
 }  // namespace isowave::bench

@@ -1,7 +1,8 @@
 #pragma once
 // What the stage benchmarks share: the device, inputs that are made once, and the clock.
 //
-//   struct SortInput { SortInput(ocl::Device &, std::int64_t pairs); ... };   // makes and checks: not timed
+//   // makes and checks its input: not timed
+//   struct SortInput { SortInput(ocl::Device &, std::int64_t pairs); ... };
 //   void sort_pairs(benchmark::State &state) {
 //     auto &in = input<SortInput>(state.range(0));
 //     measure(state, {pairs, bytes}, [&] { in.reset(); }, [&] { in.sort(...); });
@@ -26,19 +27,22 @@
 
 namespace isowave::bench {
 
-/// What no stage can beat, measured in the same run and by the clock that stages are timed with: OpenCL events where
-/// the driver reports them, else the wall clock.
+/// What no stage can beat, measured in the same run and by the clock that stages are timed with:
+/// OpenCL events where the driver reports them, else the wall clock.
 struct Ceiling {
-  double bytes_per_second = 0;  ///< read and written by a copy of 256 MiB: the better of command and kernel
-  double launch_seconds = 0;    ///< an empty kernel
+  double bytes_per_second =
+      0;  ///< read and written by a copy of 256 MiB: the better of command and kernel
+  double launch_seconds = 0;  ///< an empty kernel
 
-  /// Least time of a stage that moves `bytes` in `launches`. Data that a cache still holds may move faster.
+  /// Least time of a stage that moves `bytes` in `launches`. Data that a cache still holds may move
+  /// faster.
   double seconds(double bytes, double launches) const {
     return std::max(bytes / bytes_per_second, launches * launch_seconds);
   }
 };
 
-/// Opens the device of all benchmarks; closes it, and frees the input kept, when it goes. One at a time.
+/// Opens the device of all benchmarks; closes it, and frees the input kept, when it goes. One at a
+/// time.
 class Session {
  public:
   /// profiling: time with OpenCL events where the driver reports them, else with the wall clock.
@@ -91,9 +95,9 @@ inline std::int64_t pixels_of_width(std::int64_t width) {
   return static_cast<std::int64_t>(image_of_width(width).num_pixels());
 }
 
-/// T(device, args...), kept until the next different one is asked for: Google Benchmark calls a benchmark
-/// several times to find how many iterations it needs. T's constructor also runs the stage once and checks
-/// it.
+/// T(device, args...), kept until the next different one is asked for: Google Benchmark calls a
+/// benchmark several times to find how many iterations it needs. T's constructor also runs the
+/// stage once and checks it.
 template <class T, class... Args>
 T &input(const Args &...args) {
   Session &session = Session::current();
@@ -125,14 +129,15 @@ struct Work {
 
 using Step = std::function<void()>;
 
-/// The benchmark loop: prepare, not timed; then run, timed from its first launch to the end of its last. The
-/// time is that of the OpenCL events, or the wall clock's where there are none. Counters, medians over the
-/// iterations: wall_ms, event_ms; spread_%: distance of the quartiles; launches; ceiling_ms: Ceiling::seconds()
-/// of work and launches; of_ceiling_%: the fraction of the ceiling that is reached, ceiling_ms of the time.
+/// The benchmark loop: prepare, not timed; then run, timed from its first launch to the end of its
+/// last. The time is that of the OpenCL events, or the wall clock's where there are none. Counters,
+/// medians over the iterations: wall_ms, event_ms; spread_%: distance of the quartiles; launches;
+/// ceiling_ms: Ceiling::seconds() of work and launches; of_ceiling_%: the fraction of the ceiling
+/// that is reached, ceiling_ms of the time.
 void measure(benchmark::State &state, const Work &work, const Step &prepare, const Step &run);
 
 /// Registers `body` under `name`. What it throws becomes the error of that benchmark alone.
-benchmark::internal::Benchmark *stage_benchmark(const std::string &name,
-                                                const std::function<void(benchmark::State &)> &body);
+benchmark::internal::Benchmark *stage_benchmark(
+    const std::string &name, const std::function<void(benchmark::State &)> &body);
 
 }  // namespace isowave::bench

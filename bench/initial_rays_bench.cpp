@@ -10,7 +10,8 @@ constexpr std::int64_t kEdge = 128;
 
 struct InitialRaysInput : FrameRig {
   InitialRaysInput(ocl::Device &device, std::int64_t width)
-      : FrameRig(device, mixing_layer(kEdge), mixing_layer_setup(kEdge, image_of_width(width), 64)) {
+      : FrameRig(device, mixing_layer(kEdge),
+                 mixing_layer_setup(kEdge, image_of_width(width), 64)) {
     start();
     std::vector<uint> expected;  // the rays that have a first block
     const std::vector<uint> first_blocks = rays.ray_block_ids.read();

@@ -1,5 +1,6 @@
-// A block's rays against its dual grid: intersect.cl, from 1 to 1000 rays per block. A camera looks straight
-// at a slab of blocks that all hold the surface; its field of view says how many of them share the rays.
+// A block's rays against its dual grid: intersect.cl, from 1 to 1000 rays per block. A camera looks
+// straight at a slab of blocks that all hold the surface; its field of view says how many of them
+// share the rays.
 
 #include <cmath>
 #include <numbers>
@@ -29,7 +30,8 @@ FrameSetup slab_setup(std::int64_t width, std::int64_t rays_per_block) {
   FrameSetup setup;
   setup.size = image_of_width(width);
   const double rays_per_side = std::sqrt(static_cast<double>(rays_per_block));
-  const double height = kMargin * 4 * setup.size.height / rays_per_side;  // seen of the slab [voxels]
+  const double height =
+      kMargin * 4 * setup.size.height / rays_per_side;  // seen of the slab [voxels]
   const glm::dvec3 centre(2.0 * kBlocksX, 2.0 * kBlocksY, 2.0);
   setup.camera = {centre - glm::dvec3(0, 0, kDistance),
                   centre,
@@ -75,7 +77,8 @@ struct IntersectInput : FrameRig {
 void intersect_blocks(benchmark::State &state) {
   auto &in = input<IntersectInput>(state.range(0), state.range(1));
   const double pairs = in.counts.granted_count, blocks = in.counts.visible_count;
-  const double bytes = pairs * (8 + sizeof(PairHit)) + blocks * (ISO_DUAL_GRID_VERTICES * sizeof(float) + 12);
+  const double bytes =
+      pairs * (8 + sizeof(PairHit)) + blocks * (ISO_DUAL_GRID_VERTICES * sizeof(float) + 12);
   measure(
       state, {pairs, bytes}, [] {}, [&] { in.run(); });
   state.counters["rays/block"] = pairs / blocks;

@@ -1,4 +1,5 @@
-// Block ranges and coarse macrocells of a volume, once per volume; the bits of an isovalue: macrocells.cl.
+// Block ranges and coarse macrocells of a volume, once per volume; the bits of an isovalue:
+// macrocells.cl.
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +29,8 @@ struct MacrocellsInput {
     verify();
   }
 
-  /// Ranges hold all values that libzfp decodes in a block's dual cells; the bits say what the ranges say.
+  /// Ranges hold all values that libzfp decodes in a block's dual cells; the bits say what the
+  /// ranges say.
   void verify() {
     const std::vector<float> voxels = decode_with_libzfp(volume);
     const std::vector<cl_ushort> ranges = macrocells.ranges().read();
@@ -41,7 +43,8 @@ struct MacrocellsInput {
       for (std::size_t z = 4 * bz; z <= std::min(4 * bz + 4, n - 1); ++z) {
         for (std::size_t y = 4 * by; y <= std::min(4 * by + 4, n - 1); ++y) {
           const float *row = &voxels[n * (y + n * z)];
-          const auto [least, most] = std::minmax_element(row + 4 * bx, row + std::min(4 * bx + 4, n - 1) + 1);
+          const auto [least, most] =
+              std::minmax_element(row + 4 * bx, row + std::min(4 * bx + 4, n - 1) + 1);
           low = std::min(low, *least);
           high = std::max(high, *most);
         }

@@ -1,6 +1,7 @@
-// isowave_bench: every stage of the pipeline alone, on one device. The options that are not ours are Google
-// Benchmark's: --benchmark_filter=REGEX picks stages, --benchmark_out=FILE writes JSON. A default
-// run is for looking around: for numbers to quote or to compare (tools/compare-bench), add --benchmark_min_time=1 or
+// isowave_bench: every stage of the pipeline alone, on one device. The options that are not ours
+// are Google Benchmark's: --benchmark_filter=REGEX picks stages, --benchmark_out=FILE writes JSON.
+// A default run is for looking around: for numbers to quote or to compare (tools/compare-bench),
+// add --benchmark_min_time=1 or
 // --benchmark_repetitions=9.
 
 #include <benchmark/benchmark.h>
@@ -34,7 +35,8 @@ int run_benchmarks(const std::string &device, bool profiling, std::vector<std::s
     benchmark::AddCustomContext(name, value);
   }
   const isowave::bench::Ceiling &ceiling = session.ceiling();
-  benchmark::AddCustomContext("copy_GB_per_s", fmt::format("{:.1f}", ceiling.bytes_per_second * 1e-9));
+  benchmark::AddCustomContext("copy_GB_per_s",
+                              fmt::format("{:.1f}", ceiling.bytes_per_second * 1e-9));
   benchmark::AddCustomContext("launch_us", fmt::format("{:.2f}", ceiling.launch_seconds * 1e6));
   const std::size_t num_run = benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
@@ -47,8 +49,9 @@ int main(int argc, char **argv) {
   CLI::App app("Times every stage of isowave alone.", "isowave_bench");
   std::string device;
   bool no_events = false;
-  app.add_option("--device", device,
-                 "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
+  app.add_option(
+      "--device", device,
+      "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
   app.add_flag("--no-events", no_events, "time with the wall clock: profiling slows launches down");
   app.allow_extras();
   app.footer("All other options are Google Benchmark's: see --benchmark_help.");

@@ -1,5 +1,5 @@
-// Pipeline rays: start_rays, march and request_ahead of march.cl, each by itself: the first launch of each in a frame, where
-// march finds all blocks cached, and request_ahead none.
+// Pipeline rays: start_rays, march and request_ahead of march.cl, each by itself: the first launch
+// of each in a frame, where march finds all blocks cached, and request_ahead none.
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
@@ -13,13 +13,15 @@ constexpr std::uint32_t kSpeculation = 64;
 
 struct MarchInput : FrameRig {
   MarchInput(ocl::Device &device, std::int64_t width)
-      : FrameRig(device, mixing_layer(kEdge), mixing_layer_setup(kEdge, image_of_width(width), kSpeculation)),
+      : FrameRig(device, mixing_layer(kEdge),
+                 mixing_layer_setup(kEdge, image_of_width(width), kSpeculation)),
         march(device, rays.num_rays, kGroupSize, kDefaultSolver) {
     start_frame();
     num_started = read_counts().next_active_count;
     rays.open_pass();
     march(macrocells, cache, rays);
-    check(read_counts().hit_count == 0 && read_counts().next_active_count == num_started, "waiting rays");
+    check(read_counts().hit_count == 0 && read_counts().next_active_count == num_started,
+          "waiting rays");
     march.request_ahead(macrocells, cache, rays);
     num_requests = read_counts().requested_count;
     check(num_requests > 0, "requests");
@@ -77,8 +79,11 @@ void march_cached(benchmark::State &state) {
 void request_all(benchmark::State &state) {
   auto &in = input<MarchInput>(state.range(0));
   measure(
-      state, {double(in.num_started), 2.0 * sizeof(uint) * in.num_started + sizeof(uint) * in.num_requests},
-      [&] { in.start_waiting(); }, [&] { in.march.request_ahead(in.macrocells, in.cache, in.rays); });
+      state,
+      {double(in.num_started),
+       2.0 * sizeof(uint) * in.num_started + sizeof(uint) * in.num_requests},
+      [&] { in.start_waiting(); },
+      [&] { in.march.request_ahead(in.macrocells, in.cache, in.rays); });
   state.counters["requests"] = in.num_requests;
 }
 

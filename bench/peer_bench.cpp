@@ -1,5 +1,6 @@
-// peer_bench: a new isovalue, and further frames of it, by our renderer and by what one would take instead: VTK's Flying
-// Edges and Embree. Each side lives in a process of its own, warm; they draw in turns.
+// peer_bench: a new isovalue, and further frames of it, by our renderer and by what one would take
+// instead: VTK's Flying Edges and Embree. Each side lives in a process of its own, warm; they draw
+// in turns.
 //
 //   peer_bench [--dims 256 512] [--rounds 5] [--isovalues 126,128,130] --json peer.json
 
@@ -152,15 +153,18 @@ std::array<double, 3> load_average() {
   return load;
 }
 
-/// One size: rounds x isovalues, in turns that change their order. The first turn of each isovalue is not counted.
-ordered_json measure(const Options &options, const std::string &program, const std::string &volume) {
+/// One size: rounds x isovalues, in turns that change their order. The first turn of each isovalue
+/// is not counted.
+ordered_json measure(const Options &options, const std::string &program,
+                     const std::string &volume) {
   std::array<std::unique_ptr<Child>, kSides.size()> children;
   const auto load_before = load_average();
   for (std::size_t side = 0; side < kSides.size(); ++side) {
     children[side] = std::make_unique<Child>(
-        program, std::vector<std::string>{"--side", kSides[side], "--volume", volume, "--device",
-                                          options.device, "--rate", std::to_string(options.rate), "--size",
-                                          fmt::format("{}x{}", options.size.at(0), options.size.at(1))});
+        program,
+        std::vector<std::string>{"--side", kSides[side], "--volume", volume, "--device",
+                                 options.device, "--rate", std::to_string(options.rate), "--size",
+                                 fmt::format("{}x{}", options.size.at(0), options.size.at(1))});
     children[side]->answer();
   }
   std::array<Samples, kSides.size()> samples;
@@ -178,11 +182,13 @@ ordered_json measure(const Options &options, const std::string &program, const s
       ++turn;
       const auto [least, most] = std::minmax_element(hits.begin(), hits.end());
       if (*most - *least > 0.01 * *most)
-        throw Error("isovalue {}: the sides hit {} pixels: not one picture", isovalue, fmt::join(hits, ", "));
+        throw Error("isovalue {}: the sides hit {} pixels: not one picture", isovalue,
+                    fmt::join(hits, ", "));
     }
   }
-  ordered_json json = {
-      {"volume", volume}, {"load_average_before", load_before}, {"load_average_after", load_average()}};
+  ordered_json json = {{"volume", volume},
+                       {"load_average_before", load_before},
+                       {"load_average_after", load_average()}};
   for (std::size_t side = 0; side < kSides.size(); ++side) {
     for (const auto &[name, values] : samples[side]) {
       json["sides"][kSides[side]][name] = spread_json(spread_of(values));
@@ -199,7 +205,8 @@ std::string cell(const ordered_json &side, const std::string &name) {
 }
 
 void print_rows(const ordered_json &sides, const char *title, const std::string &unit) {
-  fmt::print("{:<20}{:>22}{:>22}{:>22}{:>22}\n", title, "new isovalue", "new, cache kept", "warm", "next");
+  fmt::print("{:<20}{:>22}{:>22}{:>22}{:>22}\n", title, "new isovalue", "new, cache kept", "warm",
+             "next");
   for (const auto &[name, side] : sides.items()) {
     fmt::print("{:<20}{:>22}{:>22}{:>22}{:>22}\n", name, cell(side, "new" + unit),
                cell(side, "new_kept" + unit), cell(side, "warm" + unit), cell(side, "next" + unit));
@@ -208,14 +215,16 @@ void print_rows(const ordered_json &sides, const char *title, const std::string 
 
 void print_size(const ordered_json &size) {
   constexpr double kMiB = 1 << 20;
-  fmt::print("\n{}; load average {:.1f} before, {:.1f} after\n", size.at("volume").get<std::string>(),
+  fmt::print("\n{}; load average {:.1f} before, {:.1f} after\n",
+             size.at("volume").get<std::string>(),
              size.at("load_average_before").at(0).get<double>(),
              size.at("load_average_after").at(0).get<double>());
   const ordered_json &sides = size.at("sides");
   print_rows(sides, "ms", "_ms");
   print_rows(sides, "ms of processors", "_cpu_ms");
   for (const auto &[name, side] : sides.items()) {
-    fmt::print("{}: peak {:.0f} MiB", name, side.at("peak_byte_count").at("max").get<double>() / kMiB);
+    fmt::print("{}: peak {:.0f} MiB", name,
+               side.at("peak_byte_count").at("max").get<double>() / kMiB);
     if (side.contains("device_byte_count")) {
       fmt::print("; device memory, peak {:.0f} MiB\n",
                  side.at("device_byte_count").at("max").get<double>() / kMiB);
@@ -242,10 +251,12 @@ void compare(const Options &options, const std::string &command, const std::stri
                      {"width", options.size.at(0)},
                      {"height", options.size.at(1)}};
   fmt::print("{}\n", command);
-  for (const auto &[name, value] : json.at("context").items()) fmt::print("  {:<16}{}\n", name, value.dump());
+  for (const auto &[name, value] : json.at("context").items())
+    fmt::print("  {:<16}{}\n", name, value.dump());
   std::vector<std::string> volumes;
   if (!options.volume.empty()) volumes.push_back(options.volume);
-  for (const std::uint32_t n : options.volume.empty() ? options.dims : std::vector<std::uint32_t>{}) {
+  for (const std::uint32_t n :
+       options.volume.empty() ? options.dims : std::vector<std::uint32_t>{}) {
     volumes.push_back(fmt::format("generate:mixing_layer_{0}x{0}x{0}_uint8", n));
   }
   for (const std::string &volume : volumes) {
@@ -253,15 +264,20 @@ void compare(const Options &options, const std::string &command, const std::stri
     print_size(json["sizes"].back());
   }
   fmt::print(
-      "\nmesh_low, mesh_medium: Flying Edges of VTK, tree (build quality low, medium) and rays of Embree on "
+      "\nmesh_low, mesh_medium: Flying Edges of VTK, tree (build quality low, medium) and rays of "
+      "Embree on "
       "all\n"
-      "processors; rays, blocks: our pipelines. Median (min..max) over rounds and isovalues. new isovalue: "
+      "processors; rays, blocks: our pipelines. Median (min..max) over rounds and isovalues. new "
+      "isovalue: "
       "from there\n"
-      "to the finished hits, nothing decoded before; cache kept: with what the isovalue before left decoded; "
+      "to the finished hits, nothing decoded before; cache kept: with what the isovalue before "
+      "left decoded; "
       "warm:\n"
-      "the same view again; next: one degree further; of processors: their time, of all threads, which the "
+      "the same view again; next: one degree further; of processors: their time, of all threads, "
+      "which the "
       "load of\n"
-      "others hardly changes; peak: memory of the side's process, without what loading the volume took.\n");
+      "others hardly changes; peak: memory of the side's process, without what loading the volume "
+      "took.\n");
   if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
@@ -279,7 +295,8 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("--dims", options.dims, "edges of the mixing layers [256 512]");
   app.add_option("--volume", options.volume,
                  "this volume instead: a .zfp file, or " + std::string(tools::kVolumeHelp));
-  app.add_option("--isovalues", options.isovalues, "isovalues drawn in turn, at least two [126 128 130]")
+  app.add_option("--isovalues", options.isovalues,
+                 "isovalues drawn in turn, at least two [126 128 130]")
       ->delimiter(',')
       ->expected(2, 1000);
   app.add_option("--rate", options.rate, "bits per voxel")->capture_default_str();
@@ -287,7 +304,9 @@ void add_options(CLI::App &app, Options &options) {
                  "times that every isovalue is drawn, after one that is not counted")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
-  app.add_option("--size", options.size, "picture size WxH [1280x720]")->delimiter('x')->expected(2);
+  app.add_option("--size", options.size, "picture size WxH [1280x720]")
+      ->delimiter('x')
+      ->expected(2);
   app.add_option("--device", options.device, "our device")->capture_default_str();
   app.add_option("--json", options.json, "also write everything to this file");
   app.add_option("--side", options.side)->group("");  // of a child
@@ -306,7 +325,8 @@ int main(int argc, char **argv) {
   app.callback([&] {
     if (options.side.empty()) {
       isowave::bench::check_options(app, options);
-      isowave::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")), argv[0]);
+      isowave::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
+                              argv[0]);
     } else {
       isowave::bench::serve(options);
     }

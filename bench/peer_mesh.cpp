@@ -51,22 +51,24 @@ struct PixelRays {
 struct Packet8 {
   using RayHit = RTCRayHit8;
   static constexpr std::uint32_t kWidth = 4, kHeight = 2;
-  static void intersect(const int *valid, RTCScene scene, RTCIntersectContext *context, RayHit *rays) {
+  static void intersect(const int *valid, RTCScene scene, RTCIntersectContext *context,
+                        RayHit *rays) {
     rtcIntersect8(valid, scene, context, rays);
   }
 };
 struct Packet16 {
   using RayHit = RTCRayHit16;
   static constexpr std::uint32_t kWidth = 4, kHeight = 4;
-  static void intersect(const int *valid, RTCScene scene, RTCIntersectContext *context, RayHit *rays) {
+  static void intersect(const int *valid, RTCScene scene, RTCIntersectContext *context,
+                        RayHit *rays) {
     rtcIntersect16(valid, scene, context, rays);
   }
 };
 
 /// Traces one packet whose first pixel is (x0,y0); returns its hits.
 template <class Packet>
-std::uint64_t trace_packet(RTCScene scene, const PixelRays &pixels, ImageSize size, std::uint32_t x0,
-                           std::uint32_t y0) {
+std::uint64_t trace_packet(RTCScene scene, const PixelRays &pixels, ImageSize size,
+                           std::uint32_t x0, std::uint32_t y0) {
   constexpr std::uint32_t kSize = Packet::kWidth * Packet::kHeight;
   alignas(64) std::array<int, kSize> valid;
   alignas(64) typename Packet::RayHit rays;
@@ -92,7 +94,8 @@ std::uint64_t trace_packet(RTCScene scene, const PixelRays &pixels, ImageSize si
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   Packet::intersect(valid.data(), scene, &context, &rays);
   std::uint64_t hits = 0;
-  for (std::uint32_t i = 0; i < kSize; ++i) hits += valid[i] && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+  for (std::uint32_t i = 0; i < kSize; ++i)
+    hits += valid[i] && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
   return hits;
 }
 
@@ -108,7 +111,8 @@ std::uint64_t trace_packets(RTCScene scene, const Camera &camera, ImageSize size
       [&](const Range &range, std::uint64_t hits) {
         for (std::uint32_t row = range.rows().begin(); row < range.rows().end(); ++row) {
           for (std::uint32_t column = range.cols().begin(); column < range.cols().end(); ++column) {
-            hits += trace_packet<Packet>(scene, pixels, size, column * Packet::kWidth, row * Packet::kHeight);
+            hits += trace_packet<Packet>(scene, pixels, size, column * Packet::kWidth,
+                                         row * Packet::kHeight);
           }
         }
         return hits;
@@ -119,20 +123,24 @@ std::uint64_t trace_packets(RTCScene scene, const Camera &camera, ImageSize size
 /// Device and scene of one mesh.
 class MeshTree {
  public:
-  /// Copies points and indices (VTK's are of 64 bits, Embree's of 32) and builds: all of it is build time.
-  MeshTree(RTCDevice device, vtkPolyData *mesh, RTCBuildQuality quality) : scene_(rtcNewScene(device)) {
+  /// Copies points and indices (VTK's are of 64 bits, Embree's of 32) and builds: all of it is
+  /// build time.
+  MeshTree(RTCDevice device, vtkPolyData *mesh, RTCBuildQuality quality)
+      : scene_(rtcNewScene(device)) {
     rtcSetSceneBuildQuality(scene_, quality);
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetGeometryBuildQuality(geometry, quality);
     const auto *points = vtkFloatArray::SafeDownCast(mesh->GetPoints()->GetData());
     vtkCellArray *triangles = mesh->GetPolys();
-    if (points == nullptr || !triangles->IsStorage64Bit()) throw Error("VTK gives a mesh of other types");
+    if (points == nullptr || !triangles->IsStorage64Bit())
+      throw Error("VTK gives a mesh of other types");
     const auto num_points = static_cast<std::size_t>(points->GetNumberOfTuples());
     const auto num_triangles = static_cast<std::size_t>(triangles->GetNumberOfCells());
     auto *vertices = static_cast<float *>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), num_points));
-    auto *indices = static_cast<std::uint32_t *>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), num_triangles));
+    auto *indices = static_cast<std::uint32_t *>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                3 * sizeof(std::uint32_t), num_triangles));
     copy(const_cast<vtkFloatArray *>(points)->GetPointer(0), 3 * num_points, vertices);
     copy(triangles->GetConnectivityArray64()->GetPointer(0), 3 * num_triangles, indices);
     rtcCommitGeometry(geometry);
@@ -162,7 +170,8 @@ class MeshSide : public PeerSide {
  public:
   MeshSide(CompressedVolume volume, const Camera &camera, ImageSize size, RTCBuildQuality quality)
       : camera_(camera), size_(size), quality_(quality), device_(rtcNewDevice(nullptr)) {
-    // Memory that was freed stays ours: to fetch it from the system again costs as much as the work itself.
+    // Memory that was freed stays ours: to fetch it from the system again costs as much as the work
+    // itself.
     mallopt(M_MMAP_MAX, 0);
     mallopt(M_TRIM_THRESHOLD, -1);
     if (device_ == nullptr) throw Error("Embree cannot be opened");
@@ -190,8 +199,9 @@ class MeshSide : public PeerSide {
     contour_->SetValue(0, isovalue);
     contour_->Update();
     watch.lap(measured, "extract");
-    // Built twice, and the second counts. Embree takes the tree's memory from the system each time; where that is a virtual
-    // machine which gave it back to its host between two frames, to fetch it costs more than the build.
+    // Built twice, and the second counts. Embree takes the tree's memory from the system each time;
+    // where that is a virtual machine which gave it back to its host between two frames, to fetch
+    // it costs more than the build.
     { const MeshTree first(device_, contour_->GetOutput(), quality_); }
     watch = {};
     const MeshTree tree(device_, contour_->GetOutput(), quality_);
@@ -219,7 +229,8 @@ class MeshSide : public PeerSide {
                           : trace_packets<Packet8>(tree.scene(), camera, size_);
   }
 
-  /// Which packets are faster here, the best of three traces each. Of the first mesh, which is not measured.
+  /// Which packets are faster here, the best of three traces each. Of the first mesh, which is not
+  /// measured.
   void choose_packets(const MeshTree &tree) {
     std::array<double, 2> best;
     best.fill(std::numeric_limits<double>::infinity());
@@ -247,10 +258,11 @@ class MeshSide : public PeerSide {
 
 }  // namespace
 
-std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &camera, ImageSize size,
-                                         bool medium_quality) {
-  return std::make_unique<MeshSide>(std::move(volume), camera, size,
-                                    medium_quality ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_LOW);
+std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &camera,
+                                         ImageSize size, bool medium_quality) {
+  return std::make_unique<MeshSide>(
+      std::move(volume), camera, size,
+      medium_quality ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_LOW);
 }
 
 }  // namespace isowave::bench

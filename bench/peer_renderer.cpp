@@ -13,8 +13,8 @@ namespace {
 
 class RendererSide : public PeerSide {
  public:
-  RendererSide(const CompressedVolume &volume, const Camera &camera, ImageSize size, PipelineKind pipeline,
-               const std::string &device)
+  RendererSide(const CompressedVolume &volume, const Camera &camera, ImageSize size,
+               PipelineKind pipeline, const std::string &device)
       : camera_(camera),
         device_(ocl::choose_device(device)),
         renderer_(device_, volume, {.size = size, .pipeline = pipeline}) {}
@@ -47,8 +47,9 @@ class RendererSide : public PeerSide {
 
 }  // namespace
 
-std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera, ImageSize size,
-                                             PipelineKind pipeline, const std::string &device) {
+std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
+                                             ImageSize size, PipelineKind pipeline,
+                                             const std::string &device) {
   return std::make_unique<RendererSide>(volume, camera, size, pipeline, device);
 }
 

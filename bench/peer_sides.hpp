@@ -15,8 +15,9 @@
 
 namespace isowave::bench {
 
-/// Name -> value: ms; ms of processor time, of all threads, by names that end in _cpu_ms; counts by names that end in _count.
-/// A machine that others use as well stretches the one and hardly the other.
+/// Name -> value: ms; ms of processor time, of all threads, by names that end in _cpu_ms; counts by
+/// names that end in _count. A machine that others use as well stretches the one and hardly the
+/// other.
 using Measured = std::map<std::string, double>;
 
 /// Takes the time of one thing after another.
@@ -46,19 +47,22 @@ class Stopwatch {
 class PeerSide {
  public:
   virtual ~PeerSide() = default;
-  /// Draws the view at an isovalue that is not the last one's, and further frames of it. new_ms: from the isovalue to the
-  /// finished hits; warm_ms: the same view again; next_ms: then one degree further; hit_count; and the side's own.
+  /// Draws the view at an isovalue that is not the last one's, and further frames of it. new_ms:
+  /// from the isovalue to the finished hits; warm_ms: the same view again; next_ms: then one degree
+  /// further; hit_count; and the side's own.
   virtual Measured draw(float isovalue) = 0;
 };
 
-/// Triangles of VTK's Flying Edges, Embree's tree over them, and its rays: threads on all processors.
-/// new_ms = extract_ms + build_ms + trace_ms. medium_quality: of Embree's tree, instead of low.
-std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &camera, ImageSize size,
-                                         bool medium_quality);
+/// Triangles of VTK's Flying Edges, Embree's tree over them, and its rays: threads on all
+/// processors. new_ms = extract_ms + build_ms + trace_ms. medium_quality: of Embree's tree, instead
+/// of low.
+std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &camera,
+                                         ImageSize size, bool medium_quality);
 
-/// Our renderer on the device that is chosen. new_ms: with nothing decoded; new_kept_ms: with the cache as the isovalue before
-/// left it.
-std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera, ImageSize size,
-                                             PipelineKind pipeline, const std::string &device);
+/// Our renderer on the device that is chosen. new_ms: with nothing decoded; new_kept_ms: with the
+/// cache as the isovalue before left it.
+std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
+                                             ImageSize size, PipelineKind pipeline,
+                                             const std::string &device);
 
 }  // namespace isowave::bench

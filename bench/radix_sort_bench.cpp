@@ -1,5 +1,5 @@
-// Sorting ray-block pairs by block: radix_sort.cl. key_bits 18 and 27 are block ids of 256^3 and 2048^3
-// voxels.
+// Sorting ray-block pairs by block: radix_sort.cl. key_bits 18 and 27 are block ids of 256^3 and
+// 2048^3 voxels.
 
 #include <algorithm>
 
@@ -11,7 +11,8 @@ namespace isowave::bench {
 namespace {
 
 struct SortInput {
-  SortInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t key_bits, Distribution distribution)
+  SortInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t key_bits,
+            Distribution distribution)
       : bits(static_cast<uint>(key_bits)),
         host_keys(num_pairs),
         host_values(num_pairs),
@@ -22,7 +23,8 @@ struct SortInput {
     Random random;
     const std::uint64_t bound = std::uint64_t{1} << bits;
     const uint hot_key = random.below(bound);
-    for (uint &key : host_keys) key = distribution == Distribution::kHot ? hot_key : random.below(bound);
+    for (uint &key : host_keys)
+      key = distribution == Distribution::kHot ? hot_key : random.below(bound);
     if (distribution == Distribution::kSorted) std::sort(host_keys.begin(), host_keys.end());
     for (std::size_t i = 0; i < host_values.size(); ++i) host_values[i] = static_cast<uint>(i);
     PassCounts start{};

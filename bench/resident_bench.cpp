@@ -16,10 +16,10 @@ struct ResidentInput {
         resident(device, mixing_layer(kEdge), setup.size) {
     resident.render(setup.camera, setup.isovalue);
     const std::vector<HitRecord> hits = resident.hits(),
-                                 expected =
-                                     render_scalar(make_frame_params(mixing_layer(kEdge).info, setup.camera,
-                                                                     setup.size, setup.isovalue),
-                                                   decode_with_libzfp(mixing_layer(kEdge)));
+                                 expected = render_scalar(
+                                     make_frame_params(mixing_layer(kEdge).info, setup.camera,
+                                                       setup.size, setup.isovalue),
+                                     decode_with_libzfp(mixing_layer(kEdge)));
     check(same_bits(std::span(hits), std::span(expected)), "picture");
   }
 
@@ -36,7 +36,9 @@ void draw_frame(benchmark::State &state) {
 }
 
 const bool kRegistered = [] {
-  stage_benchmark("resident", draw_frame)->ArgName("width")->ArgsProduct({{kWidths.begin(), kWidths.end()}});
+  stage_benchmark("resident", draw_frame)
+      ->ArgName("width")
+      ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
   return true;
 }();
 

@@ -8,13 +8,14 @@
 
 namespace isowave::bench {
 
-/// mixing_layer in an edge^3 cube, compressed at `rate` bits per voxel; its surface is at 0.5. Kept for the
-/// rest of the run.
+/// mixing_layer in an edge^3 cube, compressed at `rate` bits per voxel; its surface is at 0.5. Kept
+/// for the rest of the run.
 const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate = 4);
 inline constexpr float kMixingLayerIsovalue = 0.5f;
 
-/// blocks_x * blocks_y * 2 blocks: a wavy surface at isovalue 0 passes through every block of the first
-/// layer; those of the second own no cell. Seen along z, each ray has exactly one block to test.
+/// blocks_x * blocks_y * 2 blocks: a wavy surface at isovalue 0 passes through every block of the
+/// first layer; those of the second own no cell. Seen along z, each ray has exactly one block to
+/// test.
 CompressedVolume wavy_slab(std::uint32_t blocks_x, std::uint32_t blocks_y);
 
 /// Numbers from a fixed seed, the same with every standard library.

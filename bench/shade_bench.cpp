@@ -1,4 +1,5 @@
-// Hit buffer -> picture on the host: shade.cl and the read-back; the wall time holds the host's part as well.
+// Hit buffer -> picture on the host: shade.cl and the read-back; the wall time holds the host's
+// part as well.
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
@@ -17,7 +18,8 @@ struct ShadeInput : FrameRig {
     start();
     while (run_pass().next_active_count != 0) {
     }
-    check(run().pixels == shade_scalar(params, appearance, rays.hits.read()).pixels, "shaded pixels");
+    check(run().pixels == shade_scalar(params, appearance, rays.hits.read()).pixels,
+          "shaded pixels");
   }
   Image8 run() { return shade(appearance, rays); }
 
@@ -34,7 +36,9 @@ void shade_hits(benchmark::State &state) {
 }
 
 const bool kRegistered = [] {
-  stage_benchmark("shade", shade_hits)->ArgName("width")->ArgsProduct({{kWidths.begin(), kWidths.end()}});
+  stage_benchmark("shade", shade_hits)
+      ->ArgName("width")
+      ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
   return true;
 }();
 

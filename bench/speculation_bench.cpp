@@ -1,4 +1,5 @@
-// N_Spec and the counts that a pass opens with: speculation.cl. One work-item; what it takes is a launch.
+// N_Spec and the counts that a pass opens with: speculation.cl. One work-item; what it takes is a
+// launch.
 
 #include <algorithm>
 
@@ -12,11 +13,13 @@ constexpr std::int64_t kEdge = 128;
 
 struct SpeculationInput : FrameRig {
   explicit SpeculationInput(ocl::Device &device)
-      : FrameRig(device, mixing_layer(kEdge), mixing_layer_setup(kEdge, image_of_width(kWidths[0]), 64)) {
+      : FrameRig(device, mixing_layer(kEdge),
+                 mixing_layer_setup(kEdge, image_of_width(kWidths[0]), 64)) {
     start();
     const uint active = read_counts().next_active_count;
     begin_pass();
-    check(read_counts().spec_count == std::min<std::uint64_t>(64, rays.num_rays / active), "N_Spec");
+    check(read_counts().spec_count == std::min<std::uint64_t>(64, rays.num_rays / active),
+          "N_Spec");
   }
 };
 

@@ -1,5 +1,5 @@
-// Rays -> their next N_Spec blocks: traverse.cl. The first pass of a frame, with as many rays as give each
-// N_Spec.
+// Rays -> their next N_Spec blocks: traverse.cl. The first pass of a frame, with as many rays as
+// give each N_Spec.
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
@@ -10,7 +10,8 @@ namespace {
 struct TraverseInput : FrameRig {
   TraverseInput(ocl::Device &device, std::int64_t width, std::int64_t edge, std::int64_t spec_count)
       : FrameRig(device, mixing_layer(edge),
-                 mixing_layer_setup(edge, image_of_width(width), static_cast<std::uint32_t>(spec_count))) {
+                 mixing_layer_setup(edge, image_of_width(width),
+                                    static_cast<std::uint32_t>(spec_count))) {
     start();
     thin_wavefront(params.max_spec_count);
     begin_pass();
@@ -19,7 +20,8 @@ struct TraverseInput : FrameRig {
     verify();
   }
 
-  /// Every block found is one that the isovalue is in the range of; those of a ray come without gaps.
+  /// Every block found is one that the isovalue is in the range of; those of a ray come without
+  /// gaps.
   void verify() {
     counts = read_counts();
     const std::vector<uint> masks = macrocells.masks().read();
@@ -31,8 +33,10 @@ struct TraverseInput : FrameRig {
     for (std::size_t pair = 0; pair < blocks.size(); ++pair) {
       if (blocks[pair] == ISO_INVALID_ID) continue;
       ++num_pairs;
-      check(pair % counts.spec_count == 0 || blocks[pair - 1] != ISO_INVALID_ID, "order of a ray's blocks");
-      const uint x = blocks[pair] % params.blocks_x, y = blocks[pair] / params.blocks_x % params.blocks_y,
+      check(pair % counts.spec_count == 0 || blocks[pair - 1] != ISO_INVALID_ID,
+            "order of a ray's blocks");
+      const uint x = blocks[pair] % params.blocks_x,
+                 y = blocks[pair] / params.blocks_x % params.blocks_y,
                  z = blocks[pair] / params.blocks_x / params.blocks_y;
       const std::size_t cell = x / 4 + coarse_x * (y / 4 + std::size_t{coarse_y} * (z / 4));
       const uint bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);

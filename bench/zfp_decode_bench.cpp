@@ -17,8 +17,9 @@ constexpr std::uint32_t kNumDecoded = 1u << 18;  // a GPU holds 2^17 at a time
 
 CompressedVolume repeated_volume(std::int64_t rate) {
   CompressedVolume volume = mixing_layer(kEdge, rate);
-  const std::vector<uint> payload(volume.words.begin(),
-                                  volume.words.begin() + volume.block_count() * volume.bits_per_block / 32);
+  const std::vector<uint> payload(
+      volume.words.begin(),
+      volume.words.begin() + volume.block_count() * volume.bits_per_block / 32);
   const std::vector<uint> tail(volume.words.begin() + payload.size(), volume.words.end());
   volume.words.clear();
   for (std::uint32_t copy = 0; copy < kCopies; ++copy) {
@@ -86,7 +87,8 @@ struct DecodeInput {
 
 void decode_blocks(benchmark::State &state, Order order) {
   auto &in = input<DecodeInput>(state.range(0), order);
-  const double block_bytes = in.stream.layout.bits_per_block / 8.0 + ISO_BLOCK_VOXELS * sizeof(float) + 8;
+  const double block_bytes =
+      in.stream.layout.bits_per_block / 8.0 + ISO_BLOCK_VOXELS * sizeof(float) + 8;
   measure(
       state, {kNumDecoded, kNumDecoded * block_bytes}, [] {}, [&] { in.run(); });
 }

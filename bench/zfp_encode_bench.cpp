@@ -37,7 +37,9 @@ struct EncodeInput {
   }
   void run() { encode(voxels, kDims, bits_per_block, words); }
   void measure_errors() { encode.measure_errors(voxels, kDims, bits_per_block, words, errors); }
-  double bytes() const { return kNumBlocks * (bits_per_block / 8.0 + ISO_BLOCK_VOXELS * sizeof(float)); }
+  double bytes() const {
+    return kNumBlocks * (bits_per_block / 8.0 + ISO_BLOCK_VOXELS * sizeof(float));
+  }
 
   std::uint32_t bits_per_block;
   ZfpEncode encode;
@@ -60,7 +62,9 @@ void measure_errors(benchmark::State &state) {
 
 const bool kRegistered = [] {
   stage_benchmark("zfp_encode", encode_blocks)->ArgName("rate")->ArgsProduct({{1, 2, 4, 8, 16}});
-  stage_benchmark("zfp_encode/errors", measure_errors)->ArgName("rate")->ArgsProduct({{1, 2, 4, 8, 16}});
+  stage_benchmark("zfp_encode/errors", measure_errors)
+      ->ArgName("rate")
+      ->ArgsProduct({{1, 2, 4, 8, 16}});
   return true;
 }();
 

@@ -1,16 +1,17 @@
 /// block_cache.cl -- gives cache slots to the blocks that a pass needs (Sec. 3.4, 3.5).
 ///
-/// table: block -> slot (block_table.h). slot_block_ids [slots]: the block in each slot, or ISO_INVALID_ID.
-/// slot_stamps [slots]: when it was used last (slot_stamps.h). free_slots [slots]: the first cache.free_count hold no
-/// block. requested_bits: one per block, 0 between passes.
+/// table: block -> slot (block_table.h). slot_block_ids [slots]: the block in each slot, or
+/// ISO_INVALID_ID. slot_stamps [slots]: when it was used last (slot_stamps.h). free_slots [slots]:
+/// the first cache.free_count hold no block. requested_bits: one per block, 0 between passes.
 ///
-/// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may not
-/// suffice: cache_rank -> cache_select (how many, which) -> cache_evict -> cache_rebuild -> then cache_assign. All
-/// cost O(slots) or O(requests), never O(blocks). Which block gets which slot is left to chance; no hit depends on it.
+/// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may
+/// not suffice: cache_rank -> cache_select (how many, which) -> cache_evict -> cache_rebuild ->
+/// then cache_assign. All cost O(slots) or O(requests), never O(blocks). Which block gets which
+/// slot is left to chance; no hit depends on it.
 ///
-/// Progress is certain: the first block of the first active ray is served before all others. If old slots are too few
-/// even for it, slots that other rays use in this very pass are taken; those rays wait for the next. (Not in the
-/// paper, whose cache grows instead.)
+/// Progress is certain: the first block of the first active ray is served before all others. If old
+/// slots are too few even for it, slots that other rays use in this very pass are taken; those rays
+/// wait for the next. (Not in the paper, whose cache grows instead.)
 #include "device/block_requests.h"
 
 #define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
@@ -19,14 +20,15 @@ ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
 }
 
-/// Are so many keys too many, those of evicted blocks included? Three eighths of the entries stay without.
+/// Are so many keys too many, those of evicted blocks included? Three eighths of the entries stay
+/// without.
 ISO_INLINE int table_is_full(const FrameParams *frame, uint num_keys) {
   return num_keys > 5 * frame->table_groups;
 }
 
 /// Adds a key to the table, or finds the one it has.
-ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id, uint slot,
-                             ulong changing) {
+ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id,
+                             uint slot, ulong changing) {
   const BlockCoords b = block_coords(frame, block_id);
   uint i = table_home(frame, b.x, b.y, b.z);
   for (;;) {
@@ -47,14 +49,15 @@ ISO_INLINE void table_evict(const FrameParams *frame, global BlockEntry *table, 
   table[i].slot = ISO_BLOCK_ABSENT;
 }
 
-/// Per pair: stamps the cached blocks of its dual grid and appends the missing ones, once each, to the
-/// request list [capacity]. Grid-stride over pair slots.
+/// Per pair: stamps the cached blocks of its dual grid and appends the missing ones, once each, to
+/// the request list [capacity]. Grid-stride over pair slots.
 kernel void cache_request(const FrameParams frame_params, global PassCounts *counts,
                           global const uint *pair_block_ids, global const BlockEntry *table,
                           global uint *slot_stamps, global uint *requested_bits,
                           global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count, pass = counts->pass;
+  const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count,
+             pass = counts->pass;
   if (get_global_id(0) == 0) {
     open_requests(cache);
     cache->first_block_id = pair_slots == 0 ? ISO_INVALID_ID : pair_block_ids[0];
@@ -65,7 +68,8 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
     uint missing[8];
     uint num_missing = 0;
     /* The neighbouring ray's pair asks for the same blocks: let it. Saves most of the work. */
-    if (block_id != ISO_INVALID_ID && (pair < spec_count || pair_block_ids[pair - spec_count] != block_id)) {
+    if (block_id != ISO_INVALID_ID &&
+        (pair < spec_count || pair_block_ids[pair - spec_count] != block_id)) {
       const BlockCoords b = block_coords(frame, block_id);
       for (uint corner = 0; corner < 8; ++corner) {
         const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
@@ -85,9 +89,10 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
   }
 }
 
-/// Who reads a block's cells reads its dual grid, but march stamps just that block, which costs a GPU less in each
-/// pass than eight stamps. So a block was also read when one was whose dual grid it is in; or may have been, where
-/// that was needed since. Returns the stamp of a cached block's last use.
+/// Who reads a block's cells reads its dual grid, but march stamps just that block, which costs a
+/// GPU less in each pass than eight stamps. So a block was also read when one was whose dual grid
+/// it is in; or may have been, where that was needed since. Returns the stamp of a cached block's
+/// last use.
 ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *table,
                          global const uint *slot_stamps, uint block_id, uint stamp) {
   const BlockCoords b = block_coords(frame, block_id);
@@ -106,15 +111,16 @@ ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *tabl
   return latest;
 }
 
-/// Of slots with blocks. Unless free slots suffice: slot_ranks [slots], eviction_rank() of each, and how many there
-/// are of each rank. Where the table may be rebuilt: slot_changing [slots], what it knows of the blocks' cells. Were
-/// that lost, a view that comes again could need blocks that were not worth keeping. rank_histogram
-/// [ISO_EVICTION_RANKS]: zero before. Grid-stride over slots.
+/// Of slots with blocks. Unless free slots suffice: slot_ranks [slots], eviction_rank() of each,
+/// and how many there are of each rank. Where the table may be rebuilt: slot_changing [slots], what
+/// it knows of the blocks' cells. Were that lost, a view that comes again could need blocks that
+/// were not worth keeping. rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over
+/// slots.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots, uint capacity,
-    global const CacheState *cache, global const BlockEntry *table, global const uint *slot_block_ids,
-    global const uint *slot_stamps, global uchar *slot_ranks, global ulong *slot_changing,
-    global uint *rank_histogram) {
+    global const CacheState *cache, global const BlockEntry *table,
+    global const uint *slot_block_ids, global const uint *slot_stamps, global uchar *slot_ranks,
+    global ulong *slot_changing, global uint *rank_histogram) {
   const FrameParams *frame = &frame_params;
   local uint histogram[ISO_EVICTION_RANKS];
   /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
@@ -122,15 +128,16 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ra
   const int is_short = requested > cache->free_count;
   const int may_rebuild = table_is_full(frame, cache->table_count + requested);
   const uint counted_slots = is_short || may_rebuild ? num_slots : 0;
-  for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE) histogram[rank] = 0;
+  for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE)
+    histogram[rank] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
     const uint block_id = slot_block_ids[slot], stamp = slot_stamps[slot];
     if (block_id != ISO_INVALID_ID) {
       if (is_short) {
         uint rank = eviction_rank(stamp, counts);
-        if (rank >=
-            ISO_RANKS_OF_FRAME) /* older, so that the others decide whether it is freed before this frame's */
+        if (rank >= ISO_RANKS_OF_FRAME) /* older, so that the others decide whether it is freed
+                                           before this frame's */
           rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
         slot_ranks[slot] = (uchar)rank;
         atomic_inc(&histogram[rank]);
@@ -147,12 +154,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ra
   }
 }
 
-/// Decides how many slots are freed and of which ranks they are. One work-group. rank_histogram is zeroed
-/// again.
+/// Decides how many slots are freed and of which ranks they are. One work-group. rank_histogram is
+/// zeroed again.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
     global const BlockEntry *table, global uint *slot_stamps, global uint *requested_bits,
-    global uint *request_block_ids, uint capacity, global uint *rank_histogram, global CacheState *cache) {
+    global uint *request_block_ids, uint capacity, global uint *rank_histogram,
+    global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint first_missing[8]; /* blocks served first that are not cached */
   local uint places[8];        /* where they stand on the request list */
@@ -174,7 +182,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
       const BlockCoords b = block_coords(frame, block_id);
       const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
       /* What rays of several levels of detail touch is within their own. */
-      const uint exists = ISO_LEVELS ? 1u : (uint)(dual_grid_block(frame, b, corner) != ISO_INVALID_ID);
+      const uint exists =
+          ISO_LEVELS ? 1u : (uint)(dual_grid_block(frame, b, corner) != ISO_INVALID_ID);
       if ((cache->first_touched >> corner & exists) != 0) {
         const uint slot = cached_slot(frame, table, x, y, z);
         if (slot != ISO_BLOCK_ABSENT) {
@@ -212,7 +221,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     }
     granted = min(requested, max(num_slots - in_use, num_first_missing));
     evicted = granted > num_free ? granted - num_free : 0;
-    if (evicted != 0) { /* some more that are out of use, so that the next passes need not count again */
+    if (evicted !=
+        0) { /* some more that are out of use, so that the next passes need not count again */
       const uint unused = histogram[ISO_EVICTION_RANKS - 1];
       evicted += min(num_slots / ISO_SPARE_PART, unused - min(unused, evicted));
     }
@@ -233,10 +243,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
 }
 
 /// Frees the slots selected; empties the table where it is to be rebuilt. Grid-stride over slots.
-kernel void cache_evict(const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
-                        global uint *slot_block_ids, global const uint *slot_stamps,
-                        global const uchar *slot_ranks, global BlockEntry *table, global CacheState *cache,
-                        global uint *free_slots) {
+kernel void cache_evict(const FrameParams frame_params, global const PassCounts *counts,
+                        uint num_slots, global uint *slot_block_ids, global const uint *slot_stamps,
+                        global const uchar *slot_ranks, global BlockEntry *table,
+                        global CacheState *cache, global uint *free_slots) {
   const FrameParams *frame = &frame_params;
   const uint cutoff_rank = cache->cutoff_rank, rebuild = cache->rebuild;
   if (counts->requested_count == 0) return;
@@ -248,9 +258,10 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
        slot += get_global_size(0)) {
     const uint stamp = slot_stamps[slot], block_id = slot_block_ids[slot];
     const uint rank = slot_ranks[slot];
-    int is_victim =
-        block_id != ISO_INVALID_ID && stamp != needed_stamp(counts->pass + 1) && rank >= cutoff_rank;
-    if (is_victim && rank == cutoff_rank) is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;
+    int is_victim = block_id != ISO_INVALID_ID && stamp != needed_stamp(counts->pass + 1) &&
+                    rank >= cutoff_rank;
+    if (is_victim && rank == cutoff_rank)
+      is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;
     if (is_victim) {
       if (!rebuild) table_evict(frame, table, block_id);
       slot_block_ids[slot] = ISO_INVALID_ID;
@@ -260,9 +271,10 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
 }
 
 /// Enters the blocks that are still cached into the emptied table. Grid-stride over slots.
-kernel void cache_rebuild(const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
-                          global const uint *slot_block_ids, global const ulong *slot_changing,
-                          global const CacheState *cache, global BlockEntry *table) {
+kernel void cache_rebuild(const FrameParams frame_params, global const PassCounts *counts,
+                          uint num_slots, global const uint *slot_block_ids,
+                          global const ulong *slot_changing, global const CacheState *cache,
+                          global BlockEntry *table) {
   const FrameParams *frame = &frame_params;
   if (counts->requested_count == 0 || !cache->rebuild) return;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
@@ -272,9 +284,11 @@ kernel void cache_rebuild(const FrameParams frame_params, global const PassCount
   }
 }
 
-/// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over slots and table.
-kernel void cache_classify(const FrameParams frame_params, uint num_slots, global const uint *slot_block_ids,
-                           global const float *cache_values, global ulong *inside, global BlockEntry *table) {
+/// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over slots and
+/// table.
+kernel void cache_classify(const FrameParams frame_params, uint num_slots,
+                           global const uint *slot_block_ids, global const float *cache_values,
+                           global ulong *inside, global BlockEntry *table) {
   const FrameParams *frame = &frame_params;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
     if (slot_block_ids[slot] != ISO_INVALID_ID) {
@@ -290,13 +304,14 @@ kernel void cache_classify(const FrameParams frame_params, uint num_slots, globa
   }
 }
 
-/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i gets the i-th free
-/// slot from the end; requests past the last are dropped. decode_slots [requests]: the slots. Takes the marks of all
-/// requests back. Grid-stride over requests.
+/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i
+/// gets the i-th free slot from the end; requests past the last are dropped. decode_slots
+/// [requests]: the slots. Takes the marks of all requests back. Grid-stride over requests.
 kernel void cache_assign(const FrameParams frame_params, global const PassCounts *asked,
-                         global PassCounts *counts, global const uint *request_block_ids, uint capacity,
-                         global const uint *free_slots, global BlockEntry *table, global uint *slot_block_ids,
-                         global uint *slot_stamps, global uint *requested_bits, global uint *decode_slots,
+                         global PassCounts *counts, global const uint *request_block_ids,
+                         uint capacity, global const uint *free_slots, global BlockEntry *table,
+                         global uint *slot_block_ids, global uint *slot_stamps,
+                         global uint *requested_bits, global uint *decode_slots,
                          global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   const uint listed = listed_count(asked, capacity), num_free = cache->free_count;
@@ -323,8 +338,8 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
 
 /// The cache as it was made: every slot free. Grid-stride over slots and table.
 kernel void cache_clear(uint num_slots, uint table_size, global BlockEntry *table,
-                        global uint *slot_block_ids, global uint *slot_stamps, global uint *free_slots,
-                        global CacheState *cache) {
+                        global uint *slot_block_ids, global uint *slot_stamps,
+                        global uint *free_slots, global CacheState *cache) {
   if (get_global_id(0) == 0) {
     cache->free_count = num_slots;
     cache->granted = cache->recycled = 0;

@@ -1,15 +1,17 @@
-/// composite.cl -- the closest of a ray's N_Spec results becomes its hit; the other rays go on (Sec. 4.4).
+/// composite.cl -- the closest of a ray's N_Spec results becomes its hit; the other rays go on
+/// (Sec. 4.4).
 #include "device/cached_cell.h"
 #include "device/closest_pair.h"
 #include "portable/cell_intersect.h"
 
-/// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block without slots;
-/// ray_active_mask [active_count] = 1 where it goes on. active_ray_ids: a ray that moved on looks twice as far ahead.
-/// Grid-stride.
-kernel void composite(const FrameParams frame_params, global PassCounts *counts, global uint *active_ray_ids,
-                      global const uint *pair_block_ids, global const PairHit *pair_hits,
-                      global const uint *closest_pairs, global const BlockEntry *table,
-                      global const float *cache_values, global uint *ray_block_ids, global HitRecord *hits,
+/// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block
+/// without slots; ray_active_mask [active_count] = 1 where it goes on. active_ray_ids: a ray that
+/// moved on looks twice as far ahead. Grid-stride.
+kernel void composite(const FrameParams frame_params, global PassCounts *counts,
+                      global uint *active_ray_ids, global const uint *pair_block_ids,
+                      global const PairHit *pair_hits, global const uint *closest_pairs,
+                      global const BlockEntry *table, global const float *cache_values,
+                      global uint *ray_block_ids, global HitRecord *hits,
                       global uint *ray_active_mask) {
   const FrameParams *frame = &frame_params;
   const LastPlanes last = last_planes(frame);
@@ -17,10 +19,12 @@ kernel void composite(const FrameParams frame_params, global PassCounts *counts,
              window = counts->window_count;
   for (uint a = get_global_id(0); a < active_count; a += get_global_size(0)) {
     const uint entry = active_ray_ids[a], ray_id = entry & ISO_RAY_PIXEL;
-    uint goes_on = ray_block_ids[ray_id] != ISO_INVALID_ID; /* also for rays outside the window: untouched */
+    uint goes_on =
+        ray_block_ids[ray_id] != ISO_INVALID_ID; /* also for rays outside the window: untouched */
     if (a < window) {
       const uint pair = closest_pair(closest_pairs, pair_block_ids, pair_hits, a, spec_count);
-      if (pair == ISO_INVALID_ID || (pair_hits[pair].cell == ISO_NOT_TESTED && pair != a * spec_count)) {
+      if (pair == ISO_INVALID_ID ||
+          (pair_hits[pair].cell == ISO_NOT_TESTED && pair != a * spec_count)) {
         const uint ahead = min((entry >> ISO_RAY_AHEAD_SHIFT) + 1, ISO_RAY_AHEAD_MAX);
         if (frame->per_ray_speculation) active_ray_ids[a] = ray_id | ahead << ISO_RAY_AHEAD_SHIFT;
       }
@@ -33,7 +37,8 @@ kernel void composite(const FrameParams frame_params, global PassCounts *counts,
         } else {
           const Ray ray = make_ray(frame, ray_id);
           const BlockCoords b = block_coords(frame, block_id);
-          const int x = (int)(4 * b.x + (pair_hit.cell & 3)), y = (int)(4 * b.y + (pair_hit.cell >> 2 & 3)),
+          const int x = (int)(4 * b.x + (pair_hit.cell & 3)),
+                    y = (int)(4 * b.y + (pair_hit.cell >> 2 & 3)),
                     z = (int)(4 * b.z + (pair_hit.cell >> 4));
           const GridWalk cell = walk_from(&ray, x, y, z, 1, last);
           float w[8];

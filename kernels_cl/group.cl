@@ -1,22 +1,26 @@
-/// group.cl -- the pass's ray-block pairs that can be intersected now, gathered by block (Sec. 3.6, 4.2).
+/// group.cl -- the pass's ray-block pairs that can be intersected now, gathered by block
+/// (Sec. 3.6, 4.2).
 ///
-/// Two ways to the same groups; they differ in the order of the groups and of the pairs in one, on which no hit depends.
+/// Two ways to the same groups; they differ in the order of the groups and of the pairs in one, on
+/// which no hit depends.
 ///   radix      group_select -> radix_sort -> group_head_sums -> group_heads
 ///   counting   group_count -> group_blocks -> group_scatter
 ///
-/// Counting: slot_counts [slots] and candidate_count are 0 between passes. A pair whose own block is cached
-/// takes its rank among the pairs of that block from the count of the block's slot, and whoever gets rank 0
-/// lists the slot as a candidate. Only then is each candidate's dual grid looked up: eight blocks a block,
-/// not eight a pair. The visible ones draw places for their pairs, in whatever order they come. Nothing here
-/// costs more than O(pairs), whatever the number of slots or blocks.
+/// Counting: slot_counts [slots] and candidate_count are 0 between passes. A pair whose own block
+/// is cached takes its rank among the pairs of that block from the count of the block's slot, and
+/// whoever gets rank 0 lists the slot as a candidate. Only then is each candidate's dual grid
+/// looked up: eight blocks a block, not eight a pair. The visible ones draw places for their pairs,
+/// in whatever order they come. Nothing here costs more than O(pairs), whatever the number of slots
+/// or blocks.
 #include "device/closest_pair.h"
 #include "device/work_group.h"
 #include "portable/block_table.h"
 
 /// Whether every block of the dual grid of block b is cached: all or nothing. slot: its own.
-ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b, global const BlockEntry *table,
-                                   uint *slot) {
-  const uint outside = (b.x + 1 == frame->blocks_x ? 0xAAu : 0u) | (b.y + 1 == frame->blocks_y ? 0xCCu : 0u) |
+ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b,
+                                   global const BlockEntry *table, uint *slot) {
+  const uint outside = (b.x + 1 == frame->blocks_x ? 0xAAu : 0u) |
+                       (b.y + 1 == frame->blocks_y ? 0xCCu : 0u) |
                        (b.z + 1 == frame->blocks_z ? 0xF0u : 0u);
   BlockEntry entries[8];
   uint absent = 0;
@@ -30,16 +34,18 @@ ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b, glob
 
 #define PAIR_TILE (ISO_GROUP_SIZE * ISO_GROUP_ITEMS)
 
-/// pair_ids, keys [granted_count]: the pairs that can be intersected, and the cache slots of their blocks,
-/// which sort by block with the fewest bits. Marks the others as not tested. Groups stride over tiles of
-/// pairs; each appends with one global atomic a tile. counts->granted_count: 0 before.
+/// pair_ids, keys [granted_count]: the pairs that can be intersected, and the cache slots of their
+/// blocks, which sort by block with the fewest bits. Marks the others as not tested. Groups stride
+/// over tiles of pairs; each appends with one global atomic a tile. counts->granted_count: 0
+/// before.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_select(
     const FrameParams frame_params, global PassCounts *counts, global const uint *pair_block_ids,
     global const BlockEntry *table, global PairHit *pair_hits, global uint *closest_pairs,
     global uint *pair_ids, global uint *keys) {
   const FrameParams *frame = &frame_params;
   local uint num_granted, first_place;
-  const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count, item = get_local_id(0);
+  const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count,
+             item = get_local_id(0);
   for (uint tile = get_group_id(0); tile * PAIR_TILE < pair_slots; tile += get_num_groups(0)) {
     uint slots[ISO_GROUP_ITEMS], places[ISO_GROUP_ITEMS];
     if (item == 0) num_granted = 0;
@@ -58,7 +64,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_se
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (item == 0 && num_granted != 0) first_place = atomic_add(&counts->granted_count, num_granted);
+    if (item == 0 && num_granted != 0)
+      first_place = atomic_add(&counts->granted_count, num_granted);
     barrier(CLK_LOCAL_MEM_FENCE);
     for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
       if (places[i] != ISO_INVALID_ID) {
@@ -94,8 +101,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_he
   }
 }
 
-/// block_rays [visible_count], in the order of the keys. Groups stride over tiles; each sums up the tiles
-/// before its own, which are too few for a launch between. counts->visible_count: 0 before.
+/// block_rays [visible_count], in the order of the keys. Groups stride over tiles; each sums up the
+/// tiles before its own, which are too few for a launch between. counts->visible_count: 0 before.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_heads(
     global PassCounts *counts, global const uint *keys, global const uint *tile_sums,
     global BlockRays *block_rays) {
@@ -106,7 +113,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_he
     const uint begin = tile * KEY_TILE + get_local_id(0) * ISO_SCAN_ITEMS;
     const uint end = min(begin + ISO_SCAN_ITEMS, count);
     uint skipped = 0, heads = 0, total, visible;
-    for (uint i = next_tile + get_local_id(0); i < tile; i += ISO_GROUP_SIZE) skipped += tile_sums[i];
+    for (uint i = next_tile + get_local_id(0); i < tile; i += ISO_GROUP_SIZE)
+      skipped += tile_sums[i];
     group_scan(sums, skipped, &total);
     before += total;
     for (uint i = begin; i < end; ++i) heads += starts_block(keys, i);
@@ -123,8 +131,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_he
 
 /// slots [ISO_GROUP_ITEMS]: of these blocks; ISO_BLOCK_ABSENT of one that is not cached, and of
 /// ISO_INVALID_ID. As find_dual_grid(), reads all first entries before it looks at one.
-ISO_INLINE void find_slots(const FrameParams *frame, global const BlockEntry *table, const uint *block_ids,
-                           uint *slots) {
+ISO_INLINE void find_slots(const FrameParams *frame, global const BlockEntry *table,
+                           const uint *block_ids, uint *slots) {
   BlockEntry entries[ISO_GROUP_ITEMS];
   ISO_UNROLL
   for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
@@ -143,13 +151,14 @@ ISO_INLINE void find_slots(const FrameParams *frame, global const BlockEntry *ta
   }
 }
 
-/// pair_slots [pair slots]: the cache slot of each pair's block, or ISO_BLOCK_ABSENT; pair_ranks [pair
-/// slots]: its place among the pairs of that block, if cached. Lists the slots of those blocks. Groups stride
-/// over tiles of pairs; each appends with one global atomic a tile.
+/// pair_slots [pair slots]: the cache slot of each pair's block, or ISO_BLOCK_ABSENT; pair_ranks
+/// [pair slots]: its place among the pairs of that block, if cached. Lists the slots of those
+/// blocks. Groups stride over tiles of pairs; each appends with one global atomic a tile.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_count(
-    const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_block_ids,
-    global const BlockEntry *table, global uint *pair_slots, global uint *pair_ranks,
-    global uint *slot_counts, global uint *candidate_slots, global uint *candidate_count) {
+    const FrameParams frame_params, global const PassCounts *counts,
+    global const uint *pair_block_ids, global const BlockEntry *table, global uint *pair_slots,
+    global uint *pair_ranks, global uint *slot_counts, global uint *candidate_slots,
+    global uint *candidate_count) {
   const FrameParams *frame = &frame_params;
   local uint new_slots[PAIR_TILE];
   local uint num_staged, first_place;
@@ -159,7 +168,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_co
     uint block_ids[ISO_GROUP_ITEMS], slots[ISO_GROUP_ITEMS], ranks[ISO_GROUP_ITEMS], num_new;
     if (item == 0) num_staged = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
-    /* Step by step for all of the work-item's pairs, so that their loads and atomics are under way together. */
+    /* Step by step for all of the work-item's pairs, so that their loads and atomics are under way
+     * together. */
     ISO_UNROLL
     for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
       const uint pair = first + i * ISO_GROUP_SIZE;
@@ -182,18 +192,21 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_co
     num_new = num_staged;
     if (item == 0 && num_new != 0) first_place = atomic_add(candidate_count, num_new);
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = item; i < num_new; i += ISO_GROUP_SIZE) candidate_slots[first_place + i] = new_slots[i];
+    for (uint i = item; i < num_new; i += ISO_GROUP_SIZE)
+      candidate_slots[first_place + i] = new_slots[i];
   }
 }
 
-/// block_rays [visible_count]: of the candidates whose dual grid is cached, in any order; slot_offsets
-/// [slots]: where the pairs of each candidate begin, or ISO_INVALID_ID where it is not visible. slot_counts
-/// of the candidates = 0, for the next pass. Groups stride over the candidates; each draws places with two
-/// global atomics a turn. counts->granted_count and visible_count: 0 before.
+/// block_rays [visible_count]: of the candidates whose dual grid is cached, in any order;
+/// slot_offsets [slots]: where the pairs of each candidate begin, or ISO_INVALID_ID where it is not
+/// visible. slot_counts of the candidates = 0, for the next pass. Groups stride over the
+/// candidates; each draws places with two global atomics a turn. counts->granted_count and
+/// visible_count: 0 before.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_blocks(
     const FrameParams frame_params, global PassCounts *counts, global const uint *candidate_slots,
-    global const uint *candidate_count, global const uint *slot_block_ids, global const BlockEntry *table,
-    global uint *slot_counts, global uint *slot_offsets, global BlockRays *block_rays) {
+    global const uint *candidate_count, global const uint *slot_block_ids,
+    global const BlockEntry *table, global uint *slot_counts, global uint *slot_offsets,
+    global BlockRays *block_rays) {
   const FrameParams *frame = &frame_params;
   local uint num_blocks, num_pairs, first_block, first_pair;
   const uint candidates = *candidate_count, item = get_local_id(0);
@@ -218,7 +231,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_bl
       first_pair = atomic_add(&counts->granted_count, num_pairs);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (slot != ISO_INVALID_ID) slot_offsets[slot] = pairs == 0 ? ISO_INVALID_ID : first_pair + offset;
+    if (slot != ISO_INVALID_ID)
+      slot_offsets[slot] = pairs == 0 ? ISO_INVALID_ID : first_pair + offset;
     if (pairs != 0) {
       block_rays[first_block + block].begin = first_pair + offset;
       block_rays[first_block + block].end = first_pair + offset + pairs;
@@ -226,12 +240,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_bl
   }
 }
 
-/// pair_ids [granted_count]: the pairs in their groups. Marks the others as not tested. candidate_count = 0,
-/// for the next pass. Grid-stride over pair slots.
+/// pair_ids [granted_count]: the pairs in their groups. Marks the others as not tested.
+/// candidate_count = 0, for the next pass. Grid-stride over pair slots.
 kernel void group_scatter(global const PassCounts *counts, global const uint *pair_block_ids,
                           global const uint *pair_slots, global const uint *pair_ranks,
                           global const uint *slot_offsets, global PairHit *pair_hits,
-                          global uint *closest_pairs, global uint *pair_ids, global uint *candidate_count) {
+                          global uint *closest_pairs, global uint *pair_ids,
+                          global uint *candidate_count) {
   const uint count = counts->pair_slot_count, spec_count = counts->spec_count;
   if (get_global_id(0) == 0) *candidate_count = 0;
   for (uint pair = get_global_id(0); pair < count; pair += get_global_size(0)) {

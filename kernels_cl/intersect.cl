@@ -4,8 +4,8 @@
 #include "device/closest_pair.h"
 #include "portable/cell_intersect.h"
 
-/// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk came into doubt.
-/// dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
+/// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk
+/// came into doubt. dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
 ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last,
                                    local const float *dual_grid) {
   RayEvent enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
@@ -41,14 +41,15 @@ ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes las
   return hit;
 }
 
-/// One work-group per visible block, striding over them. pair_ids [granted_count]: pairs gathered by their
-/// block; block_rays [visible_count]: which of them are a block's; pair_block_ids [pair slots]. pair_hits
-/// [pair slots]: written for every pair. closest_pairs [active rays]: see closest_pair.h.
+/// One work-group per visible block, striding over them. pair_ids [granted_count]: pairs gathered
+/// by their block; block_rays [visible_count]: which of them are a block's; pair_block_ids [pair
+/// slots]. pair_hits [pair slots]: written for every pair. closest_pairs [active rays]: see
+/// closest_pair.h.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
     const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_ids,
-    global const BlockRays *block_rays, global const uint *pair_block_ids, global const BlockEntry *table,
-    global const float *cache_values, global const uint *active_ray_ids, global PairHit *pair_hits,
-    global uint *closest_pairs) {
+    global const BlockRays *block_rays, global const uint *pair_block_ids,
+    global const BlockEntry *table, global const float *cache_values,
+    global const uint *active_ray_ids, global PairHit *pair_hits, global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
   local uint corner_slots[8];
@@ -58,10 +59,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
     const uint begin = block_rays[visible].begin, end = block_rays[visible].end;
     const BlockCoords b = block_coords(frame, pair_block_ids[pair_ids[begin]]);
     for (uint corner = get_local_id(0); corner < 8; corner += ISO_GROUP_SIZE) {
-      corner_slots[corner] =
-          dual_grid_block(frame, b, corner) == ISO_INVALID_ID
-              ? ISO_BLOCK_ABSENT
-              : cached_slot(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1), b.z + (corner >> 2));
+      corner_slots[corner] = dual_grid_block(frame, b, corner) == ISO_INVALID_ID
+                                 ? ISO_BLOCK_ABSENT
+                                 : cached_slot(frame, table, b.x + (corner & 1),
+                                               b.y + (corner >> 1 & 1), b.z + (corner >> 2));
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     for (uint vertex = get_local_id(0); vertex < ISO_DUAL_GRID_VERTICES; vertex += ISO_GROUP_SIZE) {
@@ -69,8 +70,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
       const uint slot = corner_slots[(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2)];
       float value = 0.0f; /* beyond the volume: no cell of the block uses it */
       if (slot != ISO_BLOCK_ABSENT) {
-        value =
-            cache_values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] - frame->isovalue;
+        value = cache_values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] -
+                frame->isovalue;
       }
       dual_grid[vertex] = value;
     }
@@ -86,9 +87,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
   }
 }
 
-/// The pairs whose walk came into doubt, walked on from there with 48-bit arithmetic. They are few, but in
-/// intersect() the registers for them would cost a fifth of its speed (H100). Same arguments, less
-/// block_rays; grid-stride over the pairs.
+/// The pairs whose walk came into doubt, walked on from there with 48-bit arithmetic. They are few,
+/// but in intersect() the registers for them would cost a fifth of its speed (H100). Same
+/// arguments, less block_rays; grid-stride over the pairs.
 kernel void settle_doubts(const FrameParams frame_params, global const PassCounts *counts,
                           global const uint *pair_ids, global const uint *pair_block_ids,
                           global const BlockEntry *table, global const float *cache_values,

@@ -1,17 +1,21 @@
-/// kept_picture.cl -- a smaller picture of the same frame stands in where a larger one has nothing yet.
+/// kept_picture.cl -- a smaller picture of the same frame stands in where a larger one has nothing
+/// yet.
 #include "portable/shared_types.h"
 
-/// hits [height * width] takes from kept [kept_height * kept_width] the hit whose pixel lies nearest in the frame: where it has none itself, or
-/// everywhere. Both pictures have the same vertical field of view. Grid-stride.
+/// hits [height * width] takes from kept [kept_height * kept_width] the hit whose pixel lies
+/// nearest in the frame: where it has none itself, or everywhere. Both pictures have the same
+/// vertical field of view. Grid-stride.
 kernel void show_kept(const FrameParams frame_params, uint kept_width, uint kept_height,
                       global const HitRecord *kept, uint everywhere, global HitRecord *hits) {
   const FrameParams *frame = &frame_params;
   const int width = (int)frame->width, height = (int)frame->height;
   const int small_width = (int)kept_width, small_height = (int)kept_height;
-  for (uint pixel = get_global_id(0); pixel < frame->width * frame->height; pixel += get_global_size(0)) {
+  for (uint pixel = get_global_id(0); pixel < frame->width * frame->height;
+       pixel += get_global_size(0)) {
     if (!everywhere && hits[pixel].t < INFINITY) continue;
     const int column = (int)(pixel % frame->width), row = (int)(pixel / frame->width);
-    /* Distances from the middle, in halves of a pixel of the one picture times the other's height. */
+    /* Distances from the middle, in halves of a pixel of the one picture times the other's height.
+     */
     const int x = (2 * column + 1 - width) * small_height + small_width * height;
     const int small_column = clamp(x / (2 * height), 0, small_width - 1);
     const int small_row = (2 * row + 1) * small_height / (2 * height);

@@ -1,15 +1,19 @@
-/// macrocells.cl -- value ranges of blocks and coarse macrocells, and what an isovalue touches (Sec. 3.1).
+/// macrocells.cl -- value ranges of blocks and coarse macrocells, and what an isovalue touches
+/// (Sec. 3.1).
 ///
-/// A block's range is that of its dual cells: its own decoded voxels and the first layers of its +x/+y/+z
-/// neighbours. Every block is decoded once: macrocell_partials keeps the ranges of the eight sub-lattices
-/// that a block gives to itself and to its seven -x/-y/-z neighbours, one layer of blocks (in z) at a time;
-/// macrocell_ranges joins them.
+/// A block's range is that of its dual cells: its own decoded voxels and the first layers of its
+/// +x/+y/+z neighbours. Every block is decoded once: macrocell_partials keeps the ranges of the
+/// eight sub-lattices that a block gives to itself and to its seven -x/-y/-z neighbours, one layer
+/// of blocks (in z) at a time; macrocell_ranges joins them.
 ///
-/// Ranges are stored in 8 bits through `thresholds` [256], ascending from -INFINITY to INFINITY: low = the last threshold
-/// <= min, high = the first >= max. So they only ever grow: no block is skipped wrongly. With `below` the first threshold >= isovalue + e and
-/// `above` the first >= isovalue - f, where the frame's voxels may be lower by e and higher by f than those that ranges were made of,
-/// some value may be below the isovalue iff low < below, and some at or above iff high >= above. Both: active. e and f may be
-/// larger for blocks of larger bounds (block_bound.h). Coarse macrocells of 4^3 blocks hold the union of their blocks.
+/// Ranges are stored in 8 bits through `thresholds` [256], ascending from -INFINITY to INFINITY:
+/// low = the last threshold
+/// <= min, high = the first >= max. So they only ever grow: no block is skipped wrongly. With
+/// `below` the first threshold >= isovalue + e and `above` the first >= isovalue - f, where the
+/// frame's voxels may be lower by e and higher by f than those that ranges were made of, some value
+/// may be below the isovalue iff low < below, and some at or above iff high >= above. Both: active.
+/// e and f may be larger for blocks of larger bounds (block_bound.h). Coarse macrocells of 4^3
+/// blocks hold the union of their blocks.
 #include "device/block_stream.h"
 #include "portable/block_grid.h"
 
@@ -24,14 +28,15 @@ ISO_INLINE ValueRange join(ValueRange a, ValueRange b) {
   return r;
 }
 
-/// partials [(first_partial + num_blocks) * 8]: entry 8 b + m is the range of the block's voxels with x = 0 if m & 1, y = 0 if
-/// m & 2, z = 0 if m & 4; padding left out. Block i of the launch is sampled_block(first_block + i * stride, stride) and b is first_partial + i.
-/// part_0 .. layout: the zfp stream, see block_stream.h. Grid-stride.
+/// partials [(first_partial + num_blocks) * 8]: entry 8 b + m is the range of the block's voxels
+/// with x = 0 if m & 1, y = 0 if m & 2, z = 0 if m & 4; padding left out. Block i of the launch is
+/// sampled_block(first_block + i * stride, stride) and b is first_partial + i. part_0 .. layout:
+/// the zfp stream, see block_stream.h. Grid-stride.
 kernel void macrocell_partials(const FrameParams frame_params, global const uint *part_0,
                                global const uint *part_1, global const uint *part_2,
-                               global const uint *part_3, global const uint *index, const StreamLayout layout,
-                               uint first_block, uint stride, uint num_blocks, uint first_partial,
-                               global ValueRange *partials) {
+                               global const uint *part_3, global const uint *index,
+                               const StreamLayout layout, uint first_block, uint stride,
+                               uint num_blocks, uint first_partial, global ValueRange *partials) {
   const FrameParams *frame = &frame_params;
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
     const uint block_id = sampled_block(first_block + i * stride, stride);
@@ -60,12 +65,12 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
   }
 }
 
-/// The 8-bit range of every block of layer `layer` (in z): ranges [blocks], low in bits 0..7, high in
-/// bits 8..15; low > high in blocks that own no dual cell. below, above: the partials of this layer and the
-/// next, [blocks_x * blocks_y * 8]; above is not read in the last layer. Grid-stride.
-kernel void macrocell_ranges(const FrameParams frame_params, uint layer, global const ValueRange *below,
-                             global const ValueRange *above, global const float *thresholds,
-                             global ushort *ranges) {
+/// The 8-bit range of every block of layer `layer` (in z): ranges [blocks], low in bits 0..7, high
+/// in bits 8..15; low > high in blocks that own no dual cell. below, above: the partials of this
+/// layer and the next, [blocks_x * blocks_y * 8]; above is not read in the last layer. Grid-stride.
+kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
+                             global const ValueRange *below, global const ValueRange *above,
+                             global const float *thresholds, global ushort *ranges) {
   const FrameParams *frame = &frame_params;
   const uint layer_blocks = frame->blocks_x * frame->blocks_y;
   for (uint i = get_global_id(0); i < layer_blocks; i += get_global_size(0)) {
@@ -78,7 +83,8 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer, global 
     range.max = -INFINITY;
     for (uint corner = 0; corner < 8; ++corner) {
       const uint nx = x + (corner & 1), ny = y + (corner >> 1 & 1);
-      if (nx >= frame->blocks_x || ny >= frame->blocks_y || layer + (corner >> 2) >= frame->blocks_z)
+      if (nx >= frame->blocks_x || ny >= frame->blocks_y ||
+          layer + (corner >> 2) >= frame->blocks_z)
         continue;
       range = join(range, (corner & 4 ? above : below)[8 * (nx + frame->blocks_x * ny) + corner]);
     }
@@ -110,10 +116,12 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer, global 
 /// The block of bit 0..63 of a coarse macrocell, or ISO_INVALID_ID outside the volume.
 ISO_INLINE uint macrocell_block(const FrameParams *frame, uint coarse, uint bit) {
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
-  const uint x = 4 * (coarse % coarse_x) + (bit & 3), y = 4 * (coarse / coarse_x % coarse_y) + (bit >> 2 & 3),
+  const uint x = 4 * (coarse % coarse_x) + (bit & 3),
+             y = 4 * (coarse / coarse_x % coarse_y) + (bit >> 2 & 3),
              z = 4 * (coarse / coarse_x / coarse_y) + (bit >> 4);
-  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z ? block_id_at(frame, x, y, z)
-                                                                           : ISO_INVALID_ID;
+  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z
+             ? block_id_at(frame, x, y, z)
+             : ISO_INVALID_ID;
 }
 
 /// coarse_ranges [num_coarse]: the union of each coarse macrocell's block ranges. Once per volume.
@@ -149,13 +157,15 @@ ISO_INLINE uint dual_grid_code(const FrameParams *frame, global const uint *boun
   return code;
 }
 
-/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. limits [256]: of blocks by the code of their
-/// bound, each as wide as the one before at least; without bounds the first is for all blocks. bounds: packed codes, from word bounds_begin on. box [6]: in, INT_MAX three
-/// times and 0 three times; out, first and behind the last macrocell with a bit, x, y, z. Once per isovalue. Grid-stride.
-kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse, global const ushort *ranges,
-                            global const ushort *coarse_ranges, global const uint *limits, uint has_bounds,
-                            global const uint *bounds, uint bounds_begin, global uint *masks,
-                            global int *box) {
+/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. limits
+/// [256]: of blocks by the code of their bound, each as wide as the one before at least; without
+/// bounds the first is for all blocks. bounds: packed codes, from word bounds_begin on. box [6]:
+/// in, INT_MAX three times and 0 three times; out, first and behind the last macrocell with a bit,
+/// x, y, z. Once per isovalue. Grid-stride.
+kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse,
+                            global const ushort *ranges, global const ushort *coarse_ranges,
+                            global const uint *limits, uint has_bounds, global const uint *bounds,
+                            uint bounds_begin, global uint *masks, global int *box) {
   const FrameParams *frame = &frame_params;
   const uint widest = limits[has_bounds != 0 ? ISO_BOUND_CODES - 1 : 0];
   for (uint coarse = get_global_id(0); coarse < num_coarse; coarse += get_global_size(0)) {

@@ -1,8 +1,9 @@
-/// march.cl -- pipeline `rays`: each ray walks through the active blocks and intersects those that are cached; at the
-/// first that is not it waits, and asks for that block and its next candidates (Sec. 3.3, 4).
+/// march.cl -- pipeline `rays`: each ray walks through the active blocks and intersects those that
+/// are cached; at the first that is not it waits, and asks for that block and its next candidates
+/// (Sec. 3.3, 4).
 ///
-/// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort and no composite:
-/// a ray's blocks come in ray order, so its first change is its hit.
+/// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort
+/// and no composite: a ray's blocks come in ray order, so its first change is its hit.
 #define ISO_FOUND local
 #include "device/block_requests.h"
 #include "device/level_borders.h"
@@ -24,7 +25,8 @@ ISO_INLINE void append_ray(int goes_on, uint entry, volatile local uint *counter
   barrier(CLK_LOCAL_MEM_FENCE);
 }
 
-/// Work-items for each ray, all of one work-group: as many as there are, up to one for each block of a round.
+/// Work-items for each ray, all of one work-group: as many as there are, up to one for each block
+/// of a round.
 ISO_INLINE uint lanes_per_ray(uint num_rays) {
   uint lanes = min(ISO_BLOCKS_AT_ONCE, (uint)ISO_GROUP_SIZE);
   while (lanes > 1 && lanes * num_rays > get_global_size(0)) lanes /= 2;
@@ -40,7 +42,8 @@ ISO_INLINE uint speculation_count(const FrameParams *frame, uint num_rays) {
   return num_rays == 0 ? 0 : clamp(frame_rays(frame) / num_rays, 1u, frame->max_spec_count);
 }
 
-/// How many of the rays that wait ask for blocks in this pass: see next_window(). All in the first of a frame.
+/// How many of the rays that wait ask for blocks in this pass: see next_window(). All in the first
+/// of a frame.
 ISO_INLINE uint open_window(const FrameParams *frame, global const PassCounts *prev,
                             global const PassCounts *counts) {
   uint window = frame_rays(frame);
@@ -70,13 +73,14 @@ ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCoun
 
 #define ISO_HIT_WORDS ((uint)(sizeof(HitRecord) / sizeof(uint)))
 
-/// hits [count] = no_hit(), by a work-group. Seen as words, in fours, of which neighbours write neighbours: records
-/// are 36 bytes long, so that the nine stores of each would be scattered.
+/// hits [count] = no_hit(), by a work-group. Seen as words, in fours, of which neighbours write
+/// neighbours: records are 36 bytes long, so that the nine stores of each would be scattered.
 ISO_INLINE void clear_hits(global uint *words, uint count) {
   const uint num_words = ISO_HIT_WORDS * count;
   for (uint i = 4 * get_local_id(0); i < num_words; i += 4 * ISO_GROUP_SIZE) {
     const uint4 at = i % ISO_HIT_WORDS + (uint4)(0, 1, 2, 3);
-    const uint4 field = select(at, at - ISO_HIT_WORDS, at >= ISO_HIT_WORDS); /* t; block_id and cell; zeros */
+    const uint4 field =
+        select(at, at - ISO_HIT_WORDS, at >= ISO_HIT_WORDS); /* t; block_id and cell; zeros */
     const uint4 ids = select((uint4)(0), (uint4)(ISO_INVALID_ID), field < 3);
     const uint4 words_of_none = select(ids, as_uint4((float4)(INFINITY)), field == 0);
     if (i + 4 <= num_words) {
@@ -89,12 +93,13 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
-/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids [counts->next_active_count]: of the
-/// frame's screen box, the pixels whose rays meet an active block, each with that block in ray_block_ids [pixel].
-/// counts: of the frame's last pass, next_active_count 0 before; *next: of the first pass of this frame. frames
-/// [num_frames]: with levels of detail, those that draw, the finest first; frame_params is the first of them. ranges:
-/// of their blocks. A kernel of its own, since it is so much leaner than march that far more of its work-items fit a
-/// device at a time. Groups stride over the tiles.
+/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids
+/// [counts->next_active_count]: of the frame's screen box, the pixels whose rays meet an active
+/// block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass,
+/// next_active_count 0 before; *next: of the first pass of this frame. frames [num_frames]: with
+/// levels of detail, those that draw, the finest first; frame_params is the first of them. ranges:
+/// of their blocks. A kernel of its own, since it is so much leaner than march that far more of its
+/// work-items fit a device at a time. Groups stride over the tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const ushort *ranges, global PassCounts *counts,
@@ -111,14 +116,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   }
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < frame_rays(frame);
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    clear_hits(hit_words + begin * ISO_HIT_WORDS, min((uint)ISO_GROUP_SIZE, frame_rays(frame) - begin));
-    barrier(CLK_LOCAL_MEM_FENCE); /* or each of a CPU's work-items, one by one, would go through all memory */
+    clear_hits(hit_words + begin * ISO_HIT_WORDS,
+               min((uint)ISO_GROUP_SIZE, frame_rays(frame) - begin));
+    barrier(CLK_LOCAL_MEM_FENCE); /* or each of a CPU's work-items, one by one, would go through all
+                                     memory */
   }
   if (item == 0) counters[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
-    const uint pixel = begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
+    const uint pixel =
+        begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
     uint num_found = 0, log_ahead = ISO_FIRST_LOG_AHEAD;
     if (pixel != ISO_INVALID_ID) {
       const Ray ray = make_ray(frame, pixel);
@@ -127,25 +135,27 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
         num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
       if (ISO_LEVELS && num_found == 0) {
         log_ahead = ISO_BORDER_LOG_AHEAD;
-        found[item] = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0, ISO_SIDE_UNKNOWN,
-                                    found + item);
+        found[item] = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0,
+                                    ISO_SIDE_UNKNOWN, found + item);
         num_found = found[item] != ISO_INVALID_ID;
       }
       if (num_found != 0) ray_block_ids[pixel] = found[item];
     }
-    append_ray(num_found != 0, pixel | log_ahead << ISO_RAY_AHEAD_SHIFT, counters, &counts->next_active_count,
-               next_active_ray_ids);
+    append_ray(num_found != 0, pixel | log_ahead << ISO_RAY_AHEAD_SHIFT, counters,
+               &counts->next_active_count, next_active_ray_ids);
   }
 }
 
-/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from ray_block_ids
-/// [pixel], an active block. Out: hits [pixel]; next_active_ray_ids [counts->next_active_count] of those that wait,
-/// and in ray_block_ids the block they wait at; *next, opened. macrocell_masks: as traverse(). frame_params, frames,
-/// ranges: as start_rays; a ray that leaves the band of its level waits behind the border.
+/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from
+/// ray_block_ids [pixel], an active block. Out: hits [pixel]; next_active_ray_ids
+/// [counts->next_active_count] of those that wait, and in ray_block_ids the block they wait at;
+/// *next, opened. macrocell_masks: as traverse(). frame_params, frames, ranges: as start_rays; a
+/// ray that leaves the band of its level waits behind the border.
 ///
-/// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so few that a device
-/// would wait for the longest of them, each has more work-items, up to one for each block of a round; the first block
-/// in which anything happens decides, which an atomic_min of its place tells.
+/// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so
+/// few that a device would wait for the longest of them, each has more work-items, up to one for
+/// each block of a round; the first block in which anything happens decides, which an atomic_min of
+/// its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const ushort *ranges, global BlockEntry *table,
@@ -196,15 +206,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
           found[item] = from;
           next = block_behind(level, &ray, block_coords(level, from), last);
         } else {
-          num_found = find_blocks_from(level, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
-                                       ISO_BLOCKS_AT_ONCE, found + item);
+          num_found =
+              find_blocks_from(level, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
+                               ISO_BLOCKS_AT_ONCE, found + item);
         }
         for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
           const int stands_here = first && at == 0;
           const int may_end = ISO_LEVELS && next == ISO_INVALID_ID && at + 1 == num_found;
           result = march_block(level, table, inside, cache_values, &ray,
-                               block_coords(level, found[at * ISO_GROUP_SIZE + item]), last, slots + item,
-                               slot_stamps, stamp, stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
+                               block_coords(level, found[at * ISO_GROUP_SIZE + item]), last,
+                               slots + item, slot_stamps, stamp,
+                               stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
                                stands_here ? side : ISO_SIDE_UNKNOWN, may_end, &change);
           if (result == ISO_RAY_LEFT) {
             ++num_passed;
@@ -252,7 +264,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       log_ahead = ISO_BORDER_LOG_AHEAD;
     }
     append_ray(waits,
-               pixel | log_ahead << ISO_RAY_AHEAD_SHIFT | (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
+               pixel | log_ahead << ISO_RAY_AHEAD_SHIFT |
+                   (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
                counters, &counts->next_active_count, next_active_ray_ids);
   }
   if (num_hits != 0) atomic_add(&group_hits, num_hits);
@@ -273,9 +286,10 @@ typedef struct Requests {
   volatile local uint *num_staged;
 } Requests;
 
-/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the others. In steps
-/// for all corners, so that a GPU waits for memory twice, not sixteen times. Most have been asked for by another ray:
-/// their bits tell, and cost neither a search in the table nor an atomic, for whose result one would wait.
+/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the
+/// others. In steps for all corners, so that a GPU waits for memory twice, not sixteen times. Most
+/// have been asked for by another ray: their bits tell, and cost neither a search in the table nor
+/// an atomic, for whose result one would wait.
 ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
                                 global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
                                 Requests requests) {
@@ -304,23 +318,24 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
       if (place < ISO_REQUEST_STAGING) {
         requests.staged[place] = block_id;
       } else {
-        list_request(frame, requests.block_ids, requests.capacity, requests.bits, atomic_inc(requests.count),
-                     block_id);
+        list_request(frame, requests.block_ids, requests.capacity, requests.bits,
+                     atomic_inc(requests.count), block_id);
       }
     }
   }
 }
 
-/// Of the rays that wait, active_ray_ids [counts->next_active_count], the first counts->window_count ask for the
-/// blocks that they touch in their next active blocks: N_Spec of them (Sec. 4), or their own number of
-/// frame->per_ray_speculation. Out: request_block_ids [counts->requested_count, at most capacity]. The other
-/// arguments as in march. Groups stride over the rays; when these are few, each has more work-items, which share its
-/// blocks out among them.
+/// Of the rays that wait, active_ray_ids [counts->next_active_count], the first
+/// counts->window_count ask for the blocks that they touch in their next active blocks: N_Spec of
+/// them (Sec. 4), or their own number of frame->per_ray_speculation. Out: request_block_ids
+/// [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over
+/// the rays; when these are few, each has more work-items, which share its blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,
     global const uint *active_ray_ids, global const uint *ray_block_ids, global uint *slot_stamps,
-    global uint *requested_bits, global uint *request_block_ids, uint capacity, global CacheState *cache) {
+    global uint *requested_bits, global uint *request_block_ids, uint capacity,
+    global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin, group_pairs, group_ahead;
@@ -330,11 +345,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
   const uint num_rays = min(num_waiting, counts->window_count), lanes = lanes_per_ray(num_rays);
   const uint stamp = needed_stamp(counts->pass);
   const uint spec_count = speculation_count(frame, num_waiting);
-  /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more. With the number of those that
-     wait, which is fewer, decoding takes longer than the passes that it saves. */
+  /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more.
+     With the number of those that wait, which is fewer, decoding takes longer than the passes that
+     it saves. */
   const uint least = speculation_count(frame, counts->active_count) / 2;
-  const uint most =
-      counts->window_count < frame_rays(frame) ? scarce_speculation(frame, num_rays) : ISO_MAX_SPECULATION;
+  const uint most = counts->window_count < frame_rays(frame) ? scarce_speculation(frame, num_rays)
+                                                             : ISO_MAX_SPECULATION;
   uint num_pairs = 0, num_ahead = 0;
   if (get_global_id(0) == 0) counts->spec_count = spec_count;
   if (item == 0) num_staged = group_pairs = group_ahead = 0;
@@ -344,7 +360,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
     const uint i = (begin + item) / lanes, lane = (begin + item) % lanes;
     if (i < num_rays) {
       const uint entry = active_ray_ids[i], pixel = entry & ISO_RAY_PIXEL;
-      const uint state = ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
+      const uint state =
+          ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
       uint next = ISO_LEVELS ? state & ISO_RAY_BLOCK : state,
            side = ISO_LEVELS ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
       ISO_FRAME_OF(level, next);
@@ -354,8 +371,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       const uint ahead = min(frame->per_ray_speculation ? max(own, least) : spec_count, most);
       if (lane == 0) num_ahead += ahead;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
-        const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,
-                                                min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
+        const uint num_found =
+            find_blocks_from(level, macrocell_masks, &ray, side, &next,
+                             min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
         side = ISO_SIDE_UNKNOWN;
         for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
           const uint block_id = found[at * ISO_GROUP_SIZE + item];

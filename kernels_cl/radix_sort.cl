@@ -1,15 +1,15 @@
-/// radix_sort.cl -- stable LSD radix sort of (key, value) pairs (Sec. 3.6), `bits` of the keys in each pass:
-/// at most ISO_RADIX_BITS, so digits = 2^bits are at most ISO_RADIX_DIGITS.
+/// radix_sort.cl -- stable LSD radix sort of (key, value) pairs (Sec. 3.6), `bits` of the keys in
+/// each pass: at most ISO_RADIX_BITS, so digits = 2^bits are at most ISO_RADIX_DIGITS.
 ///
-/// One pass = radix_histogram -> radix_scan -> radix_scatter, over tiles of ISO_GROUP_SIZE * ISO_RADIX_ITEMS
-/// pairs. table: first [digits] the pairs of each digit; then [digits][tiles] those in each tile, which
-/// radix_scan turns into those in the tiles before. It does so digit by digit, each in a work-group of its
-/// own; where the pairs of a digit begin, every group of radix_scatter finds out for itself: digits are few
-/// [Satish et al. 2009].
+/// One pass = radix_histogram -> radix_scan -> radix_scatter, over tiles of ISO_GROUP_SIZE *
+/// ISO_RADIX_ITEMS pairs. table: first [digits] the pairs of each digit; then [digits][tiles] those
+/// in each tile, which radix_scan turns into those in the tiles before. It does so digit by digit,
+/// each in a work-group of its own; where the pairs of a digit begin, every group of radix_scatter
+/// finds out for itself: digits are few [Satish et al. 2009].
 ///
-/// Two ways to rank the pairs of a tile, by -D ISO_RADIX_SERIAL: 0, all work-items of a group together
-/// (place_round); 1, the first work-item alone, one after the other: four times as fast on a CPU, where
-/// work-items are turns of a loop and atomics are dear (PoCL).
+/// Two ways to rank the pairs of a tile, by -D ISO_RADIX_SERIAL: 0, all work-items of a group
+/// together (place_round); 1, the first work-item alone, one after the other: four times as fast on
+/// a CPU, where work-items are turns of a loop and atomics are dear (PoCL).
 #include "device/work_group.h"
 #include "portable/radix_sort.h"
 
@@ -74,12 +74,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_hi
   }
 }
 
-/// Pairs of a digit in each tile -> in the tiles before; their sum to the table's beginning. A work-group per
-/// digit.
-kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_scan(global const uint *counts,
-                                                                                   uint count_field,
-                                                                                   uint bits,
-                                                                                   global uint *table) {
+/// Pairs of a digit in each tile -> in the tiles before; their sum to the table's beginning. A
+/// work-group per digit.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_scan(
+    global const uint *counts, uint count_field, uint bits, global uint *table) {
   local uint sums[ISO_GROUP_SIZE];
   const uint num_tiles = (counts[count_field] + TILE - 1) / TILE, digit = get_group_id(0);
   global uint *row = table + table_entry(bits, num_tiles, digit, 0);
@@ -103,10 +101,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_sc
   if (get_local_id(0) == 0) table[digit] = carry;
 }
 
-/// bases [digits] = the pairs of smaller digits, from totals [digits]. sums [ISO_GROUP_SIZE]. All items must
-/// call it.
-ISO_INLINE void scan_digits(global const uint *totals, uint digits, local uint *sums, local uint *bases) {
-  const uint share = (digits + ISO_GROUP_SIZE - 1) / ISO_GROUP_SIZE, begin = get_local_id(0) * share;
+/// bases [digits] = the pairs of smaller digits, from totals [digits]. sums [ISO_GROUP_SIZE]. All
+/// items must call it.
+ISO_INLINE void scan_digits(global const uint *totals, uint digits, local uint *sums,
+                            local uint *bases) {
+  const uint share = (digits + ISO_GROUP_SIZE - 1) / ISO_GROUP_SIZE,
+             begin = get_local_id(0) * share;
   const uint end = min(begin + share, digits);
   uint sum = 0, total, before;
   for (uint digit = begin; digit < end; ++digit) sum += totals[digit];
@@ -119,13 +119,14 @@ ISO_INLINE void scan_digits(global const uint *totals, uint digits, local uint *
 }
 
 #if !ISO_RADIX_SERIAL
-/// Sends the keys of a round, staged [TILE] from `round` on, to their places, and leaves these there instead.
-/// Each work-item looks after entries of its own. A key goes behind those of its digit in the rounds before
-/// (next) and in this one: members [ROUND_WORDS][ISO_RADIX_DIGITS] has a bit for each of its pairs, in order,
-/// that says whether it has the digit. 0 between rounds.
+/// Sends the keys of a round, staged [TILE] from `round` on, to their places, and leaves these
+/// there instead. Each work-item looks after entries of its own. A key goes behind those of its
+/// digit in the rounds before (next) and in this one: members [ROUND_WORDS][ISO_RADIX_DIGITS] has a
+/// bit for each of its pairs, in order, that says whether it has the digit. 0 between rounds.
 ISO_INLINE void place_round(uint round, uint size, uint shift, uint bits, local uint *members,
                             local uint *next, local uint *staged, global uint *out_keys) {
-  uint digits[ROUND_ITEMS], ends[ROUND_ITEMS]; /* ends: where the next round goes on, if last of its digit */
+  uint digits[ROUND_ITEMS],
+      ends[ROUND_ITEMS]; /* ends: where the next round goes on, if last of its digit */
   ISO_UNROLL
   for (uint i = 0; i < ROUND_ITEMS; ++i) {
     const uint place = i * ISO_GROUP_SIZE + get_local_id(0);
@@ -160,7 +161,8 @@ ISO_INLINE void place_round(uint round, uint size, uint shift, uint bits, local 
     if (ends[i] != ISO_INVALID_ID) {
       next[digits[i]] = ends[i];
       ISO_UNROLL
-      for (uint word = 0; word < ROUND_WORDS; ++word) members[word * ISO_RADIX_DIGITS + digits[i]] = 0;
+      for (uint word = 0; word < ROUND_WORDS; ++word)
+        members[word * ISO_RADIX_DIGITS + digits[i]] = 0;
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -170,7 +172,8 @@ ISO_INLINE void place_round(uint round, uint size, uint shift, uint bits, local 
 /// Moves the pairs of each tile to their places. table: after radix_scan. Groups stride over tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_scatter(
     global const uint *keys, global const uint *values, global const uint *counts, uint count_field,
-    uint shift, uint bits, global const uint *table, global uint *out_keys, global uint *out_values) {
+    uint shift, uint bits, global const uint *table, global uint *out_keys,
+    global uint *out_values) {
   local uint sums[ISO_GROUP_SIZE];
   local uint bases[ISO_RADIX_DIGITS];
   local uint next[ISO_RADIX_DIGITS]; /* where the next pair of each digit goes */

@@ -1,32 +1,37 @@
-/// resident.cl -- the floor that benchmarks compare with: the whole volume is decoded, and one launch draws the frame.
+/// resident.cl -- the floor that benchmarks compare with: the whole volume is decoded, and one
+/// launch draws the frame.
 ///
-/// The macrocell masks, walks and cells are those of the pipelines, and so are the bits of the picture; what is missing is all
-/// that a bounded memory costs: cache, table, requests, passes.
+/// The macrocell masks, walks and cells are those of the pipelines, and so are the bits of the
+/// picture; what is missing is all that a bounded memory costs: cache, table, requests, passes.
 ///
-/// values [num_blocks * 64]: block after block in the order of their ids, x + 4y + 16z in a block. Against rows of the whole
-/// volume, a cell's corners lie in two to four cache lines instead of four to eight, and a ray's next cell mostly in the same.
+/// values [num_blocks * 64]: block after block in the order of their ids, x + 4y + 16z in a block.
+/// Against rows of the whole volume, a cell's corners lie in two to four cache lines instead of
+/// four to eight, and a ray's next cell mostly in the same.
 #define ISO_FOUND local
 #include "device/block_cells.h"
 #include "device/block_stream.h"
 #include "device/block_walk.h"
 #include "portable/cell_intersect.h"
 
-/// Decodes blocks [first_block, first_block + num_blocks) of the zfp stream, see block_stream.h. Once per volume. Grid-stride.
-kernel void resident_decode(global const uint *part_0, global const uint *part_1, global const uint *part_2,
-                            global const uint *part_3, global const uint *index, const StreamLayout layout,
-                            uint first_block, uint num_blocks, global float *values) {
+/// Decodes blocks [first_block, first_block + num_blocks) of the zfp stream, see block_stream.h.
+/// Once per volume. Grid-stride.
+kernel void resident_decode(global const uint *part_0, global const uint *part_1,
+                            global const uint *part_2, global const uint *part_3,
+                            global const uint *index, const StreamLayout layout, uint first_block,
+                            uint num_blocks, global float *values) {
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
     const uint block_id = first_block + i;
     float block[ISO_BLOCK_VOXELS];
     decode_block(part_0, part_1, part_2, part_3, index, layout, block_id, 0, block);
-    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[(ulong)block_id * ISO_BLOCK_VOXELS + v] = block[v];
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+      values[(ulong)block_id * ISO_BLOCK_VOXELS + v] = block[v];
   }
 }
 
-/// inside [num_blocks]: bit x + 4y + 16z of each block: is the voxel inside, value >= isovalue? Once per isovalue.
-/// Grid-stride.
-kernel void resident_inside(const FrameParams frame_params, uint num_blocks, global const float *values,
-                            global ulong *inside) {
+/// inside [num_blocks]: bit x + 4y + 16z of each block: is the voxel inside, value >= isovalue?
+/// Once per isovalue. Grid-stride.
+kernel void resident_inside(const FrameParams frame_params, uint num_blocks,
+                            global const float *values, global ulong *inside) {
   const FrameParams *frame = &frame_params;
   for (uint block_id = get_global_id(0); block_id < num_blocks; block_id += get_global_size(0)) {
     ulong bits = 0;
@@ -38,10 +43,11 @@ kernel void resident_inside(const FrameParams frame_params, uint num_blocks, glo
   }
 }
 
-/// changing [num_blocks]: bit x + 4y + 16z: has the cell of that block corners on both sides? Blocks beyond the volume matter
-/// to cells outside it alone: any block stands for them. Once per isovalue. Grid-stride.
-kernel void resident_changing(const FrameParams frame_params, uint num_blocks, global const ulong *inside,
-                              global ulong *changing) {
+/// changing [num_blocks]: bit x + 4y + 16z: has the cell of that block corners on both sides?
+/// Blocks beyond the volume matter to cells outside it alone: any block stands for them. Once per
+/// isovalue. Grid-stride.
+kernel void resident_changing(const FrameParams frame_params, uint num_blocks,
+                              global const ulong *inside, global ulong *changing) {
   const FrameParams *frame = &frame_params;
   for (uint block_id = get_global_id(0); block_id < num_blocks; block_id += get_global_size(0)) {
     const BlockCoords b = block_coords(frame, block_id);
@@ -56,14 +62,14 @@ kernel void resident_changing(const FrameParams frame_params, uint num_blocks, g
 }
 
 /// The corners of dual cell (x,y,z) minus the isovalue, corner x + 2y + 4z.
-ISO_INLINE void resident_corners(const FrameParams *frame, global const float *values, int x, int y, int z,
-                                 float *w) {
+ISO_INLINE void resident_corners(const FrameParams *frame, global const float *values, int x, int y,
+                                 int z, float *w) {
   for (int corner = 0; corner < 8; ++corner) {
     const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
                vz = (uint)(z + (corner >> 2));
     const ulong block_id = block_id_at(frame, vx >> 2, vy >> 2, vz >> 2);
-    w[corner] =
-        values[block_id * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] - frame->isovalue;
+    w[corner] = values[block_id * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] -
+                frame->isovalue;
   }
 }
 
@@ -76,18 +82,19 @@ typedef struct CellWalk {
   int left;  ///< has it left the block?
 } CellWalk;
 
-/// Walks on to the next change of inside in the block's `changing` cells, in float. Returns 1, ISO_DOUBTFUL, or 0 when the ray
-/// has left the block.
+/// Walks on to the next change of inside in the block's `changing` cells, in float. Returns 1,
+/// ISO_DOUBTFUL, or 0 when the ray has left the block.
 ISO_INLINE int walk_to_change(const FrameParams *frame, global const float *values, const Ray *ray,
                               LastPlanes last, ulong changing, CellWalk *at) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   int found = 0;
   while (!found && !at->left) {
     const RayEvent exit = walk_exit(&at->cell, ray);
-    if ((changing >> ((at->cell.x & 3) + 4 * (at->cell.y & 3) + 16 * (at->cell.z & 3)) & 1ul) != 0) {
+    if ((changing >> ((at->cell.x & 3) + 4 * (at->cell.y & 3) + 16 * (at->cell.z & 3)) & 1ul) !=
+        0) {
       resident_corners(frame, values, at->cell.x, at->cell.y, at->cell.z, at->w);
-      found = change_or_doubt_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter, exit,
-                                      &at->change);
+      found = change_or_doubt_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z,
+                                      at->enter, exit, &at->change);
     }
     if (!found) {
       at->left = leaves(&at->cell, &at->block, exit);
@@ -98,7 +105,8 @@ ISO_INLINE int walk_to_change(const FrameParams *frame, global const float *valu
   return found;
 }
 
-/// Is there a change of inside on the ray's way through block b, of which those cells change? If so, *at is its cell.
+/// Is there a change of inside on the ray's way through block b, of which those cells change? If
+/// so, *at is its cell.
 ISO_INLINE int resident_block(const FrameParams *frame, global const float *values, ulong changing,
                               const Ray *ray, BlockCoords b, LastPlanes last, CellWalk *at) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
@@ -109,10 +117,11 @@ ISO_INLINE int resident_block(const FrameParams *frame, global const float *valu
     at->cell = enter_block(ray, b, at->enter, last);
     at->left = 0;
     found = walk_to_change(frame, values, ray, last, changing, at);
-    while (found == ISO_DOUBTFUL) { /* rare: its 48-bit arithmetic stays out of the loop over cells */
+    while (found ==
+           ISO_DOUBTFUL) { /* rare: its 48-bit arithmetic stays out of the loop over cells */
       const RayEvent exit = walk_exit(&at->cell, ray);
-      found = change_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter, exit,
-                             &at->change);
+      found = change_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter,
+                             exit, &at->change);
       if (!found) {
         at->left = leaves(&at->cell, &at->block, exit);
         walk_step(&at->cell, ray, exit, 1, last);
@@ -124,7 +133,8 @@ ISO_INLINE int resident_block(const FrameParams *frame, global const float *valu
   return found;
 }
 
-/// The frame: hits [pixel]. macrocell_masks: as traverse(). One work-item per pixel, in whole tiles of 8 x 4 pixels.
+/// The frame: hits [pixel]. macrocell_masks: as traverse(). One work-item per pixel, in whole tiles
+/// of 8 x 4 pixels.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident(
     const FrameParams frame_params, global const uint *macrocell_masks, global const float *values,
     global const ulong *changing, global HitRecord *hits) {
@@ -145,17 +155,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident
     int hit = 0;
     CellWalk at;
     while (next != ISO_INVALID_ID && !hit) {
-      const uint num_found =
-          find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE, found, ISO_GROUP_SIZE);
+      const uint num_found = find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE,
+                                         found, ISO_GROUP_SIZE);
       for (uint i = 0; i < num_found && !hit; ++i) {
         const uint block_id = found[i * ISO_GROUP_SIZE];
-        hit =
-            resident_block(frame, values, changing[block_id], &ray, block_coords(frame, block_id), last, &at);
+        hit = resident_block(frame, values, changing[block_id], &ray, block_coords(frame, block_id),
+                             last, &at);
       }
     }
-    hits[pixel] =
-        hit ? make_hit(frame, &ray, at.w, at.cell.x, at.cell.y, at.cell.z, at.enter,
-                       walk_exit(&at.cell, &ray), refine(solver, at.change.cubic, at.change.bracket))
-            : no_hit();
+    hits[pixel] = hit ? make_hit(frame, &ray, at.w, at.cell.x, at.cell.y, at.cell.z, at.enter,
+                                 walk_exit(&at.cell, &ray),
+                                 refine(solver, at.change.cubic, at.change.bracket))
+                      : no_hit();
   }
 }

@@ -1,15 +1,16 @@
 /// scan.cl -- exclusive prefix sum and stream compaction (Sec. 3.6, 4.2).
-/// Counts live on the device: `counts` are the uints of PassCounts, `count_field` says which of them is the
-/// number of entries. (A cast from the struct is what Mesa rusticl gets wrong: README "Devices".) Compaction
-/// = compact_count -> scan_exclusive of the tile sums -> compact_values. A tile is
-/// ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever waits for another
-/// one.
+/// Counts live on the device: `counts` are the uints of PassCounts, `count_field` says which of
+/// them is the number of entries. (A cast from the struct is what Mesa rusticl gets wrong: README
+/// "Devices".) Compaction = compact_count -> scan_exclusive of the tile sums -> compact_values. A
+/// tile is ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever
+/// waits for another one.
 #include "device/work_group.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
 
 /// values[i] = sum of values[0..i), in place, for ceil(count / divisor) entries; their sum goes to
-/// total_field, unless that is ISO_INVALID_ID. One work-group: made for tables of tiles, which are short.
+/// total_field, unless that is ISO_INVALID_ID. One work-group: made for tables of tiles, which are
+/// short.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exclusive(
     global uint *values, global uint *counts, uint count_field, uint divisor, uint total_field) {
   local uint sums[ISO_GROUP_SIZE];
@@ -49,7 +50,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_
   }
 }
 
-/// out = values[i] of every i with mask[i] != 0, in order. tile_offsets: scanned sums of compact_count.
+/// out = values[i] of every i with mask[i] != 0, in order. tile_offsets: scanned sums of
+/// compact_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_values(
     global const uint *mask, global const uint *values, global const uint *counts, uint count_field,
     global const uint *tile_offsets, global uint *out) {

@@ -1,12 +1,13 @@
 /// speculation.cl -- the pass's N_Spec from the rays still at work (Sec. 4).
 #include "portable/shared_types.h"
 
-/// Opens a pass: N_Spec = min(max_spec_count, floor(W H / N_Act)), next_window(), counters at 0. One work-item.
+/// Opens a pass: N_Spec = min(max_spec_count, floor(W H / N_Act)), next_window(), counters at 0.
+/// One work-item.
 kernel void begin_pass(const FrameParams frame_params, global PassCounts *counts) {
   const FrameParams *frame = &frame_params;
   const uint active = counts->next_active_count;
-  const uint window =
-      min(next_window(counts->window_count, counts->requested_count, counts->decoded_count), active);
+  const uint window = min(
+      next_window(counts->window_count, counts->requested_count, counts->decoded_count), active);
   uint spec = 0;
   if (active != 0) {
     spec = frame->width * frame->height / active;

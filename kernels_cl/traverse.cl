@@ -1,12 +1,14 @@
-/// traverse.cl -- each active ray's next N_Spec blocks that may hold the isosurface (Sec. 3.3, 4.1).
+/// traverse.cl -- each active ray's next N_Spec blocks that may hold the isosurface
+/// (Sec. 3.3, 4.1).
 #define ISO_FOUND global
 #include "device/block_walk.h"
 
-/// pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k ascending along the ray; ISO_INVALID_ID behind
-/// the last. They are N_Spec at most, fewer where a ray has its own number (frame->per_ray_speculation). closest_pairs
-/// [window_count] = ISO_INVALID_ID. ray_block_ids [pixel]: in, the block to go on from; out, the first block not yet looked at, or
-/// ISO_INVALID_ID when the ray has left the volume. macrocell_masks [2 * coarse cells]: bit x + 4y + 16z of a block in its
-/// coarse cell. Grid-stride over the window.
+/// pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k ascending along the
+/// ray; ISO_INVALID_ID behind the last. They are N_Spec at most, fewer where a ray has its own
+/// number (frame->per_ray_speculation). closest_pairs [window_count] = ISO_INVALID_ID.
+/// ray_block_ids [pixel]: in, the block to go on from; out, the first block not yet looked at, or
+/// ISO_INVALID_ID when the ray has left the volume. macrocell_masks [2 * coarse cells]: bit x + 4y
+/// + 16z of a block in its coarse cell. Grid-stride over the window.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse(
     const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
     global const uint *active_ray_ids, global uint *ray_block_ids, global uint *pair_block_ids,
@@ -19,12 +21,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
     const uint entry = active_ray_ids[a], ray_id = entry & ISO_RAY_PIXEL;
-    const uint ahead =
-        frame->per_ray_speculation ? min(1u << (entry >> ISO_RAY_AHEAD_SHIFT), spec_count) : spec_count;
+    const uint ahead = frame->per_ray_speculation
+                           ? min(1u << (entry >> ISO_RAY_AHEAD_SHIFT), spec_count)
+                           : spec_count;
     const Ray ray = make_ray(frame, ray_id);
     uint block_id = ray_block_ids[ray_id];
-    const uint found =
-        find_blocks(frame, macrocell_masks, &ray, &block_id, ahead, pair_block_ids + a * spec_count, 1);
+    const uint found = find_blocks(frame, macrocell_masks, &ray, &block_id, ahead,
+                                   pair_block_ids + a * spec_count, 1);
     for (uint k = found; k < spec_count; ++k) pair_block_ids[a * spec_count + k] = ISO_INVALID_ID;
     ray_block_ids[ray_id] = block_id;
     closest_pairs[a] = ISO_INVALID_ID;

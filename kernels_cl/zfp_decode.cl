@@ -10,21 +10,25 @@ ISO_INLINE uint place_of(global const uint *places, uint i) {
   return ISO_LEVELS ? ISO_STREAM_PARTS == 0 ? places[i] : i : i;
 }
 
-/// One work-item decodes one block; the work-group stores them together, so that neighbouring work-items write neighbouring
-/// values. The block of request i goes to slot slots[i]: cache_values [slots * 64], x + 4y + 16z within a slot.
-/// part_0 .. layout: the zfp stream, see block_stream.h; a window holds the blocks from request `first` on. Which of a
-/// block's voxels are inside goes to inside [slots]. Groups stride over requests [first, end), but not beyond
-/// decoded_count. With levels of detail, only those for blocks of this one are served, and of the next one that is drawn, whose stream is in
-/// next_words (or of this one again); a window has blocks of this one alone: request places [i] is its number i.
+/// One work-item decodes one block; the work-group stores them together, so that neighbouring
+/// work-items write neighbouring values. The block of request i goes to slot slots[i]: cache_values
+/// [slots * 64], x + 4y + 16z within a slot. part_0 .. layout: the zfp stream, see block_stream.h;
+/// a window holds the blocks from request `first` on. Which of a block's voxels are inside goes to
+/// inside [slots]. Groups stride over requests [first, end), but not beyond decoded_count. With
+/// levels of detail, only those for blocks of this one are served, and of the next one that is
+/// drawn, whose stream is in next_words (or of this one again); a window has blocks of this one
+/// alone: request places [i] is its number i.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_decode(
     const FrameParams frame_params, global const uint *part_0, global const uint *part_1,
-    global const uint *part_2, global const uint *part_3, global const uint *index, const StreamLayout layout,
-    const FrameParams next_frame, global const uint *next_words, global const uint *next_index,
-    const StreamLayout next_layout, uint first, uint end, global const PassCounts *counts,
-    global const uint *places, global const uint *block_ids, global const uint *slots,
-    global float *cache_values, global ulong *inside) {
-  local float staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
-  local uint to_slots[ISO_LEVELS ? ISO_GROUP_SIZE : 1]; /* ISO_BLOCK_ABSENT: that of another level's block */
+    global const uint *part_2, global const uint *part_3, global const uint *index,
+    const StreamLayout layout, const FrameParams next_frame, global const uint *next_words,
+    global const uint *next_index, const StreamLayout next_layout, uint first, uint end,
+    global const PassCounts *counts, global const uint *places, global const uint *block_ids,
+    global const uint *slots, global float *cache_values, global ulong *inside) {
+  local float
+      staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
+  local uint to_slots[ISO_LEVELS ? ISO_GROUP_SIZE
+                                 : 1]; /* ISO_BLOCK_ABSENT: that of another level's block */
   const float isovalue = frame_params.isovalue == 0.0f ? -0.0f : frame_params.isovalue;
   const uint count = min(counts->decoded_count, end), item = get_local_id(0);
   for (uint begin = first + get_group_id(0) * ISO_GROUP_SIZE; begin < count;
@@ -44,8 +48,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     if (block_id != ISO_INVALID_ID) {
       uint outside_low = 0, outside_high = 0;
       decode_block(is_next ? next_words : part_0, is_next ? next_words : part_1,
-                   is_next ? next_words : part_2, is_next ? next_words : part_3, is_next ? next_index : index,
-                   is_next ? next_layout : layout, block_id, begin + item - first, values);
+                   is_next ? next_words : part_2, is_next ? next_words : part_3,
+                   is_next ? next_index : index, is_next ? next_layout : layout, block_id,
+                   begin + item - first, values);
       ISO_UNROLL
       for (uint v = 32; v-- > 0;) { /* the signs; nothing minus this isovalue is -0 */
         outside_low = outside_low << 1 | as_uint(values[v] - isovalue) >> 31;
@@ -67,7 +72,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
         const uint block = i / ISO_STAGED_VALUES, v = i % ISO_STAGED_VALUES;
         const uint slot = ISO_LEVELS ? to_slots[block] : slots[begin + block];
         if (!ISO_LEVELS || slot != ISO_BLOCK_ABSENT)
-          cache_values[slot * ISO_BLOCK_VOXELS + part + v] = staged[block * (ISO_STAGED_VALUES + 1) + v];
+          cache_values[slot * ISO_BLOCK_VOXELS + part + v] =
+              staged[block * (ISO_STAGED_VALUES + 1) + v];
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);

@@ -25,8 +25,8 @@ static uint num_blocks(uint nx, uint ny, uint nz) {
   return (nx + 3u) / 4u * ((ny + 3u) / 4u) * ((nz + 3u) / 4u);
 }
 
-/// One work-item per block of voxels [nz][ny][nx]: block b = bx + blocks_x * (by + blocks_y * bz) goes to
-/// words [b * bits_per_block / 32 ..]. Grid-stride over the blocks.
+/// One work-item per block of voxels [nz][ny][nx]: block b = bx + blocks_x * (by + blocks_y * bz)
+/// goes to words [b * bits_per_block / 32 ..]. Grid-stride over the blocks.
 kernel void zfp_encode(global const float *voxels, uint nx, uint ny, uint nz, uint bits_per_block,
                        global uint *words) {
   const uint count = num_blocks(nx, ny, nz);
@@ -43,11 +43,11 @@ kernel void zfp_encode(global const float *voxels, uint nx, uint ny, uint nz, ui
   }
 }
 
-/// One work-item per block of what zfp_encode wrote: the largest |decoded - voxel| at a place (bound_place()) is
-/// errors [2 i] + errors [2 i + 1], exactly, with i = ISO_BOUND_PLACES b + place.
-/// `words` has one word behind the last block. Grid-stride over the blocks.
-kernel void zfp_encode_errors(global const float *voxels, uint nx, uint ny, uint nz, uint bits_per_block,
-                              global const uint *words, global float *errors) {
+/// One work-item per block of what zfp_encode wrote: the largest |decoded - voxel| at a place
+/// (bound_place()) is errors [2 i] + errors [2 i + 1], exactly, with i = ISO_BOUND_PLACES b +
+/// place. `words` has one word behind the last block. Grid-stride over the blocks.
+kernel void zfp_encode_errors(global const float *voxels, uint nx, uint ny, uint nz,
+                              uint bits_per_block, global const uint *words, global float *errors) {
   const uint count = num_blocks(nx, ny, nz);
   for (uint b = get_global_id(0); b < count; b += get_global_size(0)) {
     const BlockPlace place = place_of(b, nx, ny, nz);

@@ -123,8 +123,8 @@ bool place_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord 
   return difference <= 0x1p-21 * (std::abs(hit.t) + 1 / speed) && length(beside) <= 0x1p-20;
 }
 
-void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
-           Accuracy &tally) {
+void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray,
+           const HitRecord &record, Accuracy &tally) {
   const OracleRay exact = exact_ray(ray);
   const OracleHit truth = oracle.first_hit(exact);
   const RendererHit got = renderer_hit(frame, exact, record);
@@ -159,7 +159,8 @@ void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, co
   }
   tally.distance.push_back(std::abs(got.t - truth.t) * speed);
   const double slope = length(oracle.gradient(got.point));
-  if (slope > 0) tally.residual.push_back(std::abs(oracle.field(got.point) - double(frame.isovalue)) / slope);
+  if (slope > 0)
+    tally.residual.push_back(std::abs(oracle.field(got.point) - double(frame.isovalue)) / slope);
 }
 
 void merge(Accuracy &into, const Accuracy &from) {
@@ -175,7 +176,8 @@ void merge(Accuracy &into, const Accuracy &from) {
   into.residual.insert(into.residual.end(), from.residual.begin(), from.residual.end());
 }
 
-Accuracy judge_rays(const FrameParams &frame, std::span<const HitRecord> hits, const JudgeRay &judge_ray) {
+Accuracy judge_rays(const FrameParams &frame, std::span<const HitRecord> hits,
+                    const JudgeRay &judge_ray) {
   if (hits.size() != std::size_t{frame.width} * frame.height) {
     throw std::invalid_argument("judge_rays: the hits do not fit the frame");
   }
@@ -191,7 +193,8 @@ Accuracy judge_rays(const FrameParams &frame, std::span<const HitRecord> hits, c
   return sum;
 }
 
-Accuracy judge_frame(const HitOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits) {
+Accuracy judge_frame(const HitOracle &oracle, const FrameParams &frame,
+                     std::span<const HitRecord> hits) {
   return judge_rays(frame, hits, [&](const Ray &ray, const HitRecord &hit, Accuracy &tally) {
     judge(oracle, frame, ray, hit, tally);
   });

@@ -33,8 +33,8 @@ void judge_bound(const HitOracle &truth, const FrameParams &frame, std::uint32_t
 
 }  // namespace
 
-BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame, std::span<const HitRecord> drawn,
-                        std::span<const float> bounds) {
+BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame,
+                        std::span<const HitRecord> drawn, std::span<const float> bounds) {
   if (drawn.size() != std::size_t{frame.width} * frame.height || bounds.size() != drawn.size())
     throw std::invalid_argument("judge_bounds: hits and bounds do not fit the frame");
   std::vector<BoundTally> tallies(thread_count(0));

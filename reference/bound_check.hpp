@@ -1,5 +1,6 @@
 #pragma once
-// The bounds of a frame's error (core/accuracy/certify.hpp) against an oracle of the volume before compression.
+// The bounds of a frame's error (core/accuracy/certify.hpp) against an oracle of the volume before
+// compression.
 
 #include <cstdint>
 #include <span>
@@ -19,9 +20,10 @@ struct BoundTally {
   std::vector<double> slack;  ///< bound / error of each of `hits`
 };
 
-/// truth: of the volume before compression. frame: which was drawn, at the finest level. drawn, bounds [height * width]: its hits, and
-/// Certificate::bounds. With as many threads as there are cores. Throws std::invalid_argument where sizes do not fit.
-BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame, std::span<const HitRecord> drawn,
-                        std::span<const float> bounds);
+/// truth: of the volume before compression. frame: which was drawn, at the finest level. drawn,
+/// bounds [height * width]: its hits, and Certificate::bounds. With as many threads as there are
+/// cores. Throws std::invalid_argument where sizes do not fit.
+BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame,
+                        std::span<const HitRecord> drawn, std::span<const float> bounds);
 
 }  // namespace isowave

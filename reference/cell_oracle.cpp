@@ -19,8 +19,8 @@ using Corners = std::array<double, 8>;  ///< minus the isovalue; corner x + 2y +
 
 constexpr int kNoAxis = 3;
 
-/// The part of a ray within a closed box of voxel planes. At its ends the coordinate across the plane is that
-/// plane, exactly.
+/// The part of a ray within a closed box of voxel planes. At its ends the coordinate across the
+/// plane is that plane, exactly.
 struct Segment {
   double t_enter = 0, t_exit = kInfinity;
   int enter_axis = kNoAxis, exit_axis = kNoAxis;  ///< kNoAxis: the ray starts in the box
@@ -49,7 +49,8 @@ std::optional<Segment> clip(const OracleRay &ray, const Cell &lower, const Cell 
     }
   }
   if (segment.t_exit >= segment.t_enter) return segment;
-  // A cell touched at an edge may seem missed by a rounding error; what it holds there must still count.
+  // A cell touched at an edge may seem missed by a rounding error; what it holds there must still
+  // count.
   if (segment.t_exit < segment.t_enter * (1 - 0x1p-49)) return std::nullopt;
   segment.t_exit = segment.t_enter;
   return segment;
@@ -68,8 +69,8 @@ Vec local_position(const OracleRay &ray, const Cell &cell, const Segment &segmen
   return p;
 }
 
-/// The trilinear field: convex combinations along x, y, z. Of corners of one sign it has that sign, and at p = 0 or 1
-/// it does not depend on the other side's corners.
+/// The trilinear field: convex combinations along x, y, z. Of corners of one sign it has that sign,
+/// and at p = 0 or 1 it does not depend on the other side's corners.
 double trilinear(Corners v, const Vec &p) {
   unsigned count = 4;
   for (std::size_t axis = 0; axis < 3; ++axis, count /= 2) {
@@ -78,7 +79,8 @@ double trilinear(Corners v, const Vec &p) {
   return v[0];
 }
 
-/// c0 + c1 s + c2 s^2 + c3 s^3: the field from p (s = 0) to q (s = 1), by the same combinations, with factors linear in s.
+/// c0 + c1 s + c2 s^2 + c3 s^3: the field from p (s = 0) to q (s = 1), by the same combinations,
+/// with factors linear in s.
 std::array<double, 4> power_form(const Corners &v, const Vec &p, const Vec &q) {
   std::array<std::array<double, 4>, 8> c{};
   for (unsigned i = 0; i < 8; ++i) c[i][0] = v[i];
@@ -104,7 +106,9 @@ std::array<double, 2> extrema(const std::array<double, 4> &c) {
   const double discriminant = half_b * half_b - a * constant;
   if (!(discriminant >= 0)) return {-1, -1};
   const double q = -(half_b + std::copysign(std::sqrt(discriminant), half_b));  // no cancellation
-  const auto in_range = [](double s) { return s > 0 && s < 1 ? s : -1.0; };     // NaN and infinity are none
+  const auto in_range = [](double s) {
+    return s > 0 && s < 1 ? s : -1.0;
+  };  // NaN and infinity are none
   std::array<double, 2> roots{in_range(q / a), in_range(constant / q)};
   if (roots[0] > roots[1]) std::swap(roots[0], roots[1]);
   return roots;
@@ -146,7 +150,8 @@ float round_up(double x) {
 
 }  // namespace
 
-/// What one ray carries through Embree: the exact ray and the best hit so far. Embree's own ray is a float32 copy.
+/// What one ray carries through Embree: the exact ray and the best hit so far. Embree's own ray is
+/// a float32 copy.
 struct CellQuery : RTCIntersectContext {
   const CellOracle *oracle = nullptr;
   const OracleRay *ray = nullptr;
@@ -173,22 +178,26 @@ struct CellQuery : RTCIntersectContext {
     const Cell cell = oracle.cell_of(oracle.cells_[args->primID]);
     const auto segment = clip(*query.ray, cell, {cell[0] + 1, cell[1] + 1, cell[2] + 1});
     if (!segment || (query.best.hit && segment->t_enter > query.best.t)) return;
-    const auto t = first_other_side(oracle.corners(cell), *query.ray, cell, *segment, query.start_inside);
+    const auto t =
+        first_other_side(oracle.corners(cell), *query.ray, cell, *segment, query.start_inside);
     // Of cells with the same t the lowest answers, whatever Embree's order.
-    if (!t || (query.best.hit && (*t > query.best.t || (*t == query.best.t && cell > query.best.cell))))
+    if (!t ||
+        (query.best.hit && (*t > query.best.t || (*t == query.best.t && cell > query.best.cell))))
       return;
     query.best = {true, *t, cell};
-    // Embree culls boxes beyond tfar. A closer cell's enlarged box begins before its exact t_enter, also as computed
-    // (see kEmbreeReach), so a float32 not below t culls none.
+    // Embree culls boxes beyond tfar. A closer cell's enlarged box begins before its exact t_enter,
+    // also as computed (see kEmbreeReach), so a float32 not below t culls none.
     RTCRayN_tfar(RTCRayHitN_RayN(args->rayhit, args->N), args->N, 0) = round_up(*t);
     RTCHitN_geomID(RTCRayHitN_HitN(args->rayhit, args->N), args->N, 0) = args->geomID;
     RTCHitN_primID(RTCRayHitN_HitN(args->rayhit, args->N), args->N, 0) = args->primID;
   }
 };
 
-CellOracle::CellOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
+CellOracle::CellOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims,
+                       float isovalue)
     : CellOracle(voxels, {}, dims, isovalue) {}
-CellOracle::CellOracle(std::span<const double> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
+CellOracle::CellOracle(std::span<const double> voxels, std::array<std::uint32_t, 3> dims,
+                       float isovalue)
     : CellOracle({}, voxels, dims, isovalue) {}
 
 CellOracle::CellOracle(std::span<const float> voxels, std::span<const double> exact_voxels,
@@ -199,9 +208,10 @@ CellOracle::CellOracle(std::span<const float> voxels, std::span<const double> ex
       isovalue_(isovalue),
       scene_(std::make_unique<EmbreeScene>(false)) {
   const auto [smallest, largest] = std::minmax_element(dims.begin(), dims.end());
-  if (voxels.size() + exact_voxels.size() != std::size_t{dims[0]} * dims[1] * dims[2] || *smallest < 2 ||
-      *largest > 0x10000) {
-    throw std::invalid_argument("CellOracle: the voxels do not fit the dims, or those are not 2 to 65536");
+  if (voxels.size() + exact_voxels.size() != std::size_t{dims[0]} * dims[1] * dims[2] ||
+      *smallest < 2 || *largest > 0x10000) {
+    throw std::invalid_argument(
+        "CellOracle: the voxels do not fit the dims, or those are not 2 to 65536");
   }
   find_cells();
   RTCGeometry geometry = rtcNewGeometry(scene_->device(), RTC_GEOMETRY_TYPE_USER);
@@ -253,12 +263,14 @@ std::array<double, 8> CellOracle::corners(const Cell &cell) const {
     const std::size_t x = static_cast<std::size_t>(cell[0]) + (corner & 1u),
                       y = static_cast<std::size_t>(cell[1]) + (corner >> 1 & 1u),
                       z = static_cast<std::size_t>(cell[2]) + (corner >> 2);
-    v[corner] = value(x + dims_[0] * (y + std::size_t{dims_[1]} * z)) - isovalue_;  // its sign is exact
+    v[corner] =
+        value(x + dims_[0] * (y + std::size_t{dims_[1]} * z)) - isovalue_;  // its sign is exact
   }
   return v;
 }
 
-/// The side of the ray's first point in the domain. enters: whether there is one, with some of the domain behind it.
+/// The side of the ray's first point in the domain. enters: whether there is one, with some of the
+/// domain behind it.
 bool CellOracle::starts_inside(const OracleRay &ray, bool &enters) const {
   Cell upper;
   for (std::size_t axis = 0; axis < 3; ++axis) upper[axis] = static_cast<int>(dims_[axis]) - 1;
@@ -298,7 +310,8 @@ std::array<double, 3> CellOracle::gradient(const std::array<double, 3> &point) c
   const Cell cell = cell_at(point);
   const Corners v = corners(cell);
   Vec result;
-  for (std::size_t axis = 0; axis < 3; ++axis) {  // linear along each axis: the difference of two faces
+  for (std::size_t axis = 0; axis < 3;
+       ++axis) {  // linear along each axis: the difference of two faces
     Vec high{point[0] - cell[0], point[1] - cell[1], point[2] - cell[2]}, low = high;
     high[axis] = 1;
     low[axis] = 0;

@@ -24,7 +24,8 @@ double torus(const Vec &p) {
 
 double gyroid_shell(const Vec &p) {
   const double k = 0.35;
-  const double g = std::sin(k * p[0]) * std::cos(k * p[1]) + std::sin(k * p[1]) * std::cos(k * p[2]) +
+  const double g = std::sin(k * p[0]) * std::cos(k * p[1]) +
+                   std::sin(k * p[1]) * std::cos(k * p[2]) +
                    std::sin(k * p[2]) * std::cos(k * p[0]);
   return std::min(2 * (0.7 - std::abs(g)), sphere(p));
 }
@@ -33,7 +34,8 @@ constexpr std::array<ClosedSurface, 3> kSurfaces = {
     {{"sphere", sphere}, {"torus", torus}, {"gyroid shell", gyroid_shell}}};
 
 /// p: index space of the finest level.
-double trilinear(const FrameParams &frame, std::span<const float> voxels, std::size_t level, const Vec &p) {
+double trilinear(const FrameParams &frame, std::span<const float> voxels, std::size_t level,
+                 const Vec &p) {
   const std::array<std::size_t, 3> dims{frame.dims_x, frame.dims_y, frame.dims_z};
   std::array<std::size_t, 3> c;
   Vec f;

@@ -1,5 +1,6 @@
 #pragma once
-// Closed surfaces for the watertight tests, as grids of voxels with coarser levels, and what is inside of them.
+// Closed surfaces for the watertight tests, as grids of voxels with coarser levels, and what is
+// inside of them.
 
 #include <array>
 #include <cstddef>
@@ -12,8 +13,8 @@ namespace isowave {
 
 struct ClosedSurface {
   const char *name;
-  double (*field)(const std::array<double, 3>
-                      &p);  ///< index space; the surface at 0, positive inside, well within the grid
+  double (*field)(const std::array<double, 3> &
+                      p);  ///< index space; the surface at 0, positive inside, well within the grid
 };
 inline constexpr std::uint32_t kSurfaceEdge = 42;  ///< voxels along each axis; not a multiple of 4
 /// Sphere, torus, gyroid shell.
@@ -27,8 +28,9 @@ struct GridLevels {
   std::vector<FrameParams> frames;
   std::vector<std::vector<float>> voxels;
 
-  /// Whether the point, in index space of the finest, is inside at every level, and further from the surface than float32 rays are
-  /// from the point: of the fields between the voxels, which are what must be closed: trilinear, in double.
+  /// Whether the point, in index space of the finest, is inside at every level, and further from
+  /// the surface than float32 rays are from the point: of the fields between the voxels, which are
+  /// what must be closed: trilinear, in double.
   bool is_inside(const std::array<double, 3> &p) const;
 };
 /// num_levels: by downsample().

@@ -15,13 +15,16 @@ double farthest_plane(const std::array<double, 3> &eye, const std::array<std::ui
   return farthest;
 }
 
-bool within_embree_reach(const std::array<double, 3> &eye, const std::array<std::uint32_t, 3> &dims) {
+bool within_embree_reach(const std::array<double, 3> &eye,
+                         const std::array<std::uint32_t, 3> &dims) {
   return farthest_plane(eye, dims) <= kEmbreeReach;
 }
 
-std::string out_of_reach(const std::array<double, 3> &eye, const std::array<std::uint32_t, 3> &dims) {
+std::string out_of_reach(const std::array<double, 3> &eye,
+                         const std::array<std::uint32_t, 3> &dims) {
   return fmt::format(
-      "the eye is {:.0f} voxels from the volume's far side: Embree's float32 can be trusted to {:.0f}",
+      "the eye is {:.0f} voxels from the volume's far side: Embree's float32 can be trusted to "
+      "{:.0f}",
       farthest_plane(eye, dims), kEmbreeReach);
 }
 

@@ -24,7 +24,8 @@ RTCRayHit to_embree(const OracleRay &ray) {
 EmbreeScene::EmbreeScene(bool compact) : device_(rtcNewDevice(nullptr)) {
   check("open");
   scene_ = rtcNewScene(device_);
-  rtcSetSceneFlags(scene_, compact ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(
+      scene_, compact ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_MEDIUM);
 }
 

@@ -22,7 +22,8 @@ class EmbreeScene {
   RTCDevice device() const { return device_; }
   RTCScene scene() const { return scene_; }
 
-  /// Attaches the scene's one geometry, which the scene owns from here on, and builds. Throws Error (memory).
+  /// Attaches the scene's one geometry, which the scene owns from here on, and builds. Throws Error
+  /// (memory).
   void build(RTCGeometry geometry);
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
-// What the oracles of the trilinear field have in common: given a ray, its first hit; given a point, the field.
-// Each answers with its own maths. Nothing here, nor in any oracle, comes from the kernels.
+// What the oracles of the trilinear field have in common: given a ray, its first hit; given a
+// point, the field. Each answers with its own maths. Nothing here, nor in any oracle, comes from
+// the kernels.
 
 #include <array>
 #include <limits>
@@ -9,8 +10,8 @@ namespace isowave {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A ray in index space: position = origin + t direction, t >= 0. The numbers are taken as exact; the
-/// renderer's float32 ones fit without rounding.
+/// A ray in index space: position = origin + t direction, t >= 0. The numbers are taken as exact;
+/// the renderer's float32 ones fit without rounding.
 struct OracleRay {
   std::array<double, 3> origin{}, direction{};
 };
@@ -25,8 +26,8 @@ class HitOracle {
  public:
   virtual ~HitOracle() = default;
 
-  /// The first t at which (field >= isovalue) differs from its value where the ray enters the domain [0,
-  /// dims-1], or starts in it. Thread-safe.
+  /// The first t at which (field >= isovalue) differs from its value where the ray enters the
+  /// domain [0, dims-1], or starts in it. Thread-safe.
   virtual OracleHit first_hit(const OracleRay &ray) const = 0;
 
   /// The field at a point of the domain in double precision, and its gradient.

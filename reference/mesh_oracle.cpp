@@ -15,10 +15,12 @@ namespace {
 
 constexpr std::uint32_t kNoVertex = std::numeric_limits<std::uint32_t>::max();
 
-// The nodes of a cell's tetrahedra: corners x + 2y + 4z, then face centres (axis, low or high side), then the centre.
+// The nodes of a cell's tetrahedra: corners x + 2y + 4z, then face centres (axis, low or high
+// side), then the centre.
 constexpr unsigned kNumNodes = 15, kFaceNode = 8, kCentreNode = 14;
 constexpr unsigned kNumTetrahedra = 24;
-// Edges that cells share belong to a voxel: three to the next voxels, and four spokes of each of its three lower faces.
+// Edges that cells share belong to a voxel: three to the next voxels, and four spokes of each of
+// its three lower faces.
 constexpr unsigned kEdgesPerVoxel = 15;
 constexpr double kCellDiagonal = 1.7320508075688772;
 
@@ -27,7 +29,8 @@ using Node = std::array<int, 3>;  ///< half voxels from the cell's lower corner,
 Node node_place(unsigned node) {
   if (node == kCentreNode) return {1, 1, 1};
   if (node < kFaceNode)
-    return {static_cast<int>(2 * (node & 1)), static_cast<int>(node & 2), static_cast<int>(node >> 2 << 1)};
+    return {static_cast<int>(2 * (node & 1)), static_cast<int>(node & 2),
+            static_cast<int>(node >> 2 << 1)};
   Node place{1, 1, 1};
   place[(node - kFaceNode) / 2] = static_cast<int>((node - kFaceNode) % 2 * 2);
   return place;
@@ -74,7 +77,8 @@ struct CellTables {
     unsigned count = 0;
     for (unsigned face = 0; face < 6; ++face) {
       const unsigned axis = face / 2, side = face % 2, b = (axis + 1) % 3, c = (axis + 2) % 3;
-      for (unsigned i = 0; i < 4; ++i) {  // around the face, counter-clockwise as seen from the axis' end
+      for (unsigned i = 0; i < 4;
+           ++i) {  // around the face, counter-clockwise as seen from the axis' end
         const auto corner = [&](unsigned k) {
           return side << axis | unsigned(k == 1 || k == 2) << b | unsigned(k == 2 || k == 3) << c;
         };
@@ -96,22 +100,23 @@ struct InsideFirst {
   unsigned num_inside;
   std::array<unsigned, 4> order;
 };
-constexpr std::array<InsideFirst, 16> kInsideFirst{{{0, {0, 1, 2, 3}},
-                                                    {1, {0, 1, 2, 3}},
-                                                    {1, {1, 0, 3, 2}},
-                                                    {2, {0, 1, 2, 3}},
-                                                    {1, {2, 0, 1, 3}},
-                                                    {2, {0, 2, 3, 1}},
-                                                    {2, {1, 2, 0, 3}},
-                                                    {3, {3, 0, 2, 1}},  // one outside: it comes first
-                                                    {1, {3, 0, 2, 1}},
-                                                    {2, {0, 3, 1, 2}},
-                                                    {2, {1, 3, 2, 0}},
-                                                    {3, {2, 0, 1, 3}},
-                                                    {2, {2, 3, 0, 1}},
-                                                    {3, {1, 0, 3, 2}},
-                                                    {3, {0, 1, 2, 3}},
-                                                    {4, {0, 1, 2, 3}}}};
+constexpr std::array<InsideFirst, 16> kInsideFirst{
+    {{0, {0, 1, 2, 3}},
+     {1, {0, 1, 2, 3}},
+     {1, {1, 0, 3, 2}},
+     {2, {0, 1, 2, 3}},
+     {1, {2, 0, 1, 3}},
+     {2, {0, 2, 3, 1}},
+     {2, {1, 2, 0, 3}},
+     {3, {3, 0, 2, 1}},  // one outside: it comes first
+     {1, {3, 0, 2, 1}},
+     {2, {0, 3, 1, 2}},
+     {2, {1, 3, 2, 0}},
+     {3, {2, 0, 1, 3}},
+     {2, {2, 3, 0, 1}},
+     {3, {1, 0, 3, 2}},
+     {3, {0, 1, 2, 3}},
+     {4, {0, 1, 2, 3}}}};
 
 /// One pass over the cells, layer by layer; the vertices of two layers of voxels are remembered.
 class Extraction {
@@ -143,7 +148,8 @@ class Extraction {
       for (unsigned i = 0; i < 4; ++i) mask |= unsigned(values_[nodes[i]] >= 0) << i;
       const auto &[num_inside, order] = kInsideFirst[mask];
       if (num_inside == 0 || num_inside == 4) continue;
-      const unsigned i = nodes[order[0]], j = nodes[order[1]], k = nodes[order[2]], l = nodes[order[3]];
+      const unsigned i = nodes[order[0]], j = nodes[order[1]], k = nodes[order[2]],
+                     l = nodes[order[3]];
       if (num_inside == 1) add_triangle(vertex(i, j), vertex(i, k), vertex(i, l));
       if (num_inside == 3) add_triangle(vertex(i, j), vertex(i, l), vertex(i, k));
       if (num_inside == 2) {
@@ -152,11 +158,13 @@ class Extraction {
       }
     }
     if (mesh_.triangles.size() > kMaxTriangles) {
-      throw Error("the isosurface has more than {} triangles: too many for the mesh oracle", kMaxTriangles);
+      throw Error("the isosurface has more than {} triangles: too many for the mesh oracle",
+                  kMaxTriangles);
     }
   }
 
-  /// Values minus the isovalue at the nodes; false for a cell that the surface does not pass through.
+  /// Values minus the isovalue at the nodes; false for a cell that the surface does not pass
+  /// through.
   bool load_cell() {
     unsigned num_inside = 0;
     for (unsigned corner = 0; corner < 8; ++corner) {
@@ -218,7 +226,8 @@ class Extraction {
 
 }  // namespace
 
-IsoMesh extract_isosurface(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue) {
+IsoMesh extract_isosurface(std::span<const float> voxels, std::array<std::uint32_t, 3> dims,
+                           float isovalue) {
   if (voxels.size() != std::size_t{dims[0]} * dims[1] * dims[2] ||
       *std::min_element(dims.begin(), dims.end()) < 2) {
     throw std::invalid_argument("extract_isosurface: the voxels do not fit the dims");
@@ -227,7 +236,8 @@ IsoMesh extract_isosurface(std::span<const float> voxels, std::array<std::uint32
 }
 
 std::uint64_t num_open_edges(const IsoMesh &mesh) {
-  // Each directed edge once, as (lower vertex, higher vertex, direction): an edge is closed when it is there in both.
+  // Each directed edge once, as (lower vertex, higher vertex, direction): an edge is closed when it
+  // is there in both.
   std::vector<std::array<std::uint32_t, 3>> edges;
   edges.reserve(3 * mesh.triangles.size());
   for (const auto &triangle : mesh.triangles) {
@@ -255,10 +265,11 @@ class TracedMesh {
     const std::size_t num_vertices = mesh_.vertices.size();
     mesh_.vertices.push_back({});
     RTCGeometry geometry = rtcNewGeometry(scene_.device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh_.vertices.data(),
-                               0, sizeof mesh_.vertices[0], num_vertices);
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh_.triangles.data(),
-                               0, sizeof mesh_.triangles[0], mesh_.triangles.size());
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                               mesh_.vertices.data(), 0, sizeof mesh_.vertices[0], num_vertices);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                               mesh_.triangles.data(), 0, sizeof mesh_.triangles[0],
+                               mesh_.triangles.size());
     scene_.build(geometry);
   }
 
@@ -275,7 +286,8 @@ class TracedMesh {
   std::uint64_t num_triangles() const { return mesh_.triangles.size(); }
 
  private:
-  IsoMesh mesh_;  ///< Embree reads it in place; one vertex more, so that it may read 16 bytes at the last
+  IsoMesh mesh_;  ///< Embree reads it in place; one vertex more, so that it may read 16 bytes at
+                  ///< the last
   EmbreeScene scene_;
 };
 
@@ -288,14 +300,16 @@ std::array<double, 3> on_ray(const OracleRay &ray, double t) {
 
 }  // namespace
 
-/// A box of points `spacing` voxels apart, numbered from the volume's origin: [begin, begin + count) along each axis.
+/// A box of points `spacing` voxels apart, numbered from the volume's origin: [begin, begin +
+/// count) along each axis.
 struct FineGrid {
   double spacing;
   std::array<std::int64_t, 3> begin{};
   std::array<std::uint32_t, 3> count{};
 
   /// kHalfWidth points to each side of `centre`, as far as the domain reaches.
-  FineGrid(double spacing_in, const std::array<double, 3> &centre, const std::array<std::uint32_t, 3> &dims)
+  FineGrid(double spacing_in, const std::array<double, 3> &centre,
+           const std::array<std::uint32_t, 3> &dims)
       : spacing(spacing_in) {
     constexpr std::int64_t kHalfWidth = 9;  // more than sqrt(3) voxels at a spacing of 1/4
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -303,7 +317,8 @@ struct FineGrid {
       const std::int64_t middle =
           std::clamp(static_cast<std::int64_t>(centre[axis] / spacing), std::int64_t{0}, last);
       begin[axis] = std::max(std::int64_t{0}, middle - kHalfWidth);
-      count[axis] = static_cast<std::uint32_t>(std::min(last, middle + kHalfWidth) - begin[axis] + 1);
+      count[axis] =
+          static_cast<std::uint32_t>(std::min(last, middle + kHalfWidth) - begin[axis] + 1);
     }
   }
 
@@ -321,7 +336,8 @@ struct FineGrid {
   }
 };
 
-MeshOracle::MeshOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
+MeshOracle::MeshOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims,
+                       float isovalue)
     : voxels_(voxels),
       dims_(dims),
       isovalue_(isovalue),
@@ -345,14 +361,16 @@ double MeshOracle::value(const std::array<double, 3> &point) const {
   std::array<std::size_t, 3> cell;
   std::array<double, 3> p;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    cell[axis] = static_cast<std::size_t>(std::clamp(std::floor(point[axis]), 0.0, dims_[axis] - 2.0));
+    cell[axis] =
+        static_cast<std::size_t>(std::clamp(std::floor(point[axis]), 0.0, dims_[axis] - 2.0));
     p[axis] = point[axis] - static_cast<double>(cell[axis]);
   }
   double sum = 0;
   for (unsigned corner = 0; corner < 8; ++corner) {
     const std::size_t x = cell[0] + (corner & 1u), y = cell[1] + (corner >> 1 & 1u),
                       z = cell[2] + (corner >> 2);
-    const double weight = ((corner & 1u) != 0 ? p[0] : 1 - p[0]) * ((corner & 2u) != 0 ? p[1] : 1 - p[1]) *
+    const double weight = ((corner & 1u) != 0 ? p[0] : 1 - p[0]) *
+                          ((corner & 2u) != 0 ? p[1] : 1 - p[1]) *
                           ((corner & 4u) != 0 ? p[2] : 1 - p[2]);
     sum += weight * (voxels_[x + dims_[0] * (y + std::size_t{dims_[1]} * z)] - isovalue_);
   }
@@ -366,22 +384,25 @@ TracedMesh MeshOracle::refined(const FineGrid &grid) const {
   for (std::uint32_t z = 0; z < grid.count[2]; ++z) {
     for (std::uint32_t y = 0; y < grid.count[1]; ++y) {
       for (std::uint32_t x = 0; x < grid.count[0]; ++x) {
-        values.push_back(static_cast<float>(value({grid.place(0, x), grid.place(1, y), grid.place(2, z)})));
+        values.push_back(
+            static_cast<float>(value({grid.place(0, x), grid.place(1, y), grid.place(2, z)})));
       }
     }
   }
   return TracedMesh(extract_isosurface(values, grid.count, 0));
 }
 
-std::optional<double> MeshOracle::agrees_refined(const OracleRay &ray, const RendererHit &got, double from,
-                                                 double at) const {
+std::optional<double> MeshOracle::agrees_refined(const OracleRay &ray, const RendererHit &got,
+                                                 double from, double at) const {
   const double speed = speed_of(ray);
   for (const double spacing : {1.0 / 4, 1.0 / 16, 1.0 / 64, 1.0 / 256}) {
     const FineGrid grid(spacing, on_ray(ray, at), dims_);
     const TracedMesh mesh = refined(grid);
-    // From just before the grid, whose diagonal is 31 spacings: the fine ray's float32 numbers are small.
+    // From just before the grid, whose diagonal is 31 spacings: the fine ray's float32 numbers are
+    // small.
     const double start = std::max(from, at - 40 * spacing / speed);
-    // The part of the ray that is in the grid for certain; the grid ends at the domain's border, a false hit may not.
+    // The part of the ray that is in the grid for certain; the grid ends at the domain's border, a
+    // false hit may not.
     const double reach = 8 * spacing / speed;
     const auto agrees = [&](double t) {
       if (t == kInfinity) return !(got.hit && std::abs(got.t - at) <= reach);
@@ -402,13 +423,15 @@ std::optional<double> MeshOracle::agrees_refined(const OracleRay &ray, const Ren
   return std::nullopt;
 }
 
-void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, const HitRecord &record,
-           Accuracy &tally) {
+void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray,
+           const HitRecord &record, Accuracy &tally) {
   const OracleRay exact = exact_ray(ray);
   const RendererHit got = renderer_hit(frame, exact, record);
   const double t_got = got.hit ? got.t : kInfinity, speed = speed_of(exact);
   double t_mesh = oracle.first_hit(exact);
-  const auto agrees = [&] { return t_mesh == t_got || std::abs(t_mesh - t_got) * speed <= kCellDiagonal; };
+  const auto agrees = [&] {
+    return t_mesh == t_got || std::abs(t_mesh - t_got) * speed <= kCellDiagonal;
+  };
   ++tally.rays;
   tally.hits += std::isfinite(t_mesh);
   if (got.hit && !place_fits(frame, exact, record, got)) ++tally.wrong_places;
@@ -419,7 +442,8 @@ void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, c
   }
   double from = 0;
   while (!agrees()) {
-    const std::optional<double> until = oracle.agrees_refined(exact, got, from, std::min(t_mesh, t_got));
+    const std::optional<double> until =
+        oracle.agrees_refined(exact, got, from, std::min(t_mesh, t_got));
     if (!until) {
       ++(t_mesh < t_got ? tally.missed : tally.false_hits);
       return;
@@ -431,7 +455,8 @@ void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, c
   ++tally.unstable;
 }
 
-Accuracy judge_frame(const MeshOracle &oracle, const FrameParams &frame, std::span<const HitRecord> hits) {
+Accuracy judge_frame(const MeshOracle &oracle, const FrameParams &frame,
+                     std::span<const HitRecord> hits) {
   return judge_rays(frame, hits, [&](const Ray &ray, const HitRecord &hit, Accuracy &tally) {
     judge(oracle, frame, ray, hit, tally);
   });

@@ -18,7 +18,8 @@ class Random {
   /// 0 .. end - 1
   std::uint32_t below(std::uint32_t end) { return static_cast<std::uint32_t>(engine_() % end); }
 
-  std::array<double, 3> in_box(const std::array<double, 3> &low, const std::array<double, 3> &high) {
+  std::array<double, 3> in_box(const std::array<double, 3> &low,
+                               const std::array<double, 3> &high) {
     return {in(low[0], high[0]), in(low[1], high[1]), in(low[2], high[2])};
   }
   /// Uniform on the unit sphere.

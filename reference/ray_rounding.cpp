@@ -27,7 +27,8 @@ std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, I
     const double v = (1 - 2 * (double(row) + 0.5) / size.height) * a;
     const glm::dvec3 direction = glm::normalize(to_index * (fwd + u * right + v * up));
     const auto [x, y, z] =
-        renderer_hit(frame, exact_ray(make_ray(&frame, static_cast<std::uint32_t>(pixel))), hit).point;
+        renderer_hit(frame, exact_ray(make_ray(&frame, static_cast<std::uint32_t>(pixel))), hit)
+            .point;
     const glm::dvec3 point(x, y, z);
     distances.push_back(glm::length(glm::cross(point - eye, direction)));
   }

@@ -1,6 +1,6 @@
 #pragma once
-// How far the float32 ray of a pixel runs from the camera's exact one. This is no error of the intersection, which takes
-// the rounded ray as it is, and is reported apart from those.
+// How far the float32 ray of a pixel runs from the camera's exact one. This is no error of the
+// intersection, which takes the rounded ray as it is, and is reported apart from those.
 
 #include <span>
 #include <vector>
@@ -10,9 +10,9 @@
 
 namespace isowave {
 
-/// Distance of each hit point from the exact ray of its pixel, computed in double [voxels]; nothing for pixels without a
-/// hit. hits [height * width] of make_frame_params(info, camera, size, ...). Throws std::invalid_argument when those do
-/// not fit.
+/// Distance of each hit point from the exact ray of its pixel, computed in double [voxels]; nothing
+/// for pixels without a hit. hits [height * width] of make_frame_params(info, camera, size, ...).
+/// Throws std::invalid_argument when those do not fit.
 std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, ImageSize size,
                                  std::span<const HitRecord> hits);
 

@@ -16,7 +16,8 @@ namespace {
 
 using Interval = boost::numeric::interval<double>;
 
-/// t at which the ray crosses a grid plane of one axis: (plane - origin) / direction, of exact numbers.
+/// t at which the ray crosses a grid plane of one axis: (plane - origin) / direction, of exact
+/// numbers.
 struct Crossing {
   double plane = 0, origin = 0, direction = 1;
   double t = kInfinity;  ///< rounded
@@ -29,7 +30,8 @@ struct Crossing {
 /// Exact order of two crossings: < 0, 0, > 0.
 int compare(const Crossing &a, const Crossing &b) {
   if (a.t == kInfinity || b.t == kInfinity) return (a.t > b.t) - (a.t < b.t);
-  if (std::abs(a.t - b.t) > 1e-14 * std::max(std::abs(a.t), std::abs(b.t))) return a.t < b.t ? -1 : 1;
+  if (std::abs(a.t - b.t) > 1e-14 * std::max(std::abs(a.t), std::abs(b.t)))
+    return a.t < b.t ? -1 : 1;
   return cmp(a.exact(), b.exact());
 }
 
@@ -37,8 +39,9 @@ int compare(const Crossing &a, const Crossing &b) {
 template <class Number>
 using Polynomial = std::array<Number, 4>;
 
-/// The field on the segment from p (s = 0) to p + e (s = 1), minus the isovalue: the multilinear expansion
-/// sum over subsets of axes of (mixed difference) * product of coordinates, multiplied out in s.
+/// The field on the segment from p (s = 0) to p + e (s = 1), minus the isovalue: the multilinear
+/// expansion sum over subsets of axes of (mixed difference) * product of coordinates, multiplied
+/// out in s.
 template <class Number>
 Polynomial<Number> along_segment(const std::array<double, 8> &v, double isovalue,
                                  const std::array<Number, 3> &p, const std::array<Number, 3> &e) {
@@ -47,7 +50,8 @@ Polynomial<Number> along_segment(const std::array<double, 8> &v, double isovalue
                                    Number(v[4]), Number(v[5]), Number(v[6]), Number(v[7])};
   for (unsigned axis = 0; axis < 3; ++axis) {  // in place: corner values -> mixed differences
     for (unsigned corner = 0; corner < 8; ++corner) {
-      if (corner >> axis & 1u) difference[corner] = difference[corner] - difference[corner ^ (1u << axis)];
+      if (corner >> axis & 1u)
+        difference[corner] = difference[corner] - difference[corner ^ (1u << axis)];
     }
   }
   for (unsigned subset = 0; subset < 8; ++subset) {
@@ -100,8 +104,8 @@ struct Answer {
   double s = 0;
 };
 
-/// The number of distinct real roots in (0,1], by Sturm's chain, for what subdivision cannot end: multiple
-/// roots.
+/// The number of distinct real roots in (0,1], by Sturm's chain, for what subdivision cannot end:
+/// multiple roots.
 int count_distinct_roots(const Polynomial<mpq_class> &b) {
   using Poly = std::vector<mpq_class>;
   const auto trim = [](Poly &p) {
@@ -172,27 +176,32 @@ Answer undecided_piece(const Polynomial<Interval> &, double) {
   return {Answer::kUndecided};
 }
 
-/// inside at the ends is alike (else the caller knows of a change): two near roots, one double root, or none.
+/// inside at the ends is alike (else the caller knows of a change): two near roots, one double
+/// root, or none.
 Answer undecided_piece(const Polynomial<mpq_class> &b, double s) {
   if (side(b[0]) != side(b[3])) return {Answer::kChange, s};
   if (side(b[0]) == Side::kOutside) {  // touching the isovalue is already inside
     return {count_distinct_roots(b) > 0 ? Answer::kChange : Answer::kNone, s};
   }
   const bool ends_on_zero = b[0] == 0 || b[3] == 0;
-  return {count_distinct_roots(b) - (ends_on_zero ? 1 : 0) > 1 ? Answer::kChange : Answer::kNone, s};
+  return {count_distinct_roots(b) - (ends_on_zero ? 1 : 0) > 1 ? Answer::kChange : Answer::kNone,
+          s};
 }
 
 /// The first change of inside on the piece [begin, begin + width] of [0,1], leftmost first.
 template <class Number>
-Answer first_change(const Polynomial<Number> &b, double begin, double width, int depth, int max_depth) {
+Answer first_change(const Polynomial<Number> &b, double begin, double width, int depth,
+                    int max_depth) {
   std::array<Side, 4> sides;
   for (unsigned i = 0; i < 4; ++i) sides[i] = side(b[i]);
   if (sides[0] == Side::kUnknown) return {Answer::kUndecided};
   const bool known = std::find(sides.begin(), sides.end(), Side::kUnknown) == sides.end();
   int variations = 0;
   for (unsigned i = 1; i < 4; ++i) variations += sides[i] != sides[i - 1];
-  if (known && variations == 0) return {Answer::kNone};  // the curve lies in the hull of its coefficients
-  if (known && variations == 1) return {Answer::kChange, begin + width * place_of_root(b)};  // Descartes
+  if (known && variations == 0)
+    return {Answer::kNone};  // the curve lies in the hull of its coefficients
+  if (known && variations == 1)
+    return {Answer::kChange, begin + width * place_of_root(b)};  // Descartes
   if (depth >= max_depth) return undecided_piece(b, begin + 0.5 * width);
   const auto [left, right] = halves(b);
   const Answer in_left = first_change(left, begin, 0.5 * width, depth + 1, max_depth);
@@ -202,10 +211,12 @@ Answer first_change(const Polynomial<Number> &b, double begin, double width, int
 
 /// Position of the ray at a crossing, relative to the cell's origin, as an interval or exactly.
 template <class Number>
-std::array<Number, 3> position(const OracleRay &ray, const std::array<int, 3> &cell, const Number &t) {
+std::array<Number, 3> position(const OracleRay &ray, const std::array<int, 3> &cell,
+                               const Number &t) {
   std::array<Number, 3> p;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    p[axis] = Number(ray.origin[axis]) - Number(double(cell[axis])) + t * Number(ray.direction[axis]);
+    p[axis] =
+        Number(ray.origin[axis]) - Number(double(cell[axis])) + t * Number(ray.direction[axis]);
   }
   return p;
 }
@@ -223,7 +234,8 @@ Answer change_in_cell(const std::array<double, 8> &v, double isovalue, const Ora
 
 }  // namespace
 
-RootOracle::RootOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue)
+RootOracle::RootOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims,
+                       float isovalue)
     : voxels_(voxels), dims_(dims), isovalue_(isovalue) {
   if (voxels.size() != std::size_t{dims[0]} * dims[1] * dims[2] ||
       *std::min_element(dims.begin(), dims.end()) < 2) {
@@ -299,13 +311,15 @@ OracleHit RootOracle::first_hit(const OracleRay &ray) const {
     const bool mixed =
         std::any_of(v.begin() + 1, v.end(), [&](double x) { return (x >= isovalue_) != inside; });
     if (mixed && compare(enter, leave) < 0) {
-      Answer answer = change_in_cell<Interval>(v, isovalue_, ray, cell, enter.interval(), leave.interval(),
-                                               kMaxIntervalDepth);
+      Answer answer = change_in_cell<Interval>(v, isovalue_, ray, cell, enter.interval(),
+                                               leave.interval(), kMaxIntervalDepth);
       if (answer.kind == Answer::kUndecided) {
         ++num_exact_cells_;
-        answer = change_in_cell<mpq_class>(v, isovalue_, ray, cell, enter.exact(), leave.exact(), kMaxDepth);
+        answer = change_in_cell<mpq_class>(v, isovalue_, ray, cell, enter.exact(), leave.exact(),
+                                           kMaxDepth);
       }
-      if (answer.kind == Answer::kChange) return {true, enter.t + answer.s * (leave.t - enter.t), cell};
+      if (answer.kind == Answer::kChange)
+        return {true, enter.t + answer.s * (leave.t - enter.t), cell};
     }
     cell[axis] += step[axis];
     if (cell[axis] < 0 || cell[axis] > static_cast<int>(dims_[axis]) - 2) return {};
@@ -318,7 +332,8 @@ double RootOracle::field(const std::array<double, 3> &point) const {
   std::array<int, 3> cell;
   std::array<double, 3> p;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    cell[axis] = std::clamp(static_cast<int>(std::floor(point[axis])), 0, static_cast<int>(dims_[axis]) - 2);
+    cell[axis] =
+        std::clamp(static_cast<int>(std::floor(point[axis])), 0, static_cast<int>(dims_[axis]) - 2);
     p[axis] = point[axis] - cell[axis];
   }
   return along_segment<double>(corners(cell), 0.0, p, {0.0, 0.0, 0.0})[0];
@@ -328,11 +343,13 @@ std::array<double, 3> RootOracle::gradient(const std::array<double, 3> &point) c
   std::array<int, 3> cell;
   std::array<double, 3> p;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    cell[axis] = std::clamp(static_cast<int>(std::floor(point[axis])), 0, static_cast<int>(dims_[axis]) - 2);
+    cell[axis] =
+        std::clamp(static_cast<int>(std::floor(point[axis])), 0, static_cast<int>(dims_[axis]) - 2);
     p[axis] = point[axis] - cell[axis];
   }
   std::array<double, 3> result;
-  for (std::size_t axis = 0; axis < 3; ++axis) {  // the derivative along an axis is the linear term there
+  for (std::size_t axis = 0; axis < 3;
+       ++axis) {  // the derivative along an axis is the linear term there
     std::array<double, 3> e{};
     e[axis] = 1.0;
     result[axis] = along_segment<double>(corners(cell), 0.0, p, e)[1];
@@ -341,7 +358,8 @@ std::array<double, 3> RootOracle::gradient(const std::array<double, 3> &point) c
 }
 
 std::optional<double> first_change_of_cubic(const std::array<double, 4> &b) {
-  Answer answer = first_change(Polynomial<Interval>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxIntervalDepth);
+  Answer answer =
+      first_change(Polynomial<Interval>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxIntervalDepth);
   if (answer.kind == Answer::kUndecided) {
     answer = first_change(Polynomial<mpq_class>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxDepth);
   }

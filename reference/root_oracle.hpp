@@ -1,11 +1,11 @@
 #pragma once
-// The oracle of the intersection: where a ray first changes sides of the isosurface of the trilinear field,
-// decided exactly.
+// The oracle of the intersection: where a ray first changes sides of the isosurface of the
+// trilinear field, decided exactly.
 //
-// Shares no code, constant or formula with the kernels. Rays and voxels are float32, hence rational numbers;
-// the field along a ray is a piecewise cubic with rational coefficients. Double-precision interval arithmetic
-// answers nearly every question; what it leaves open is decided in exact rational arithmetic (GMP), so every
-// answer is certified.
+// Shares no code, constant or formula with the kernels. Rays and voxels are float32, hence rational
+// numbers; the field along a ray is a piecewise cubic with rational coefficients. Double-precision
+// interval arithmetic answers nearly every question; what it leaves open is decided in exact
+// rational arithmetic (GMP), so every answer is certified.
 
 #include <array>
 #include <atomic>
@@ -38,8 +38,8 @@ class RootOracle final : public HitOracle {
   mutable std::atomic<std::uint64_t> num_exact_cells_{0};
 };
 
-/// The first s in [0,1] at which a cubic in Bernstein form changes sides of 0 (half-open: 0 is inside), none if it never
-/// does. Exact, placed to double precision.
+/// The first s in [0,1] at which a cubic in Bernstein form changes sides of 0 (half-open: 0 is
+/// inside), none if it never does. Exact, placed to double precision.
 std::optional<double> first_change_of_cubic(const std::array<double, 4> &coefficients);
 
 }  // namespace isowave

@@ -21,7 +21,8 @@ void load_corners(const FrameParams &frame, const float *voxels, int x, int y, i
   const std::size_t row = frame.dims_x, layer = row * frame.dims_y;
   const float *v = voxels + static_cast<std::size_t>(x) + row * static_cast<std::size_t>(y) +
                    layer * static_cast<std::size_t>(z);
-  const std::size_t offsets[8] = {0, 1, row, row + 1, layer, layer + 1, layer + row, layer + row + 1};
+  const std::size_t offsets[8] = {0,     1,         row,         row + 1,
+                                  layer, layer + 1, layer + row, layer + row + 1};
   for (int corner = 0; corner < 8; ++corner) w[corner] = v[offsets[corner]] - frame.isovalue;
 }
 
@@ -41,10 +42,11 @@ GridWalk enter_box(const Ray &ray, RayEvent enter, int size, const CellBox &box,
                    locate(ray.z, 2, enter, size, box.begin.z, box.end.z - 1), size, last);
 }
 
-/// Calls visit(cell, enter, exit) for each cell of `box` along the ray, which enters it by `enter`, until visit returns
-/// true.
+/// Calls visit(cell, enter, exit) for each cell of `box` along the ray, which enters it by `enter`,
+/// until visit returns true.
 template <class Visit>
-void walk_cells(const FrameParams &frame, const Ray &ray, RayEvent enter, const CellBox &box, Visit visit) {
+void walk_cells(const FrameParams &frame, const Ray &ray, RayEvent enter, const CellBox &box,
+                Visit visit) {
   const LastPlanes last = last_planes(&frame);
   GridWalk cell = enter_box(ray, enter, 1, box, last);
   while (contains(box, cell)) {
@@ -59,16 +61,18 @@ void walk_cells(const FrameParams &frame, const Ray &ray, RayEvent enter, const 
 HitRecord trace_box(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
                     RayEvent enter, const CellBox &box) {
   HitRecord hit = no_hit();
-  walk_cells(frame, ray, enter, box, [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
-    CellChange change;
-    float w[8];
-    load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-    if (!change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, &change))
-      return false;
-    hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
-                   refine(solver, change.cubic, change.bracket));
-    return true;
-  });
+  walk_cells(frame, ray, enter, box,
+             [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
+               CellChange change;
+               float w[8];
+               load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
+               if (!change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
+                                   &change))
+                 return false;
+               hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
+                              refine(solver, change.cubic, change.bracket));
+               return true;
+             });
   return hit;
 }
 
@@ -79,8 +83,8 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
   return trace_box(frame, voxels, solver, ray, enter, {glm::ivec3(0), {last.x, last.y, last.z}});
 }
 
-/// The first hit of a ray in the band of one level. inside: in, is the ray where the band begins, if it comes from another; out,
-/// where the band ends, if the ray gets there within the domain.
+/// The first hit of a ray in the band of one level. inside: in, is the ray where the band begins,
+/// if it comes from another; out, where the band ends, if the ray gets there within the domain.
 HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
                      std::optional<bool> &inside) {
   const LastPlanes last = last_planes(&frame), zero{};
@@ -91,28 +95,31 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
   if (!clip_to_box(&ray, zero, last, &enter, &exit)) return hit;
   bool at_border = enter.axis == ISO_AXIS_START && before.has_value();
   const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
-  walk_cells(frame, ray, enter, domain, [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
-    const bool ends = !event_before(cell_exit, end);
-    if (ends) cell_exit = end;
-    CellChange change;
-    float w[8];
-    load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-    const auto inside_now = [&](RayEvent event, bool leaving) {
-      return inside_at(&ray, w, event, cell.x, cell.y, cell.z, leaving) != 0;
-    };
-    if (at_border && inside_now(cell_enter, false) != before) {
-      hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, 0.0f);
-      return true;
-    }
-    at_border = false;
-    if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, &change)) {
-      hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
-                     refine(solver, change.cubic, change.bracket));
-      return true;
-    }
-    if (ends) inside = inside_now(cell_exit, true);
-    return ends;
-  });
+  walk_cells(frame, ray, enter, domain,
+             [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
+               const bool ends = !event_before(cell_exit, end);
+               if (ends) cell_exit = end;
+               CellChange change;
+               float w[8];
+               load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
+               const auto inside_now = [&](RayEvent event, bool leaving) {
+                 return inside_at(&ray, w, event, cell.x, cell.y, cell.z, leaving) != 0;
+               };
+               if (at_border && inside_now(cell_enter, false) != before) {
+                 hit =
+                     make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, 0.0f);
+                 return true;
+               }
+               at_border = false;
+               if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
+                                  &change)) {
+                 hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
+                                refine(solver, change.cubic, change.bracket));
+                 return true;
+               }
+               if (ends) inside = inside_now(cell_exit, true);
+               return ends;
+             });
   return hit;
 }
 
@@ -124,7 +131,8 @@ void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
 
 /// The hits [height * width] of trace_pixel(pixel), by several threads.
 template <class TracePixel>
-std::vector<HitRecord> trace_pixels(const FrameParams &frame, unsigned threads, TracePixel trace_pixel) {
+std::vector<HitRecord> trace_pixels(const FrameParams &frame, unsigned threads,
+                                    TracePixel trace_pixel) {
   std::vector<HitRecord> hits(std::size_t{frame.width} * frame.height);
   std::atomic<std::uint32_t> next_row{0};
   const auto trace_rows = [&] {
@@ -134,7 +142,8 @@ std::vector<HitRecord> trace_pixels(const FrameParams &frame, unsigned threads, 
     }
   };
   std::vector<std::jthread> pool;
-  const unsigned num_threads = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+  const unsigned num_threads =
+      threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
   for (unsigned i = 1; i < num_threads; ++i) pool.emplace_back(trace_rows);
   trace_rows();
   pool.clear();
@@ -150,17 +159,19 @@ void append_segments(const FrameParams &frame, std::span<const float> voxels, co
   RayEvent enter;
   if (!domain_entry(&ray, last, &enter)) return;
   const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
-  walk_cells(frame, ray, enter, domain, [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
-    CellChange change;
-    float w[8];
-    load_corners(frame, voxels.data(), cell.x, cell.y, cell.z, w);
-    if (!corners_differ(w)) return false;
-    const CellPoint a = event_position(&ray, cell_enter, cell.x, cell.y, cell.z, 0),
-                    b = event_position(&ray, cell_exit, cell.x, cell.y, cell.z, 1);
-    segments.push_back({segment_cubic(w, a, b), std::hypot(b.x - a.x, b.y - a.y, b.z - a.z)});
-    return change_in_cell(kDefaultSolver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, &change) !=
-           0;
-  });
+  walk_cells(
+      frame, ray, enter, domain,
+      [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
+        CellChange change;
+        float w[8];
+        load_corners(frame, voxels.data(), cell.x, cell.y, cell.z, w);
+        if (!corners_differ(w)) return false;
+        const CellPoint a = event_position(&ray, cell_enter, cell.x, cell.y, cell.z, 0),
+                        b = event_position(&ray, cell_exit, cell.x, cell.y, cell.z, 1);
+        segments.push_back({segment_cubic(w, a, b), std::hypot(b.x - a.x, b.y - a.y, b.z - a.z)});
+        return change_in_cell(kDefaultSolver, &ray, w, cell.x, cell.y, cell.z, cell_enter,
+                              cell_exit, &change) != 0;
+      });
 }
 
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
@@ -169,8 +180,8 @@ HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, 
   return trace(frame, voxels.data(), solver, ray);
 }
 
-HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels, Solver solver,
-                                 const Ray &ray) {
+HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels,
+                                 Solver solver, const Ray &ray) {
   check_voxels(frame, voxels);
   const LastPlanes last = last_planes(&frame);
   const glm::ivec3 end_cell(last.x, last.y, last.z);
@@ -180,9 +191,9 @@ HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float
   GridWalk block = enter_box(ray, enter, 4, blocks, last);
   while (contains(blocks, block)) {
     const glm::ivec3 begin(4 * block.x, 4 * block.y, 4 * block.z);
-    const HitRecord hit =
-        trace_box(frame, voxels.data(), solver, ray, region_entry(&ray, block.x, block.y, block.z, 4, last),
-                  {begin, glm::min(begin + 4, end_cell)});
+    const HitRecord hit = trace_box(frame, voxels.data(), solver, ray,
+                                    region_entry(&ray, block.x, block.y, block.z, 4, last),
+                                    {begin, glm::min(begin + 4, end_cell)});
     if (std::isfinite(hit.t)) return hit;
     block = walk_from(&ray, block.x, block.y, block.z, 4, last);  // all that is kept between passes
     walk_step(&block, &ray, walk_exit(&block, &ray), 4, last);
@@ -190,16 +201,17 @@ HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float
   return no_hit();
 }
 
-std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
-                                     unsigned threads) {
+std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
+                                     Solver solver, unsigned threads) {
   check_voxels(frame, voxels);
   return trace_pixels(frame, threads, [&](std::uint32_t pixel) {
     return trace(frame, voxels.data(), solver, make_ray(&frame, pixel));
   });
 }
 
-HitRecord trace_scalar_levels(std::span<const FrameParams> frames, std::span<const std::vector<float>> voxels,
-                              Solver solver, std::span<const Ray> rays) {
+HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
+                              std::span<const std::vector<float>> voxels, Solver solver,
+                              std::span<const Ray> rays) {
   HitRecord hit = no_hit();
   std::optional<bool> inside;
   for (std::size_t level = 0; level < frames.size() && !std::isfinite(hit.t); ++level) {
@@ -210,9 +222,10 @@ HitRecord trace_scalar_levels(std::span<const FrameParams> frames, std::span<con
 }
 
 std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
-                                            std::span<const std::vector<float>> voxels, Solver solver,
-                                            unsigned threads) {
-  for (std::size_t level = 0; level < frames.size(); ++level) check_voxels(frames[level], voxels[level]);
+                                            std::span<const std::vector<float>> voxels,
+                                            Solver solver, unsigned threads) {
+  for (std::size_t level = 0; level < frames.size(); ++level)
+    check_voxels(frames[level], voxels[level]);
   return trace_pixels(frames[0], threads, [&](std::uint32_t pixel) {
     std::vector<Ray> rays;
     for (const FrameParams &frame : frames) rays.push_back(make_ray(&frame, pixel));

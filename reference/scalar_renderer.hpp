@@ -1,8 +1,8 @@
 #pragma once
-// The twin: the same portable headers as the kernels in plain loops over every cell that a ray passes. No
-// macrocells, no cache, no speculation, no wavefront. A device's frame must equal it bit for bit, so that any
-// difference is a scheduling bug and not rounding. What it cannot find - a wrong formula in the shared
-// headers - the oracles must.
+// The twin: the same portable headers as the kernels in plain loops over every cell that a ray
+// passes. No macrocells, no cache, no speculation, no wavefront. A device's frame must equal it bit
+// for bit, so that any difference is a scheduling bug and not rounding. What it cannot find - a
+// wrong formula in the shared headers - the oracles must.
 
 #include <span>
 #include <vector>
@@ -14,37 +14,40 @@ namespace isowave {
 
 /// voxels   [nz][ny][nx] decoded values, x fastest (decode_with_libzfp).
 /// threads  0: one per core.
-/// Returns the hits [height * width], row 0 at the top. Throws std::invalid_argument when voxels do not fit
-/// the frame.
+/// Returns the hits [height * width], row 0 at the top. Throws std::invalid_argument when voxels do
+/// not fit the frame.
 std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const float> voxels,
                                      Solver solver = kDefaultSolver, unsigned threads = 0);
 
-/// The same for a frame that several levels of detail draw, each its band: frames as make_level_frames() returns them, and
-/// the voxels of each level. The side that a ray is on is carried from cell to cell across borders.
+/// The same for a frame that several levels of detail draw, each its band: frames as
+/// make_level_frames() returns them, and the voxels of each level. The side that a ray is on is
+/// carried from cell to cell across borders.
 std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
                                             std::span<const std::vector<float>> voxels,
                                             Solver solver = kDefaultSolver, unsigned threads = 0);
 
 /// One ray of the same: rays [level], which is the same ray in each level's index space.
-HitRecord trace_scalar_levels(std::span<const FrameParams> frames, std::span<const std::vector<float>> voxels,
-                              Solver solver, std::span<const Ray> rays);
+HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
+                              std::span<const std::vector<float>> voxels, Solver solver,
+                              std::span<const Ray> rays);
 
-/// One ray of render_scalar(): the hit of `ray` (index space; t in units of frame.t_scale). frame: dims, blocks,
-/// isovalue and t_scale are used.
+/// One ray of render_scalar(): the hit of `ray` (index space; t in units of frame.t_scale). frame:
+/// dims, blocks, isovalue and t_scale are used.
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                        const Ray &ray);
 
-/// The same ray block by block, as the device's passes see it: each block is entered anew and all that is known on
-/// leaving one is its number. Must give the bits of trace_scalar().
-HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels, Solver solver,
-                                 const Ray &ray);
+/// The same ray block by block, as the device's passes see it: each block is entered anew and all
+/// that is known on leaving one is its number. Must give the bits of trace_scalar().
+HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels,
+                                 Solver solver, const Ray &ray);
 
 /// What an intersector is asked about one cell.
 struct CellSegment {
   Cubic cubic;   ///< field minus isovalue along the ray, from entry (0) to exit (1)
   float length;  ///< from entry to exit [voxels]
 };
-/// Appends the segments of a ray in the cells that hold the isovalue, from the eye to its hit: what tracing it asks.
+/// Appends the segments of a ray in the cells that hold the isovalue, from the eye to its hit: what
+/// tracing it asks.
 void append_segments(const FrameParams &frame, std::span<const float> voxels, const Ray &ray,
                      std::vector<CellSegment> &segments);
 

@@ -41,7 +41,8 @@ StabilityScene sampled(std::array<std::uint32_t, 3> dims, float isovalue, const 
   StabilityScene scene{dims, {}, isovalue, {}};
   for (std::uint32_t z = 0; z < dims[2]; ++z) {
     for (std::uint32_t y = 0; y < dims[1]; ++y) {
-      for (std::uint32_t x = 0; x < dims[0]; ++x) scene.voxels.push_back(static_cast<float>(field(x, y, z)));
+      for (std::uint32_t x = 0; x < dims[0]; ++x)
+        scene.voxels.push_back(static_cast<float>(field(x, y, z)));
     }
   }
   return scene;
@@ -56,8 +57,8 @@ StabilityScene cell_of(const std::array<double, 8> &corners, float isovalue) {
 /// Rays through random points of the domain, from all sides.
 void add_random_rays(StabilityScene &scene, Random &random, std::uint32_t count) {
   for (std::uint32_t i = 0; i < count; ++i) {
-    scene.rays.push_back(
-        ray_through(random.in_box({0, 0, 0}, upper_corner(scene)), random.direction(), random.in(5, 50)));
+    scene.rays.push_back(ray_through(random.in_box({0, 0, 0}, upper_corner(scene)),
+                                     random.direction(), random.in(5, 50)));
   }
 }
 
@@ -101,8 +102,9 @@ void compress_and_decode(StabilityScene &scene, const CompressOptions &options) 
 // The cases.
 
 StabilityCase sign_cases(std::uint32_t rays, Random &random) {
-  StabilityCase result{
-      "256 sign cases", "every pattern of corners inside and outside, ambiguous faces included", {}};
+  StabilityCase result{"256 sign cases",
+                       "every pattern of corners inside and outside, ambiguous faces included",
+                       {}};
   for (unsigned pattern = 0; pattern < 256; ++pattern) {
     std::array<double, 8> corners;
     for (unsigned i = 0; i < 8; ++i) corners[i] = (pattern >> i & 1u ? 1 : -1) * random.in(0.05, 1);
@@ -120,7 +122,8 @@ StabilityCase double_roots(std::uint32_t rays, Random &random) {
     std::array<double, 8> corners;
     for (double &corner : corners) corner = random.in(-1, 1);
     StabilityScene scene = cell_of(corners, 0);
-    const Vec through = random.in_box({0.3, 0.3, 0.3}, {0.7, 0.7, 0.7}), direction = random.direction();
+    const Vec through = random.in_box({0.3, 0.3, 0.3}, {0.7, 0.7, 0.7}),
+              direction = random.direction();
     const auto value = [&](double s) {
       return trilinear(scene, {through[0] + s * direction[0], through[1] + s * direction[1],
                                through[2] + s * direction[2]});
@@ -146,13 +149,16 @@ StabilityCase double_roots(std::uint32_t rays, Random &random) {
 }
 
 StabilityCase triple_roots(std::uint32_t rays, Random &random) {
-  StabilityCase result{"triple roots", "(x-a)(y-b)(z-c) along the diagonal through its saddle point", {}};
+  StabilityCase result{
+      "triple roots", "(x-a)(y-b)(z-c) along the diagonal through its saddle point", {}};
   for (std::uint32_t i = 0; i < rays; ++i) {
     const Vec at = random.in_box({0.2, 0.2, 0.2}, {0.8, 0.8, 0.8});
-    StabilityScene scene = sampled(
-        {2, 2, 2}, 0, [&](double x, double y, double z) { return (x - at[0]) * (y - at[1]) * (z - at[2]); });
+    StabilityScene scene = sampled({2, 2, 2}, 0, [&](double x, double y, double z) {
+      return (x - at[0]) * (y - at[1]) * (z - at[2]);
+    });
     const double r = std::sqrt(1.0 / 3.0);
-    const Vec direction{random.below(2) ? r : -r, random.below(2) ? r : -r, random.below(2) ? r : -r};
+    const Vec direction{random.below(2) ? r : -r, random.below(2) ? r : -r,
+                        random.below(2) ? r : -r};
     scene.rays.push_back(ray_through(at, direction, random.in(1, 20)));
     result.scenes.push_back(std::move(scene));
   }
@@ -165,11 +171,14 @@ StabilityCase near_roots(std::uint32_t rays, Random &random) {
       "three near roots", "(x-a)(y-b)(z-c) along diagonals that pass its saddle point closely", {}};
   while (result.scenes.size() < rays) {
     const Vec at = random.in_box({0.3, 0.3, 0.3}, {0.7, 0.7, 0.7}), aside = random.direction();
-    StabilityScene scene = sampled(
-        {2, 2, 2}, 0, [&](double x, double y, double z) { return (x - at[0]) * (y - at[1]) * (z - at[2]); });
+    StabilityScene scene = sampled({2, 2, 2}, 0, [&](double x, double y, double z) {
+      return (x - at[0]) * (y - at[1]) * (z - at[2]);
+    });
     const double r = std::sqrt(1.0 / 3.0), offset = std::pow(10.0, random.in(-5, -0.5));
-    const Vec direction{random.below(2) ? r : -r, random.below(2) ? r : -r, random.below(2) ? r : -r};
-    const Vec through{at[0] + offset * aside[0], at[1] + offset * aside[1], at[2] + offset * aside[2]};
+    const Vec direction{random.below(2) ? r : -r, random.below(2) ? r : -r,
+                        random.below(2) ? r : -r};
+    const Vec through{at[0] + offset * aside[0], at[1] + offset * aside[1],
+                      at[2] + offset * aside[2]};
     scene.rays.push_back(ray_through(through, direction, random.in(1, 20)));
     result.scenes.push_back(std::move(scene));
   }
@@ -177,7 +186,8 @@ StabilityCase near_roots(std::uint32_t rays, Random &random) {
 }
 
 StabilityCase tangents(std::uint32_t rays, Random &random) {
-  StabilityCase result{"tangents", "rays that graze a sphere of radius 5 within a tenth of a voxel", {}};
+  StabilityCase result{
+      "tangents", "rays that graze a sphere of radius 5 within a tenth of a voxel", {}};
   StabilityScene scene = sampled({16, 16, 16}, 5, [](double x, double y, double z) {
     return std::sqrt((x - 7.4) * (x - 7.4) + (y - 7.6) * (y - 7.6) + (z - 7.3) * (z - 7.3));
   });
@@ -188,7 +198,8 @@ StabilityCase tangents(std::uint32_t rays, Random &random) {
     const double length = std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
     for (double &x : t) x /= length;
     const double radius = 5 + random.in(-0.1, 0.1);
-    scene.rays.push_back(ray_through({7.4 + radius * n[0], 7.6 + radius * n[1], 7.3 + radius * n[2]}, t, 30));
+    scene.rays.push_back(
+        ray_through({7.4 + radius * n[0], 7.6 + radius * n[1], 7.3 + radius * n[2]}, t, 30));
   }
   result.scenes.push_back(std::move(scene));
   return result;
@@ -201,11 +212,11 @@ StabilityCase vanishing_leading_coefficient(std::uint32_t rays, Random &random) 
     const Vec g = random.direction();
     const double quadratic = random.below(2) ? random.in(-1, 1) : 0;
     const double cubic = std::pow(10.0, random.in(-12, 0)) * (random.below(2) ? 1 : -1);
-    StabilityScene scene =
-        sampled({2, 2, 2}, static_cast<float>(random.in(-0.5, 0.5)), [&](double x, double y, double z) {
-          return g[0] * (x - 0.5) + g[1] * (y - 0.5) + g[2] * (z - 0.5) + quadratic * x * y +
-                 cubic * x * y * z;
-        });
+    StabilityScene scene = sampled({2, 2, 2}, static_cast<float>(random.in(-0.5, 0.5)),
+                                   [&](double x, double y, double z) {
+                                     return g[0] * (x - 0.5) + g[1] * (y - 0.5) + g[2] * (z - 0.5) +
+                                            quadratic * x * y + cubic * x * y * z;
+                                   });
     add_random_rays(scene, random, 1);
     result.scenes.push_back(std::move(scene));
   }
@@ -213,7 +224,8 @@ StabilityCase vanishing_leading_coefficient(std::uint32_t rays, Random &random) 
 }
 
 StabilityCase constant_cells(std::uint32_t rays, Random &random) {
-  StabilityCase result{"constant field", "isovalue below, equal to and above a constant: never a hit", {}};
+  StabilityCase result{
+      "constant field", "isovalue below, equal to and above a constant: never a hit", {}};
   for (const float isovalue : {6.0f, 7.0f, 8.0f, std::nextafter(7.0f, 8.0f)}) {
     StabilityScene scene = sampled({6, 5, 7}, isovalue, [](double, double, double) { return 7.0; });
     add_random_rays(scene, random, rays / 4);
@@ -227,9 +239,10 @@ StabilityCase saddle_cells(std::uint32_t rays, Random &random) {
       "saddle cells", "isovalue at, and close to, the value of a face's or the cell's saddle", {}};
   for (std::uint32_t i = 0; i < rays; ++i) {
     const double offset = random.below(3) ? std::pow(10.0, random.in(-8, -1)) : 0;
-    StabilityScene scene = sampled({3, 3, 3}, static_cast<float>(offset), [&](double x, double y, double z) {
-      return (x - 0.5) * (y - 0.5) + (i % 2 ? 0.25 * (z - 1) * (x - 1) : 0.0);
-    });
+    StabilityScene scene =
+        sampled({3, 3, 3}, static_cast<float>(offset), [&](double x, double y, double z) {
+          return (x - 0.5) * (y - 0.5) + (i % 2 ? 0.25 * (z - 1) * (x - 1) : 0.0);
+        });
     add_random_rays(scene, random, 1);
     result.scenes.push_back(std::move(scene));
   }
@@ -237,13 +250,15 @@ StabilityCase saddle_cells(std::uint32_t rays, Random &random) {
 }
 
 StabilityCase isovalue_on_values(std::uint32_t rays, Random &random) {
-  StabilityCase result{
-      "isovalue on voxels", "integer voxels and isovalue: vertices, edges and faces lie on the surface", {}};
+  StabilityCase result{"isovalue on voxels",
+                       "integer voxels and isovalue: vertices, edges and faces lie on the surface",
+                       {}};
   for (int i = 0; i < 8; ++i) {
     StabilityScene scene = noise({13, 11, 9}, random, true);
-    scene.isovalue = i == 0   ? *std::min_element(scene.voxels.begin(), scene.voxels.end())
-                     : i == 1 ? *std::max_element(scene.voxels.begin(), scene.voxels.end())
-                              : scene.voxels[random.below(static_cast<std::uint32_t>(scene.voxels.size()))];
+    scene.isovalue =
+        i == 0   ? *std::min_element(scene.voxels.begin(), scene.voxels.end())
+        : i == 1 ? *std::max_element(scene.voxels.begin(), scene.voxels.end())
+                 : scene.voxels[random.below(static_cast<std::uint32_t>(scene.voxels.size()))];
     add_random_rays(scene, random, rays / 8);
     result.scenes.push_back(std::move(scene));
   }
@@ -253,8 +268,9 @@ StabilityCase isovalue_on_values(std::uint32_t rays, Random &random) {
 StabilityCase plateaus(std::uint32_t rays, Random &random) {
   StabilityCase result{"plateaus", "two-valued voxels with the isovalue equal to one of them", {}};
   for (const float isovalue : {10.0f, 20.0f}) {
-    StabilityScene scene = sampled({12, 12, 12}, isovalue,
-                                   [&](double, double, double) { return random.below(3) ? 10.0 : 20.0; });
+    StabilityScene scene = sampled({12, 12, 12}, isovalue, [&](double, double, double) {
+      return random.below(3) ? 10.0 : 20.0;
+    });
     add_random_rays(scene, random, rays / 2);
     result.scenes.push_back(std::move(scene));
   }
@@ -262,8 +278,9 @@ StabilityCase plateaus(std::uint32_t rays, Random &random) {
 }
 
 StabilityCase axis_parallel(std::uint32_t rays, Random &random) {
-  StabilityCase result{
-      "zero direction components", "one or two components 0, -0 or denormal; positions anywhere", {}};
+  StabilityCase result{"zero direction components",
+                       "one or two components 0, -0 or denormal; positions anywhere",
+                       {}};
   StabilityScene scene = noise({18, 17, 19}, random, false);
   const double zeros[] = {0.0, -0.0, 1e-42, -1e-42, 1e-30};
   for (std::uint32_t i = 0; i < rays; ++i) {
@@ -319,7 +336,9 @@ StabilityCase lattice_rays(std::uint32_t rays, Random &random) {
 
 StabilityCase eyes_inside(std::uint32_t rays, Random &random) {
   StabilityCase result{
-      "eye inside", "the eye in a cell, on cell planes and on vertices; starting inside is no hit", {}};
+      "eye inside",
+      "the eye in a cell, on cell planes and on vertices; starting inside is no hit",
+      {}};
   StabilityScene scene = noise({18, 17, 19}, random, true);
   for (std::uint32_t i = 0; i < rays; ++i) {
     Vec eye = random.in_box({0, 0, 0}, upper_corner(scene));
@@ -342,9 +361,12 @@ StabilityCase eyes_on_surface(std::uint32_t rays, Random &random) {
     double low = 0, high = 8;
     for (int step = 0; step < 60; ++step) {
       const double middle = 0.5 * (low + high);
-      (trilinear(scene, {8 + middle * d[0], 8 + middle * d[1], 8 + middle * d[2]}) < 5 ? low : high) = middle;
+      (trilinear(scene, {8 + middle * d[0], 8 + middle * d[1], 8 + middle * d[2]}) < 5 ? low
+                                                                                       : high) =
+          middle;
     }
-    scene.rays.push_back(make_ray_from({8 + low * d[0], 8 + low * d[1], 8 + low * d[2]}, random.direction()));
+    scene.rays.push_back(
+        make_ray_from({8 + low * d[0], 8 + low * d[1], 8 + low * d[2]}, random.direction()));
   }
   result.scenes.push_back(std::move(scene));
   return result;
@@ -370,8 +392,9 @@ StabilityCase far_eyes(std::uint32_t rays, Random &random, double distance) {
 }
 
 StabilityCase anisotropic(std::uint32_t rays, Random &random) {
-  StabilityCase result{
-      "spacing 1:1:1000", "directions of a world whose voxels are a thousand times deeper than wide", {}};
+  StabilityCase result{"spacing 1:1:1000",
+                       "directions of a world whose voxels are a thousand times deeper than wide",
+                       {}};
   StabilityScene scene = noise({25, 23, 9}, random, false);
   for (std::uint32_t i = 0; i < rays; ++i) {
     Vec direction = random.direction();
@@ -383,7 +406,8 @@ StabilityCase anisotropic(std::uint32_t rays, Random &random) {
 }
 
 StabilityCase borders(std::uint32_t rays, Random &random) {
-  StabilityCase result{"partial blocks", "dims one to three past a multiple of four, two voxels thick", {}};
+  StabilityCase result{
+      "partial blocks", "dims one to three past a multiple of four, two voxels thick", {}};
   const std::array<std::uint32_t, 3> dims[] = {{5, 6, 7}, {2, 9, 13},  {4, 4, 4},
                                                {8, 2, 5}, {17, 21, 3}, {2, 2, 2}};
   for (const auto &d : dims) {
@@ -424,9 +448,10 @@ StabilityCase extreme_values(std::uint32_t rays, Random &random, double scale, c
 }
 
 StabilityCase steps(std::uint32_t rays, Random &random) {
-  StabilityCase result{"steps", "0 and 255 beside each other: the steepest cubics uint8 data makes", {}};
-  StabilityScene scene =
-      sampled({18, 17, 19}, 128, [&](double, double, double) { return random.below(2) ? 255.0 : 0.0; });
+  StabilityCase result{
+      "steps", "0 and 255 beside each other: the steepest cubics uint8 data makes", {}};
+  StabilityScene scene = sampled(
+      {18, 17, 19}, 128, [&](double, double, double) { return random.below(2) ? 255.0 : 0.0; });
   add_random_rays(scene, random, rays / 2);
   result.scenes.push_back(scene);
   scene.rays.clear();
@@ -456,7 +481,8 @@ StabilityCase low_rates(std::uint32_t rays, Random &random) {
 }
 
 StabilityCase mapped_nan(std::uint32_t rays, Random &random) {
-  StabilityCase result{"NaN with mapping", "a fifth of the voxels NaN or infinite, mapped to a number", {}};
+  StabilityCase result{
+      "NaN with mapping", "a fifth of the voxels NaN or infinite, mapped to a number", {}};
   for (const float replacement : {0.0f, 128.0f, -1e6f}) {
     StabilityScene scene = noise({18, 17, 19}, random, false);
     for (float &v : scene.voxels) {
@@ -474,7 +500,8 @@ StabilityCase mapped_nan(std::uint32_t rays, Random &random) {
 
 /// Rays through corners and edges of blocks and macrocells: where walks are broken off and resumed.
 StabilityCase speculation_borders(std::uint32_t rays, Random &random) {
-  StabilityCase result{"speculation borders", "rays through corners and edges of 4^3 and 16^3 blocks", {}};
+  StabilityCase result{
+      "speculation borders", "rays through corners and edges of 4^3 and 16^3 blocks", {}};
   StabilityScene scene = noise({38, 37, 35}, random, false);
   for (std::uint32_t i = 0; i < rays; ++i) {
     const double size = random.below(2) ? 4 : 16;

@@ -1,6 +1,6 @@
 #pragma once
-// The stability suite: small fields and rays at which intersectors fail, each case named and seeded. What
-// must come out is decided by the root oracle, not stored.
+// The stability suite: small fields and rays at which intersectors fail, each case named and
+// seeded. What must come out is decided by the root oracle, not stored.
 
 #include <array>
 #include <cstdint>
@@ -30,7 +30,8 @@ struct StabilityCase {
 
 struct CaseResult {
   Accuracy accuracy;
-  std::uint64_t resumed_differently = 0;  ///< rays whose hit has other bits when walked block by block
+  std::uint64_t resumed_differently =
+      0;  ///< rays whose hit has other bits when walked block by block
 
   /// Rays missed, false, in a wrong cell, in a wrong place or resumed differently.
   std::uint64_t failures() const { return accuracy.failures() + resumed_differently; }
@@ -39,12 +40,12 @@ struct CaseResult {
 /// Every case, with about `rays_per_case` rays each. The same for the same seed on every machine.
 std::vector<StabilityCase> stability_cases(std::uint32_t rays_per_case, std::uint32_t seed);
 
-/// A case's rays through the twin with one solver, judged by the root oracle; each is walked twice, at once and
-/// block by block.
+/// A case's rays through the twin with one solver, judged by the root oracle; each is walked twice,
+/// at once and block by block.
 CaseResult run_case(const StabilityCase &stability_case, Solver solver);
 
-/// What the default solver must deliver: no failures, and the 99th percentile of |f - iso| / |grad f| at most this
-/// [voxels].
+/// What the default solver must deliver: no failures, and the 99th percentile of |f - iso| / |grad
+/// f| at most this [voxels].
 inline constexpr double kResidualLimit = 1e-4;
 bool passes(const CaseResult &result);
 

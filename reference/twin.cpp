@@ -7,7 +7,8 @@ namespace isowave {
 namespace {
 
 /// Adds to the voxels of each block what its values are lowered or raised by.
-void add_offset(const CompressedVolume &level, const ValueOffset &offset, std::vector<float> &voxels) {
+void add_offset(const CompressedVolume &level, const ValueOffset &offset,
+                std::vector<float> &voxels) {
   const glm::uvec3 dims = level.info.dims, blocks = level.num_blocks();
   float *value = voxels.data();
   for (std::uint32_t z = 0; z < dims.z; ++z) {
@@ -22,7 +23,8 @@ void add_offset(const CompressedVolume &level, const ValueOffset &offset, std::v
 
 }  // namespace
 
-Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_error, FieldBound bound)
+Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_error,
+           FieldBound bound)
     : max_pixel_error_(max_pixel_error) {
   check_levels(volume, max_pixel_error);
   for (const CompressedVolume *level : levels_of(volume, max_pixel_error > 0)) {
@@ -30,16 +32,17 @@ Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_
     levels_.push_back(level->info);
     voxels_.push_back(decode_with_libzfp(*level, level_error));
     if (bound == FieldBound::kNone) continue;
-    const ValueOffset offset = value_offset({*level, level == &volume}, bound,
-                                            plane_error(level->error_bound, level_error), volume.value_range);
+    const ValueOffset offset =
+        value_offset({*level, level == &volume}, bound,
+                     plane_error(level->error_bound, level_error), volume.value_range);
     add_offset(*level, offset, voxels_.back());
   }
 }
 
 std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float isovalue,
                                     Solver solver) const {
-  return render_scalar_levels(make_level_frames(levels_, camera, size, isovalue, max_pixel_error_), voxels_,
-                              solver);
+  return render_scalar_levels(make_level_frames(levels_, camera, size, isovalue, max_pixel_error_),
+                              voxels_, solver);
 }
 
 }  // namespace isowave

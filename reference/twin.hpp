@@ -1,5 +1,6 @@
 #pragma once
-// The twin of a renderer: whole frames of a compressed volume, decoded by libzfp and traced by the scalar renderer.
+// The twin of a renderer: whole frames of a compressed volume, decoded by libzfp and traced by the
+// scalar renderer.
 
 #include <vector>
 
@@ -12,8 +13,9 @@ namespace isowave {
 
 class Twin {
  public:
-  /// Decodes the volume, and its coarser levels where max_pixel_error, as RendererOptions', is not 0. value_error: as
-  /// Renderer::set_value_error(). bound: as Renderer::draw_bound(). Throws Error: what check_levels() throws.
+  /// Decodes the volume, and its coarser levels where max_pixel_error, as RendererOptions', is not
+  /// 0. value_error: as Renderer::set_value_error(). bound: as Renderer::draw_bound(). Throws
+  /// Error: what check_levels() throws.
   explicit Twin(const CompressedVolume &volume, double max_pixel_error = 0, double value_error = 0,
                 FieldBound bound = FieldBound::kNone);
 

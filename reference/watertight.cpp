@@ -38,7 +38,8 @@ Shot random_shot(const GridLevels &levels, Random &random) {
     } while (direction == Vec{});
   }
   const double distance = random.below(2) ? 0 : 64;  // from inside, or from outside
-  // The ray that was rounded to float32 passes the inside point within 1e-5 voxels, far less than its depth inside.
+  // The ray that was rounded to float32 passes the inside point within 1e-5 voxels, far less than
+  // its depth inside.
   Shot shot{{}, levels.frames, distance == 0 ? INFINITY : static_cast<float>(distance)};
   float begin = 0;
   for (std::size_t level = 0; level < levels.frames.size(); ++level) {
@@ -56,10 +57,11 @@ Shot random_shot(const GridLevels &levels, Random &random) {
   return shot;
 }
 
-WatertightResult run_surface(const ClosedSurface &surface, std::uint64_t num_rays, std::uint32_t seed,
-                             Solver solver, RayBands bands) {
+WatertightResult run_surface(const ClosedSurface &surface, std::uint64_t num_rays,
+                             std::uint32_t seed, Solver solver, RayBands bands) {
   const GridLevels levels = surface_levels(surface, bands == RayBands::kLevels ? 3 : 1);
-  constexpr std::uint64_t kBatch = 1 << 14;  // one random stream each, so that threads do not change the rays
+  constexpr std::uint64_t kBatch =
+      1 << 14;  // one random stream each, so that threads do not change the rays
   const std::uint64_t num_batches = (num_rays + kBatch - 1) / kBatch;
   std::atomic<std::uint64_t> next_batch{0}, leaks{0};
   const auto work = [&] {
@@ -67,24 +69,27 @@ WatertightResult run_surface(const ClosedSurface &surface, std::uint64_t num_ray
       Random random(seed * 0x9E3779B97F4A7C15u + batch);
       for (std::uint64_t i = batch * kBatch; i < std::min(num_rays, (batch + 1) * kBatch); ++i) {
         const Shot shot = random_shot(levels, random);
-        const HitRecord hit = bands == RayBands::kOne
-                                  ? trace_scalar(levels.frames[0], levels.voxels[0], solver, shot.rays[0])
-                                  : trace_scalar_levels(shot.frames, levels.voxels, solver, shot.rays);
+        const HitRecord hit =
+            bands == RayBands::kOne
+                ? trace_scalar(levels.frames[0], levels.voxels[0], solver, shot.rays[0])
+                : trace_scalar_levels(shot.frames, levels.voxels, solver, shot.rays);
         if (!std::isfinite(hit.t) || hit.t > shot.latest) ++leaks;
       }
     }
   };
   std::vector<std::jthread> pool;
-  for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) pool.emplace_back(work);
+  for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
+    pool.emplace_back(work);
   work();
   pool.clear();
-  return {surface.name + std::string(bands == RayBands::kLevels ? ", levels" : ""), num_rays, leaks};
+  return {surface.name + std::string(bands == RayBands::kLevels ? ", levels" : ""), num_rays,
+          leaks};
 }
 
 }  // namespace
 
-std::vector<WatertightResult> run_watertight(std::uint64_t num_rays, std::uint32_t seed, Solver solver,
-                                             RayBands bands) {
+std::vector<WatertightResult> run_watertight(std::uint64_t num_rays, std::uint32_t seed,
+                                             Solver solver, RayBands bands) {
   std::vector<WatertightResult> results;
   for (const ClosedSurface &surface : closed_surfaces()) {
     results.push_back(run_surface(surface, num_rays, seed, solver, bands));

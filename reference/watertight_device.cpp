@@ -28,7 +28,8 @@ class SurfaceReader : public VolumeReader {
   }
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
     constexpr std::size_t kLayer = std::size_t{kSurfaceEdge} * kSurfaceEdge;
-    std::copy_n(voxels_.begin() + std::ptrdiff_t(z_begin * kLayer), num_layers * kLayer, out.begin());
+    std::copy_n(voxels_.begin() + std::ptrdiff_t(z_begin * kLayer), num_layers * kLayer,
+                out.begin());
   }
 
  private:
@@ -69,23 +70,27 @@ View random_view(const GridLevels &levels, Random &random) {
       for (double &d : direction) d = static_cast<int>(random.below(3)) - 1;
     } while (direction == Vec{});
   }
-  const glm::dvec3 at(target[0], target[1], target[2]), along(direction[0], direction[1], direction[2]);
+  const glm::dvec3 at(target[0], target[1], target[2]),
+      along(direction[0], direction[1], direction[2]);
   view.camera.eye = view.from_inside ? at : at - 64.0 * along;
   view.camera.at = view.camera.eye + along;
   view.camera.up = std::abs(along.y) < 0.9 && along.y * along.y < 0.9 * glm::dot(along, along)
                        ? glm::dvec3(0, 1, 0)
                        : glm::dvec3(1, 0, 0);
   if (lattice) {
-    // u and v are fractions with small divisors, many of them equal; with an odd number of pixels, also 0.
+    // u and v are fractions with small divisors, many of them equal; with an odd number of pixels,
+    // also 0.
     view.camera.fovy_deg = 90;
     view.size.width = view.size.height = kPicture - random.below(2);
   } else {
     view.camera.fovy_deg = view.from_inside ? random.in(20, 150) : random.in(0.5, 30);
   }
   // The first border lies 2 / (error * pixel) voxels from the eye.
-  const double pixel = 2 * std::tan(view.camera.fovy_deg * 3.141592653589793 / 360) / view.size.height;
+  const double pixel =
+      2 * std::tan(view.camera.fovy_deg * 3.141592653589793 / 360) / view.size.height;
   const double eye_distance = glm::length(view.camera.eye - at);
-  view.max_pixel_error = 2 / (pixel * random.in(std::max(1.0, eye_distance - 20), eye_distance + 20));
+  view.max_pixel_error =
+      2 / (pixel * random.in(std::max(1.0, eye_distance - 20), eye_distance + 20));
   return view;
 }
 
@@ -106,7 +111,8 @@ float passes_inside(const GridLevels &levels, const Ray &ray, Random &random) {
   for (int i = 0; i < kPointsPerRay && begin < end; ++i) {
     const double t = begin + (end - begin) * (i + random.unit()) / kPointsPerRay;
     Vec p;
-    for (std::size_t axis = 0; axis < 3; ++axis) p[axis] = double(axes[axis].o) + t * double(axes[axis].d);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      p[axis] = double(axes[axis].o) + t * double(axes[axis].d);
     if (levels.is_inside(p)) return static_cast<float>(t);
   }
   return INFINITY;
@@ -125,7 +131,8 @@ void judge_view(const GridLevels &levels, const View &view, const std::vector<Hi
     for (std::uint32_t column = 0; column < view.size.width; ++column) {
       const auto pixel = static_cast<uint>(row * view.size.width + column);
       float latest = std::numeric_limits<float>::max();
-      if (!view.from_inside) latest = passes_inside(levels, make_ray(&frame, pixel), random) * frame.t_scale;
+      if (!view.from_inside)
+        latest = passes_inside(levels, make_ray(&frame, pixel), random) * frame.t_scale;
       if (!std::isfinite(latest)) continue;
       ++row_rays;
       row_leaks += !(hits[pixel].t <= latest);
@@ -140,8 +147,8 @@ void judge_view(const GridLevels &levels, const View &view, const std::vector<Hi
 }  // namespace
 
 std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKind pipeline,
-                                                std::uint64_t num_rays, std::uint32_t seed, Solver solver,
-                                                RayBands bands) {
+                                                std::uint64_t num_rays, std::uint32_t seed,
+                                                Solver solver, RayBands bands) {
   const bool with_levels = bands == RayBands::kLevels;
   std::vector<WatertightResult> results;
   for (const ClosedSurface &surface : closed_surfaces()) {

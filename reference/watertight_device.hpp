@@ -1,5 +1,6 @@
 #pragma once
-// The watertight test of a device: its pipelines draw small pictures of closed surfaces, from inside and outside.
+// The watertight test of a device: its pipelines draw small pictures of closed surfaces, from
+// inside and outside.
 
 #include <cstdint>
 #include <vector>
@@ -9,12 +10,14 @@
 
 namespace isowave {
 
-/// As run_watertight(), with rays of pictures instead of single ones, since only these go through whole pipelines: traversal by
-/// macrocells, the cache, decoding. Draws views of each surface until at least num_rays rays had to hit: all of a view from an inside
-/// point, and of one from outside those that pass an inside point, before which they must. A third of the views stand at lattice points and look
-/// along lattice directions. kLevels: with borders anywhere in the surface, pipeline `rays` alone.
+/// As run_watertight(), with rays of pictures instead of single ones, since only these go through
+/// whole pipelines: traversal by macrocells, the cache, decoding. Draws views of each surface until
+/// at least num_rays rays had to hit: all of a view from an inside point, and of one from outside
+/// those that pass an inside point, before which they must. A third of the views stand at lattice
+/// points and look along lattice directions. kLevels: with borders anywhere in the surface,
+/// pipeline `rays` alone.
 std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKind pipeline,
-                                                std::uint64_t num_rays, std::uint32_t seed, Solver solver,
-                                                RayBands bands = RayBands::kOne);
+                                                std::uint64_t num_rays, std::uint32_t seed,
+                                                Solver solver, RayBands bands = RayBands::kOne);
 
 }  // namespace isowave

@@ -21,7 +21,8 @@ class ArrayReader : public VolumeReader {
   }
   /// On a unit grid.
   template <class Value>
-  ArrayReader(const glm::uvec3 &dims, const std::vector<Value> &voxels, VoxelType type = VoxelType::kFloat32)
+  ArrayReader(const glm::uvec3 &dims, const std::vector<Value> &voxels,
+              VoxelType type = VoxelType::kFloat32)
       : voxels_(voxels.begin(), voxels.end()) {
     info_.dims = dims;
     info_.type = type;
@@ -34,7 +35,8 @@ class ArrayReader : public VolumeReader {
                            [](double v) { return static_cast<float>(v); });
   }
   /// Whatever the type is said to be.
-  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                         std::span<double> out) override {
     std::ranges::copy(layers(z_begin, num_layers), out.begin());
   }
 

@@ -1,5 +1,6 @@
-// core/block_cache over many passes and frames, against a model that knows when and how each slot was used last. Which block
-// gets which slot is left to chance, so the model follows what the device chose and checks that it may.
+// core/block_cache over many passes and frames, against a model that knows when and how each slot
+// was used last. Which block gets which slot is left to chance, so the model follows what the
+// device chose and checks that it may.
 
 #include "core/stages/block_cache.hpp"
 
@@ -22,8 +23,8 @@ namespace {
 
 constexpr glm::uvec3 kDims(29, 25, 22);  // 8 x 7 x 6 blocks
 
-/// What was cached, where, and when it was used last. Times are counted in halves of passes: 2 p + 1 is when blocks are needed
-/// for what follows pass p, 2 p when they are read in it.
+/// What was cached, where, and when it was used last. Times are counted in halves of passes: 2 p +
+/// 1 is when blocks are needed for what follows pass p, 2 p when they are read in it.
 class CacheModel {
  public:
   CacheModel(const FrameParams &frame, uint num_slots)
@@ -89,13 +90,15 @@ class CacheModel {
     if (!pairs.empty() && pairs[0] != ISO_INVALID_ID) {
       for (const uint block : dual_grid_blocks(frame_, pairs[0])) first_grid.insert(block);
     }
-    const auto first_missing =
-        static_cast<uint>(std::ranges::count_if(first_grid, [&](uint block) { return !cached(block); }));
-    /* Slots of this pass stay with it, but as many as the first pair needs are found in any case. */
+    const auto first_missing = static_cast<uint>(
+        std::ranges::count_if(first_grid, [&](uint block) { return !cached(block); }));
+    /* Slots of this pass stay with it, but as many as the first pair needs are found in any case.
+     */
     const std::size_t listed = std::min<std::size_t>(wanted_.size(), world.cache.capacity);
     ASSERT_EQ(decoded, std::min<std::size_t>(listed, std::max(num_slots - in_use, first_missing)));
 
-    const std::vector<uint> table = world.slots_by_block(), slots = world.cache.slot_block_ids.read(),
+    const std::vector<uint> table = world.slots_by_block(),
+                            slots = world.cache.slot_block_ids.read(),
                             stream = world.cache.request_block_ids.read(),
                             targets = world.cache.decode_slots.read();
     /* The decode list: distinct blocks that were asked for, in distinct slots. */
@@ -120,7 +123,8 @@ class CacheModel {
         slots_[slot] = ISO_INVALID_ID;
         ++spared;
       } else {
-        ASSERT_EQ(slots[slot], slots_[slot]) << "slot " << slot << " changed and is not in the decode list";
+        ASSERT_EQ(slots[slot], slots_[slot])
+            << "slot " << slot << " changed and is not in the decode list";
         if (slots_[slot] != ISO_INVALID_ID && !first_grid.contains(slots_[slot]))
           first_kept = std::min(first_kept, order(slot));
       }
@@ -131,7 +135,8 @@ class CacheModel {
     ASSERT_EQ(world.counts().recycled_count, recycled);
     num_recycled += recycled;
     if (stole) {
-      ASSERT_EQ(decoded, first_missing) << "slots of this pass were taken, and not for the first pair";
+      ASSERT_EQ(decoded, first_missing)
+          << "slots of this pass were taken, and not for the first pair";
     }
     for (uint i = 0; i < decoded; ++i) {
       ASSERT_EQ(slots[targets[i]], stream[i]);
@@ -151,7 +156,8 @@ class CacheModel {
       ASSERT_TRUE(cached(block)) << "block " << block << " of the first pair";
     /* When slots are scarce, what the first pair had already stays for a pass more. */
     for (uint slot = 0;
-         slot < num_slots && wanted_.size() > std::min(num_slots - in_use, world.cache.capacity); ++slot) {
+         slot < num_slots && wanted_.size() > std::min(num_slots - in_use, world.cache.capacity);
+         ++slot) {
       if (first_grid.contains(slots_[slot]) && !into.contains(slot)) used_[slot] = now_ + 2;
     }
     num_granted += decoded;
@@ -159,7 +165,8 @@ class CacheModel {
     num_stolen += stole;
   }
 
-  /// Who reads in a block reads its dual grid. Not of blocks that are of this frame by their own stamp.
+  /// Who reads in a block reads its dual grid. Not of blocks that are of this frame by their own
+  /// stamp.
   void find_last_uses() {
     last_uses_ = used_;
     for (uint slot = 0; slot < slots_.size(); ++slot) {
@@ -175,9 +182,18 @@ class CacheModel {
     }
   }
 
-  /// What is evicted first is less. Greater ages than this count as it; in this frame and the last one, as about a fourth.
+  /// What is evicted first is less. Greater ages than this count as it; in this frame and the last
+  /// one, as about a fourth.
   static constexpr uint kOldest = 127;
-  enum Class { kEarlier, kUnreadInLast, kReadInLast, kUnreadInFrame, kReadInFrame, kNeeded, kNever };
+  enum Class {
+    kEarlier,
+    kUnreadInLast,
+    kReadInLast,
+    kUnreadInFrame,
+    kReadInFrame,
+    kNeeded,
+    kNever
+  };
   using Order = std::pair<Class, int>;
   Order order(uint slot) const {
     const uint used = last_uses_[slot];
@@ -187,7 +203,8 @@ class CacheModel {
       return static_cast<int>(std::min((time - used) / 2, oldest));
     };
     if (used < last_begin_) return {kEarlier, -age_at(last_begin_, kOldest)};
-    if (used < frame_begin_) return {is_unread ? kUnreadInLast : kReadInLast, -age_at(frame_begin_, 31)};
+    if (used < frame_begin_)
+      return {is_unread ? kUnreadInLast : kReadInLast, -age_at(frame_begin_, 31)};
     const int age = age_at(now_, 30);
     return is_unread ? Order{kUnreadInFrame, -age} : Order{kReadInFrame, age};
   }
@@ -200,10 +217,12 @@ class CacheModel {
 
 class BlockCacheOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  /// Random passes: each active ray asks for a row of neighbouring blocks that drifts from pass to pass.
-  CacheModel run_passes(uint num_slots, uint num_pixels, uint num_passes, uint group_size, uint seed) {
-    SCOPED_TRACE(
-        fmt::format("{} slots, {} pixels, group size {}, seed {}", num_slots, num_pixels, group_size, seed));
+  /// Random passes: each active ray asks for a row of neighbouring blocks that drifts from pass to
+  /// pass.
+  CacheModel run_passes(uint num_slots, uint num_pixels, uint num_passes, uint group_size,
+                        uint seed) {
+    SCOPED_TRACE(fmt::format("{} slots, {} pixels, group size {}, seed {}", num_slots, num_pixels,
+                             group_size, seed));
     Random random(seed);
     const FrameParams frame = plain_frame(kDims, num_pixels);
     const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
@@ -244,7 +263,8 @@ TEST_P(BlockCacheOnDevice, ScarceSlots) {
     for (const uint num_slots : {8u, 9u, 17u}) {
       const CacheModel model = run_passes(num_slots, 24, 60, group_size, 10 + num_slots);
       EXPECT_GT(model.num_refused, 0u);
-      EXPECT_GT(model.num_stolen, 0u) << "the first pair was never in need: the test tests too little";
+      EXPECT_GT(model.num_stolen, 0u)
+          << "the first pair was never in need: the test tests too little";
     }
   }
 }
@@ -263,7 +283,8 @@ TEST_P(BlockCacheOnDevice, AmpleSlots) {
   EXPECT_LE(model.num_granted, 8u * 7 * 6) << "a block was decoded twice";
 }
 
-/// One ray after the other over all blocks, in a cache of one dual grid: each is served in its pass.
+/// One ray after the other over all blocks, in a cache of one dual grid: each is served in its
+/// pass.
 TEST_P(BlockCacheOnDevice, OneDualGridOfSlotsServesEveryBlock) {
   const FrameParams frame = plain_frame(kDims, 3);
   StageWorld world(device_, frame, kMinCacheSlots, 64);
@@ -271,7 +292,8 @@ TEST_P(BlockCacheOnDevice, OneDualGridOfSlotsServesEveryBlock) {
   const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
   for (uint block = 0; block < num_blocks; ++block) {
     SCOPED_TRACE(fmt::format("block {}", block));
-    model.pass(world, {block * 37 % num_blocks, block * 11 % num_blocks, block * 5 % num_blocks}, 1);
+    model.pass(world, {block * 37 % num_blocks, block * 11 % num_blocks, block * 5 % num_blocks},
+               1);
     if (HasFatalFailure()) return;
   }
 }

@@ -42,8 +42,8 @@ class CameraFileTest : public testing::Test {
 };
 
 TEST_F(CameraFileTest, ReadsEveryField) {
-  const CameraFile file = read_camera_file(
-      write(R"({"dims":[4,5,6],"spacing":[1,0.5,2],"width":640,"height":360,"fovy_deg":45.5,"cameras":[
+  const CameraFile file = read_camera_file(write(
+      R"({"dims":[4,5,6],"spacing":[1,0.5,2],"width":640,"height":360,"fovy_deg":45.5,"cameras":[
                {"eye":[1,2,3],"at":[4,5,7],"up":[0,1,0]},{"eye":[-1e3,0,0],"at":[0,0,0],"up":[0,0,1]}]})"));
   EXPECT_EQ(file.dims, glm::uvec3(4, 5, 6));
   EXPECT_EQ(file.spacing, glm::dvec3(1, 0.5, 2));
@@ -59,8 +59,8 @@ TEST_F(CameraFileTest, ReadsEveryField) {
 }
 
 TEST_F(CameraFileTest, GridAndImageSizeAreOptional) {
-  const CameraFile file =
-      read_camera_file(write(R"({"fovy_deg":60,"cameras":[{"eye":[0,0,9],"at":[0,0,0],"up":[0,1,0]}]})"));
+  const CameraFile file = read_camera_file(
+      write(R"({"fovy_deg":60,"cameras":[{"eye":[0,0,9],"at":[0,0,0],"up":[0,1,0]}]})"));
   EXPECT_FALSE(file.dims || file.spacing || file.width || file.height);
   EXPECT_EQ(file.cameras.size(), 1u);
 }
@@ -82,8 +82,9 @@ TEST_F(CameraFileTest, RefusesWhatIsGivenTwice) {
               HasSubstr("\"width\" is given twice"));
   EXPECT_THAT(refusal(R"({"fovy_deg":50,"cameras":[{"eye":[0,0,0],)" + camera.substr(1) + "]}"),
               HasSubstr("\"eye\" is given twice"));
-  EXPECT_THAT(refusal(R"({"fovy_deg":50,"cameras":[)" + camera + "]}" + std::string(1, '\0') + "[]"),
-              HasSubstr("no JSON from byte"));
+  EXPECT_THAT(
+      refusal(R"({"fovy_deg":50,"cameras":[)" + camera + "]}" + std::string(1, '\0') + "[]"),
+      HasSubstr("no JSON from byte"));
 }
 
 TEST_F(CameraFileTest, NamesTheFieldThatIsMissingOrWrong) {
@@ -98,13 +99,15 @@ TEST_F(CameraFileTest, NamesTheFieldThatIsMissingOrWrong) {
               HasSubstr("camera 0: \"up\" is missing"));
   EXPECT_THAT(refusal(R"({"fovy_deg":60,"cameras":[{"eye":[0,9],"at":[0,0,0],"up":[0,1,0]}]})"),
               HasSubstr("\"eye\" must be [x, y, z]"));
-  EXPECT_THAT(refusal(R"({"fovy_deg":60,"cameras":[{"eye":[0,0,null],"at":[0,0,0],"up":[0,1,0]}]})"),
-              HasSubstr("\"eye\" must be a number"));
+  EXPECT_THAT(
+      refusal(R"({"fovy_deg":60,"cameras":[{"eye":[0,0,null],"at":[0,0,0],"up":[0,1,0]}]})"),
+      HasSubstr("\"eye\" must be a number"));
   for (const char *width : {"0", "-4", "1.5", "4294967296", "\"640\""}) {
     EXPECT_THAT(refusal(fmt::format(R"({{"fovy_deg":60,"width":{},"cameras":{}}})", width, one)),
                 HasSubstr("\"width\""));
   }
-  EXPECT_THAT(refusal(R"({"fovy_deg":60,"dims":[4,0,4],"cameras":)" + one + "}"), HasSubstr("\"dims\""));
+  EXPECT_THAT(refusal(R"({"fovy_deg":60,"dims":[4,0,4],"cameras":)" + one + "}"),
+              HasSubstr("\"dims\""));
   EXPECT_THAT(refusal(R"({"fovy_deg":60,"spacing":[1,-1,1],"cameras":)" + one + "}"),
               HasSubstr("\"spacing\""));
 }
@@ -116,7 +119,9 @@ TEST_F(CameraFileTest, RefusesDegenerateCameras) {
 }
 
 TEST(Camera, DegenerateOnesAreRefused) {
-  const auto refused = [](const Camera &camera) { EXPECT_THROW(check_camera(camera, "view"), Error); };
+  const auto refused = [](const Camera &camera) {
+    EXPECT_THROW(check_camera(camera, "view"), Error);
+  };
   constexpr double kInf = std::numeric_limits<double>::infinity();
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NO_THROW(check_camera({{0, 0, 9}, {0, 0, 0}, {0, 1, 0}, 60}, "view"));

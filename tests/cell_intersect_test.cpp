@@ -1,4 +1,5 @@
-// kernels_cl/portable/cell_intersect.h on the host against long double: signs, faces, first changes, whole cells.
+// kernels_cl/portable/cell_intersect.h on the host against long double: signs, faces, first
+// changes, whole cells.
 
 #include "kernels_cl/portable/cell_intersect.h"
 
@@ -27,21 +28,24 @@ TEST(CellIntersect, LerpEndsAreExact) {
   Random random(1);
   std::uniform_real_distribution<float> value(-1e6f, 1e6f);
   for (int i = 0; i < 100000; ++i) {
-    const float a = value(random), b = std::ldexp(value(random), static_cast<int>(random() % 60) - 30);
+    const float a = value(random),
+                b = std::ldexp(value(random), static_cast<int>(random() % 60) - 30);
     ASSERT_EQ(lerp(0.0f, a, b), a);
     ASSERT_EQ(lerp(1.0f, a, b), b);
     ASSERT_EQ(lerp(static_cast<float>(random()) * 0x1p-32f, a, a), a);
   }
 }
 
-/// Both ends below 0 give below 0, both at or above give at or above: 0 itself, and the smallest differences
-/// of values that a volume can hold (2^-97 * 2^-23), included. The error is 2 u max(|a|, |b|).
+/// Both ends below 0 give below 0, both at or above give at or above: 0 itself, and the smallest
+/// differences of values that a volume can hold (2^-97 * 2^-23), included. The error is 2 u
+/// max(|a|, |b|).
 TEST(CellIntersect, LerpKeepsSigns) {
   Random random(2);
   for (int i = 0; i < 2000000; ++i) {
     const auto magnitude = [&] {
       if (random() % 16 == 0) return 0.0f;
-      return std::ldexp(1.0f + static_cast<float>(random()) * 0x1p-32f, -static_cast<int>(random() % 121));
+      return std::ldexp(1.0f + static_cast<float>(random()) * 0x1p-32f,
+                        -static_cast<int>(random() % 121));
     };
     const float u = random() % 4 == 0 ? std::ldexp(1.0f, -static_cast<int>(random() % 30))
                                       : static_cast<float>(random() >> 8) * 0x1p-24f;
@@ -57,8 +61,8 @@ TEST(CellIntersect, LerpKeepsSigns) {
   }
 }
 
-/// A ray that goes from one cell to the next: the cubic of the first ends in the bits that that of the second
-/// begins with, whatever the other corners and events are.
+/// A ray that goes from one cell to the next: the cubic of the first ends in the bits that that of
+/// the second begins with, whatever the other corners and events are.
 TEST(CellIntersect, SharedFacesHaveEqualBits) {
   Random random(3);
   std::uniform_real_distribution<float> unit(-1, 1);
@@ -77,7 +81,8 @@ TEST(CellIntersect, SharedFacesHaveEqualBits) {
     std::array<float, 3> o;
     for (int k = 0; k < 3; ++k)
       o[k] = static_cast<float>(from[k]) + 0.5f + unit(random) * 0.7f - distance * d[k];
-    const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]), make_ray_axis(o[2], d[2])};
+    const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]),
+                     make_ray_axis(o[2], d[2])};
     const RayAxis axes[3] = {ray.x, ray.y, ray.z};
     const int plane = step > 0 ? to[axis] : from[axis];
     const RayEvent face = make_event(plane_t(axes[axis], static_cast<float>(plane)), axis);
@@ -89,16 +94,19 @@ TEST(CellIntersect, SharedFacesHaveEqualBits) {
       const bool on_face = ((corner & bit) != 0) == (step < 0);
       far[corner] = on_face ? near[corner ^ bit] : unit(random);
     }
-    const CellPoint other = {std::abs(unit(random)), std::abs(unit(random)), std::abs(unit(random))};
-    const Cubic before = segment_cubic(near, other, event_position(&ray, face, from[0], from[1], from[2], 1));
-    const Cubic after = segment_cubic(far, event_position(&ray, face, to[0], to[1], to[2], 0), other);
+    const CellPoint other = {std::abs(unit(random)), std::abs(unit(random)),
+                             std::abs(unit(random))};
+    const Cubic before =
+        segment_cubic(near, other, event_position(&ray, face, from[0], from[1], from[2], 1));
+    const Cubic after =
+        segment_cubic(far, event_position(&ray, face, to[0], to[1], to[2], 0), other);
     ASSERT_EQ(std::bit_cast<std::uint32_t>(before.b3), std::bit_cast<std::uint32_t>(after.b0))
         << "face " << i << ", seed 3";
   }
 }
 
-/// The four coefficients are the cubic along the segment. Each is three levels of lerp, 2 u M each; b1 and b2
-/// add the rounding of two sums, of 1/3 and of the product with it: 4 u M.
+/// The four coefficients are the cubic along the segment. Each is three levels of lerp, 2 u M each;
+/// b1 and b2 add the rounding of two sums, of 1/3 and of the product with it: 4 u M.
 TEST(CellIntersect, SegmentCubicIsTheFieldAlongTheSegment) {
   Random random(4);
   std::uniform_real_distribution<float> unit(-1, 1);
@@ -109,20 +117,24 @@ TEST(CellIntersect, SegmentCubicIsTheFieldAlongTheSegment) {
                     b = {std::abs(unit(random)), std::abs(unit(random)), std::abs(unit(random))};
     const Polynomial f = power_basis(segment_cubic(w, a, b));
     for (const Real s : {0.0L, 0.3L, 0.5L, 0.9L, 1.0L}) {
-      const Real x = a.x + s * (static_cast<Real>(b.x) - a.x), y = a.y + s * (static_cast<Real>(b.y) - a.y),
+      const Real x = a.x + s * (static_cast<Real>(b.x) - a.x),
+                 y = a.y + s * (static_cast<Real>(b.y) - a.y),
                  z = a.z + s * (static_cast<Real>(b.z) - a.z);
       Real exact = 0;
       for (int corner = 0; corner < 8; ++corner) {
-        exact += w[corner] * (corner & 1 ? x : 1 - x) * (corner & 2 ? y : 1 - y) * (corner & 4 ? z : 1 - z);
+        exact += w[corner] * (corner & 1 ? x : 1 - x) * (corner & 2 ? y : 1 - y) *
+                 (corner & 4 ? z : 1 - z);
       }
-      ASSERT_LE(std::abs(f.value(s) - exact), 10 * kUnit) << "segment " << i << ", s " << s << ", seed 4";
+      ASSERT_LE(std::abs(f.value(s) - exact), 10 * kUnit)
+          << "segment " << i << ", s " << s << ", seed 4";
     }
   }
 }
 
-/// Tests first_change on one cubic. Bounds, u = 2^-24, M = largest coefficient: de Casteljau has three levels
-/// of 2 u M, so values are right to 6 u M; the last step moves s by less than 2^-23 = 2 u, and the extremum
-/// where [0,1] is split is off by so little that the value there is right to about 10 u M.
+/// Tests first_change on one cubic. Bounds, u = 2^-24, M = largest coefficient: de Casteljau has
+/// three levels of 2 u M, so values are right to 6 u M; the last step moves s by less than 2^-23 =
+/// 2 u, and the extremum where [0,1] is split is off by so little that the value there is right to
+/// about 10 u M.
 class FirstChangeChecker {
  public:
   void check(const Cubic &c) {
@@ -134,7 +146,8 @@ class FirstChangeChecker {
     ++num_cubics;
     if (found) {
       ASSERT_TRUE(s >= 0.0f && s <= 1.0f) << s;
-      /* Backward: the field is 0 there, but for values' rounding and two last steps along the steepest slope.
+      /* Backward: the field is 0 there, but for values' rounding and two last steps along the
+       * steepest slope.
        */
       ASSERT_LE(std::abs(f.value(s)), 6 * noise + 4 * kUnit * slope_near(f, s)) << "s " << s;
     }
@@ -145,12 +158,13 @@ class FirstChangeChecker {
     ASSERT_EQ(found, expected.found) << "the change is at " << static_cast<double>(expected.s);
     if (!found) return;
     ++num_hits;
-    /* Forward: where the slope changes little between both answers, error = residual / slope: at most
-       6 u M / |f'| + 4 u, and 4 u |f'| <= 4 u 6 M. */
+    /* Forward: where the slope changes little between both answers, error = residual / slope: at
+       most 6 u M / |f'| + 4 u, and 4 u |f'| <= 4 u 6 M. */
     const Real slope = std::abs(f.slope(expected.s));
     if (slope < 0.05L * largest) return;
     const Real error = std::abs(s - expected.s) * slope / noise;
-    ASSERT_LE(error, 6 + 4 * slope / largest + 1) << "s " << s << ", not " << static_cast<double>(expected.s);
+    ASSERT_LE(error, 6 + 4 * slope / largest + 1)
+        << "s " << s << ", not " << static_cast<double>(expected.s);
     worst = std::max(worst, error);
     ++num_measured;
   }
@@ -161,7 +175,8 @@ class FirstChangeChecker {
  private:
   static Real slope_near(const Polynomial &f, Real s) {
     const Real step = 0x1p-22L;
-    return std::max({std::abs(f.slope(s)), std::abs(f.slope(s - step)), std::abs(f.slope(s + step))});
+    return std::max(
+        {std::abs(f.slope(s)), std::abs(f.slope(s - step)), std::abs(f.slope(s + step))});
   }
 };
 
@@ -199,7 +214,8 @@ TEST(CellIntersect, FirstChangeNearDoubleRoots) {
     const Real r = inner(random), q = random() % 2 ? outer(random) : -outer(random) + 1;
     const Real sign = random() % 2 ? 1 : -1;
     Polynomial f{{-r * r * q, r * r + 2 * r * q, -2 * r - q, 1}};
-    const Real offset = std::ldexp(1.0L, -static_cast<int>(random() % 21)) * (random() % 2 ? 1 : -1);
+    const Real offset =
+        std::ldexp(1.0L, -static_cast<int>(random() % 21)) * (random() % 2 ? 1 : -1);
     f.c[0] += offset;
     const auto &p = f.c;
     const Cubic c = {static_cast<float>(sign * p[0]), static_cast<float>(sign * (p[0] + p[1] / 3)),
@@ -254,11 +270,12 @@ TEST(CellIntersect, FirstChangeIsHalfOpen) {
   }
 }
 
-/// Coefficients of small whole numbers: zeros at ends and tangents in every combination. inside must change
-/// between the ends if it differs there.
+/// Coefficients of small whole numbers: zeros at ends and tangents in every combination. inside
+/// must change between the ends if it differs there.
 TEST(CellIntersect, FirstChangeNeverMissesEndsThatDiffer) {
   for (int n = 0; n < 5 * 5 * 5 * 5; ++n) {
-    const Cubic c = {float(n % 5 - 2), float(n / 5 % 5 - 2), float(n / 25 % 5 - 2), float(n / 125 - 2)};
+    const Cubic c = {float(n % 5 - 2), float(n / 5 % 5 - 2), float(n / 25 % 5 - 2),
+                     float(n / 125 - 2)};
     SCOPED_TRACE(text_of(c));
     float s = -1;
     const bool found = first_change(kDefaultSolver, c, &s) != 0;
@@ -288,9 +305,11 @@ Polynomial exact_cubic(const Ray &ray, const float *w, const std::array<int, 3> 
     Polynomial product{{w[corner], 0, 0, 0}};
     for (int axis = 0; axis < 3; ++axis) {
       const bool upper = corner >> axis & 1;
-      const Real constant = upper ? at[axis] : 1 - at[axis], linear = upper ? along[axis] : -along[axis];
+      const Real constant = upper ? at[axis] : 1 - at[axis],
+                 linear = upper ? along[axis] : -along[axis];
       for (int degree = 3; degree >= 0; --degree) {
-        product.c[degree] = product.c[degree] * constant + (degree > 0 ? product.c[degree - 1] * linear : 0);
+        product.c[degree] =
+            product.c[degree] * constant + (degree > 0 ? product.c[degree - 1] * linear : 0);
       }
     }
     for (int degree = 0; degree < 4; ++degree) f.c[degree] += product.c[degree];
@@ -298,9 +317,10 @@ Polynomial exact_cubic(const Ray &ray, const float *w, const std::array<int, 3> 
   return f;
 }
 
-/// Whole cells, up to 3000 voxels from the eye: the hit's residual in the exact field on the exact ray.
-/// In u M: positions of both ends 6 (u each on three axes, slope 2 M), coefficients 10, values 6, last steps
-/// 4 |df/ds| / M <= 24: together 46; and 64 leaves the oracle's margin for hit or miss.
+/// Whole cells, up to 3000 voxels from the eye: the hit's residual in the exact field on the exact
+/// ray. In u M: positions of both ends 6 (u each on three axes, slope 2 M), coefficients 10, values
+/// 6, last steps 4 |df/ds| / M <= 24: together 46; and 64 leaves the oracle's margin for hit or
+/// miss.
 TEST(CellIntersect, CellsFarFromTheEye) {
   Random random(7);
   std::uniform_real_distribution<float> unit(-1, 1);
@@ -318,7 +338,8 @@ TEST(CellIntersect, CellsFarFromTheEye) {
       cell[axis] = static_cast<int>(random() % 2000);
       o[axis] = static_cast<float>(cell[axis]) + 0.5f + 0.5f * unit(random) - distance * d[axis];
     }
-    const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]), make_ray_axis(o[2], d[2])};
+    const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]),
+                     make_ray_axis(o[2], d[2])};
     const LastPlanes last = {4000, 4000, 4000};
     const GridWalk region = walk_from(&ray, cell[0], cell[1], cell[2], 1, last);
     const RayEvent enter = region_entry(&ray, cell[0], cell[1], cell[2], 1, last),
@@ -336,8 +357,8 @@ TEST(CellIntersect, CellsFarFromTheEye) {
     const Polynomial f = exact_cubic(ray, w, cell, t_enter, t_exit);
     const FirstChange expected = first_change_of(f);
     CellChange change;
-    const bool found =
-        change_in_cell(kDefaultSolver, &ray, w, cell[0], cell[1], cell[2], enter, exit, &change) != 0;
+    const bool found = change_in_cell(kDefaultSolver, &ray, w, cell[0], cell[1], cell[2], enter,
+                                      exit, &change) != 0;
     const float s = found ? refine(kDefaultSolver, change.cubic, change.bracket) : -1;
     SCOPED_TRACE(fmt::format("ray {}, {} voxels away, seed 7", i, distance));
     if (found) {
@@ -347,16 +368,20 @@ TEST(CellIntersect, CellsFarFromTheEye) {
       const HitRecord hit = make_hit(&frame, &ray, w, cell[0], cell[1], cell[2], enter, exit, s);
       const Real t = t_enter + s * (t_exit - t_enter);
       ASSERT_LE(std::abs(hit.t / 2 - t), 2 * kUnit * t);  // t itself is a float32
-      ASSERT_EQ(hit.block_id, uint(cell[0] / 4) + 1001 * (uint(cell[1] / 4) + 1001 * uint(cell[2] / 4)));
+      ASSERT_EQ(hit.block_id,
+                uint(cell[0] / 4) + 1001 * (uint(cell[1] / 4) + 1001 * uint(cell[2] / 4)));
       ASSERT_EQ(hit.cell, uint(cell[0] % 4 + 4 * (cell[1] % 4) + 16 * (cell[2] % 4)));
-      const float local[3] = {hit.x, hit.y, hit.z}, gradient[3] = {hit.grad_x, hit.grad_y, hit.grad_z};
+      const float local[3] = {hit.x, hit.y, hit.z},
+                  gradient[3] = {hit.grad_x, hit.grad_y, hit.grad_z};
       for (int axis = 0; axis < 3; ++axis) {
-        ASSERT_LE(std::abs(local[axis] - (axes[axis].o + t * axes[axis].d - cell[axis])), 4 * kUnit) << axis;
+        ASSERT_LE(std::abs(local[axis] - (axes[axis].o + t * axes[axis].d - cell[axis])), 4 * kUnit)
+            << axis;
         Real slope = 0;
         for (int corner = 0; corner < 8; ++corner) {
           Real weight = corner >> axis & 1 ? 1 : -1;
           for (int other = 0; other < 3; ++other) {
-            if (other != axis) weight *= corner >> other & 1 ? local[other] : 1 - Real(local[other]);
+            if (other != axis)
+              weight *= corner >> other & 1 ? local[other] : 1 - Real(local[other]);
           }
           slope += weight * w[corner];
         }

@@ -32,7 +32,8 @@ glm::dvec3 random_direction(std::mt19937 &random) {
 
 glm::dvec3 random_point(std::mt19937 &random, const Dims &dims) {
   std::uniform_real_distribution<double> uniform;
-  return {uniform(random) * (dims[0] - 1), uniform(random) * (dims[1] - 1), uniform(random) * (dims[2] - 1)};
+  return {uniform(random) * (dims[0] - 1), uniform(random) * (dims[1] - 1),
+          uniform(random) * (dims[2] - 1)};
 }
 
 TEST(CellOracle, FindsAPlaneExactly) {
@@ -59,11 +60,12 @@ TEST(CellOracle, FindsBothSheetsOfASaddle) {
 }
 
 TEST(CellOracle, FindsASphere) {
-  // Trilinear interpolation of |p - c|^2 is too large by the variance of the corners' weights, at most 3/4.
+  // Trilinear interpolation of |p - c|^2 is too large by the variance of the corners' weights, at
+  // most 3/4.
   const glm::dvec3 centre(24);
   const double radius = 20;
-  const auto voxels =
-      sample(glm::uvec3(49), [&](const glm::dvec3 &p) { return -glm::dot(p - centre, p - centre); });
+  const auto voxels = sample(
+      glm::uvec3(49), [&](const glm::dvec3 &p) { return -glm::dot(p - centre, p - centre); });
   const CellOracle oracle(voxels, {49, 49, 49}, static_cast<float>(-radius * radius));
   std::mt19937 random(5);
   for (int i = 0; i < 500; ++i) {
@@ -81,25 +83,29 @@ TEST(CellOracle, FindsASphere) {
 }
 
 TEST(CellOracle, StartingInsideIsAState) {
-  const auto voxels = sample(glm::uvec3(17), [](const glm::dvec3 &p) { return 5 - glm::length(p - 8.0); });
+  const auto voxels =
+      sample(glm::uvec3(17), [](const glm::dvec3 &p) { return 5 - glm::length(p - 8.0); });
   const CellOracle oracle(voxels, {17, 17, 17}, 0);
   const OracleHit leaves = oracle.first_hit({{8, 8, 8}, {1, 0, 0}});
   ASSERT_TRUE(leaves.hit);
   EXPECT_NEAR(leaves.t, 5, 1e-14);  // on the lattice line the field is linear between voxels
   const CellOracle all_inside(voxels, {17, 17, 17}, -100);
-  EXPECT_FALSE(all_inside.first_hit({{-8, 8, 8}, {1, 0, 0}}).hit) << "the domain's border is no surface";
+  EXPECT_FALSE(all_inside.first_hit({{-8, 8, 8}, {1, 0, 0}}).hit)
+      << "the domain's border is no surface";
   EXPECT_EQ(all_inside.num_cells(), 0u);
 }
 
 TEST(CellOracle, CountsTheIsovalueAsInside) {
-  // A plateau at the isovalue behind cells with corners below it: the change is at its first voxels.
+  // A plateau at the isovalue behind cells with corners below it: the change is at its first
+  // voxels.
   const auto voxels = sample({9, 5, 5}, [](const glm::dvec3 &p) { return p.x < 3.5 ? 0 : 0.1f; });
   const CellOracle oracle(voxels, {9, 5, 5}, 0.1f);
   const OracleHit hit = oracle.first_hit({{-1, 1.7, 2.3}, {1, 0, 0}});
   ASSERT_TRUE(hit.hit);
   EXPECT_NEAR(hit.t, 5, 1e-14);
-  EXPECT_FALSE(
-      CellOracle(voxels, {9, 5, 5}, std::nextafter(0.1f, 1.0f)).first_hit({{-1, 1.7, 2.3}, {1, 0, 0}}).hit);
+  EXPECT_FALSE(CellOracle(voxels, {9, 5, 5}, std::nextafter(0.1f, 1.0f))
+                   .first_hit({{-1, 1.7, 2.3}, {1, 0, 0}})
+                   .hit);
 }
 
 TEST(CellOracle, AgreesWithTheRootOracleInAllSignCases) {
@@ -108,12 +114,14 @@ TEST(CellOracle, AgreesWithTheRootOracleInAllSignCases) {
   int num_hits = 0;
   for (unsigned pattern = 0; pattern < 256; ++pattern) {
     std::vector<float> corners(8);
-    for (unsigned i = 0; i < 8; ++i) corners[i] = (pattern >> i & 1u ? 1.0f : -1.0f) * uniform(random);
+    for (unsigned i = 0; i < 8; ++i)
+      corners[i] = (pattern >> i & 1u ? 1.0f : -1.0f) * uniform(random);
     const RootOracle roots(corners, {2, 2, 2}, 0);
     const CellOracle cells(corners, {2, 2, 2}, 0);
     for (int i = 0; i < 40; ++i) {
       const glm::dvec3 direction = random_direction(random);
-      const OracleRay ray = float_ray(random_point(random, {2, 2, 2}) - 10.0 * direction, direction);
+      const OracleRay ray =
+          float_ray(random_point(random, {2, 2, 2}) - 10.0 * direction, direction);
       const OracleHit expected = roots.first_hit(ray), got = cells.first_hit(ray);
       ASSERT_EQ(got.hit, expected.hit) << "pattern " << pattern << ", ray " << i;
       num_hits += expected.hit;
@@ -160,15 +168,16 @@ TEST(CellOracle, AgreesWithTheRootOracleOnTheStabilitySuite) {
                           (!got.hit || std::abs(got.t - expected.t) * speed_of(exact) <= kSameHit);
         if (same) continue;
         ++different;
-        // Only where the field touches the isovalue to within rounding: a little beside, both answers occur.
+        // Only where the field touches the isovalue to within rounding: a little beside, both
+        // answers occur.
         bool unstable = false;
         for (int i = 0; i < 8 && !unstable; ++i) {
           const OracleHit moved = roots.first_hit(moved_sideways(exact, 1e-5, i));
           unstable = moved.hit != expected.hit ||
                      (moved.hit && std::abs(moved.t - expected.t) * speed_of(exact) > kSameHit);
         }
-        EXPECT_TRUE(unstable) << "root oracle " << expected.hit << " " << expected.t << ", cell oracle "
-                              << got.hit << " " << got.t;
+        EXPECT_TRUE(unstable) << "root oracle " << expected.hit << " " << expected.t
+                              << ", cell oracle " << got.hit << " " << got.t;
       }
     }
   }
@@ -199,15 +208,16 @@ TEST(CellOracle, RefusesVoxelsThatDoNotFit) {
 class CellOracleFrame : public testing::Test {
  protected:
   const test::TestVolume volume{{23, 19, 13}, test::noise_field(11)};
-  const FrameParams frame =
-      make_frame_params(volume.info(), test::camera_along({-10, 25, 30}, {21.5, -15.5, -24}), {64, 48}, 0.4f);
+  const FrameParams frame = make_frame_params(
+      volume.info(), test::camera_along({-10, 25, 30}, {21.5, -15.5, -24}), {64, 48}, 0.4f);
   const CellOracle oracle{volume.voxels, {23, 19, 13}, 0.4f};
   std::vector<HitRecord> hits = render_scalar(frame, volume.voxels);
 
   /// A hit well inside its cell, not at its block's lower border along x, and the nth of those.
   HitRecord &hit_in_cell(int n) {
     for (HitRecord &hit : hits) {
-      const bool central = std::min({hit.x, hit.y, hit.z}) > 0.1f && std::max({hit.x, hit.y, hit.z}) < 0.9f;
+      const bool central =
+          std::min({hit.x, hit.y, hit.z}) > 0.1f && std::max({hit.x, hit.y, hit.z}) < 0.9f;
       if (std::isfinite(hit.t) && central && (hit.cell & 3u) != 0 && n-- == 0) return hit;
     }
     throw std::logic_error("no such hit");

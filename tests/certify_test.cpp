@@ -1,4 +1,5 @@
-// Bounds of a frame's error: never exceeded against the volume before compression, in double precision; and what is chosen by them.
+// Bounds of a frame's error: never exceeded against the volume before compression, in double
+// precision; and what is chosen by them.
 
 #include "core/accuracy/certify.hpp"
 #include "core/io/open_volume.hpp"
@@ -99,8 +100,8 @@ TEST(BlockBound, SharesGrowTowardsOneVoxel) {
   EXPECT_EQ(bound_share(2), 1.0f);
 }
 
-/// However the volume was compressed: no voxel is off by more than its share of its block's bound, and some voxel of most blocks by
-/// nearly as much.
+/// However the volume was compressed: no voxel is off by more than its share of its block's bound,
+/// and some voxel of most blocks by nearly as much.
 TEST(BlockBound, NoVoxelExceedsItsShare) {
   const glm::uvec3 dims(37, 40, 42);
   for (const auto &field : {test::gyroid_field(15), test::noise_field(5)}) {
@@ -118,8 +119,10 @@ TEST(BlockBound, NoVoxelExceedsItsShare) {
       std::vector<double> closest(bounds.codes.size(), 0.0);
       for (std::size_t i = 0; i < decoded.size(); ++i) {
         const glm::uvec3 at(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y), in = at % 4u;
-        const std::size_t block = at.x / 4 + blocks.x * (at.y / 4 + std::size_t{blocks.y} * (at.z / 4));
-        const double most = double{offset_of_voxel(offset, bounds, block, in.x + 4 * in.y + 16 * in.z)};
+        const std::size_t block =
+            at.x / 4 + blocks.x * (at.y / 4 + std::size_t{blocks.y} * (at.z / 4));
+        const double most =
+            double{offset_of_voxel(offset, bounds, block, in.x + 4 * in.y + 16 * in.z)};
         const double off = std::abs(double{decoded[i]} - double{scene.source[i]});
         ASSERT_LE(off, most) << "voxel " << i;
         if (most > 0) closest[block] = std::max(closest[block], off / most);
@@ -130,8 +133,8 @@ TEST(BlockBound, NoVoxelExceedsItsShare) {
   }
 }
 
-/// The field that bounds span, trilinear like the volume's own, over the difference of a level from the volume: the least of many places
-/// at random. Below 1, a bound is exceeded.
+/// The field that bounds span, trilinear like the volume's own, over the difference of a level from
+/// the volume: the least of many places at random. Below 1, a bound is exceeded.
 double least_slack(const Scene &scene, std::size_t level, int num_places) {
   const glm::uvec3 dims = scene.volume.info.dims;
   const CompressedVolume &coarse = scene.volume.coarser[level];
@@ -148,7 +151,8 @@ double least_slack(const Scene &scene, std::size_t level, int num_places) {
     }
   }
   const CellOracle truth(scene.source, {dims.x, dims.y, dims.z}, 0.5f);
-  const CellOracle coarse_field(voxels, {n.x, n.y, n.z}, 0.5f), bound(bounds, {n.x, n.y, n.z}, 0.5f);
+  const CellOracle coarse_field(voxels, {n.x, n.y, n.z}, 0.5f),
+      bound(bounds, {n.x, n.y, n.z}, 0.5f);
   const double scale = double(2u << level);
   std::mt19937 random(5);
   double least = 1e9;
@@ -177,7 +181,8 @@ TEST(LevelBounds, HoldBetweenVoxels) {
   }
 }
 
-/// Steps of a unit of the last place, alike for all voxels that share an x: what a comparison of levels may lose.
+/// Steps of a unit of the last place, alike for all voxels that share an x: what a comparison of
+/// levels may lose.
 TEST(LevelBounds, HoldFarFromZero) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
     std::array<double, 33> steps;
@@ -194,9 +199,11 @@ TEST(LevelBounds, HoldFarFromZero) {
 
 // ---- what is certified
 
-/// Checks each bound of a frame against the source. Returns the slack, bound / error, of pixels with a hit, ascending.
+/// Checks each bound of a frame against the source. Returns the slack, bound / error, of pixels
+/// with a hit, ascending.
 std::vector<double> expect_kept(const Certificate &certificate, std::span<const HitRecord> drawn,
-                                const Scene &scene, const Camera &camera, ImageSize size, float isovalue) {
+                                const Scene &scene, const Camera &camera, ImageSize size,
+                                float isovalue) {
   const FrameParams frame = make_frame_params(scene.volume.info, camera, size, isovalue);
   const glm::uvec3 dims = scene.volume.info.dims;
   const CellOracle truth(scene.source, {dims.x, dims.y, dims.z}, isovalue);
@@ -226,12 +233,14 @@ class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   ocl::Device device_{GetParam()};
   std::uint64_t certified_ = 0, all_ = 0;  ///< pixels of certify_frame()
 };
-INSTANTIATE_TEST_SUITE_P(Devices, CertifyOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, CertifyOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
   const Scene scene({9, 10, 11}, test::gyroid_field(9), {.rate = 6});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.size = kSmall, .cache_slots = 20, .with_bounds = true});
+  Renderer renderer(device_, scene.volume,
+                    {.size = kSmall, .cache_slots = 20, .with_bounds = true});
   for (const FieldBound bound : {FieldBound::kLower, FieldBound::kUpper, FieldBound::kNone}) {
     renderer.draw_bound(bound);
     renderer.render(camera, 0.4f);
@@ -242,13 +251,15 @@ TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
 
 TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
   for (const CompressOptions &options :
-       {CompressOptions{.rate = 8}, CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
+       {CompressOptions{.rate = 8},
+        CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
     const Scene scene({40, 37, 44}, test::gyroid_field(11), options);
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
       ocl::Device device(GetParam());
-      Renderer renderer(device, scene.volume,
-                        {.size = kMedium, .stream = place, .max_pixel_error = 4, .with_bounds = true});
+      Renderer renderer(
+          device, scene.volume,
+          {.size = kMedium, .stream = place, .max_pixel_error = 4, .with_bounds = true});
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
       for (const double value_error : {0.0, 0.1}) {
         renderer.set_value_error(value_error);
@@ -269,16 +280,19 @@ TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
 
 TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
   for (const glm::uvec3 &dims : {glm::uvec3(64, 60, 56), glm::uvec3(33, 48, 40)}) {
-    for (const auto &field : {test::gyroid_field(24), test::sphere_field(dims), test::noise_field(7)}) {
+    for (const auto &field :
+         {test::gyroid_field(24), test::sphere_field(dims), test::noise_field(7)}) {
       for (const CompressOptions &options :
-           {CompressOptions{.rate = 8}, CompressOptions{.error_bound = ErrorBound{.min_exponent = -8}}}) {
+           {CompressOptions{.rate = 8},
+            CompressOptions{.error_bound = ErrorBound{.min_exponent = -8}}}) {
         const Scene scene(dims, field, options);
         Renderer renderer(device_, scene.volume,
                           {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
         std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
         cameras.push_back(camera_along({20, 18, 16}, {0.3, 0.2, 1}));  // from within
         for (const Camera &camera : cameras) {
-          for (const Detail &detail : {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
+          for (const Detail &detail :
+               {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
             renderer.set_max_pixel_error(detail.max_pixel_error);
             renderer.set_value_error(detail.value_error);
             const std::vector<HitRecord> drawn = certify_frame(renderer, scene, camera, 0.3f, 10);
@@ -295,7 +309,8 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
 TEST_P(CertifyOnDevice, RealVolumes) {
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
-    Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
+    Renderer renderer(device_, scene.volume,
+                      {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
     for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
       for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
         for (const double max_pixel_error : {0.0, 2.0}) {
@@ -318,24 +333,27 @@ TEST_P(CertifyOnDevice, FarAway) {
   Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   renderer.render(camera, 80);
   const std::vector<HitRecord> drawn = renderer.hits();
-  const std::vector<double> slack =
-      expect_kept(certify(renderer, scene.volume, camera, 80, drawn), drawn, scene, camera, kMedium, 80);
+  const std::vector<double> slack = expect_kept(certify(renderer, scene.volume, camera, 80, drawn),
+                                                drawn, scene, camera, kMedium, 80);
   ASSERT_GT(slack.size(), 500u);
   EXPECT_LT(slack[0], 3) << "farther off than rounding explains";
 }
 
-/// Voxels are exact, and the eye is among them: what is left is mostly what float32 loses of values.
+/// Voxels are exact, and the eye is among them: what is left is mostly what float32 loses of
+/// values.
 TEST_P(CertifyOnDevice, ExactVolumes) {
   const auto noise = [field = test::noise_field(3)](const glm::dvec3 &at) mutable {
     return std::rint(127.5 + 127.5 * field(at));
   };
-  const Scene scene({40, 40, 40}, noise,
-                    {.error_bound = ErrorBound{.min_exponent = -6, .whole_numbers = true, .max_error = 0}});
+  const Scene scene(
+      {40, 40, 40}, noise,
+      {.error_bound = ErrorBound{.min_exponent = -6, .whole_numbers = true, .max_error = 0}});
   Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   for (const double x : {12.0, 19.0, 26.0}) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
       const Camera camera = camera_along({x, 20, 21}, direction);
-      for (const float isovalue : {60.0f, 120.5f}) certify_frame(renderer, scene, camera, isovalue, 0.01);
+      for (const float isovalue : {60.0f, 120.5f})
+        certify_frame(renderer, scene, camera, isovalue, 0.01);
     }
   }
   EXPECT_GT(all_, 10000u);
@@ -348,16 +366,19 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
        {CompressOptions{.rate = 4},
         CompressOptions{.error_bound = ErrorBound{.min_exponent = -6, .max_error = 0.015625}}}) {
     const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
-    Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+    Renderer renderer(device_, scene.volume,
+                      {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const double max_pixel_error : {0.0, 2.0}) {
       renderer.set_max_pixel_error(max_pixel_error);
       renderer.render(camera, 0.3f);
       const std::vector<HitRecord> drawn = renderer.hits();
       const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
-      const std::vector<double> slack = expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
+      const std::vector<double> slack =
+          expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
       ASSERT_GT(slack.size(), 100u);
-      // The error of a coarse level changes its sign between voxels: there, only the larger errors say how tight a bound is.
+      // The error of a coarse level changes its sign between voxels: there, only the larger errors
+      // say how tight a bound is.
       EXPECT_LT(max_pixel_error == 0 ? slack[slack.size() / 2] : slack[slack.size() / 10], 8);
       const CertificateSummary summary = summarize(certificate, 1e9);
       EXPECT_GT(summary.num_certified, summary.num_pixels * 7 / 10) << max_pixel_error;
@@ -383,14 +404,17 @@ TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
   EXPECT_EQ(exceeded([](float bound) { return bound; }), 0u);
   EXPECT_GT(exceeded([](float bound) { return bound / 1000; }), 100u);
   EXPECT_GT(exceeded([](float) { return 0.0f; }), 100u) << "hits that are said to miss";
-  EXPECT_GT(exceeded([](float bound) { return bound == 0 ? 1.0f : bound; }), 100u) << "and the other way";
+  EXPECT_GT(exceeded([](float bound) { return bound == 0 ? 1.0f : bound; }), 100u)
+      << "and the other way";
   EXPECT_THROW(judge_bounds(truth, frame, drawn, {}), std::invalid_argument);
 }
 
 TEST_P(CertifyOnDevice, ChoosesLessForMore) {
   const glm::uvec3 dims(96, 96, 96);
-  const Scene scene(dims, test::sphere_field(dims), {.error_bound = ErrorBound{.min_exponent = -10}});
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+  const Scene scene(dims, test::sphere_field(dims),
+                    {.error_bound = ErrorBound{.min_exponent = -10}});
+  Renderer renderer(device_, scene.volume,
+                    {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye += 0.35 * (camera.eye - camera.at);  // so far that levels spare most blocks
   double pixel_error = -1, value_error = -1;
@@ -427,7 +451,8 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
 TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   for (const std::uint32_t rate : {8u, 16u, 24u}) {
     const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
-    Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+    Renderer renderer(device_, scene.volume,
+                      {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 1);
     EXPECT_TRUE(choice.reachable);
@@ -435,25 +460,32 @@ TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   }
 }
 
-/// Where coarse levels would draw only what is farthest, they spare too little for what several levels cost.
+/// Where coarse levels would draw only what is farthest, they spare too little for what several
+/// levels cost.
 TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
-  const Scene scene({96, 96, 96}, test::gyroid_field(48), {.error_bound = ErrorBound{.min_exponent = -10}});
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+  const Scene scene({96, 96, 96}, test::gyroid_field(48),
+                    {.error_bound = ErrorBound{.min_exponent = -10}});
+  Renderer renderer(device_, scene.volume,
+                    {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
-    return each.detail.max_pixel_error > 0.6 && each.certified >= choice.tries[0].certified - kLostShare;
+    return each.detail.max_pixel_error > 0.6 &&
+           each.certified >= choice.tries[0].certified - kLostShare;
   })) << "the error would allow them";
   EXPECT_EQ(choice.detail.max_pixel_error, 0);
   EXPECT_EQ(renderer.render(camera, 0.3f).last_level, 0u);
 }
 
-/// Coarse levels reach a little out of the volume; where a ray is there at a border, on one side for certain, nothing is unknown.
+/// Coarse levels reach a little out of the volume; where a ray is there at a border, on one side
+/// for certain, nothing is unknown.
 TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
   const glm::uvec3 dims(96, 96, 96);
-  const Scene scene(dims, test::sphere_field(dims), {.error_bound = ErrorBound{.min_exponent = -10}});
+  const Scene scene(dims, test::sphere_field(dims),
+                    {.error_bound = ErrorBound{.min_exponent = -10}});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+  Renderer renderer(device_, scene.volume,
+                    {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
   for (const double max_pixel_error :
        {1.0, 1.4}) {  // a border among the places where rays enter, or in the surface
     renderer.set_max_pixel_error(max_pixel_error);
@@ -467,7 +499,8 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
     const Certificate certificate = certify(renderer, scene.volume, camera, 0.5f, drawn);
     std::size_t num_hits = 0;
     for (std::size_t i = 0; i < drawn.size(); ++i) {
-      const int met = std::isfinite(lower[i].t) + std::isfinite(upper[i].t) + std::isfinite(drawn[i].t);
+      const int met =
+          std::isfinite(lower[i].t) + std::isfinite(upper[i].t) + std::isfinite(drawn[i].t);
       if (met == 0) {
         EXPECT_EQ(certificate.bounds[i], 0) << "ray " << i;
       } else if (met == 3) {
@@ -522,7 +555,8 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
     renderer.render(camera, 0.3f);
     certify(renderer, volume, camera, 0.3f, renderer.hits());
   };
-  EXPECT_NO_THROW(certify_with(scene.volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}));
+  EXPECT_NO_THROW(
+      certify_with(scene.volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}));
   CompressedVolume volume = scene.volume;
   volume.max_error.reset();
   volume.bounds = {};
@@ -531,8 +565,9 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   volume = scene.volume;
   volume.coarser[0].bounds = {};
   EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));
-  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}); },
-              ThrowsMessage<Error>(HasSubstr("--levels")));
+  EXPECT_THAT(
+      [&] { certify_with(volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}); },
+      ThrowsMessage<Error>(HasSubstr("--levels")));
   volume = scene.volume;
   volume.value_range = {-INFINITY, INFINITY};
   EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },

@@ -1,5 +1,6 @@
-// Options and streams of the program, run as a user runs it: values that mean nothing, options without effect, pipes, a standard output
-// that fails, and errors that are one line whatever they quote.
+// Options and streams of the program, run as a user runs it: values that mean nothing, options
+// without effect, pipes, a standard output that fails, and errors that are one line whatever they
+// quote.
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -24,7 +25,8 @@ using test::write_file;
 const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
 const std::string kRender = "render " + kNucleon + " -i 80 --size 16x12 ";
 
-/// Status 1 and one line that begins with the program's name and says `text`; what was printed before does not matter.
+/// Status 1 and one line that begins with the program's name and says `text`; what was printed
+/// before does not matter.
 void expect_failure(const test::ProgramResult &result, std::string_view text) {
   EXPECT_EQ(result.status, 1);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
@@ -66,15 +68,16 @@ TEST(CliOptions, EmptyValuesAreRefused) {
 }
 
 TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
-  for (const char *value :
-       {"-1", "0", "GB", "18446744073709551616", "1e30GB", "99999999999EB", "-1GB", "1.5GB", "1XB", " 1GB "})
+  for (const char *value : {"-1", "0", "GB", "18446744073709551616", "1e30GB", "99999999999EB",
+                            "-1GB", "1.5GB", "1XB", " 1GB "})
     expect_one_line_error(kRender + "--memory-budget '" + value + "'", "--memory-budget: ");
   for (const char *value : {"inf", "-inf", "nan", "1e39", "1e400", "0x10", "1,5", "80x", " 80"})
     expect_one_line_error("render " + kNucleon + " -i '" + value + "'", "--isovalue: ");
   for (const char *value : {"-1", "18446744073709551616", "1e3", "0x10", "+1", "1.0"})
-    expect_one_line_error("generate mixing_layer --dims 8 --seed '" + std::string(value) + "'", "--seed: ");
-  for (const char *option :
-       {"--value-error", "--max-pixel-error", "--max-error", "--time-budget", "--tolerance", "--spacing"})
+    expect_one_line_error("generate mixing_layer --dims 8 --seed '" + std::string(value) + "'",
+                          "--seed: ");
+  for (const char *option : {"--value-error", "--max-pixel-error", "--max-error", "--time-budget",
+                             "--tolerance", "--spacing"})
     expect_one_line_error(kRender + option + " inf", option);
   for (const std::string option : {"--tolerance", "--tolerance-relative"}) {
     for (const char *value : {"0", "-1"})
@@ -108,19 +111,23 @@ TEST(CliOptions, SpacingsAndPlacesThatFloatsCannotHoldAreRefused) {
   ASSERT_EQ(run_isowave("convert " + kNucleon + " -o " + zfp).status, 0);
   for (const std::string &volume : {kNucleon, zfp}) {
     for (const char *spacing : {"0", "-1", "1 1 0"})
-      expect_one_line_error("info " + volume + " --spacing " + spacing, "each must be finite and above 0");
+      expect_one_line_error("info " + volume + " --spacing " + spacing,
+                            "each must be finite and above 0");
   }
-  write_file(folder / "far.nhdr",
-             std::string_view("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspace: "
-                              "left-posterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
-                              "space origin: (1e15,0,0)\ndata file: v.raw\n"));
+  write_file(
+      folder / "far.nhdr",
+      std::string_view("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspace: "
+                       "left-posterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+                       "space origin: (1e15,0,0)\ndata file: v.raw\n"));
   write_file(folder / "v.raw", std::string(512, '\x20'));
-  const auto far = run_isowave("render " + quoted(folder / "far.nhdr") + " -i 1 --reference --size 8x8");
+  const auto far =
+      run_isowave("render " + quoted(folder / "far.nhdr") + " -i 1 --reference --size 8x8");
   expect_failure(far, "cannot tell voxels apart");
   const auto camera = [&](const std::string &eye, const std::string &up) {
-    write_file(folder / "c.json", R"({"width":8,"height":8,"fovy_deg":50,"cameras":[{"eye":)" + eye +
-                                      R"(,"at":[0,0,0],"up":)" + up + "}]}");
-    return run_isowave("render " + kNucleon + " -i 1 --reference --cameras " + quoted(folder / "c.json"));
+    write_file(folder / "c.json", R"({"width":8,"height":8,"fovy_deg":50,"cameras":[{"eye":)" +
+                                      eye + R"(,"at":[0,0,0],"up":)" + up + "}]}");
+    return run_isowave("render " + kNucleon + " -i 1 --reference --cameras " +
+                       quoted(folder / "c.json"));
   };
   expect_failure(camera("[1e160,0,0]", "[0,1,0]"), "too large");
   expect_failure(camera("[1e-160,0,0]", "[0,1,0]"), "the same point");
@@ -137,7 +144,8 @@ TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   for (const char *option :
        {"--exact", "--rate 8", "--tolerance 1", "--tolerance-relative 0.1", "--levels 1"}) {
     const std::string name = std::string(option).substr(0, std::string(option).find(' '));
-    expect_failure(run_isowave("render " + zfp + " -i 80 --size 8x8 --reference " + option), name + ": ");
+    expect_failure(run_isowave("render " + zfp + " -i 80 --size 8x8 --reference " + option),
+                   name + ": ");
     if (name != "--levels")
       expect_failure(run_isowave("verify " + zfp + " -i 80 --size 8x8 " + option), name + ": ");
   }
@@ -152,10 +160,12 @@ TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   expect_one_line_error("verify " + kNucleon, "give --isovalue");
   expect_one_line_error("verify " + kNucleon + " -i 80 --levels 2", "--levels: ");
   expect_one_line_error("generate sphere --dims 8 --seed 3", "--seed: ");
-  expect_one_line_error("info generate:sphere_8x8x8_uint8:3", "a seed is of mixing_layer's noise alone");
+  expect_one_line_error("info generate:sphere_8x8x8_uint8:3",
+                        "a seed is of mixing_layer's noise alone");
   expect_one_line_error(kRender + "--no-stage-times", "--no-stage-times: ");
-  expect_one_line_error("convert " + kNucleon + " --exact --no-verify -o " + quoted(folder / "a.zfp"),
-                        "--no-verify: ");
+  expect_one_line_error(
+      "convert " + kNucleon + " --exact --no-verify -o " + quoted(folder / "a.zfp"),
+      "--no-verify: ");
 }
 
 TEST(CliOptions, PipesAreNotWaitedFor) {
@@ -164,8 +174,9 @@ TEST(CliOptions, PipesAreNotWaitedFor) {
     ASSERT_EQ(::mkfifo((folder / name).c_str(), 0600), 0);
     const std::string pipe = quoted(folder / name);
     for (const std::string &arguments :
-         {"info " + pipe, "render " + pipe + " -i 80", "render " + kNucleon + " -i 80 --cameras " + pipe,
-          "compare " + pipe + " " + pipe, "convert " + pipe + " -o " + quoted(folder / "a.zfp")}) {
+         {"info " + pipe, "render " + pipe + " -i 80",
+          "render " + kNucleon + " -i 80 --cameras " + pipe, "compare " + pipe + " " + pipe,
+          "convert " + pipe + " -o " + quoted(folder / "a.zfp")}) {
       const auto result = run_command("timeout 20 " + isowave_program() + " " + arguments);
       EXPECT_EQ(result.status, 1) << arguments;
       EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
@@ -177,9 +188,9 @@ TEST(CliOptions, PipesAreNotWaitedFor) {
 TEST(CliOptions, AStandardOutputThatFailsIsAnError) {
   const TemporaryFolder folder;
   for (const std::string &arguments :
-       {"info " + kNucleon, "info --json " + kNucleon, std::string("--help"), std::string("--version"),
-        std::string("render --help"), std::string("devices"), kRender + "--reference",
-        "generate sphere --dims 8 -o " + quoted(folder / "s.raw"),
+       {"info " + kNucleon, "info --json " + kNucleon, std::string("--help"),
+        std::string("--version"), std::string("render --help"), std::string("devices"),
+        kRender + "--reference", "generate sphere --dims 8 -o " + quoted(folder / "s.raw"),
         "convert " + kNucleon + " -o " + quoted(folder / "n.zfp")}) {
     for (const char *where : {" >/dev/full", " >&-"}) {
       SCOPED_TRACE(arguments + where);
@@ -219,8 +230,8 @@ TEST(CliOptions, NamesThatAreNoUtf8GoIntoJson) {
   const auto info = run_isowave("info --json '" + name + "'");
   EXPECT_EQ(info.status, 0) << info.err;
   EXPECT_EQ(nlohmann::json::parse(info.out)["dims"][0], 8);
-  const auto render =
-      run_isowave("render '" + name + "' -i 40 --size 8x8 --reference --stats " + quoted(folder / "s.json"));
+  const auto render = run_isowave("render '" + name + "' -i 40 --size 8x8 --reference --stats " +
+                                  quoted(folder / "s.json"));
   EXPECT_EQ(render.status, 0) << render.err;
   EXPECT_NO_THROW(nlohmann::json::parse(test::read_file(folder / "s.json")));
 }
@@ -239,10 +250,10 @@ TEST(CliOptions, KernelsThatDoNotBuildAreOneLineAndALog) {
   const TemporaryFolder folder;
   bool failed = false;
   for (int files = 4; files < 10 && !failed; ++files) {
-    const auto run =
-        run_command("env OCL_ICD_VENDORS=pocl.icd POCL_CACHE_DIR=" + quoted(folder / "cache") +
-                    " TMPDIR=" + quoted(folder.path()) + " prlimit --nofile=" + std::to_string(files) + " " +
-                    isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
+    const auto run = run_command(
+        "env OCL_ICD_VENDORS=pocl.icd POCL_CACHE_DIR=" + quoted(folder / "cache") +
+        " TMPDIR=" + quoted(folder.path()) + " prlimit --nofile=" + std::to_string(files) + " " +
+        isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
     if (run.err.find("does not build") == std::string::npos) continue;
     failed = true;
     EXPECT_EQ(run.status, 1);
@@ -254,7 +265,8 @@ TEST(CliOptions, KernelsThatDoNotBuildAreOneLineAndALog) {
     const std::string saying = "the compiler's whole log is ";
     const std::size_t at = run.err.find(saying);
     ASSERT_NE(at, std::string::npos) << run.err;
-    const std::string log = run.err.substr(at + saying.size(), run.err.size() - at - saying.size() - 1);
+    const std::string log =
+        run.err.substr(at + saying.size(), run.err.size() - at - saying.size() - 1);
     EXPECT_TRUE(log.starts_with(folder.path().string())) << log;
     EXPECT_NE(test::read_file(log), "");
   }
@@ -266,11 +278,14 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
   const TemporaryFolder folder, temporary;
   if (run_isowave("devices").out.find("Portable Computing Language") == std::string::npos)
     GTEST_SKIP() << "no PoCL";
-  for (const fs::path &path : {folder.path(), temporary.path()}) fs::permissions(path, fs::perms::all);
+  for (const fs::path &path : {folder.path(), temporary.path()})
+    fs::permissions(path, fs::perms::all);
   write_file(folder / "file", std::string_view(""));
-  const std::string as_user = ::geteuid() == 0 ? "setpriv --reuid 65534 --regid 65534 --clear-groups " : "";
+  const std::string as_user =
+      ::geteuid() == 0 ? "setpriv --reuid 65534 --regid 65534 --clear-groups " : "";
   const auto render = [&](const std::string &environment) {
-    return run_command(as_user + "env -u XDG_CACHE_HOME -u POCL_CACHE_DIR OCL_ICD_VENDORS=pocl.icd TMPDIR=" +
+    return run_command(as_user +
+                       "env -u XDG_CACHE_HOME -u POCL_CACHE_DIR OCL_ICD_VENDORS=pocl.icd TMPDIR=" +
                        quoted(temporary.path()) + " " + environment + " " + isowave_program() +
                        " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8 --pipeline rays");
   };
@@ -279,17 +294,19 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
     const auto run = render(environment);
     EXPECT_EQ(run.status, 0) << environment << run.out << run.err;
     EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
-    EXPECT_NE(run.err.find("compiled kernels go to " + temporary.path().string()), std::string::npos)
+    EXPECT_NE(run.err.find("compiled kernels go to " + temporary.path().string()),
+              std::string::npos)
         << run.err;
   }
-  const auto no_path =
-      run_command("env PATH= POCL_CACHE_DIR=" + quoted(temporary / "new") + " OCL_ICD_VENDORS=pocl.icd " +
-                  isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
+  const auto no_path = run_command("env PATH= POCL_CACHE_DIR=" + quoted(temporary / "new") +
+                                   " OCL_ICD_VENDORS=pocl.icd " + isowave_program() +
+                                   " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
   EXPECT_EQ(no_path.status, 0) << no_path.err;
   const auto given = render("HOME=" + quoted(folder.path()));
   EXPECT_EQ(given.status, 0) << given.err;
   EXPECT_EQ(given.err, "") << "nothing is said where it works as usual";
-  expect_failure(render("POCL_CACHE_DIR=" + quoted(folder / "file")), "set POCL_CACHE_DIR to another folder");
+  expect_failure(render("POCL_CACHE_DIR=" + quoted(folder / "file")),
+                 "set POCL_CACHE_DIR to another folder");
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// Files that the program writes, run as a user runs it: none takes the place of an input or of another output, names of any length
-// and links work, and what cannot be written is said before any work.
+// Files that the program writes, run as a user runs it: none takes the place of an input or of
+// another output, names of any length and links work, and what cannot be written is said before any
+// work.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -62,11 +63,12 @@ TEST_F(CliOutputs, NeverTakeTheInputsPlace) {
   for (const char *option : {"-o ", "--depth ", "--stats "}) {
     expect_refused(render(name("v.zfp")) + option + name("v.zfp"), "v.zfp");
     expect_refused(render(raw()) + option + raw(), "take the place of the input");
-    expect_refused(render(raw()) + "--cameras " + name("cam.json") + " " + option + name("cam.json"),
-                   "cam.json");
     expect_refused(
-        render(raw()) + option + name("./../" + folder_.path().filename().string() + "/v_8x8x8_uint8.raw"),
-        "the input");
+        render(raw()) + "--cameras " + name("cam.json") + " " + option + name("cam.json"),
+        "cam.json");
+    expect_refused(render(raw()) + option +
+                       name("./../" + folder_.path().filename().string() + "/v_8x8x8_uint8.raw"),
+                   "the input");
   }
   fs::create_symlink("v_8x8x8_uint8.raw", folder_ / "link.zfp");
   fs::create_hard_link(folder_ / "v_8x8x8_uint8.raw", folder_ / "hard.zfp");
@@ -74,9 +76,11 @@ TEST_F(CliOutputs, NeverTakeTheInputsPlace) {
     expect_refused("convert " + raw() + " -o " + name(other), "take the place of the input");
     expect_refused(render(raw()) + "-o " + name(other), "take the place of the input");
   }
-  expect_refused("verify " + raw() + " -i 40 --size 16x12 --json " + raw(), "take the place of the input");
-  expect_refused("verify " + raw() + " -i 40 --cameras " + name("cam.json") + " --json " + name("cam.json"),
-                 "cam.json");
+  expect_refused("verify " + raw() + " -i 40 --size 16x12 --json " + raw(),
+                 "take the place of the input");
+  expect_refused(
+      "verify " + raw() + " -i 40 --cameras " + name("cam.json") + " --json " + name("cam.json"),
+      "cam.json");
   expect_refused("bench solvers " + name("v.zfp") + ":40 --json " + name("v.zfp"),
                  "take the place of the input");
   expect_refused("bench pareto " + raw() + " -i 40 --json " + raw(), "take the place of the input");
@@ -86,22 +90,27 @@ TEST_F(CliOutputs, NeverTakeThePlaceOfDetachedVoxels) {
   write_file(folder_ / "v.nhdr",
              std::string_view("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n"
                               "data file: v_8x8x8_uint8.raw\n"));
-  write_file(folder_ / "v.mhd",
-             std::string_view("ObjectType = Image\nNDims = 3\nDimSize = 8 8 8\nElementType = MET_UCHAR\n"
-                              "ElementDataFile = v_8x8x8_uint8.raw\n"));
-  // What only looks like the end of a header, or like the name, is for the reader of headers to tell.
+  write_file(
+      folder_ / "v.mhd",
+      std::string_view("ObjectType = Image\nNDims = 3\nDimSize = 8 8 8\nElementType = MET_UCHAR\n"
+                       "ElementDataFile = v_8x8x8_uint8.raw\n"));
+  // What only looks like the end of a header, or like the name, is for the reader of headers to
+  // tell.
   write_file(
       folder_ / "pairs.nhdr",
-      std::string_view("NRRD0004\ndatafile:=none\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n"
-                       "data file: v_8x8x8_uint8.raw\n"));
-  write_file(folder_ / "blank.mhd",
-             std::string_view("ObjectType = Image\nNDims = 3\n\ndatafile = none\nDimSize = 8 8 8\n\n"
-                              "ElementType = MET_UCHAR\nElementDataFile = v_8x8x8_uint8.raw\n"));
+      std::string_view(
+          "NRRD0004\ndatafile:=none\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n"
+          "data file: v_8x8x8_uint8.raw\n"));
+  write_file(
+      folder_ / "blank.mhd",
+      std::string_view("ObjectType = Image\nNDims = 3\n\ndatafile = none\nDimSize = 8 8 8\n\n"
+                       "ElementType = MET_UCHAR\nElementDataFile = v_8x8x8_uint8.raw\n"));
   std::string comments = "NRRD0004\n";
   while (comments.size() < (1u << 20)) comments += "#" + std::string(1000, 'x') + "\n";
   write_file(
       folder_ / "long.nhdr",
-      comments + "type: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\ndata file: v_8x8x8_uint8.raw\n");
+      comments +
+          "type: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\ndata file: v_8x8x8_uint8.raw\n");
   for (const char *header : {"v.nhdr", "v.mhd", "pairs.nhdr", "blank.mhd", "long.nhdr"}) {
     ASSERT_EQ(run_isowave("info " + name(header)).status, 0) << "else this proves nothing";
     expect_refused(render(name(header)) + "--depth " + raw(), "take the place of the input");
@@ -115,28 +124,32 @@ TEST_F(CliOutputs, NeverTakeEachOthersPlace) {
   expect_refused(render(raw()) + "-o " + one + " --stats " + name("./a.png"), "take the place of");
   expect_refused(render(raw()) + "--depth " + one + " --stats " + one, "take the place of");
   expect_refused(render(raw()) + "-i 40 -o " + one, "take the place of");
-  expect_refused(render(raw()) + "-i 41 -o " + one + " --stats " + name("a_iso41_view0.png"), "--stats");
+  expect_refused(render(raw()) + "-i 41 -o " + one + " --stats " + name("a_iso41_view0.png"),
+                 "--stats");
   expect_refused("render " + raw() + " -i 40 --time-budget 9 -o " + one + " --refined " + one,
                  "take the place of");
   fs::create_directory(folder_ / "p");
-  expect_refused("render " + raw() + " -i 40 --progress-dir " + name("p") + " -o " + name("p/pass0001.png"),
-                 "--progress-dir");
+  expect_refused(
+      "render " + raw() + " -i 40 --progress-dir " + name("p") + " -o " + name("p/pass0001.png"),
+      "--progress-dir");
   for (const char *inside : {"new", "new/", "new/er"})
-    expect_refused("render " + raw() + " -i 40 --progress-dir " + name(inside) + " -o " + name("new"),
-                   "--progress-dir");
+    expect_refused(
+        "render " + raw() + " -i 40 --progress-dir " + name(inside) + " -o " + name("new"),
+        "--progress-dir");
   fs::create_symlink("b", folder_ / "l1");
   fs::create_symlink("b", folder_ / "l2");
-  expect_refused(render(raw()) + "--depth " + name("l1") + " --stats " + name("l2"), "take the place of");
+  expect_refused(render(raw()) + "--depth " + name("l1") + " --stats " + name("l2"),
+                 "take the place of");
   EXPECT_EQ(run_isowave(render(raw()) + "-i 41 -o " + one + " --depth " + name("a.npy")).status, 0);
 }
 
 TEST_F(CliOutputs, FilesThatMayNotGrowAreAnErrorLikeOthers) {
   const std::size_t before = folder_.num_files();
-  for (const auto &arguments :
-       {"convert generate:gyroid_64x64x64_uint8 -o " + name("a.zfp"),
-        "generate gyroid --dims 64 -o " + name("a.raw"), render(raw()) + "--stats " + name("a.json")}) {
-    const auto result = test::run_command("{ ( ulimit -f 0; " + test::isowave_program() + " " + arguments +
-                                          " ) 2>&1; echo status $?; } | cat");
+  for (const auto &arguments : {"convert generate:gyroid_64x64x64_uint8 -o " + name("a.zfp"),
+                                "generate gyroid --dims 64 -o " + name("a.raw"),
+                                render(raw()) + "--stats " + name("a.json")}) {
+    const auto result = test::run_command("{ ( ulimit -f 0; " + test::isowave_program() + " " +
+                                          arguments + " ) 2>&1; echo status $?; } | cat");
     EXPECT_THAT(result.out, testing::HasSubstr("cannot write")) << arguments;
     EXPECT_THAT(result.out, testing::HasSubstr("status 1")) << arguments;
     EXPECT_EQ(folder_.num_files(), before) << arguments;
@@ -146,7 +159,8 @@ TEST_F(CliOutputs, FilesThatMayNotGrowAreAnErrorLikeOthers) {
 TEST_F(CliOutputs, NamesMayBeAsLongAsTheSystemAllows) {
   const std::string longest(255, 'n'), longer(256, 'n');
   ASSERT_EQ(run_isowave(render(raw()) + "--depth " + name(longest)).status, 0);
-  EXPECT_EQ(run_isowave(render(raw()) + "--depth " + name(longest)).status, 0) << "also to replace it";
+  EXPECT_EQ(run_isowave(render(raw()) + "--depth " + name(longest)).status, 0)
+      << "also to replace it";
   EXPECT_TRUE(fs::is_regular_file(folder_ / longest));
   expect_refused(render(raw()) + "--depth " + name(longer), "cannot write");
   expect_refused(render(raw()) + "-i 41 --depth " + name(longest), "cannot write");
@@ -168,7 +182,8 @@ TEST_F(CliOutputs, WhatCannotBeWrittenIsSaidBeforeAnyWork) {
   const std::string inputs = "none_8x8x8_uint8.raw -i 1 ";  // looked at later
   expect_one_line_error("render " + inputs + "-o " + name("pipe"), "not a regular file");
   expect_one_line_error("render " + inputs + "-o /dev/full", "not a regular file");
-  expect_one_line_error("render " + inputs + "--stats " + quoted(folder_.path()), "not a regular file");
+  expect_one_line_error("render " + inputs + "--stats " + quoted(folder_.path()),
+                        "not a regular file");
   expect_one_line_error("verify " + inputs + "--json " + name("missing/a"), "cannot write");
   expect_one_line_error("bench pareto " + inputs + "--json " + name("pipe"), "not a regular file");
   expect_one_line_error("bench solvers none.raw:1 --json " + name("pipe"), "not a regular file");

@@ -36,11 +36,13 @@ test::ProgramResult render(const std::string &arguments) {
 }
 
 std::string camera_file(const char *dims = "[41,41,41]") {
-  return std::string(R"({"dims":)") + dims + R"(,"spacing":[1,1,1],"width":40,"height":30,"fovy_deg":50,
+  return std::string(R"({"dims":)") + dims +
+         R"(,"spacing":[1,1,1],"width":40,"height":30,"fovy_deg":50,
     "cameras":[{"eye":[20,30,90],"at":[20,20,20],"up":[0,1,0]},{"eye":[80,20,20],"at":[20,20,20],"up":[0,1,0]}]})";
 }
 
-/// A budget that is too small is refused with the smallest that would do, which then does, with the same bits.
+/// A budget that is too small is refused with the smallest that would do, which then does, with the
+/// same bits.
 TEST(CliRender, MemoryBudget) {
   const TemporaryFolder folder;
   const std::string command = kNucleon + " --isovalue 80 --size 64x48 --device cpu";
@@ -51,8 +53,8 @@ TEST(CliRender, MemoryBudget) {
   ASSERT_NE(at, std::string::npos) << refused.err;
   const std::string least =
       refused.err.substr(at + saying.size(), refused.err.find(" would do") - at - saying.size());
-  const auto drawn =
-      render(command + " --verbose --memory-budget " + least + " --depth " + quoted(folder / "least.npy"));
+  const auto drawn = render(command + " --verbose --memory-budget " + least + " --depth " +
+                            quoted(folder / "least.npy"));
   EXPECT_NE(drawn.out.find("block cache"), std::string::npos) << drawn.out;
   render(command + " --depth " + quoted(folder / "ample.npy"));
   EXPECT_EQ(test::read_file(folder / "least.npy"), test::read_file(folder / "ample.npy"));
@@ -66,8 +68,9 @@ TEST(CliRender, StreamOnTheHost) {
   const std::uint64_t stream_bytes = 11 * 11 * 11 * 256;
   const std::string command = file + " --isovalue 80 --size 40x30 --device cpu";
   const auto outputs = [&](const std::string &name) {
-    return " -o " + quoted(folder / (name + ".png")) + " --depth " + quoted(folder / (name + ".npy")) +
-           " --no-stage-times --stats " + quoted(folder / (name + ".json"));
+    return " -o " + quoted(folder / (name + ".png")) + " --depth " +
+           quoted(folder / (name + ".npy")) + " --no-stage-times --stats " +
+           quoted(folder / (name + ".json"));
   };
   const auto expect_same = [&](const std::string &name, const char *place) {
     for (const char *extension : {".png", ".npy"}) {
@@ -79,7 +82,8 @@ TEST(CliRender, StreamOnTheHost) {
     EXPECT_EQ(stats["options"]["stream"], place);
     const json &frame = stats["frames"][0];
     std::uint64_t decoded = 0;
-    for (const json &pass : frame["per_pass"]) decoded += pass["decoded_blocks"].get<std::uint64_t>();
+    for (const json &pass : frame["per_pass"])
+      decoded += pass["decoded_blocks"].get<std::uint64_t>();
     EXPECT_EQ(frame["uploaded_blocks"], std::string_view(place) == "host" ? decoded : 0);
     EXPECT_EQ(frame["uploaded_bytes"], frame["uploaded_blocks"].get<std::uint64_t>() * 256);
     return stats;
@@ -87,7 +91,8 @@ TEST(CliRender, StreamOnTheHost) {
   render(command + outputs("device"));
   expect_same("device", "device");
   for (const char *pipeline : {"blocks", "rays"}) {
-    const auto run = render(command + " --verbose --stream host --pipeline " + pipeline + outputs(pipeline));
+    const auto run =
+        render(command + " --verbose --stream host --pipeline " + pipeline + outputs(pipeline));
     EXPECT_NE(run.out.find("stays on the host: as asked for"), std::string::npos) << run.out;
     expect_same(pipeline, "host");
   }
@@ -106,10 +111,10 @@ TEST(CliRender, StreamOnTheHost) {
 
 TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   const TemporaryFolder folder;
-  const auto run =
-      render(kNucleon + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") + " --depth " +
-             quoted(folder / "a.npy") + " --stats " + quoted(folder / "a.json") + " --progress-dir " +
-             quoted(folder / "passes") + " --max-speculation 2 --pipeline blocks");
+  const auto run = render(kNucleon + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") +
+                          " --depth " + quoted(folder / "a.npy") + " --stats " +
+                          quoted(folder / "a.json") + " --progress-dir " +
+                          quoted(folder / "passes") + " --max-speculation 2 --pipeline blocks");
   EXPECT_NE(run.out.find("device "), std::string::npos) << run.out;
   EXPECT_NE(run.out.find("isovalue 80, view 0"), std::string::npos) << run.out;
   EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"a.png", "a.npy", "a.json", "passes"}));
@@ -120,8 +125,9 @@ TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   const FloatImage depth = read_npy(folder / "a.npy");
   EXPECT_EQ(depth.width, 64u);
   EXPECT_EQ(depth.height, 48u);
-  const auto hits = std::count_if(depth.pixels.begin(), depth.pixels.end(),
-                                  [](float t) { return t < std::numeric_limits<float>::infinity(); });
+  const auto hits = std::count_if(depth.pixels.begin(), depth.pixels.end(), [](float t) {
+    return t < std::numeric_limits<float>::infinity();
+  });
 
   const json stats = json::parse(test::read_file(folder / "a.json"));
   ASSERT_EQ(stats["frames"].size(), 1u);
@@ -135,12 +141,13 @@ TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   json hit_sum = 0;
   for (const json &pass : frame["per_pass"]) {
     for (const char *field :
-         {"active_rays", "n_spec", "ray_block_pairs", "visible_blocks", "requested_blocks", "decoded_blocks",
-          "rays_hit", "utilization_percent", "completed_percent"}) {
+         {"active_rays", "n_spec", "ray_block_pairs", "visible_blocks", "requested_blocks",
+          "decoded_blocks", "rays_hit", "utilization_percent", "completed_percent"}) {
       ASSERT_TRUE(pass.contains(field)) << field;
       EXPECT_TRUE(pass[field].is_number()) << field;
     }
-    for (const char *stage : {"traverse", "request", "cache", "decode", "group", "intersect", "composite"}) {
+    for (const char *stage :
+         {"traverse", "request", "cache", "decode", "group", "intersect", "composite"}) {
       EXPECT_TRUE(pass["stage_ms"].contains(stage)) << stage;
     }
     hit_sum = hit_sum.get<int>() + pass["rays_hit"].get<int>();
@@ -154,7 +161,8 @@ TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   EXPECT_EQ(stats["options"]["cache_slots"], 11 * 11 * 11);
   EXPECT_FALSE(stats["device"]["name"].get<std::string>().empty());
   std::uint64_t bytes = 0;
-  for (const json &entry : stats["memory"]["by_name"]) bytes += entry["current"].get<std::uint64_t>();
+  for (const json &entry : stats["memory"]["by_name"])
+    bytes += entry["current"].get<std::uint64_t>();
   EXPECT_EQ(bytes, stats["memory"]["current"]);
   EXPECT_GE(stats["memory"]["peak"], stats["memory"]["current"]);
 
@@ -162,31 +170,33 @@ TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   std::set<std::string> passes;
   for (std::size_t i = 1; i <= frame["passes"]; ++i) passes.insert(fmt::format("pass{:04}.png", i));
   EXPECT_EQ(names_in(folder / "passes"), passes);
-  EXPECT_EQ(test::read_file(folder / "passes" / *passes.rbegin()), test::read_file(folder / "a.png"));
-  EXPECT_NE(test::read_file(folder / "passes" / *passes.begin()), test::read_file(folder / "a.png"));
+  EXPECT_EQ(test::read_file(folder / "passes" / *passes.rbegin()),
+            test::read_file(folder / "a.png"));
+  EXPECT_NE(test::read_file(folder / "passes" / *passes.begin()),
+            test::read_file(folder / "a.png"));
 }
 
 TEST(CliRender, ReferenceIsTheSamePicture) {
   const TemporaryFolder folder;
   const auto outputs = [&](const std::string &name) {
     return " -i 60 -i 150 --orbit 2 --size 48x40 --spacing 1 2 1 --rate 3 --color '#4080C0' -o " +
-           quoted(folder / (name + ".png")) + " --depth " + quoted(folder / (name + ".npy")) + " --stats " +
-           quoted(folder / (name + ".json"));
+           quoted(folder / (name + ".png")) + " --depth " + quoted(folder / (name + ".npy")) +
+           " --stats " + quoted(folder / (name + ".json"));
   };
   render(kNucleon + outputs("device") + " --speculation off --cache-slots 300 --no-stage-times");
   const auto reference = render(kNucleon + outputs("twin") + " --reference");
   EXPECT_EQ(reference.out.find("device"), std::string::npos) << reference.out;
   for (const char *frame : {"_iso60_view0", "_iso60_view1", "_iso150_view0", "_iso150_view1"}) {
     for (const char *extension : {".png", ".npy"}) {
-      const auto compare =
-          run_isowave("compare --exact " + quoted(folder / (fmt::format("device{}{}", frame, extension))) +
-                      " " + quoted(folder / (fmt::format("twin{}{}", frame, extension))));
+      const auto compare = run_isowave(
+          "compare --exact " + quoted(folder / (fmt::format("device{}{}", frame, extension))) +
+          " " + quoted(folder / (fmt::format("twin{}{}", frame, extension))));
       EXPECT_EQ(compare.status, 0) << frame << extension << "\n" << compare.out << compare.err;
       EXPECT_NE(compare.out.find("equal"), std::string::npos) << compare.out;
     }
   }
-  const auto compare = run_isowave("compare --exact " + quoted(folder / "device_iso60_view0.npy") + " " +
-                                   quoted(folder / "twin_iso60_view1.npy"));
+  const auto compare = run_isowave("compare --exact " + quoted(folder / "device_iso60_view0.npy") +
+                                   " " + quoted(folder / "twin_iso60_view1.npy"));
   EXPECT_EQ(compare.status, 1);
 
   const json stats = json::parse(test::read_file(folder / "device.json"));
@@ -217,13 +227,15 @@ TEST(CliRender, CameraFileGivesViewsAndSize) {
   EXPECT_EQ(first.width, 40u);
   EXPECT_EQ(first.height, 30u);
   EXPECT_NE(first.pixels, read_npy(folder / "a_iso80_view1.npy").pixels);
-  render(kNucleon + cameras + "--size 20x10 --depth " + quoted(folder / "b.npy"));  // the option wins
+  render(kNucleon + cameras + "--size 20x10 --depth " +
+         quoted(folder / "b.npy"));  // the option wins
   EXPECT_EQ(read_npy(folder / "b_iso80_view1.npy").width, 20u);
 }
 
 TEST(CliRender, ZfpFilesAndCompressionOnTheFlyAreTheSame) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 5 -o " + quoted(folder / "n.zfp")).status, 0);
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 5 -o " + quoted(folder / "n.zfp")).status,
+            0);
   render(quoted(folder / "n.zfp") + " -i 80 --size 32x32 --depth " + quoted(folder / "a.npy"));
   render(kNucleon + " --rate 5 -i 80 --size 32x32 --depth " + quoted(folder / "b.npy"));
   render(kNucleon + " --rate 4 -i 80 --size 32x32 --depth " + quoted(folder / "c.npy"));
@@ -233,7 +245,8 @@ TEST(CliRender, ZfpFilesAndCompressionOnTheFlyAreTheSame) {
 
 TEST(CliRender, ErrorsInsteadOfARate) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --exact -o " + quoted(folder / "n.zfp")).status, 0);
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --exact -o " + quoted(folder / "n.zfp")).status,
+            0);
   const auto depth = [&](const std::string &arguments) {
     render(arguments + " -i 80.5 --size 32x32 --depth " + quoted(folder / "a.npy"));
     return test::read_file(folder / "a.npy");
@@ -241,7 +254,8 @@ TEST(CliRender, ErrorsInsteadOfARate) {
   const std::string exact = depth(quoted(folder / "n.zfp"));
   EXPECT_EQ(depth(kNucleon + " --exact"), exact);
   EXPECT_EQ(depth(kNucleon + " --rate 32"), exact) << "as good as no compression";
-  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --value-error 0.1"), exact) << "less than what was left out";
+  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --value-error 0.1"), exact)
+      << "less than what was left out";
   const std::string coarse = depth(quoted(folder / "n.zfp") + " --value-error 20");
   EXPECT_NE(coarse, exact);
   EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --value-error 20 --reference"), coarse);
@@ -262,7 +276,8 @@ TEST(CliRender, LevelsOfDetail) {
   const json info = json::parse(run_isowave("info --json " + file).out);
   EXPECT_EQ(info["coarser"], json({{21, 21, 21}, {11, 11, 11}, {6, 6, 6}}));
   ASSERT_EQ(info["coarser_error"].size(), 3u);
-  EXPECT_GT(info["coarser_error"][0], info["max_error"]) << "against the finest level before compression";
+  EXPECT_GT(info["coarser_error"][0], info["max_error"])
+      << "against the finest level before compression";
   const auto depth = [&](const std::string &arguments) {
     render(arguments + " -i 80 --size 32x32 --no-stage-times --stats " + quoted(folder / "a.json") +
            " --depth " + quoted(folder / "a.npy"));
@@ -280,10 +295,12 @@ TEST(CliRender, LevelsOfDetail) {
   EXPECT_EQ(depth(file + " --max-pixel-error 0"), finest);
 
   ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 4 -o " + file).status, 0);
-  const std::string refused = "render " + file + " -i 80 --reference --depth " + quoted(folder / "b.npy");
+  const std::string refused =
+      "render " + file + " -i 80 --reference --depth " + quoted(folder / "b.npy");
   test::expect_one_line_error(refused + " --max-pixel-error 1", "no levels of detail");
   test::expect_one_line_error(refused + " --max-pixel-error -1", "a distance of -1 pixels");
-  test::expect_one_line_error("convert " + kNucleon + " --levels 9 -o " + file, "9 levels of detail");
+  test::expect_one_line_error("convert " + kNucleon + " --levels 9 -o " + file,
+                              "9 levels of detail");
   test::expect_one_line_error("convert " + kNucleon + " --levels some -o " + file, "--levels");
 }
 
@@ -304,8 +321,9 @@ TEST(CliRender, MaxError) {
   EXPECT_LE(error["median"], error["p99"]);
   const FloatImage bounds = read_npy(folder / "e.npy");
   EXPECT_EQ(bounds.pixels.size(), 64u * 48);
-  EXPECT_EQ(std::ranges::count_if(bounds.pixels, [](float bound) { return bound > 0 && bound <= 0.5f; }),
-            error["certified"].get<int>());
+  EXPECT_EQ(
+      std::ranges::count_if(bounds.pixels, [](float bound) { return bound > 0 && bound <= 0.5f; }),
+      error["certified"].get<int>());
   EXPECT_EQ(error_of(kNucleon + " --rate 16 --max-error 0.5")["chosen"], error["chosen"])
       << "a volume that is compressed now";
   const json out_of_reach = error_of(kNucleon + " --rate 2 --max-error 0.001");
@@ -315,7 +333,8 @@ TEST(CliRender, MaxError) {
   const std::string command = "render " + file + " -i 80 --depth " + quoted(folder / "b.npy");
   test::expect_one_line_error(command + " --max-error 1 --reference", "--reference cannot choose");
   test::expect_one_line_error(command + " --max-error 0", "an error of 0 pixels");
-  test::expect_one_line_error(command + " --max-error 1 --value-error 1", "leave out --value-error");
+  test::expect_one_line_error(command + " --max-error 1 --value-error 1",
+                              "leave out --value-error");
   test::expect_one_line_error(command + " --error-map " + map, "--error-map needs --max-error");
 }
 
@@ -324,8 +343,9 @@ TEST(CliRender, TimeBudget) {
   const std::string scene = kNucleon + " -i 80 --size 64x48 ";
   const auto picture = [&](const std::string &name) { return quoted(folder / (name + ".png")); };
   ASSERT_EQ(render(scene + "-o " + picture("plain")).status, 0);
-  const auto run = render(scene + "--time-budget 0.001 -o " + picture("quick") + " --refined " +
-                          picture("refined") + " --no-stage-times --stats " + quoted(folder / "a.json"));
+  const auto run =
+      render(scene + "--time-budget 0.001 -o " + picture("quick") + " --refined " +
+             picture("refined") + " --no-stage-times --stats " + quoted(folder / "a.json"));
   EXPECT_EQ(run.status, 0) << run.err;
   const json frame = json::parse(test::read_file(folder / "a.json"))["frames"][0]["time_budget"];
   EXPECT_EQ(frame["budget_ms"], 0.001);
@@ -359,20 +379,22 @@ TEST(CliRender, NegativeAndFractionalIsovalues) {
   std::vector<float> ramp(512);
   for (std::size_t i = 0; i < ramp.size(); ++i) ramp[i] = float(i % 8) - 4.0f;
   write_file(folder / "r_8x8x8_float32.raw", ramp);
-  const auto run = render("-i -1 " + quoted(folder / "r_8x8x8_float32.raw") +
-                          " --isovalue -1.5 -i -2e-1 --isovalue=-3 --size 24x16 --rate 16 --depth " +
-                          quoted(folder / "a.npy"));
-  EXPECT_EQ(names_in(folder.path()),
-            (std::set<std::string>{"r_8x8x8_float32.raw", "a_iso-1_view0.npy", "a_iso-1.5_view0.npy",
-                                   "a_iso-0.2_view0.npy", "a_iso-3_view0.npy"}));
+  const auto run =
+      render("-i -1 " + quoted(folder / "r_8x8x8_float32.raw") +
+             " --isovalue -1.5 -i -2e-1 --isovalue=-3 --size 24x16 --rate 16 --depth " +
+             quoted(folder / "a.npy"));
+  EXPECT_EQ(
+      names_in(folder.path()),
+      (std::set<std::string>{"r_8x8x8_float32.raw", "a_iso-1_view0.npy", "a_iso-1.5_view0.npy",
+                             "a_iso-0.2_view0.npy", "a_iso-3_view0.npy"}));
   EXPECT_EQ(run.out.find(": 0 rays hit"), std::string::npos) << run.out;
 }
 
 TEST(CliRender, SeveralRaysAPixel) {
   const TemporaryFolder folder;
   const std::string frame = kNucleon + " -i 80 --size 40x30 --samples 3 ";
-  render(frame + "-o " + quoted(folder / "a.png") + " --depth " + quoted(folder / "a.npy") + " --stats " +
-         quoted(folder / "a.json"));
+  render(frame + "-o " + quoted(folder / "a.png") + " --depth " + quoted(folder / "a.npy") +
+         " --stats " + quoted(folder / "a.json"));
   const Image8 picture = read_png(folder / "a.png");
   EXPECT_EQ(picture.width, 40u);
   EXPECT_EQ(picture.height, 30u);
@@ -380,7 +402,8 @@ TEST(CliRender, SeveralRaysAPixel) {
   EXPECT_EQ(read_png(folder / "r.png").pixels, picture.pixels);
   render(kNucleon + " -i 80 --size 120x90 --depth " + quoted(folder / "b.npy"));
   EXPECT_EQ(read_npy(folder / "a.npy").width, 120u);
-  EXPECT_EQ(read_npy(folder / "a.npy").pixels, read_npy(folder / "b.npy").pixels) << "depth is each ray's";
+  EXPECT_EQ(read_npy(folder / "a.npy").pixels, read_npy(folder / "b.npy").pixels)
+      << "depth is each ray's";
   EXPECT_EQ(json::parse(test::read_file(folder / "a.json"))["options"]["samples"], 3);
 }
 
@@ -401,27 +424,29 @@ void expect_refused(const std::string &arguments, std::string_view text) {
   EXPECT_TRUE(result.err.starts_with("isowave: ")) << result.err;
   EXPECT_TRUE(result.err.ends_with('\n')) << result.err;
   EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-  EXPECT_EQ(result.out.find("rays hit"), std::string::npos) << "refused before any work: " << result.out;
+  EXPECT_EQ(result.out.find("rays hit"), std::string::npos)
+      << "refused before any work: " << result.out;
 }
 
 TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
   const TemporaryFolder out;
   const std::string good = kGyroid + " -i 128 --size 16x8 ";
-  const std::string to = " -o " + quoted(out / "a.png") + " --depth " + quoted(out / "a.npy") + " --stats " +
-                         quoted(out / "a.json");
+  const std::string to = " -o " + quoted(out / "a.png") + " --depth " + quoted(out / "a.npy") +
+                         " --stats " + quoted(out / "a.json");
   expect_refused(good + "--device nosuchdevice" + to, "nosuchdevice");
   expect_refused(good + "--device 99" + to, "99");
   expect_refused(good + "--samples 0" + to, "--samples");
   expect_refused(good + "--samples 9" + to, "--samples");
-  expect_refused(kGyroid + " -i 128 --size 16384x8192 --samples 2" + to, "an image of 16384 x 8192");
+  expect_refused(kGyroid + " -i 128 --size 16384x8192 --samples 2" + to,
+                 "an image of 16384 x 8192");
   expect_refused(quoted(out / "missing.raw") + " -i 1" + to, "no such file");
   expect_refused(quoted(out / "missing.zfp") + " -i 1" + to, "missing.zfp");
   expect_refused(kGyroid + " -i abc --size 16x8" + to, "isovalue");
   expect_refused(kGyroid + " -i nan --size 16x8" + to, "isovalue");
   expect_refused(kGyroid + " --size 16x8" + to, "isovalue");
   expect_refused("-i 128" + to, "VOLUME");
-  for (const char *size :
-       {"0x0", "0x8", "16x0", "16", "x", "16x8x4", "-16x8", "16X8", "99999999999x8", "40000x40000"}) {
+  for (const char *size : {"0x0", "0x8", "16x0", "16", "x", "16x8x4", "-16x8", "16X8",
+                           "99999999999x8", "40000x40000"}) {
     expect_refused(kGyroid + " -i 128 --size=" + size + to, "pixels");
   }
   expect_refused(good + "--cache-slots 7" + to, "cache-slots");
@@ -452,7 +477,8 @@ TEST(CliRender, BadCameraFilesAreOneLine) {
   const TemporaryFolder out;
   const auto with = [&](const std::string &text) {
     write_file(folder / "c.json", text);
-    return kNucleon + " -i 80 --cameras " + quoted(folder / "c.json") + " -o " + quoted(out / "a.png");
+    return kNucleon + " -i 80 --cameras " + quoted(folder / "c.json") + " -o " +
+           quoted(out / "a.png");
   };
   expect_refused(with(camera_file("[41,41,42]")), "41x41x42");
   expect_refused(with(camera_file()) + " --spacing 1 1 2", "spacing");
@@ -460,7 +486,8 @@ TEST(CliRender, BadCameraFilesAreOneLine) {
   expect_refused(with(R"({"fovy_deg":60,"cameras":[]})"), "cameras");
   expect_refused(with(R"({"fovy_deg":60,"cameras":[{"eye":[0,0,0],"at":[0,0,0],"up":[0,1,0]}]})"),
                  "camera 0");
-  expect_refused(with(R"({"fovy_deg":60,"cameras":[{"eye":[1e9,0,0],"at":[0,0,0],"up":[0,1,0]}]})"), "eye");
+  expect_refused(with(R"({"fovy_deg":60,"cameras":[{"eye":[1e9,0,0],"at":[0,0,0],"up":[0,1,0]}]})"),
+                 "eye");
   expect_refused(kNucleon + " -i 80 --cameras " + quoted(folder / "none.json"), "none.json");
   EXPECT_EQ(out.num_files(), 0u);
 }

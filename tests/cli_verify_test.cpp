@@ -1,4 +1,5 @@
-// `isowave verify VOLUME`, run as a user runs it: which oracles judge, what is left out, and how it fails.
+// `isowave verify VOLUME`, run as a user runs it: which oracles judge, what is left out, and how it
+// fails.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -22,8 +23,8 @@ const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
 
 TEST(CliVerify, JudgesFramesByEveryOracle) {
   const TemporaryFolder folder;
-  const auto run = run_isowave(fmt::format("verify {} --isovalue 100 --size 64x48 --json '{}'", kNucleon,
-                                           (folder / "v.json").string()));
+  const auto run = run_isowave(fmt::format("verify {} --isovalue 100 --size 64x48 --json '{}'",
+                                           kNucleon, (folder / "v.json").string()));
   EXPECT_EQ(run.status, 0) << run.out << run.err;
   const json document = json::parse(test::read_file(folder / "v.json"));
   std::set<std::string> oracles;
@@ -52,8 +53,8 @@ TEST(CliVerify, NamesViewsOutOfEmbreesReach) {
   write_file(folder / "far.json",
              R"({"dims":[41,41,41],"spacing":[1,1,1],"width":32,"height":24,"fovy_deg":0.05,
     "cameras":[{"eye":[20,20,100000],"at":[20,20,20],"up":[0,1,0]}]})");
-  const std::string arguments =
-      fmt::format("verify {} --isovalue 100 --cameras '{}'", kNucleon, (folder / "far.json").string());
+  const std::string arguments = fmt::format("verify {} --isovalue 100 --cameras '{}'", kNucleon,
+                                            (folder / "far.json").string());
   const auto run = run_isowave(arguments);
   EXPECT_EQ(run.status, 0) << run.out << run.err;
   EXPECT_NE(run.out.find("left out: the eye is 100000 voxels"), std::string::npos) << run.out;
@@ -64,9 +65,10 @@ TEST(CliVerify, NamesViewsOutOfEmbreesReach) {
 
 TEST(CliVerify, JudgesBoundsOfErrors) {
   const TemporaryFolder folder;
-  const auto run = run_isowave("verify " + kNucleon +
-                               " -i 80 --orbit 2 --size 64x48 --rate 8 --max-error 2 --device cpu --json " +
-                               quoted(folder / "v.json"));
+  const auto run =
+      run_isowave("verify " + kNucleon +
+                  " -i 80 --orbit 2 --size 64x48 --rate 8 --max-error 2 --device cpu --json " +
+                  quoted(folder / "v.json"));
   EXPECT_EQ(run.status, 0) << run.err;
   const json frames = json::parse(test::read_file(folder / "v.json"))["frames"];
   ASSERT_EQ(frames.size(), 2u);
@@ -87,8 +89,9 @@ TEST(CliVerify, JudgesBoundsOfErrors) {
 
 TEST(CliVerify, TracesRaysAtClosedSurfacesByTwinAndDevice) {
   const TemporaryFolder folder;
-  const auto run = run_isowave("verify --solver bernstein --rays 50 --watertight 20000 --device cpu --json " +
-                               quoted(folder / "v.json"));
+  const auto run =
+      run_isowave("verify --solver bernstein --rays 50 --watertight 20000 --device cpu --json " +
+                  quoted(folder / "v.json"));
   EXPECT_EQ(run.status, 0) << run.out << run.err;
   const json document = json::parse(test::read_file(folder / "v.json"));
   EXPECT_EQ(document.at("device").at("type"), "cpu");
@@ -98,8 +101,8 @@ TEST(CliVerify, TracesRaysAtClosedSurfacesByTwinAndDevice) {
     EXPECT_GE(surface.at("rays"), 20000);
     EXPECT_EQ(surface.at("leaks"), 0);
   }
-  EXPECT_EQ(surfaces,
-            (std::map<std::string, int>{{"twin", 6}, {"pipeline rays", 6}, {"pipeline blocks", 3}}));
+  EXPECT_EQ(surfaces, (std::map<std::string, int>{
+                          {"twin", 6}, {"pipeline rays", 6}, {"pipeline blocks", 3}}));
   EXPECT_EQ(run_isowave("verify --rays 50 --watertight 0 --solver bernstein").out.find("device"),
             std::string::npos);
 }

@@ -79,8 +79,9 @@ TEST(Cli, ConvertWithinAnError) {
   expect_one_line_error("convert " + kNucleon + " --exact --device cpu" + to, "fixed rate only");
   expect_one_line_error("convert generate:sphere_8x8x8_float32 --exact" + to, "float32");
   write_file(folder / "c_4x4x4_uint8.raw", std::string(64, 'x'));
-  expect_one_line_error("convert " + quoted(folder / "c_4x4x4_uint8.raw") + " --tolerance-relative 0.1" + to,
-                        "no range");
+  expect_one_line_error(
+      "convert " + quoted(folder / "c_4x4x4_uint8.raw") + " --tolerance-relative 0.1" + to,
+      "no range");
   EXPECT_EQ(folder.num_files(), 3u) << "n.zfp, n.png and c";
 }
 
@@ -93,8 +94,9 @@ TEST(Cli, ConvertOnADeviceWritesTheSameFile) {
   ASSERT_EQ(on_device.status, 0) << on_device.err;
   EXPECT_EQ(on_device.err, "");
   EXPECT_EQ(test::read_file(folder / "device.zfp"), test::read_file(folder / "host.zfp"));
-  expect_one_line_error("convert " + kNucleon + " --device no_such_device -o " + quoted(folder / "a.zfp"),
-                        "no_such_device");
+  expect_one_line_error(
+      "convert " + kNucleon + " --device no_such_device -o " + quoted(folder / "a.zfp"),
+      "no_such_device");
   EXPECT_EQ(folder.num_files(), 2u);
 }
 
@@ -109,7 +111,9 @@ TEST(Cli, GeneratedFilesAndGeneratorsAreTheSameVolume) {
                         quoted(folder / "a.zfp"))
                 .status,
             0);
-  ASSERT_EQ(run_isowave("convert generate:gyroid_20x21x22_uint8 -o " + quoted(folder / "b.zfp")).status, 0);
+  ASSERT_EQ(
+      run_isowave("convert generate:gyroid_20x21x22_uint8 -o " + quoted(folder / "b.zfp")).status,
+      0);
   EXPECT_EQ(test::read_file(folder / "a.zfp"), test::read_file(folder / "b.zfp"));
   EXPECT_EQ(run_isowave("info generate:mixing_layer_20x21x22_uint8:7").status, 0);
 }
@@ -125,7 +129,8 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
   const std::string cube(64, 'x');
   expect_one_line_error("convert " + file("a_4x4x4_uint8.raw", cube.substr(1)) + to,
                         "need 64 bytes, found 63");
-  expect_one_line_error("convert " + file("b_4x4x4_uint8.raw", cube + "x") + to, "need 64 bytes, found 65");
+  expect_one_line_error("convert " + file("b_4x4x4_uint8.raw", cube + "x") + to,
+                        "need 64 bytes, found 65");
   expect_one_line_error("convert " + file("b_4x4x4_uint8.raw.gz", cube) + to, "not a gzip file");
   expect_one_line_error("convert " + file("c.raw", cube) + to, "--dims and --type");
   expect_one_line_error("convert " + file("d_0x4x4_uint8.raw", cube) + to, "0x4x4");
@@ -136,12 +141,14 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
   expect_one_line_error("convert " + file("i.nii", cube) + to, "i.nii");
   expect_one_line_error("convert " + file("j.nii.gz", cube) + to, "j.nii.gz");
   expect_one_line_error("convert " + quoted(folder / "missing.raw") + to, "no such file");
-  expect_one_line_error("convert " + file("k_4x4x4_uint8.raw", cube) + " --rate 40" + to, "1 to 32");
-  expect_one_line_error("convert " + quoted(folder / "k_4x4x4_uint8.raw") + " --dims 4 4" + to, "--dims");
+  expect_one_line_error("convert " + file("k_4x4x4_uint8.raw", cube) + " --rate 40" + to,
+                        "1 to 32");
+  expect_one_line_error("convert " + quoted(folder / "k_4x4x4_uint8.raw") + " --dims 4 4" + to,
+                        "--dims");
   expect_one_line_error("convert " + quoted(folder / "k_4x4x4_uint8.raw") + " --spacing 1 0 1" + to,
                         "spacing 1 0 1");
-  expect_one_line_error("convert " + quoted(folder / "k_4x4x4_uint8.raw") + " -o " + quoted(out / "a.raw"),
-                        ".zfp");
+  expect_one_line_error(
+      "convert " + quoted(folder / "k_4x4x4_uint8.raw") + " -o " + quoted(out / "a.raw"), ".zfp");
   expect_one_line_error("convert generate:cube_4x4x4_uint8" + to, "unknown field");
   expect_one_line_error("convert generate:sphere" + to, "FIELD_XxYxZ_TYPE");
   expect_one_line_error("convert", "required");
@@ -149,7 +156,8 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
   expect_one_line_error("generate sphere --dims 8 --type uint12 -o " + quoted(out.path()),
                         "unknown voxel type");
   expect_one_line_error("generate sphere --dims 0 -o " + quoted(out.path()), "0x0x0");
-  expect_one_line_error("generate sphere --dims 8 -o " + quoted(out / "a_8x8x9_uint8.raw"), "8x8x9");
+  expect_one_line_error("generate sphere --dims 8 -o " + quoted(out / "a_8x8x9_uint8.raw"),
+                        "8x8x9");
   expect_one_line_error("generate sphere --dims x -o " + quoted(out.path()), "--dims");
   EXPECT_EQ(out.num_files(), 0u);
 
@@ -158,12 +166,15 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
   write_file(folder / "l_4x4x4_float32.raw", voxels);
   expect_one_line_error("convert " + quoted(folder / "l_4x4x4_float32.raw") + to, "(1,1,1)");
   EXPECT_EQ(out.num_files(), 0u);
-  EXPECT_EQ(run_isowave("convert " + quoted(folder / "l_4x4x4_float32.raw") + " --map-nan 0" + to).status, 0);
+  EXPECT_EQ(
+      run_isowave("convert " + quoted(folder / "l_4x4x4_float32.raw") + " --map-nan 0" + to).status,
+      0);
 }
 
 TEST(Cli, DamagedZfpFilesAreOneLine) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 1 -o " + quoted(folder / "a.zfp")).status, 0);
+  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 1 -o " + quoted(folder / "a.zfp")).status,
+            0);
   const std::string right = test::read_file(folder / "a.zfp");
   const auto damaged = [&](std::size_t byte) {
     std::string wrong = right;
@@ -187,7 +198,8 @@ TEST(Cli, UnwritableOutputIsOneLine) {
   expect_one_line_error("convert " + kNucleon + " -o " + quoted(folder / "missing" / "a.zfp"),
                         "cannot write");
   std::filesystem::create_directory(folder / "folder.zfp");
-  expect_one_line_error("convert " + kNucleon + " -o " + quoted(folder / "folder.zfp"), "not a regular file");
+  expect_one_line_error("convert " + kNucleon + " -o " + quoted(folder / "folder.zfp"),
+                        "not a regular file");
   expect_one_line_error("generate sphere --dims 8 -o /dev/full", "/dev/full");
   EXPECT_EQ(folder.num_files(), 1u);
 }
@@ -195,9 +207,11 @@ TEST(Cli, UnwritableOutputIsOneLine) {
 TEST(Cli, FullDiskLeavesNothingAndKeepsTheOldFile) {
   const TemporaryFolder folder;
   write_file(folder / "a.raw", std::string_view("old"));
-  // A limit on file size stands in for a full disk; the signal that comes with it must be ignored first.
-  const auto result = test::run_command("trap '' XFSZ; ulimit -f 64; " + test::isowave_program() +
-                                        " generate sphere --dims 128 -o " + quoted(folder / "a.raw"));
+  // A limit on file size stands in for a full disk; the signal that comes with it must be ignored
+  // first.
+  const auto result =
+      test::run_command("trap '' XFSZ; ulimit -f 64; " + test::isowave_program() +
+                        " generate sphere --dims 128 -o " + quoted(folder / "a.raw"));
   EXPECT_EQ(result.status, 1);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   EXPECT_NE(result.err.find("cannot write"), std::string::npos) << result.err;

@@ -79,7 +79,8 @@ TEST(CompareColour, CountsPixelsNotChannels) {
   EXPECT_EQ(result.num_pixels, 2u);
   EXPECT_EQ(result.num_differing, 1u);
   EXPECT_EQ(result.max_channel_difference, 4u);
-  EXPECT_NEAR(result.psnr_db.value(), 20.0 * std::log10(255.0) - 10.0 * std::log10(25.0 / 6.0), 1e-12);
+  EXPECT_NEAR(result.psnr_db.value(), 20.0 * std::log10(255.0) - 10.0 * std::log10(25.0 / 6.0),
+              1e-12);
 }
 
 TEST(CompareColour, SizesAndChannelsMustAgree) {
@@ -96,12 +97,13 @@ class CompareProgram : public testing::Test {
 
   /// Runs `isowave compare` with the folder's files a and b.
   Outcome run(const std::string &a, const std::string &b, const std::string &options = "") {
-    const std::string command = test::isowave_program() + " compare " + (folder_ / a).string() + " " +
-                                (folder_ / b).string() + " " + options + " 2>&1";
+    const std::string command = test::isowave_program() + " compare " + (folder_ / a).string() +
+                                " " + (folder_ / b).string() + " " + options + " 2>&1";
     std::FILE *pipe = popen(command.c_str(), "r");
     Outcome outcome;
     std::array<char, 256> buffer{};
-    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) outcome.output += buffer.data();
+    while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr)
+      outcome.output += buffer.data();
     outcome.status = WEXITSTATUS(pclose(pipe));
     return outcome;
   }

@@ -1,5 +1,5 @@
-// Kernels are compiled when a renderer is made, those that it launches and no others; core/ocl/kernel_cache, and what the program
-// says of it.
+// Kernels are compiled when a renderer is made, those that it launches and no others;
+// core/ocl/kernel_cache, and what the program says of it.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -35,7 +35,8 @@ CompressedVolume levelled_volume() {
 /// Stems, and how often each was built.
 std::vector<std::string> stems_of(const ocl::Device &device) {
   std::map<std::string, int> counts;
-  for (const std::string &program : device.built_programs()) ++counts[program.substr(0, program.find(' '))];
+  for (const std::string &program : device.built_programs())
+    ++counts[program.substr(0, program.find(' '))];
   std::vector<std::string> stems;
   for (const auto &[stem, count] : counts)
     stems.push_back(count == 1 ? stem : fmt::format("{} x{}", stem, count));
@@ -57,7 +58,8 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     device_.on_new_kernel([&](std::string_view kernel) { late.emplace_back(kernel); });
     for (const double pixels : {options.max_pixel_error, 0.0}) {
       renderer.set_max_pixel_error(pixels);
-      for (const float isovalue : {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
+      for (const float isovalue :
+           {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
         renderer.render(cameras_[0], isovalue);
         EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.size.num_pixels());
       }
@@ -80,7 +82,8 @@ TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
   for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
     for (const StreamPlace stream : {StreamPlace::kDevice, StreamPlace::kHost}) {
       expect_all_compiled({.size = kSize, .pipeline = pipeline, .stream = stream});
-      expect_all_compiled({.size = {20, 15, 2}, .pipeline = pipeline, .cache_slots = 8, .stream = stream});
+      expect_all_compiled(
+          {.size = {20, 15, 2}, .pipeline = pipeline, .cache_slots = 8, .stream = stream});
     }
   }
   expect_all_compiled({.size = kSize, .max_pixel_error = 2});
@@ -106,7 +109,8 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
     renderer.render(cameras_[0], 0.1f);
     return stems_of(device);
   };
-  EXPECT_THAT(stems({.size = kSize}), ElementsAre("block_cache", "macrocells", "march", "zfp_decode"));
+  EXPECT_THAT(stems({.size = kSize}),
+              ElementsAre("block_cache", "macrocells", "march", "zfp_decode"));
   EXPECT_THAT(stems({.size = kSize}, true),
               ElementsAre("block_cache", "macrocells", "march", "shade", "zfp_decode"));
   EXPECT_THAT(stems({.size = kSize, .with_kept_picture = true}),
@@ -117,11 +121,12 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
   // Where one work-group scans alone, a GPU gives it more work-items.
   const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";
   EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks}),
-              ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect", "macrocells",
-                          scan, "speculation", "traverse", "zfp_decode"));
-  EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks, .grouping = Grouping::kRadix}),
-              ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect", "macrocells",
-                          "radix_sort", scan, "speculation", "traverse", "zfp_decode"));
+              ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect",
+                          "macrocells", scan, "speculation", "traverse", "zfp_decode"));
+  EXPECT_THAT(
+      stems({.size = kSize, .pipeline = PipelineKind::kBlocks, .grouping = Grouping::kRadix}),
+      ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect", "macrocells",
+                  "radix_sort", scan, "speculation", "traverse", "zfp_decode"));
 }
 
 /// What compiling leaves behind must not show.
@@ -142,7 +147,8 @@ TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, CompileOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, CompileOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 /// Sets an environment variable for as long as it lives.
 class Setting {
@@ -161,8 +167,8 @@ class Setting {
 };
 
 TEST(KernelCache, FolderIsTheDrivers) {
-  const Setting home("HOME", "/home/someone"), cache("XDG_CACHE_HOME", ""), pocl("POCL_CACHE_DIR", ""),
-      mesa("MESA_SHADER_CACHE_DIR", ""), nvidia("CUDA_CACHE_PATH", "");
+  const Setting home("HOME", "/home/someone"), cache("XDG_CACHE_HOME", ""),
+      pocl("POCL_CACHE_DIR", ""), mesa("MESA_SHADER_CACHE_DIR", ""), nvidia("CUDA_CACHE_PATH", "");
   const auto folder = [](const char *platform) {
     ocl::DeviceInfo info;
     info.platform = platform;
@@ -189,7 +195,8 @@ TEST(KernelCache, NewFilesAreNewKernelsButForBookkeeping) {
   const ocl::KernelCache cache(info);
   EXPECT_FALSE(cache.has_new_kernels());
   fs::create_directories(folder / "a" / "b");
-  for (const char *name : {"last_accessed", "tempfile_x", "index"}) test::write_file(folder / "a" / name, "");
+  for (const char *name : {"last_accessed", "tempfile_x", "index"})
+    test::write_file(folder / "a" / name, "");
   EXPECT_FALSE(cache.has_new_kernels());
   test::write_file(folder / "a" / "b" / "new.so", "");
   EXPECT_TRUE(cache.has_new_kernels());
@@ -199,12 +206,13 @@ TEST(KernelCache, NewFilesAreNewKernelsButForBookkeeping) {
 
 std::size_t num_libraries(const fs::path &folder) {
   std::size_t count = 0;
-  for (const auto &file : fs::recursive_directory_iterator(folder)) count += file.path().extension() == ".so";
+  for (const auto &file : fs::recursive_directory_iterator(folder))
+    count += file.path().extension() == ".so";
   return count;
 }
 
-/// PoCL compiles a kernel when it is launched first, and leaves a library for each. A frame that meets no block launches few;
-/// so whatever the second run adds had been left to its frames.
+/// PoCL compiles a kernel when it is launched first, and leaves a library for each. A frame that
+/// meets no block launches few; so whatever the second run adds had been left to its frames.
 TEST(CompileCommand, TheFirstOpeningSaysSoAndLeavesNothingToFrames) {
   const test::TemporaryFolder folder, cache;
   const Setting own("POCL_CACHE_DIR", cache.path().string());
@@ -219,8 +227,8 @@ TEST(CompileCommand, TheFirstOpeningSaysSoAndLeavesNothingToFrames) {
     return result.out;
   };
   for (const std::string pipeline : {" --pipeline rays", " --pipeline blocks"}) {
-    EXPECT_THAT(render(pipeline + " -i 1e6"),
-                testing::AllOf(HasSubstr("compiling kernels for"), HasSubstr(cache.path().string())));
+    EXPECT_THAT(render(pipeline + " -i 1e6"), testing::AllOf(HasSubstr("compiling kernels for"),
+                                                             HasSubstr(cache.path().string())));
     const nlohmann::json stats = nlohmann::json::parse(test::read_file(folder / "stats.json"));
     EXPECT_GT(stats.at("compile_ms").get<double>(), 0);
     EXPECT_GE(stats.at("setup_ms").get<double>(), 0);

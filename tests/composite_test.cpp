@@ -23,15 +23,17 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   void expect_composite(ImageSize size, uint spec_count, uint one_in, uint seed) {
     for (const ClosestHit closest : {ClosestHit::kScan, ClosestHit::kAtomicMin}) {
-      for (const uint per_ray : {0u, 1u}) expect_composite(size, spec_count, one_in, seed, closest, per_ray);
+      for (const uint per_ray : {0u, 1u})
+        expect_composite(size, spec_count, one_in, seed, closest, per_ray);
     }
   }
 
   /// In `one_in` results, one is a hit and one was not tested.
   void expect_composite(ImageSize size, uint spec_count, uint one_in, uint seed, ClosestHit how,
                         uint per_ray) {
-    SCOPED_TRACE(fmt::format("{} x {}, spec count {}, one in {}, seed {}, {}, per ray {}", size.width,
-                             size.height, spec_count, one_in, seed, to_string(how), per_ray));
+    SCOPED_TRACE(fmt::format("{} x {}, spec count {}, one in {}, seed {}, {}, per ray {}",
+                             size.width, size.height, spec_count, one_in, seed, to_string(how),
+                             per_ray));
     Random random(seed);
     FrameParams frame = case_frame(kDims, camera_cases(kDims)[0], size, 0.3f);
     frame.per_ray_speculation = per_ray;
@@ -39,10 +41,12 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     StageWorld world(device_, frame, 4 * 4 * 3, 8);
     fill_cache(world, voxels);
 
-    /* Rays: a random ascending part of the pixels. Some have left the volume behind their last block. */
+    /* Rays: a random ascending part of the pixels. Some have left the volume behind their last
+     * block. */
     const uint num_pixels = static_cast<uint>(size.num_pixels());
     std::vector<uint> active;
-    for (uint pixel = 0; pixel < num_pixels && (active.size() + 1) * spec_count <= num_pixels; ++pixel) {
+    for (uint pixel = 0; pixel < num_pixels && (active.size() + 1) * spec_count <= num_pixels;
+         ++pixel) {
       if (random() % 3 != 0) active.push_back(pixel);
     }
     std::vector<uint> states(num_pixels);
@@ -57,7 +61,8 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         PairHit result{ISO_NO_HIT, 0.0f};
         if (kind == 1 || pairs.back() == ISO_INVALID_ID) result.cell = ISO_NOT_TESTED;
         if (kind == 0 && pairs.back() != ISO_INVALID_ID) {
-          result = {random_cell(frame, pairs.back(), random), static_cast<float>(random() >> 8) * 0x1p-24f};
+          result = {random_cell(frame, pairs.back(), random),
+                    static_cast<float>(random() >> 8) * 0x1p-24f};
         }
         results.push_back(result);
       }
@@ -102,7 +107,8 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     std::vector<uint> got_next = world.rays.next_active_ray_ids.read();
     got_next.resize(next.size());
     EXPECT_EQ(first_difference(got_next, next), kNoDifference) << "of rays that go on";
-    EXPECT_EQ(first_difference(world.rays.ray_block_ids.read(), states), kNoDifference) << "of states";
+    EXPECT_EQ(first_difference(world.rays.ray_block_ids.read(), states), kNoDifference)
+        << "of states";
     const std::vector<HitRecord> hits = world.rays.hits.read();
     for (uint pixel = 0; pixel < num_pixels; ++pixel) {
       ASSERT_EQ(std::memcmp(&hits[pixel], &expected_hits[pixel], sizeof(HitRecord)), 0)

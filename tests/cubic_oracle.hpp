@@ -29,7 +29,8 @@ inline Polynomial power_basis(const Cubic &b) {
 struct FirstChange {
   bool found = false;
   Real s = 0;
-  Real margin = 0;  ///< smallest |f| at a cut: nearer to 0 than rounding, nobody can tell what happens there
+  Real margin =
+      0;  ///< smallest |f| at a cut: nearer to 0 than rounding, nobody can tell what happens there
 };
 
 inline FirstChange first_change_of(const Polynomial &f) {

@@ -1,4 +1,5 @@
-// Frames in bands of several levels of detail: where the borders are, and that every device draws what the twin draws.
+// Frames in bands of several levels of detail: where the borders are, and that every device draws
+// what the twin draws.
 
 #include "core/view/detail.hpp"
 #include "core/io/open_volume.hpp"
@@ -54,7 +55,8 @@ TEST(LevelFrames, BordersAreWhereVoxelsAreFarEnoughApart) {
   for (std::size_t level = 1; level < frames.size() && draws(frames[level]); ++level) {
     last = level;
     const double world = double{frames[level].begin_t} * frames[level].t_scale;
-    EXPECT_EQ(world, double{frames[level - 1].end_t} * frames[level - 1].t_scale) << "not the same border";
+    EXPECT_EQ(world, double{frames[level - 1].end_t} * frames[level - 1].t_scale)
+        << "not the same border";
     const double pixel = 2.0 * world / 50;  // a picture of 90 degrees is twice as high as it is far
     EXPECT_NEAR(1.5 * (1 << level) / pixel, 3.0, 1e-5);
   }
@@ -108,7 +110,8 @@ TEST(LevelFrames, OneLevelDrawsAllWhereTheVolumeReachesNoBorder) {
   EXPECT_EQ(drawn(near_camera, 100), 4) << "finer ones end before the volume begins";
 }
 
-/// Wherever the eye is and however the grid lies: each point of the volume is in the band of the level that is fine enough there.
+/// Wherever the eye is and however the grid lies: each point of the volume is in the band of the
+/// level that is fine enough there.
 TEST(LevelFrames, NoPointIsLeftOut) {
   std::mt19937 random(11);
   const auto number = [&](double low, double high) {
@@ -154,15 +157,17 @@ TEST(LevelFrames, NoPointIsLeftOut) {
 TEST(LevelFrames, RefusesWhatIsNoDistance) {
   const std::vector<VolumeInfo> levels = levels_of(test::grid_info({20, 20, 20}));
   for (const double bad : {-1.0, double(NAN), double(INFINITY)}) {
-    EXPECT_THAT([&] { make_level_frames(levels, orbit_cameras(levels[0], 1)[0], kSmall, 0.5f, bad); },
-                ThrowsMessage<Error>(HasSubstr("pixels between voxels")));
+    EXPECT_THAT(
+        [&] { make_level_frames(levels, orbit_cameras(levels[0], 1)[0], kSmall, 0.5f, bad); },
+        ThrowsMessage<Error>(HasSubstr("pixels between voxels")));
   }
 }
 
 // ---- pictures
 
 /// Hits at the border between two bands.
-std::size_t num_border_hits(const std::vector<HitRecord> &hits, const std::vector<FrameParams> &frames) {
+std::size_t num_border_hits(const std::vector<HitRecord> &hits,
+                            const std::vector<FrameParams> &frames) {
   std::size_t count = 0;
   for (const HitRecord &hit : hits) {
     for (const FrameParams &frame : frames)
@@ -171,7 +176,8 @@ std::size_t num_border_hits(const std::vector<HitRecord> &hits, const std::vecto
   return count;
 }
 
-/// Root mean square difference of a picture from the mean of 4 x 4 times as many rays at the finest level.
+/// Root mean square difference of a picture from the mean of 4 x 4 times as many rays at the finest
+/// level.
 double error_of(const Image8 &picture, const Image8 &fine) {
   double sum = 0;
   for (std::uint32_t y = 0; y < picture.height; ++y) {
@@ -182,7 +188,8 @@ double error_of(const Image8 &picture, const Image8 &fine) {
           const std::size_t at = 4 * x + i % 4 + std::size_t{fine.width} * (4 * y + i / 4);
           mean += fine.pixels[3 * at + channel] / 16.0;
         }
-        const double off = picture.pixels[3 * (x + std::size_t{picture.width} * y) + channel] - mean;
+        const double off =
+            picture.pixels[3 * (x + std::size_t{picture.width} * y) + channel] - mean;
         sum += off * off;
       }
     }
@@ -193,8 +200,8 @@ double error_of(const Image8 &picture, const Image8 &fine) {
 class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Each camera twice by one renderer. Returns the hits at borders.
-  std::size_t check(const CompressedVolume &volume, const std::vector<Camera> &cameras, float isovalue,
-                    const RendererOptions &options) {
+  std::size_t check(const CompressedVolume &volume, const std::vector<Camera> &cameras,
+                    float isovalue, const RendererOptions &options) {
     SCOPED_TRACE(fmt::format("{} pixels, {} slots", options.max_pixel_error, options.cache_slots));
     const Twin twin(volume, options.max_pixel_error);
     const std::vector<VolumeInfo> infos = level_infos(volume, true);
@@ -207,7 +214,8 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         expect_same_hits(renderer.hits(), expected, options.size.width);
         EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
       }
-      const auto frames = make_level_frames(infos, camera, options.size, isovalue, options.max_pixel_error);
+      const auto frames =
+          make_level_frames(infos, camera, options.size, isovalue, options.max_pixel_error);
       EXPECT_GT(std::ranges::count_if(frames, draws), 1) << "no border is tested";
       at_border += num_border_hits(expected, frames);
     }
@@ -217,7 +225,8 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   ocl::Device device_{GetParam()};
 };
-INSTANTIATE_TEST_SUITE_P(Devices, LevelsOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, LevelsOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 TEST_P(LevelsOnDevice, SmallFrameIsTheTwins) {
   const CompressedVolume volume = pyramid_of({9, 10, 11}, test::noise_field(8));
@@ -235,15 +244,17 @@ TEST_P(LevelsOnDevice, EveryKindOfVolumeAndPlace) {
     return all;
   };
   std::size_t at_border = 0;
-  for (const auto &field : {test::gyroid_field(11), test::noise_field(5), test::sphere_field(dims)}) {
+  for (const auto &field :
+       {test::gyroid_field(11), test::noise_field(5), test::sphere_field(dims)}) {
     for (const CompressOptions &options :
-         {CompressOptions{.rate = 8}, CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
+         {CompressOptions{.rate = 8},
+          CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
       const CompressedVolume volume = pyramid_of(dims, field, options);
       const std::uint64_t third =
           volume.payload_bits() / 8 / 3;  // the finest level in four buffers, the next in one
-      for (const auto &[place, largest_part] :
-           {std::pair{StreamPlace::kDevice, std::uint64_t{0}}, std::pair{StreamPlace::kDevice, third},
-            std::pair{StreamPlace::kHost, std::uint64_t{0}}}) {
+      for (const auto &[place, largest_part] : {std::pair{StreamPlace::kDevice, std::uint64_t{0}},
+                                                std::pair{StreamPlace::kDevice, third},
+                                                std::pair{StreamPlace::kHost, std::uint64_t{0}}}) {
         for (const double max_pixel_error : {2.5, 6.0}) {
           at_border += check(volume, cameras(volume), 0.4f,
                              {.size = kMedium,
@@ -257,7 +268,8 @@ TEST_P(LevelsOnDevice, EveryKindOfVolumeAndPlace) {
   EXPECT_GT(at_border, 10u);
 }
 
-/// Levels whose active blocks take up a corner of the volume, and borders before it, in it and behind it.
+/// Levels whose active blocks take up a corner of the volume, and borders before it, in it and
+/// behind it.
 TEST_P(LevelsOnDevice, ActiveBlocksFarFromBorders) {
   const glm::uvec3 dims(96, 80, 64);
   const auto ball = [](const glm::vec3 &centre, float inner, float outer) {
@@ -268,7 +280,8 @@ TEST_P(LevelsOnDevice, ActiveBlocksFarFromBorders) {
   cameras.push_back(camera_along({12, 11, 10}, {1, 0.8, 0.6}));  // from within
   for (const double max_pixel_error : {1.2, 2.0, 3.0})
     check(volume, cameras, 0.5f, {.size = kMedium, .max_pixel_error = max_pixel_error});
-  // Coarser levels that are inside where this one is outside: every ray that comes to their border hits there.
+  // Coarser levels that are inside where this one is outside: every ray that comes to their border
+  // hits there.
   volume.coarser = pyramid_of(dims, ball({20, 20, 20}, 0, 1)).coarser;
   EXPECT_GT(check(volume, cameras, 0.5f, {.size = kMedium, .max_pixel_error = 1.2}), 500u);
 }
@@ -305,7 +318,8 @@ TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
                     [&](const PassStats &) { return ++pass < last_pass; });
     for (const double max_pixel_error :
          last_pass % 2 ? std::array{3.0, 0.0, 30.0} : std::array{0.0, 30.0, 3.0}) {
-      renderer.set_max_pixel_error(max_pixel_error);  // several levels, the finest or a coarse one alone
+      renderer.set_max_pixel_error(
+          max_pixel_error);  // several levels, the finest or a coarse one alone
       renderer.render(cameras[0], 0.4f);
       expect_same_hits(renderer.hits(), twins.at(max_pixel_error).render(cameras[0], kMedium, 0.4f),
                        kMedium.width);
@@ -371,9 +385,11 @@ TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
   EXPECT_LT(3 * num_decoded(2.0), num_decoded(0));
 }
 
-/// What levels of detail are for where voxels are smaller than pixels: fewer blocks, and a better picture with the rays that they pay for.
+/// What levels of detail are for where voxels are smaller than pixels: fewer blocks, and a better
+/// picture with the rays that they pay for.
 TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
-  const auto reader = open_volume(std::string(ISOWAVE_TEST_DATA) + "/nucleon_41x41x41_uint8.raw.gz");
+  const auto reader =
+      open_volume(std::string(ISOWAVE_TEST_DATA) + "/nucleon_41x41x41_uint8.raw.gz");
   const CompressedVolume volume = compress(*reader, CompressOptions{.rate = 16, .levels = 0});
   const Camera camera = orbit_cameras(volume.info, 1)[0];
   struct Picture {
@@ -393,7 +409,8 @@ TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
   const double one_error = error_of(one.image, fine), four_error = error_of(four.image, fine);
   EXPECT_LT(four.decoded, one.decoded);
   EXPECT_LT(four_error, one_error);
-  EXPECT_LT(error_of(draw({16, 12, 4}, 0).image, fine), 1.0) << "the reference itself, but for rounding";
+  EXPECT_LT(error_of(draw({16, 12, 4}, 0).image, fine), 1.0)
+      << "the reference itself, but for rounding";
   RecordProperty("one_ray", fmt::format("{:.2f}, {} blocks", one_error, one.decoded));
   RecordProperty("four_rays", fmt::format("{:.2f}, {} blocks", four_error, four.decoded));
 }
@@ -406,7 +423,8 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
               ThrowsMessage<Error>(AllOf(HasSubstr("no levels of detail"), HasSubstr("--levels"))));
   EXPECT_THAT(
       [&] {
-        Renderer(device_, volume, {.size = kSmall, .pipeline = PipelineKind::kBlocks, .max_pixel_error = 1});
+        Renderer(device_, volume,
+                 {.size = kSmall, .pipeline = PipelineKind::kBlocks, .max_pixel_error = 1});
       },
       ThrowsMessage<Error>(HasSubstr("pipeline blocks")));
   EXPECT_THROW(Renderer(device_, volume, {.size = kSmall, .max_pixel_error = -1}), Error);
@@ -414,12 +432,15 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
 
 // ---- what it is for
 
-/// Not so of every volume (README "Levels of detail"): where a pixel is covered in part, one ray is as wrong at any level.
+/// Not so of every volume (README "Levels of detail"): where a pixel is covered in part, one ray is
+/// as wrong at any level.
 TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
   const glm::uvec3 dims(128, 128, 128);
-  const CompressedVolume volume = pyramid_of(dims, [noise = test::noise_field(5)](const glm::dvec3 &p) {
-    return 40 - glm::length(p - 63.5) + (noise(p) > 0.99 ? 40 : 0);  // a ball, and a voxel in 200 is wrong
-  });
+  const CompressedVolume volume =
+      pyramid_of(dims, [noise = test::noise_field(5)](const glm::dvec3 &p) {
+        return 40 - glm::length(p - 63.5) +
+               (noise(p) > 0.99 ? 40 : 0);  // a ball, and a voxel in 200 is wrong
+      });
   const ImageSize size{48, 32}, fine_size{192, 128};
   const std::array<Twin, 2> twins{Twin(volume), Twin(volume, 0.5)};
   for (const Camera &camera : orbit_cameras(volume.info, 3)) {
@@ -429,7 +450,8 @@ TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
                           twins[max_pixel_error > 0].render(camera, image, 0.0f));
     };
     const Image8 fine = picture(fine_size, 0);
-    const double with = error_of(picture(size, 0.5), fine), without = error_of(picture(size, 0), fine);
+    const double with = error_of(picture(size, 0.5), fine),
+                 without = error_of(picture(size, 0), fine);
     EXPECT_LT(with, without);
     RecordProperty("error_with_levels", fmt::format("{:.2f}", with));
     RecordProperty("error_without", fmt::format("{:.2f}", without));

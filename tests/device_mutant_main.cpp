@@ -1,5 +1,5 @@
-// A program whose kernels have one planted bug (mutants.cmake). Arguments: the pipelines that have it. Succeeds if the watertight
-// test finds leaks in each of them.
+// A program whose kernels have one planted bug (mutants.cmake). Arguments: the pipelines that have
+// it. Succeeds if the watertight test finds leaks in each of them.
 
 #include <fmt/format.h>
 
@@ -15,7 +15,8 @@ int main(int argc, char **argv) {
     const PipelineKind pipeline =
         std::string_view(argv[i]) == "blocks" ? PipelineKind::kBlocks : PipelineKind::kRays;
     std::uint64_t leaks = 0;
-    for (const WatertightResult &result : run_watertight_on(device, pipeline, 100000, 20231, kDefaultSolver))
+    for (const WatertightResult &result :
+         run_watertight_on(device, pipeline, 100000, 20231, kDefaultSolver))
       leaks += result.leaks;
     fmt::print("pipeline {}: {} leaks\n", argv[i], leaks);
     all_leak = all_leak && leaks > 0;

@@ -1,4 +1,5 @@
-// The compressed volume in one buffer, in several, and on the host behind a window: decoders see the same bits.
+// The compressed volume in one buffer, in several, and on the host behind a window: decoders see
+// the same bits.
 
 #include "core/stream/device_stream.hpp"
 
@@ -25,9 +26,11 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 constexpr std::uint32_t kOddBits[] = {9, 37, 64, 100, 777, 2048};
-constexpr std::int32_t kOddExponents[] = {-20, -3, 1};  ///< of volumes whose blocks have lengths of their own
+constexpr std::int32_t kOddExponents[] = {
+    -20, -3, 1};  ///< of volumes whose blocks have lengths of their own
 
-/// 6^3 blocks, partial ones too: 2, 3 and 4 parts can be had even where only 32 blocks are whole words.
+/// 6^3 blocks, partial ones too: 2, 3 and 4 parts can be had even where only 32 blocks are whole
+/// words.
 constexpr glm::uvec3 kDims(23, 22, 21);
 
 CompressedVolume volume_of(std::uint32_t bits_per_block, const glm::uvec3 &dims = kDims) {
@@ -129,16 +132,18 @@ TEST(ReadWords, AnyBitOfWordsAndFiles) {
       test::write_file(folder / "bits", bytes);
       shifted.file = std::make_shared<InputFile>(folder / "bits");
       shifted.file_first_bit = first_bit;
-      for (const CompressedVolume *source : {&volume, static_cast<const CompressedVolume *>(&shifted)}) {
+      for (const CompressedVolume *source :
+           {&volume, static_cast<const CompressedVolume *>(&shifted)}) {
         EXPECT_EQ(source->word_count(), volume.words.size());
-        for (const std::uint64_t bit :
-             {std::uint64_t{0}, std::uint64_t{bits}, std::uint64_t{13} * bits, end - bits, end - 1, end}) {
+        for (const std::uint64_t bit : {std::uint64_t{0}, std::uint64_t{bits},
+                                        std::uint64_t{13} * bits, end - bits, end - 1, end}) {
           std::vector<uint> got(7, 0xDEADBEEFu), expected(7);
           for (std::size_t i = 0; i < got.size(); ++i) {
             expected[i] = bit + 32 * i < end ? word_at(volume.words, bit + 32 * i, end) : 0;
           }
           source->read_words(bit, got);
-          ASSERT_EQ(got, expected) << "bit " << bit << " of " << end << ", file from bit " << first_bit;
+          ASSERT_EQ(got, expected)
+              << "bit " << bit << " of " << end << ", file from bit " << first_bit;
         }
       }
     }
@@ -173,7 +178,8 @@ class DeviceStreamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   void expect_decoded(const CompressedVolume &volume, const DeviceStream &stream) {
-    const std::vector<float> got = decode(volume, stream), expected = decode_blocks_with_libzfp(volume);
+    const std::vector<float> got = decode(volume, stream),
+                             expected = decode_blocks_with_libzfp(volume);
     ASSERT_EQ(got.size(), expected.size());
     EXPECT_EQ(std::memcmp(got.data(), expected.data(), got.size() * sizeof(float)), 0);
   }
@@ -211,8 +217,10 @@ TEST_P(DeviceStreamOnDevice, SmallWholeNumbersAreRounded) {
   expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
 }
 
-/// The index of a volume whose blocks have other lengths, by as much as `most`, which add up to the same.
-std::vector<std::uint32_t> lying_index(const CompressedVolume &volume, std::uint32_t most, uint seed) {
+/// The index of a volume whose blocks have other lengths, by as much as `most`, which add up to the
+/// same.
+std::vector<std::uint32_t> lying_index(const CompressedVolume &volume, std::uint32_t most,
+                                       uint seed) {
   std::vector<std::uint32_t> lengths;
   for (uint b = 0; b < volume.block_count(); ++b) lengths.push_back(volume.block_bits(b));
   Random random(seed);
@@ -228,7 +236,8 @@ std::vector<std::uint32_t> lying_index(const CompressedVolume &volume, std::uint
   return index.finish();
 }
 
-/// A block ends where its length says, however it lies: the same wrong values everywhere, and nothing outside the stream is read.
+/// A block ends where its length says, however it lies: the same wrong values everywhere, and
+/// nothing outside the stream is read.
 TEST_P(DeviceStreamOnDevice, SmallLyingIndexDecodesToTheSameBits) {
   const CompressedVolume truth = indexed_volume(-4, {9, 10, 11});
   const auto num_blocks = static_cast<uint>(truth.block_count());
@@ -239,8 +248,8 @@ TEST_P(DeviceStreamOnDevice, SmallLyingIndexDecodesToTheSameBits) {
   }
   BlockIndexBuilder short_blocks;  // all but the last are too short for an exponent
   for (uint b = 0; b + 1 < num_blocks; ++b) short_blocks.add(1 + b % 9);
-  const std::uint64_t rest =
-      std::min<std::uint64_t>(truth.payload_bits() - 5 * std::uint64_t{num_blocks}, ISO_MAX_BLOCK_BITS);
+  const std::uint64_t rest = std::min<std::uint64_t>(
+      truth.payload_bits() - 5 * std::uint64_t{num_blocks}, ISO_MAX_BLOCK_BITS);
   short_blocks.add(static_cast<uint>(rest));
   volumes.push_back(truth);
   volumes.back().index = short_blocks.finish();
@@ -255,12 +264,14 @@ TEST_P(DeviceStreamOnDevice, SmallLyingIndexDecodesToTheSameBits) {
       float values[64];
       zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
                        volume.error_bound.min_exponent, values);
-      ASSERT_EQ(std::memcmp(values, &expected[64 * std::size_t{b}], sizeof(values)), 0) << "block " << b;
+      ASSERT_EQ(std::memcmp(values, &expected[64 * std::size_t{b}], sizeof(values)), 0)
+          << "block " << b;
     }
   }
 }
 
-/// Where the payload is too large to be copied, blocks are read from the file, wherever it is cut meanwhile.
+/// Where the payload is too large to be copied, blocks are read from the file, wherever it is cut
+/// meanwhile.
 TEST_P(DeviceStreamOnDevice, SmallFilesThatBecomeShorterAreOneLine) {
   const test::TemporaryFolder folder;
   const auto path = folder / "a.zfp";
@@ -284,7 +295,8 @@ TEST_P(DeviceStreamOnDevice, SmallFilesThatBecomeShorterAreOneLine) {
           EXPECT_THAT([&] { decode(volume, stream); },
                       ThrowsMessage<Error>(HasSubstr("truncated while it was in use")));
         }
-        EXPECT_THAT([&] { DeviceStream(device_, volume); }, ThrowsMessage<Error>(HasSubstr("truncated")));
+        EXPECT_THAT([&] { DeviceStream(device_, volume); },
+                    ThrowsMessage<Error>(HasSubstr("truncated")));
         EXPECT_THAT([&] { DeviceStream(device_, volume, OnHost{8}); },
                     ThrowsMessage<Error>(HasSubstr("truncated")));
       }
@@ -380,7 +392,8 @@ TEST_P(DeviceStreamOnDevice, SmallMemoryIsBooked) {
   {
     const DeviceStream stream(device_, volume, limit_for(volume, 3));
     EXPECT_EQ(device_.ledger().current(), (volume.word_count() + 2 * (2 + 2)) * sizeof(uint))
-        << "behind two of three parts, a block's 64 bits from the last bit on, and two words that decoders "
+        << "behind two of three parts, a block's 64 bits from the last bit on, and two words that "
+           "decoders "
            "read";
   }
   EXPECT_EQ(device_.ledger().current(), 0u);

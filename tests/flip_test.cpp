@@ -30,7 +30,8 @@ Rgb stripes(int x, int y) {
   return {(5 * x + 3 * y) % 256, (x / 8 + y / 8) % 2 * 200 + 20, x * y % 256};
 }
 
-/// Means by flip-evaluator 1.7 (PyPI), which computes in float32, at its own and at 30 pixels per degree.
+/// Means by flip-evaluator 1.7 (PyPI), which computes in float32, at its own and at 30 pixels per
+/// degree.
 TEST(Flip, IsWhatItsAuthorsProgramSays) {
   struct Case {
     const char *name;
@@ -38,7 +39,8 @@ TEST(Flip, IsWhatItsAuthorsProgramSays) {
     double mean, mean_at_30;
   };
   const std::array cases{
-      Case{"shifted", [](int x, int y) { return stripes(std::max(x - 1, 0), y); }, 0.3573164, 0.4245500},
+      Case{"shifted", [](int x, int y) { return stripes(std::max(x - 1, 0), y); }, 0.3573164,
+           0.4245500},
       Case{"inverted",
            [](int x, int y) {
              const Rgb c = stripes(x, y);
@@ -74,7 +76,8 @@ TEST(Flip, IsWhatItsAuthorsProgramSays) {
 
 TEST(Flip, NothingIsDifferent) {
   EXPECT_EQ(Flip(image_of(stripes)).error(image_of(stripes)), 0.0);
-  EXPECT_EQ(Flip(image_of(stripes)).error(image_of(stripes, 4)), 0.0) << "a fourth channel is left out";
+  EXPECT_EQ(Flip(image_of(stripes)).error(image_of(stripes, 4)), 0.0)
+      << "a fourth channel is left out";
   EXPECT_EQ(Flip(Image8{1, 1, 3, {1, 2, 3}}).error({1, 1, 3, {1, 2, 3}}), 0.0);
 }
 

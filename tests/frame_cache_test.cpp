@@ -1,5 +1,6 @@
-// The block cache over frames, as whoever moves a camera meets it: which views need no decoding when they come again, in every
-// pipeline. (tests/block_cache_test.cpp has the order of eviction, slot by slot.)
+// The block cache over frames, as whoever moves a camera meets it: which views need no decoding
+// when they come again, in every pipeline. (tests/block_cache_test.cpp has the order of eviction,
+// slot by slot.)
 
 #include <gtest/gtest.h>
 
@@ -41,8 +42,8 @@ std::vector<Camera> close_ups(const glm::dvec3 &dims) {
       glm::dvec3 out(0.0);
       out[axis] = side;
       const glm::dvec3 eye = centre + out * (0.5 * dims[axis] + 4.0);
-      cameras.push_back(
-          test::camera_along(eye, -out, axis == 1 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0), 40.0));
+      cameras.push_back(test::camera_along(
+          eye, -out, axis == 1 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0), 40.0));
     }
   }
   return cameras;
@@ -50,7 +51,8 @@ std::vector<Camera> close_ups(const glm::dvec3 &dims) {
 
 class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
-  /// How many blocks a view reads at most: the dual grids of all that its rays look into, which pipeline `blocks` asks for.
+  /// How many blocks a view reads at most: the dual grids of all that its rays look into, which
+  /// pipeline `blocks` asks for.
   std::vector<std::uint32_t> blocks_read(const TestVolume &volume, ImageSize size,
                                          const std::vector<Camera> &cameras) {
     Renderer ample(device_, volume.compressed,
@@ -68,15 +70,17 @@ class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
 
   Renderer renderer_of(const TestVolume &volume, ImageSize size, std::uint32_t slots,
                        std::uint32_t max_speculation = ISO_MAX_SPECULATION) {
-    return {device_, volume.compressed,
-            GetParam().with({.size = size, .cache_slots = slots, .max_speculation = max_speculation})};
+    return {
+        device_, volume.compressed,
+        GetParam().with({.size = size, .cache_slots = slots, .max_speculation = max_speculation})};
   }
 
   ocl::Device device_{GetParam().device};
 };
 
-/// Views in a random order. If the cache can hold what all views since a view was drawn last have read, it decodes nothing.
-/// Without speculation, since a view needs the same blocks then, whatever is cached.
+/// Views in a random order. If the cache can hold what all views since a view was drawn last have
+/// read, it decodes nothing. Without speculation, since a view needs the same blocks then, whatever
+/// is cached.
 TEST_P(FrameCacheOnDevice, ViewsThatFitAreDecodedOnce) {
   const glm::uvec3 dims(60, 62, 58);
   const ImageSize size{40, 32};
@@ -92,17 +96,20 @@ TEST_P(FrameCacheOnDevice, ViewsThatFitAreDecodedOnce) {
     std::size_t num_fitting = 0, num_decoding = 0;
     for (int frame = 0; frame < 60; ++frame) {
       // Often one of the last views, as when somebody looks to and fro.
-      const std::size_t view = drawn.size() > 2 && random() % 2 != 0 ? drawn[drawn.size() - 1 - random() % 3]
-                                                                     : random() % cameras.size();
+      const std::size_t view = drawn.size() > 2 && random() % 2 != 0
+                                   ? drawn[drawn.size() - 1 - random() % 3]
+                                   : random() % cameras.size();
       SCOPED_TRACE(fmt::format("{} slots, frame {}, view {}", slots, frame, view));
       std::set<std::size_t> since{view};
       const auto last = std::find(drawn.rbegin(), drawn.rend(), view);
       for (auto it = drawn.rbegin(); it != last; ++it) since.insert(*it);
-      const std::uint32_t needed = std::accumulate(
-          since.begin(), since.end(), 0u, [&](std::uint32_t sum, std::size_t v) { return sum + needs[v]; });
+      const std::uint32_t needed =
+          std::accumulate(since.begin(), since.end(), 0u,
+                          [&](std::uint32_t sum, std::size_t v) { return sum + needs[v]; });
       const std::uint32_t decoded = num_decoded(renderer.render(cameras[view], kIsovalue));
       if (last != drawn.rend() && needed <= slots) {
-        EXPECT_EQ(decoded, 0u) << "all views since, this one included, read " << needed << " blocks";
+        EXPECT_EQ(decoded, 0u) << "all views since, this one included, read " << needed
+                               << " blocks";
         ++num_fitting;
       }
       num_decoding += decoded != 0;
@@ -113,8 +120,8 @@ TEST_P(FrameCacheOnDevice, ViewsThatFitAreDecodedOnce) {
   }
 }
 
-/// A view that is drawn twice in a row is not decoded twice, unless it needs more blocks than there are slots. Many views, so that
-/// the table is rebuilt now and then, which must lose nothing.
+/// A view that is drawn twice in a row is not decoded twice, unless it needs more blocks than there
+/// are slots. Many views, so that the table is rebuilt now and then, which must lose nothing.
 TEST_P(FrameCacheOnDevice, ViewsThatComeAgainAtOnceAreDecodedOnce) {
   const glm::uvec3 dims(60, 62, 58);
   const ImageSize size{56, 40};
@@ -137,8 +144,9 @@ TEST_P(FrameCacheOnDevice, ViewsThatComeAgainAtOnceAreDecodedOnce) {
   EXPECT_GT(num_decoding, 20) << "else nothing was ever evicted";
 }
 
-/// A view of more blocks than there are slots, again and again. Where a few are missing, the others stay, though speculation has
-/// asked for more since than there are slots; where many are, the cache is emptied, and no frame is worse off than the first.
+/// A view of more blocks than there are slots, again and again. Where a few are missing, the others
+/// stay, though speculation has asked for more since than there are slots; where many are, the
+/// cache is emptied, and no frame is worse off than the first.
 TEST_P(FrameCacheOnDevice, ViewsThatDoNotFitAreNoWorseOffThanCold) {
   const glm::uvec3 dims(96, 90, 84);
   const ImageSize size{96, 72};
@@ -147,7 +155,8 @@ TEST_P(FrameCacheOnDevice, ViewsThatDoNotFitAreNoWorseOffThanCold) {
   const auto expected = test::twin_hits(volume, camera, size, kIsovalue);
   std::uint32_t needed = 0;
   {
-    Renderer ample = renderer_of(volume, size, static_cast<std::uint32_t>(volume.compressed.block_count()));
+    Renderer ample =
+        renderer_of(volume, size, static_cast<std::uint32_t>(volume.compressed.block_count()));
     needed = num_decoded(ample.render(camera, kIsovalue));
   }
   int num_kept = 0, num_emptied = 0;

@@ -39,7 +39,8 @@ inline std::vector<float> sample(const glm::uvec3 &dims, const VoxelFunction &fi
   voxels.reserve(std::size_t{dims.x} * dims.y * dims.z);
   for (std::uint32_t z = 0; z < dims.z; ++z) {
     for (std::uint32_t y = 0; y < dims.y; ++y) {
-      for (std::uint32_t x = 0; x < dims.x; ++x) voxels.push_back(static_cast<float>(field({x, y, z})));
+      for (std::uint32_t x = 0; x < dims.x; ++x)
+        voxels.push_back(static_cast<float>(field({x, y, z})));
     }
   }
   return voxels;
@@ -48,11 +49,13 @@ inline std::vector<float> sample(const glm::uvec3 &dims, const VoxelFunction &fi
 /// A compressed volume and what it decodes to.
 struct TestVolume {
   explicit TestVolume(VolumeReader &reader, std::uint32_t rate)
-      : compressed(compress(reader, CompressOptions{.rate = rate})), voxels(decode_with_libzfp(compressed)) {}
+      : compressed(compress(reader, CompressOptions{.rate = rate})),
+        voxels(decode_with_libzfp(compressed)) {}
   /// Blocks as long as the goal demands. info.type: an integer type, where it is exact.
   TestVolume(const VolumeInfo &info, const std::vector<float> &source, const ErrorGoal &goal) {
     ArrayReader reader(info, source);
-    compressed = compress(reader, CompressOptions{.error_bound = choose_error_bound(reader, goal, {})});
+    compressed =
+        compress(reader, CompressOptions{.error_bound = choose_error_bound(reader, goal, {})});
     voxels = decode_with_libzfp(compressed);
   }
   TestVolume(const VolumeInfo &info, const std::vector<float> &source, std::uint32_t rate)
@@ -72,8 +75,8 @@ struct TestVolume {
   TestVolume(ArrayReader &&reader, std::uint32_t rate) : TestVolume(reader, rate) {}
 };
 
-inline std::vector<HitRecord> twin_hits(const TestVolume &volume, const Camera &camera, ImageSize size,
-                                        float isovalue) {
+inline std::vector<HitRecord> twin_hits(const TestVolume &volume, const Camera &camera,
+                                        ImageSize size, float isovalue) {
   return render_scalar(make_frame_params(volume.info(), camera, size, isovalue), volume.voxels);
 }
 
@@ -84,13 +87,13 @@ inline Camera camera_along(const glm::dvec3 &eye, const glm::dvec3 &direction,
 }
 
 inline std::uint64_t num_hits(const std::vector<HitRecord> &hits) {
-  return std::uint64_t(
-      std::count_if(hits.begin(), hits.end(), [](const HitRecord &hit) { return std::isfinite(hit.t); }));
+  return std::uint64_t(std::count_if(hits.begin(), hits.end(),
+                                     [](const HitRecord &hit) { return std::isfinite(hit.t); }));
 }
 
 /// Every bit of both buffers must be the same.
-inline void expect_same_hits(const std::vector<HitRecord> &got, const std::vector<HitRecord> &expected,
-                             std::uint32_t width) {
+inline void expect_same_hits(const std::vector<HitRecord> &got,
+                             const std::vector<HitRecord> &expected, std::uint32_t width) {
   ASSERT_EQ(got.size(), expected.size());
   if (std::memcmp(got.data(), expected.data(), got.size() * sizeof(HitRecord)) == 0) return;
   std::size_t num_differing = 0, first = 0;
@@ -100,12 +103,12 @@ inline void expect_same_hits(const std::vector<HitRecord> &got, const std::vecto
     first = i;
   }
   const auto text = [](const HitRecord &h) {
-    return fmt::format("t {} block {} cell {} at ({:a} {:a} {:a}) gradient ({:a} {:a} {:a})", h.t, h.block_id,
-                       h.cell, h.x, h.y, h.z, h.grad_x, h.grad_y, h.grad_z);
+    return fmt::format("t {} block {} cell {} at ({:a} {:a} {:a}) gradient ({:a} {:a} {:a})", h.t,
+                       h.block_id, h.cell, h.x, h.y, h.z, h.grad_x, h.grad_y, h.grad_z);
   };
-  ADD_FAILURE() << num_differing << " of " << got.size() << " pixels differ; the first is (" << first % width
-                << "," << first / width << "): " << text(got[first]) << ", expected "
-                << text(expected[first]);
+  ADD_FAILURE() << num_differing << " of " << got.size() << " pixels differ; the first is ("
+                << first % width << "," << first / width << "): " << text(got[first])
+                << ", expected " << text(expected[first]);
 }
 
 // Fields. Values are of the order of 1 unless they say otherwise.

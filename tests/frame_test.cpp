@@ -31,8 +31,10 @@ struct PixelRange {
 /// Of the pixels whose rays meet the active box.
 PixelRange seen_range(const FrameParams &frame) {
   const LastPlanes last = last_planes(&frame);
-  const LastPlanes begin = {4 * frame.active_begin_x, 4 * frame.active_begin_y, 4 * frame.active_begin_z};
-  const LastPlanes end = {std::min(4 * frame.active_end_x, last.x), std::min(4 * frame.active_end_y, last.y),
+  const LastPlanes begin = {4 * frame.active_begin_x, 4 * frame.active_begin_y,
+                            4 * frame.active_begin_z};
+  const LastPlanes end = {std::min(4 * frame.active_end_x, last.x),
+                          std::min(4 * frame.active_end_y, last.y),
                           std::min(4 * frame.active_end_z, last.z)};
   PixelRange seen;
   for (uint pixel = 0; pixel < frame.width * frame.height; ++pixel) {
@@ -86,7 +88,8 @@ TEST(Frame, ScreenBoxHasEveryPixelThatMeetsTheActiveBox) {
   }
 }
 
-/// One block, from so far away that rounding turns rays by several pixels: more than the border of one that is there anyway.
+/// One block, from so far away that rounding turns rays by several pixels: more than the border of
+/// one that is there anyway.
 TEST(Frame, ScreenBoxAllowsForRoundedDirections) {
   VolumeInfo info;
   info.dims = glm::uvec3(64);
@@ -101,7 +104,8 @@ TEST(Frame, ScreenBoxAllowsForRoundedDirections) {
   }
 }
 
-/// Two pixels about the box's corners (one, and up to a whole one), a tenth of one for rounded directions, and whole tiles.
+/// Two pixels about the box's corners (one, and up to a whole one), a tenth of one for rounded
+/// directions, and whole tiles.
 TEST(Frame, ScreenBoxIsTight) {
   VolumeInfo info;  // of spacing 1: the camera's basis is orthonormal in index space, too
   info.dims = glm::uvec3(64);
@@ -109,7 +113,8 @@ TEST(Frame, ScreenBoxIsTight) {
   for (const Camera &camera : orbit_cameras(info, 7)) {
     FrameParams frame = make_frame_params(info, camera, {320, 180}, 0);
     const glm::dvec3 fwd = glm::normalize(camera.at - camera.eye);
-    const glm::dvec3 right = glm::normalize(glm::cross(fwd, camera.up)), up = glm::cross(right, fwd);
+    const glm::dvec3 right = glm::normalize(glm::cross(fwd, camera.up)),
+                     up = glm::cross(right, fwd);
     for (int i = 0; i < 20; ++i) {
       choose_active_box(frame, random);
       set_screen_box(frame);
@@ -119,7 +124,8 @@ TEST(Frame, ScreenBoxIsTight) {
                             (corner & 2) != 0 ? 4 * frame.active_end_y : 4 * frame.active_begin_y,
                             (corner & 4) != 0 ? 4 * frame.active_end_z : 4 * frame.active_begin_z);
         const glm::dvec3 to = glm::min(at, 63.0) - camera.eye;
-        const glm::dvec2 uv = glm::dvec2(glm::dot(to, right), -glm::dot(to, up)) / glm::dot(to, fwd);
+        const glm::dvec2 uv =
+            glm::dvec2(glm::dot(to, right), -glm::dot(to, up)) / glm::dot(to, fwd);
         const glm::dvec2 pixel = 0.5 * (uv / double{frame.pixel_scale} + glm::dvec2(319, 179));
         least = glm::min(least, pixel);
         most = glm::max(most, pixel);

@@ -48,9 +48,8 @@ TEST(Generate, Names) {
 
 TEST(Generate, ClosedForms) {
   const glm::uvec3 dims(9, 7, 5);
-  const auto at = [&](const std::vector<float> &voxels, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    return voxels[(z * dims.y + y) * dims.x + x];
-  };
+  const auto at = [&](const std::vector<float> &voxels, std::uint32_t x, std::uint32_t y,
+                      std::uint32_t z) { return voxels[(z * dims.y + y) * dims.x + x]; };
   const auto sphere = generate(make_options(Field::kSphere, dims, VoxelType::kFloat32));
   EXPECT_EQ(at(sphere, 4, 3, 2), 1.0f);
   EXPECT_FLOAT_EQ(at(sphere, 8, 3, 2), float(1 - 1 / std::sqrt(3.0)));
@@ -92,7 +91,8 @@ TEST(Generate, IntegersCoverTheirRangeRounded) {
     EXPECT_EQ(voxels.back(), float(max));
     for (std::size_t i = 0; i < voxels.size(); ++i) {
       // half a step of rounding, and the float32 rounding of both values
-      ASSERT_NEAR(voxels[i], exact[i] * max, 0.5 + max * 0x1p-23) << to_string(type) << " voxel " << i;
+      ASSERT_NEAR(voxels[i], exact[i] * max, 0.5 + max * 0x1p-23)
+          << to_string(type) << " voxel " << i;
     }
   }
 }
@@ -130,7 +130,9 @@ TEST(Generate, MixingLayerMixesOnlyInTheMiddle) {
   std::size_t crossings = 0;  // sign changes along y; a mere wavy surface has one per column
   for (std::uint32_t z = 0; z < dims.z; ++z) {
     for (std::uint32_t x = 0; x < dims.x; ++x) {
-      const auto at = [&](std::uint32_t y) { return voxels[(z * dims.y + y) * dims.x + x] >= 0.5f; };
+      const auto at = [&](std::uint32_t y) {
+        return voxels[(z * dims.y + y) * dims.x + x] >= 0.5f;
+      };
       EXPECT_FALSE(at(0));
       EXPECT_TRUE(at(95));
       for (std::uint32_t y = 1; y < dims.y; ++y) crossings += at(y) != at(y - 1);
@@ -157,7 +159,8 @@ TEST(Generate, ShellIsTheSameSmoothSurfaceAtAnySize) {
       for (std::uint32_t y = 0; y < edge; ++y) {
         for (std::uint32_t x = 0; x < edge; ++x) {
           const double d = surface(glm::dvec3(x, y, z) * voxel - 1.0);
-          // 128 is the surface: beside it the step rises by 127 * 1.5 / 0.12 per unit, which 8 bits can tell.
+          // 128 is the surface: beside it the step rises by 127 * 1.5 / 0.12 per unit, which 8 bits
+          // can tell.
           const float value = at(x, y, z);
           if (std::abs(d) > 0.001) {
             ASSERT_EQ(value >= 128.0f, d > 0) << x << " " << y << " " << z;
@@ -165,13 +168,15 @@ TEST(Generate, ShellIsTheSameSmoothSurfaceAtAnySize) {
           if (std::abs(d) > 0.121) {
             ASSERT_EQ(value, d > 0 ? 255.0f : 1.0f);
           }
-          const bool border = x == 0 || y == 0 || z == 0 || x + 1 == edge || y + 1 == edge || z + 1 == edge;
+          const bool border =
+              x == 0 || y == 0 || z == 0 || x + 1 == edge || y + 1 == edge || z + 1 == edge;
           ASSERT_FALSE(border && value >= 128.0f) << "closed: no surface at the border";
           if (x > 0) crossings += (value >= 128.0f) != (at(x - 1, y, z) >= 128.0f);
         }
       }
     }
-    // Convex enough that a line along x crosses twice or never: twice the area of the silhouette, pi * (0.4 edges)^2 bent.
+    // Convex enough that a line along x crosses twice or never: twice the area of the silhouette,
+    // pi * (0.4 edges)^2 bent.
     EXPECT_NEAR(double(crossings) / (edge * edge), 2 * 3.14159265 * 0.16, 0.1);
   }
 }

@@ -1,5 +1,5 @@
-// kernels_cl/portable/grid_dda.h: crossings and positions against long double, walks of one size against those of
-// another.
+// kernels_cl/portable/grid_dda.h: crossings and positions against long double, walks of one size
+// against those of another.
 
 #include "kernels_cl/portable/grid_dda.h"
 
@@ -42,14 +42,16 @@ class RandomAxes {
     return make_ray_axis(o, d);
   }
   int plane() { return static_cast<int>(random_() % 4096); }
-  float uniform(float low, float high) { return std::uniform_real_distribution<float>(low, high)(random_); }
+  float uniform(float low, float high) {
+    return std::uniform_real_distribution<float>(low, high)(random_);
+  }
 
  private:
   Random random_;
 };
 
-/// Relative error, in units of 2^-48: 1/d 1 | e inv_d.hi rounded 1 | its sum with s inv_d.lo rounded 2 | l
-/// rounded 3 | e inv_d.lo left out 1. In all 2^-45.
+/// Relative error, in units of 2^-48: 1/d 1 | e inv_d.hi rounded 1 | its sum with s inv_d.lo
+/// rounded 2 | l rounded 3 | e inv_d.lo left out 1. In all 2^-45.
 TEST(GridDda, PlaneCrossingsHave45Bits) {
   RandomAxes random(1);
   Real largest = 0;
@@ -60,7 +62,8 @@ TEST(GridDda, PlaneCrossingsHave45Bits) {
     const TwoFloat t = plane_t(a, static_cast<float>(plane));
     ASSERT_LE(std::abs(value_of(t) - exact), 0x1p-45L * std::abs(exact))
         << "o " << a.o << ", d " << a.d << ", plane " << plane << ", seed 1";
-    ASSERT_EQ(t.hi + t.lo, t.hi) << "not normalised: o " << a.o << ", d " << a.d << ", plane " << plane;
+    ASSERT_EQ(t.hi + t.lo, t.hi) << "not normalised: o " << a.o << ", d " << a.d << ", plane "
+                                 << plane;
     if (exact != 0) largest = std::max(largest, std::abs(value_of(t) - exact) / std::abs(exact));
   }
   RecordProperty("largest_error_2^-48", std::to_string(static_cast<double>(largest / 0x1p-48L)));
@@ -79,7 +82,8 @@ TEST(GridDda, PlaneCrossingsAscend) {
   }
 }
 
-/// u = 2^-24. Rounding of the result: u |x|. Of the corrections: t.lo d 2 u^2 |p|, + se 2 u^2 |p| + u^2 |s|,
+/// u = 2^-24. Rounding of the result: u |x|. Of the corrections: t.lo d 2 u^2 |p|, + se 2 u^2 |p| +
+/// u^2 |s|,
 /// + re 3 u^2 |p| + 2 u^2 |s|, all below 8 u^2 (|p| + |s|), where s = o - c and p = t d cancel.
 TEST(GridDda, LocalPositionsKeepTheirBitsFarFromTheEye) {
   RandomAxes random(3);
@@ -113,9 +117,9 @@ TEST(GridDda, TinyDirectionsCountAsZero) {
 
 TEST(GridDda, EventsHaveOneOrder) {
   const auto event = [](float hi, float lo, int axis) { return make_event({hi, lo}, axis); };
-  const std::array<RayEvent, 7> ordered = {event(-1, 0, 2),      event(0, 0, 0),         event(0, 0, 2),
-                                           start_event(),        event(1, -0x1p-30f, 1), event(1, 0, 0),
-                                           event(1, 0x1p-40f, 0)};
+  const std::array<RayEvent, 7> ordered = {
+      event(-1, 0, 2),        event(0, 0, 0), event(0, 0, 2),       start_event(),
+      event(1, -0x1p-30f, 1), event(1, 0, 0), event(1, 0x1p-40f, 0)};
   for (std::size_t i = 0; i < ordered.size(); ++i) {
     for (std::size_t j = 0; j < ordered.size(); ++j) {
       EXPECT_EQ(event_before(ordered[i], ordered[j]) != 0, i < j) << i << " and " << j;
@@ -136,7 +140,8 @@ bool same_event(RayEvent a, RayEvent b) {
 }
 
 Cell locate_all(const Ray &ray, RayEvent e, int size, const Cell &first, const Cell &last) {
-  return {locate(ray.x, 0, e, size, first[0], last[0]), locate(ray.y, 1, e, size, first[1], last[1]),
+  return {locate(ray.x, 0, e, size, first[0], last[0]),
+          locate(ray.y, 1, e, size, first[1], last[1]),
           locate(ray.z, 2, e, size, first[2], last[2])};
 }
 
@@ -171,8 +176,8 @@ class GridDdaWalks : public testing::TestWithParam<glm::uvec3> {
   }
 };
 
-/// Each step goes to a face neighbour, moments never go back, and each region is entered by the event that
-/// region_entry and locate name without having walked.
+/// Each step goes to a face neighbour, moments never go back, and each region is entered by the
+/// event that region_entry and locate name without having walked.
 TEST_P(GridDdaWalks, WalkingEqualsLocating) {
   std::size_t num_visits = 0;
   for_each_ray([&](const Ray &ray, LastPlanes last) {
@@ -199,8 +204,8 @@ TEST_P(GridDdaWalks, WalkingEqualsLocating) {
   EXPECT_GT(num_visits, 0u);
 }
 
-/// A walk through blocks or macrocells is the cell walk seen from afar: the same regions, entered by the same
-/// events.
+/// A walk through blocks or macrocells is the cell walk seen from afar: the same regions, entered
+/// by the same events.
 TEST_P(GridDdaWalks, CoarseWalksEqualTheCellWalk) {
   for_each_ray([&](const Ray &ray, LastPlanes last) {
     const std::vector<Visit> cells = walk(ray, last, 1);
@@ -208,13 +213,15 @@ TEST_P(GridDdaWalks, CoarseWalksEqualTheCellWalk) {
       std::vector<Visit> expected;
       for (const Visit &cell : cells) {
         const Cell region = {cell.region[0] / size, cell.region[1] / size, cell.region[2] / size};
-        if (expected.empty() || expected.back().region != region) expected.push_back({region, cell.enter});
+        if (expected.empty() || expected.back().region != region)
+          expected.push_back({region, cell.enter});
       }
       const std::vector<Visit> got = walk(ray, last, size);
       ASSERT_EQ(got.size(), expected.size()) << "size " << size;
       for (std::size_t i = 0; i < got.size(); ++i) {
         ASSERT_EQ(got[i].region, expected[i].region) << "size " << size << ", visit " << i;
-        ASSERT_TRUE(same_event(got[i].enter, expected[i].enter)) << "size " << size << ", visit " << i;
+        ASSERT_TRUE(same_event(got[i].enter, expected[i].enter))
+            << "size " << size << ", visit " << i;
       }
     }
   });
@@ -229,8 +236,10 @@ TEST_P(GridDdaWalks, TouchedBlocksAreThoseOfTheCells) {
       const auto [x, y, z] = cell.region;
       uint &touched = expected[{x / 4, y / 4, z / 4}];
       for (int corner = 0; corner < 8; ++corner) {
-        const int voxel_x = x + (corner & 1), voxel_y = y + (corner >> 1 & 1), voxel_z = z + (corner >> 2);
-        touched |= 1u << (voxel_x / 4 - x / 4 + 2 * (voxel_y / 4 - y / 4) + 4 * (voxel_z / 4 - z / 4));
+        const int voxel_x = x + (corner & 1), voxel_y = y + (corner >> 1 & 1),
+                  voxel_z = z + (corner >> 2);
+        touched |=
+            1u << (voxel_x / 4 - x / 4 + 2 * (voxel_y / 4 - y / 4) + 4 * (voxel_z / 4 - z / 4));
       }
     }
     for (const auto &[block, touched] : expected) {
@@ -240,7 +249,8 @@ TEST_P(GridDdaWalks, TouchedBlocksAreThoseOfTheCells) {
     }
   });
   if (GetParam() == glm::uvec3(18, 21, 17)) {
-    for (const std::size_t count : num_touched) EXPECT_GT(count, 100u) << "else this scene tests nothing";
+    for (const std::size_t count : num_touched)
+      EXPECT_GT(count, 100u) << "else this scene tests nothing";
   }
 }
 
@@ -288,8 +298,8 @@ TEST_P(GridDdaWalks, EveryCellThatTheRayCrossesIsVisited) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Dims, GridDdaWalks,
-                         testing::Values(glm::uvec3(18, 21, 17), glm::uvec3(5, 6, 7), glm::uvec3(2, 9, 33),
-                                         glm::uvec3(2, 2, 2)));
+                         testing::Values(glm::uvec3(18, 21, 17), glm::uvec3(5, 6, 7),
+                                         glm::uvec3(2, 9, 33), glm::uvec3(2, 2, 2)));
 
 }  // namespace
 }  // namespace isowave

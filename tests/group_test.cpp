@@ -1,4 +1,5 @@
-// core/group: pairs gathered by block, exactly those whose dual grid is cached, against plain loops, by either grouping.
+// core/group: pairs gathered by block, exactly those whose dual grid is cached, against plain
+// loops, by either grouping.
 
 #include "core/stages/group.hpp"
 
@@ -28,8 +29,8 @@ class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
   };
 
   /// Passes of random pairs; one block in `hot_one_in` pairs is the same hot block.
-  Tally run_passes(uint num_slots, uint num_pixels, uint num_passes, uint hot_one_in, uint group_size,
-                   uint seed) {
+  Tally run_passes(uint num_slots, uint num_pixels, uint num_passes, uint hot_one_in,
+                   uint group_size, uint seed) {
     SCOPED_TRACE(fmt::format("{} slots, {} pixels, hot 1 in {}, group size {}, seed {}", num_slots,
                              num_pixels, hot_one_in, group_size, seed));
     Random random(seed);
@@ -127,7 +128,8 @@ TEST_P(GroupOnDevice, ScarceSlotsGrantSome) {
   }
 }
 
-/// All blocks as pairs, with the dual grids of a few of them cached: many miss just one block, each corner in turn.
+/// All blocks as pairs, with the dual grids of a few of them cached: many miss just one block, each
+/// corner in turn.
 TEST_P(GroupOnDevice, OneMissingBlockIsEnoughToWait) {
   const FrameParams frame = plain_frame(kDims, 8 * 7 * 6);
   std::vector<uint> all(8 * 7 * 6);
@@ -149,7 +151,8 @@ TEST_P(GroupOnDevice, OneMissingBlockIsEnoughToWait) {
       const std::vector<uint> grid = dual_grid_blocks(frame, block);
       const auto absent = [&](uint b) { return table[b] == ISO_BLOCK_ABSENT; };
       if (grid.size() == 8 && std::ranges::count_if(grid, absent) == 1)
-        sole_missing.insert(static_cast<std::size_t>(std::ranges::find_if(grid, absent) - grid.begin()));
+        sole_missing.insert(
+            static_cast<std::size_t>(std::ranges::find_if(grid, absent) - grid.begin()));
     }
     world.begin_pass(all, 1);
     group(world.cache, world.rays);

@@ -1,5 +1,5 @@
-// Frames of a compressed volume that stays on the host, or in several buffers: the same picture, bit for bit, and always
-// progress.
+// Frames of a compressed volume that stays on the host, or in several buffers: the same picture,
+// bit for bit, and always progress.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -30,7 +30,8 @@ TestVolume small_volume() {
 }
 /// Blocks of lengths of their own.
 TestVolume accurate_volume(const glm::uvec3 &dims, double tolerance) {
-  return TestVolume(test::grid_info(dims), test::sample(dims, test::gyroid_field(10)), ErrorGoal{tolerance});
+  return TestVolume(test::grid_info(dims), test::sample(dims, test::gyroid_field(10)),
+                    ErrorGoal{tolerance});
 }
 TestVolume medium_volume() {
   return TestVolume({30, 27, 33}, test::gyroid_field(10), 8);
@@ -62,7 +63,8 @@ class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
         expect_same_hits(renderer.hits(), expected, options.size.width);
         EXPECT_EQ(stats.uploaded_blocks, num_decoded(stats));
         if (!volume.compressed.is_indexed()) {
-          EXPECT_EQ(stats.uploaded_bytes, stats.uploaded_blocks * volume.compressed.bits_per_block / 8);
+          EXPECT_EQ(stats.uploaded_bytes,
+                    stats.uploaded_blocks * volume.compressed.bits_per_block / 8);
         }
         EXPECT_EQ(stats.passes.back().counts.next_active_count, 0u);
       }
@@ -78,7 +80,8 @@ INSTANTIATE_TEST_SUITE_P(Devices, HostStreamOnDevice, testing::ValuesIn(pipeline
 TEST_P(HostStreamOnDevice, SmallFrameIsTheTwins) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer = renderer_of(volume.compressed, {.size = kTiny, .cache_slots = 20, .window_blocks = 8});
+  Renderer renderer =
+      renderer_of(volume.compressed, {.size = kTiny, .cache_slots = 20, .window_blocks = 8});
   renderer.render(camera, kIsovalue);
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kTiny, kIsovalue), kTiny.width);
 }
@@ -89,7 +92,8 @@ TEST_P(HostStreamOnDevice, WindowsAndCaches) {
     if (is_slow() && slots != 200) continue;
     for (const std::uint32_t window : {8u, 33u, 0u, 5000u}) {
       if (is_slow() && window != 33) continue;
-      check(volume, {.size = slots < 64 ? kSmall : kMedium, .cache_slots = slots, .window_blocks = window});
+      check(volume,
+            {.size = slots < 64 ? kSmall : kMedium, .cache_slots = slots, .window_blocks = window});
     }
   }
 }
@@ -109,14 +113,16 @@ TEST_P(HostStreamOnDevice, BlocksOfLengthsOfTheirOwn) {
 
 /// One dual grid for all rays, and one at a time through the window.
 TEST_P(HostStreamOnDevice, OneDualGridAtATime) {
-  check(small_volume(), {.size = kTiny, .cache_slots = 8, .max_speculation = 1, .window_blocks = 8});
+  check(small_volume(),
+        {.size = kTiny, .cache_slots = 8, .max_speculation = 1, .window_blocks = 8});
   if (!is_slow()) check(medium_volume(), {.size = kTiny, .cache_slots = 8, .window_blocks = 8});
 }
 
 TEST_P(HostStreamOnDevice, AwkwardRates) {
   for (const std::uint32_t rate : {1u, 5u, 32u}) {
     SCOPED_TRACE(rate);
-    check(TestVolume({30, 27, 33}, test::gyroid_field(10), rate), {.size = kSmall, .window_blocks = 50});
+    check(TestVolume({30, 27, 33}, test::gyroid_field(10), rate),
+          {.size = kSmall, .window_blocks = 50});
   }
 }
 
@@ -134,15 +140,17 @@ TEST_P(HostStreamOnDevice, WarmFrameUploadsNothing) {
 TEST_P(HostStreamOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
-  Renderer renderer = renderer_of(
-      volume.compressed, {.size = kTiny, .cache_slots = 8, .max_speculation = 2, .window_blocks = 8});
+  Renderer renderer =
+      renderer_of(volume.compressed,
+                  {.size = kTiny, .cache_slots = 8, .max_speculation = 2, .window_blocks = 8});
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
-    const FrameStats cancelled =
-        renderer.render(cameras[0], kIsovalue, [&](const PassStats &) { return ++calls < stop_after; });
+    const FrameStats cancelled = renderer.render(
+        cameras[0], kIsovalue, [&](const PassStats &) { return ++calls < stop_after; });
     EXPECT_TRUE(cancelled.cancelled);
-    EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u) << "else there was nothing to cancel";
+    EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u)
+        << "else there was nothing to cancel";
     EXPECT_EQ(test::num_hits(renderer.hits()), cancelled.rays_hit);
     renderer.render(cameras[1], kIsovalue);
     expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kTiny, kIsovalue), kTiny.width);
@@ -153,8 +161,9 @@ TEST_P(HostStreamOnDevice, ProfilingChangesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   ocl::Device device(GetParam().device, true);
-  Renderer renderer(device, volume.compressed,
-                    GetParam().with({.size = kSmall, .stream = StreamPlace::kHost, .window_blocks = 8}));
+  Renderer renderer(
+      device, volume.compressed,
+      GetParam().with({.size = kSmall, .stream = StreamPlace::kHost, .window_blocks = 8}));
   const FrameStats stats = renderer.render(camera, kIsovalue);
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   const bool uploads = std::ranges::any_of(
@@ -162,7 +171,8 @@ TEST_P(HostStreamOnDevice, ProfilingChangesNothing) {
   EXPECT_TRUE(uploads);
 }
 
-/// From the file, which is read when a renderer is made; cut later, it is missed by nobody until then.
+/// From the file, which is read when a renderer is made; cut later, it is missed by nobody until
+/// then.
 TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
   const test::TemporaryFolder folder;
   const TestVolume volume = medium_volume();
@@ -180,7 +190,8 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
     renderer.render(cameras[0], kIsovalue);
     expect_same_hits(renderer.hits(), expected, kMedium.width);
   }
-  Renderer renderer = renderer_of(opened, {.size = kMedium, .cache_slots = 200, .window_blocks = 50});
+  Renderer renderer =
+      renderer_of(opened, {.size = kMedium, .cache_slots = 200, .window_blocks = 50});
   std::size_t passes = 0;
   const OnPass cut_after_one_pass = [&](const PassStats &) {
     if (++passes == 1) std::filesystem::resize_file(path, 100);
@@ -189,8 +200,9 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
   renderer.render(cameras[1], kIsovalue, cut_after_one_pass);
   EXPECT_EQ(std::filesystem::file_size(path), 100u);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-    EXPECT_THAT([&] { Renderer(device_, opened, GetParam().with({.size = kMedium, .stream = place})); },
-                ThrowsMessage<Error>(HasSubstr("truncated while it was in use")));
+    EXPECT_THAT(
+        [&] { Renderer(device_, opened, GetParam().with({.size = kMedium, .stream = place})); },
+        ThrowsMessage<Error>(HasSubstr("truncated while it was in use")));
   }
   EXPECT_THAT([&] { decode_with_libzfp(opened); }, ThrowsMessage<Error>(HasSubstr("truncated")));
   renderer.render(cameras[0], kIsovalue);
@@ -212,9 +224,11 @@ TEST_P(HostStreamOnDevice, SplitFramesAreTheTwins) {
     const std::uint64_t part_blocks = (volume.compressed.block_count() + parts - 1) / parts;
     Renderer renderer(
         device_, volume.compressed,
-        GetParam().with({.size = kMedium, .cache_slots = 300, .largest_stream_part = part_blocks * 64 + 72}));
-    EXPECT_EQ(std::ranges::count(renderer.memory_plan().buffers, "zfp stream", &MemoryPlan::Buffer::name),
-              parts);
+        GetParam().with(
+            {.size = kMedium, .cache_slots = 300, .largest_stream_part = part_blocks * 64 + 72}));
+    EXPECT_EQ(
+        std::ranges::count(renderer.memory_plan().buffers, "zfp stream", &MemoryPlan::Buffer::name),
+        parts);
     renderer.render(camera, kIsovalue);
     expect_same_hits(renderer.hits(), expected, kMedium.width);
     EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());

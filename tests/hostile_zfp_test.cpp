@@ -1,5 +1,6 @@
-// Compressed files that lie, with checksums that are right, that become shorter while they are read, or that would take
-// more memory than they are worth: the program says so in one line, or draws what its reference draws.
+// Compressed files that lie, with checksums that are right, that become shorter while they are
+// read, or that would take more memory than they are worth: the program says so in one line, or
+// draws what its reference draws.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,7 +37,8 @@ class HostileZfp : public testing::Test {
  protected:
   /// A small volume with levels, as a file; fixed rate, or fixed accuracy.
   std::string make(bool indexed) {
-    ArrayReader source(test::grid_info({18, 17, 19}), test::sample({18, 17, 19}, test::gyroid_field(9)));
+    ArrayReader source(test::grid_info({18, 17, 19}),
+                       test::sample({18, 17, 19}, test::gyroid_field(9)));
     CompressOptions options{.rate = 6, .measure_error = true, .levels = 2};
     if (indexed) options.error_bound = ErrorBound{-8};
     compress_to_file(source, options, path_);
@@ -105,7 +107,8 @@ TEST_F(HostileZfp, CutWhileTheProgramReadsIt) {
 TEST_F(HostileZfp, EmptyBlocksAreCountedInLittleMemory) {
   test::write_file(path_, header({4096, 4096, 1024}, 0));
   fs::resize_file(path_, 12 + (1ull << 28) / 8 + 4);
-  const auto result = test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
+  const auto result =
+      test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("268,435,456"));
   fs::resize_file(path_, 12 + (1ull << 28) / 8 - 4);
@@ -116,7 +119,8 @@ TEST_F(HostileZfp, EmptyBlocksAreCountedInLittleMemory) {
 TEST_F(HostileZfp, MoreBlocksThanIdsAreRefusedBeforeTheirIndexIsBuilt) {
   test::write_file(path_, header({4096, 4096, 4096}, 0));
   fs::resize_file(path_, 12 + (1ull << 30) / 8 + 4);
-  for (const std::string arguments : {"render --reference -i 0 --size 8x8 ", "verify -i 0 --size 8x8 "}) {
+  for (const std::string arguments :
+       {"render --reference -i 0 --size 8x8 ", "verify -i 0 --size 8x8 "}) {
     const auto result =
         test::run_command(in_400_mb(test::isowave_program()) + " " + arguments + quoted(path_));
     EXPECT_EQ(result.status, 1);
@@ -143,7 +147,8 @@ TEST_F(HostileZfp, MoreBlocksThanBitsAreRefusedFirst) {
        {glm::uvec3(65536), glm::uvec3(4096, 4096, 4096), glm::uvec3(65536, 65536, 2)}) {
     const std::string head = header(dims, 0), payload(2000, 0);
     test::write_file(path_, head + payload);
-    const auto result = test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
+    const auto result =
+        test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
     EXPECT_EQ(result.status, 1);
     EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
     json trailer = json::parse(TrailerFile(make(true)).text);
@@ -152,7 +157,8 @@ TEST_F(HostileZfp, MoreBlocksThanBitsAreRefusedFirst) {
     const std::string index = test::zlib(std::string(20'000, '\1'));
     trailer["payload_bits"] = 8 * payload.size();
     trailer["index_bytes"] = index.size();
-    test::write_file(path_, with_trailer(head + payload + std::string(4, 0) + index, trailer.dump(), 2));
+    test::write_file(path_,
+                     with_trailer(head + payload + std::string(4, 0) + index, trailer.dump(), 2));
     EXPECT_THROW(open_zfp_file(path_), Error);
   }
 }
@@ -214,7 +220,8 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
         test::write_file(path_, with_trailer(parts.before, changed.dump(), parts.version));
         try {
           const CompressedVolume volume = open_zfp_file(path_);
-          EXPECT_TRUE(!volume.max_error || (*volume.max_error >= 0 && std::isfinite(*volume.max_error)));
+          EXPECT_TRUE(!volume.max_error ||
+                      (*volume.max_error >= 0 && std::isfinite(*volume.max_error)));
           EXPECT_LE(volume.value_range[0], volume.value_range[1]);
           decode_with_libzfp(volume);
           ++num_read;
@@ -232,7 +239,8 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
 
 /// Deflated parts end where the trailer says, and with the last block.
 TEST_F(HostileZfp, DeflatedPartsEndWithTheirBlocks) {
-  ArrayReader source(test::grid_info({18, 17, 19}), test::sample({18, 17, 19}, test::gyroid_field(9)));
+  ArrayReader source(test::grid_info({18, 17, 19}),
+                     test::sample({18, 17, 19}, test::gyroid_field(9)));
   compress_to_file(source, {.error_bound = ErrorBound{-8}, .levels = 2}, path_);
   const TrailerFile parts(test::read_file(path_));
   const CompressedVolume volume = open_zfp_file(path_);
@@ -251,7 +259,8 @@ TEST_F(HostileZfp, DeflatedPartsEndWithTheirBlocks) {
     json changed = trailer;
     changed["index_bytes"] = index.size();
     changed["bounds_bytes"] = bounds.size();
-    test::write_file(path_, with_trailer(stream + index + bounds + levels, changed.dump(), parts.version));
+    test::write_file(path_,
+                     with_trailer(stream + index + bounds + levels, changed.dump(), parts.version));
     try {
       open_zfp_file(path_);
       return true;
@@ -279,8 +288,8 @@ TEST_F(HostileZfp, DeflatedPartsEndWithTheirBlocks) {
 TEST_F(HostileZfp, ErrorsThatLeaveOutTheCastAreNotKnown) {
   for (const std::string kind : {"float64", "int32", "float32"}) {
     for (const std::string compression : {"--rate 6", "--tolerance-relative 0.01"}) {
-      const auto run = test::run_isowave("convert generate:gyroid_18x17x19_" + kind + " --levels 2 " +
-                                         compression + " -o " + quoted(path_));
+      const auto run = test::run_isowave("convert generate:gyroid_18x17x19_" + kind +
+                                         " --levels 2 " + compression + " -o " + quoted(path_));
       ASSERT_EQ(run.status, 0) << run.err;
       const CompressedVolume right = open_zfp_file(path_);
       EXPECT_TRUE(known_max_error(right));
@@ -302,10 +311,11 @@ TEST_F(HostileZfp, ErrorsThatLeaveOutTheCastAreNotKnown) {
 
 // ---- advice
 
-/// What a frame that cannot be kept within an error says would help, `convert` takes, and it is less than there is.
+/// What a frame that cannot be kept within an error says would help, `convert` takes, and it is
+/// less than there is.
 TEST_F(HostileZfp, AdviceCanBeFollowed) {
-  const auto constant = folder_ / "c_16x16x16_float32.raw", ramp = folder_ / "r_16x16x16_float32.raw",
-             high = folder_ / "h_16x16x16_float64.raw";
+  const auto constant = folder_ / "c_16x16x16_float32.raw",
+             ramp = folder_ / "r_16x16x16_float32.raw", high = folder_ / "h_16x16x16_float64.raw";
   test::write_file(constant, std::vector<float>(4096, 3.0f));
   std::vector<float> values(4096);
   std::vector<double> high_values(4096);
@@ -321,15 +331,16 @@ TEST_F(HostileZfp, AdviceCanBeFollowed) {
     for (const std::string compression : {"--rate 2", "--rate 8", "--rate 32", "--tolerance 0.7"}) {
       for (const std::string error : {"1e-9", "0.001", "1"}) {
         const auto run = test::run_isowave(
-            fmt::format("render {} {} -i {} --device cpu --size 32x24 --max-error {} -o {}", quoted(voxels),
-                        compression, isovalue, error, quoted(folder_ / "p.png")));
+            fmt::format("render {} {} -i {} --device cpu --size 32x24 --max-error {} -o {}",
+                        quoted(voxels), compression, isovalue, error, quoted(folder_ / "p.png")));
         const std::string what =
             voxels.string() + " " + compression + " -i " + isovalue + " --max-error " + error;
         if (run.status != 0) {
           EXPECT_THAT(run.err, HasSubstr("cannot be kept")) << what;
           continue;
         }
-        EXPECT_THAT(run.out, Not(HasSubstr("warning"))) << what << ": standard output is for results";
+        EXPECT_THAT(run.out, Not(HasSubstr("warning")))
+            << what << ": standard output is for results";
         const std::string all = run.out + run.err, before = "--tolerance ";
         EXPECT_THAT(all, Not(AnyOf(HasSubstr(" nan"), HasSubstr("-nan")))) << what;
         const std::size_t at = all.find(before);
@@ -338,8 +349,8 @@ TEST_F(HostileZfp, AdviceCanBeFollowed) {
         const std::string tolerance =
             all.substr(at + before.size(), all.find(' ', at + before.size()) - at - before.size());
         EXPECT_GT(std::stod(tolerance), 0) << what << all;
-        EXPECT_EQ(test::run_isowave(fmt::format("convert {} --tolerance {} -o {}", quoted(voxels), tolerance,
-                                                quoted(path_)))
+        EXPECT_EQ(test::run_isowave(fmt::format("convert {} --tolerance {} -o {}", quoted(voxels),
+                                                tolerance, quoted(path_)))
                       .status,
                   0)
             << what << all;

@@ -1,4 +1,5 @@
-// core/initial_rays: each pixel's first block and the first wavefront, against a walk over every cell.
+// core/initial_rays: each pixel's first block and the first wavefront, against a walk over every
+// cell.
 
 #include "core/stages/initial_rays.hpp"
 

@@ -18,8 +18,10 @@ using testing::ThrowsMessage;
 
 TEST(InputFile, MissingShortAndTruncatedFilesAreOneLine) {
   const test::TemporaryFolder folder;
-  EXPECT_THAT([&] { InputFile{folder / "none"}; }, ThrowsMessage<Error>(HasSubstr("none: no such file")));
-  EXPECT_THAT([&] { InputFile{folder.path()}; }, ThrowsMessage<Error>(HasSubstr("not a regular file")));
+  EXPECT_THAT([&] { InputFile{folder / "none"}; },
+              ThrowsMessage<Error>(HasSubstr("none: no such file")));
+  EXPECT_THAT([&] { InputFile{folder.path()}; },
+              ThrowsMessage<Error>(HasSubstr("not a regular file")));
   test::write_file(folder / "a", std::string(10'000, 'a'));
   const InputFile file(folder / "a");
   EXPECT_EQ(file.size(), 10'000u);

@@ -1,5 +1,5 @@
-// core/intersect: every pair against the portable headers on the host (equal bits), and rays against closed
-// forms in double on a plane and on a saddle, which are trilinear.
+// core/intersect: every pair against the portable headers on the host (equal bits), and rays
+// against closed forms in double on a plane and on a saddle, which are trilinear.
 
 #include "core/stages/intersect.hpp"
 
@@ -32,7 +32,8 @@ double value_of(TwoFloat t) {
 }
 
 /// Cell by cell through a block, in the portable headers.
-BlockHit trace_block(const FrameParams &frame, const std::vector<float> &voxels, uint pixel, uint block) {
+BlockHit trace_block(const FrameParams &frame, const std::vector<float> &voxels, uint pixel,
+                     uint block) {
   const Ray ray = make_ray(&frame, pixel);
   const LastPlanes last = last_planes(&frame);
   const int bx = int(block % frame.blocks_x), by = int(block / frame.blocks_x % frame.blocks_y),
@@ -44,13 +45,14 @@ BlockHit trace_block(const FrameParams &frame, const std::vector<float> &voxels,
                             locate(ray.y, 1, enter, 1, 4 * by, end_y - 1),
                             locate(ray.z, 2, enter, 1, 4 * bz, end_z - 1), 1, last);
   BlockHit hit;
-  while (cell.x >= 4 * bx && cell.x < end_x && cell.y >= 4 * by && cell.y < end_y && cell.z >= 4 * bz &&
-         cell.z < end_z) {
+  while (cell.x >= 4 * bx && cell.x < end_x && cell.y >= 4 * by && cell.y < end_y &&
+         cell.z >= 4 * bz && cell.z < end_z) {
     const RayEvent exit = walk_exit(&cell, &ray);
     const std::array<float, 8> w = cell_corners(frame, voxels, cell.x, cell.y, cell.z);
     const uint number = uint(cell.x % 4 + 4 * (cell.y % 4) + 16 * (cell.z % 4));
     CellChange change;
-    if (change_in_cell(kDefaultSolver, &ray, w.data(), cell.x, cell.y, cell.z, enter, exit, &change)) {
+    if (change_in_cell(kDefaultSolver, &ray, w.data(), cell.x, cell.y, cell.z, enter, exit,
+                       &change)) {
       hit.pair = {number, refine(kDefaultSolver, change.cubic, change.bracket)};
       const double t_enter = value_of(enter.t), t_exit = value_of(exit.t);
       hit.t = t_enter + hit.pair.s * (t_exit - t_enter);
@@ -75,13 +77,15 @@ std::vector<float> make_voxels(Field field, const glm::uvec3 &dims) {
   std::vector<float> voxels;
   for (uint z = 0; z < dims.z; ++z) {
     for (uint y = 0; y < dims.y; ++y) {
-      for (uint x = 0; x < dims.x; ++x) voxels.push_back(static_cast<float>(field_value(field, x, y, z)));
+      for (uint x = 0; x < dims.x; ++x)
+        voxels.push_back(static_cast<float>(field_value(field, x, y, z)));
     }
   }
   return voxels;
 }
 
-/// Where the ray is first on the other side than where it enters the domain, by the quadratic formula.
+/// Where the ray is first on the other side than where it enters the domain, by the quadratic
+/// formula.
 struct ClosedForm {
   bool certain = false;  ///< nothing happens within rounding of an end of the ray, or of a tangent
   std::optional<double> t;
@@ -150,10 +154,10 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     bool all_tested = true;
   };
 
-  /// One frame: passes of spec_count blocks of every ray, until all rays are through. Slots may be scarce: then
-  /// each pass tests what it can, and what it cannot is not tried again.
-  void run(const glm::uvec3 &dims, Field field, const FrameParams &frame, Stages &stages, uint spec_count,
-           Tally &tally) {
+  /// One frame: passes of spec_count blocks of every ray, until all rays are through. Slots may be
+  /// scarce: then each pass tests what it can, and what it cannot is not tried again.
+  void run(const glm::uvec3 &dims, Field field, const FrameParams &frame, Stages &stages,
+           uint spec_count, Tally &tally) {
     const uint num_pixels = frame.width * frame.height;
     const std::vector<float> voxels = make_voxels(field, dims);
     stages.world.set_frame(frame);
@@ -180,11 +184,13 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         if (HasFatalFailure()) return;
       }
     }
-    if (first_hits.all_tested && field != Field::kRandom) expect_closed_form(field, frame, first_hits, tally);
+    if (first_hits.all_tested && field != Field::kRandom)
+      expect_closed_form(field, frame, first_hits, tally);
   }
 
-  static void run_pass(Stages &stages, const std::vector<float> &voxels, const std::vector<uint> &pairs,
-                       uint spec_count, FirstHits &first_hits, Tally &tally) {
+  static void run_pass(Stages &stages, const std::vector<float> &voxels,
+                       const std::vector<uint> &pairs, uint spec_count, FirstHits &first_hits,
+                       Tally &tally) {
     auto &[world, group, intersect] = stages;
     world.begin_pass(pairs, spec_count);
     world.cache.request(world.rays);
@@ -212,7 +218,8 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         continue;
       }
       const BlockHit expected = trace_block(frame, voxels, pixel, pairs[pair]);
-      ASSERT_EQ(got[pair].cell, expected.pair.cell) << "pixel " << pixel << ", block " << pairs[pair];
+      ASSERT_EQ(got[pair].cell, expected.pair.cell)
+          << "pixel " << pixel << ", block " << pairs[pair];
       ASSERT_EQ(std::bit_cast<uint>(got[pair].s), std::bit_cast<uint>(expected.pair.s))
           << "pixel " << pixel << ", block " << pairs[pair];
       ++tally.tested;
@@ -233,10 +240,11 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       const Ray ray = make_ray(&frame, pixel);
       const std::optional<double> &t = first_hits.t[pixel];
       if (t) {
-        const double residual =
-            field_value(field, ray.x.o + *t * ray.x.d, ray.y.o + *t * ray.y.d, ray.z.o + *t * ray.z.d) -
-            frame.isovalue;
-        ASSERT_LE(std::abs(residual), 46 * 0x1p-24 * first_hits.largest[pixel]) << "pixel " << pixel;
+        const double residual = field_value(field, ray.x.o + *t * ray.x.d, ray.y.o + *t * ray.y.d,
+                                            ray.z.o + *t * ray.z.d) -
+                                frame.isovalue;
+        ASSERT_LE(std::abs(residual), 46 * 0x1p-24 * first_hits.largest[pixel])
+            << "pixel " << pixel;
       }
       const ClosedForm expected = closed_form(frame, field, ray);
       if (!expected.certain) continue;
@@ -251,15 +259,16 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   bool is_slow() const { return is_llvmpipe(device_.info()); }
 
   /// Every camera (on a slow device every fourth), each with one of the isovalues in turn.
-  void run_cameras(const glm::uvec3 &dims, Field field, const std::vector<float> &isovalues, Tally &tally) {
+  void run_cameras(const glm::uvec3 &dims, Field field, const std::vector<float> &isovalues,
+                   Tally &tally) {
     const uint num_blocks = uint((dims.x + 3) / 4 * ((dims.y + 3) / 4) * ((dims.z + 3) / 4));
     const ImageSize size{23, 17};
     const std::vector<CameraCase> cameras = camera_cases(dims);
     Stages stages(device_, case_frame(dims, cameras[0], size), std::max(8u, num_blocks), 64);
     for (std::size_t i = 0; i < cameras.size(); i += is_slow() ? 4 : 1) {
       const float isovalue = isovalues[i % isovalues.size()];
-      SCOPED_TRACE(fmt::format("{} x {} x {}, camera '{}', field {}, isovalue {}", dims.x, dims.y, dims.z,
-                               cameras[i].name, static_cast<int>(field), isovalue));
+      SCOPED_TRACE(fmt::format("{} x {} x {}, camera '{}', field {}, isovalue {}", dims.x, dims.y,
+                               dims.z, cameras[i].name, static_cast<int>(field), isovalue));
       run(dims, field, case_frame(dims, cameras[i], size, isovalue), stages, 3, tally);
       if (HasFatalFailure()) return;
     }

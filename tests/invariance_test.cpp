@@ -1,5 +1,5 @@
-// What must not change the picture: speculation, cache size, grouping, work-group size, what was drawn before, and who
-// watches. And what the counts of a frame's passes must say of each other.
+// What must not change the picture: speculation, cache size, grouping, work-group size, what was
+// drawn before, and who watches. And what the counts of a frame's passes must say of each other.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -39,7 +39,8 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     const Camera camera = orbit_cameras(volume.info(), 1)[0];
     Renderer renderer(device_, volume.compressed, GetParam().with(options));
     const FrameStats stats = renderer.render(camera, kIsovalue);
-    expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue), options.size.width);
+    expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue),
+                     options.size.width);
     expect_consistent(stats, renderer.options());
     return stats;
   }
@@ -62,7 +63,8 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
         EXPECT_EQ(c.spec_count, std::min<std::uint64_t>(options.max_speculation, pixels / looking));
         EXPECT_GE(pass.n_spec, 1);
         EXPECT_LE(pass.n_spec, options.max_speculation);
-        EXPECT_LE(pass.n_spec, options.per_ray_speculation ? options.max_speculation : c.spec_count);
+        EXPECT_LE(pass.n_spec,
+                  options.per_ray_speculation ? options.max_speculation : c.spec_count);
       }
       EXPECT_LE(c.pair_count, c.ahead_count);
       EXPECT_EQ(pass.visible_blocks.has_value(), is_blocks);
@@ -78,13 +80,15 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       if (options.pipeline == PipelineKind::kBlocks) {
         expect_consistent_pairs(c, options);
       } else {
-        /* The first pass of a frame provides at most what a cancelled one before it left on the list. */
+        /* The first pass of a frame provides at most what a cancelled one before it left on the
+         * list. */
         if (i != 0) {
           EXPECT_LE(c.decoded_count, stats.passes[i - 1].counts.requested_count);
         }
       }
       EXPECT_DOUBLE_EQ(pass.utilization_percent, 100.0 * c.granted_count / double(pixels));
-      EXPECT_DOUBLE_EQ(pass.completed_percent, 100.0 * double(pixels - c.next_active_count) / double(pixels));
+      EXPECT_DOUBLE_EQ(pass.completed_percent,
+                       100.0 * double(pixels - c.next_active_count) / double(pixels));
       hits += c.hit_count;
     }
     EXPECT_EQ(hits, stats.rays_hit);
@@ -137,22 +141,27 @@ TEST_P(InvarianceOnDevice, SpeculationNeverNeedsMorePasses) {
     }
     num_passes.push_back(stats.passes.size());
   }
-  EXPECT_TRUE(std::is_sorted(num_passes.rbegin(), num_passes.rend())) << testing::PrintToString(num_passes);
+  EXPECT_TRUE(std::is_sorted(num_passes.rbegin(), num_passes.rend()))
+      << testing::PrintToString(num_passes);
   EXPECT_GT(num_passes.front(), 2 * num_passes.back()) << "else this scene tests nothing";
 }
 
 // ---- cache size
 
-/// One dual grid for all rays: the first pass asks for far more, and yet every pass takes the first ray on.
+/// One dual grid for all rays: the first pass asks for far more, and yet every pass takes the first
+/// ray on.
 TEST_P(InvarianceOnDevice, CacheOfEightSlots) {
   const TestVolume volume = small_volume();
   const FrameStats ample = check(volume, {.size = kTiny, .max_speculation = 1});
-  // A block or a ray's end in every pass (blocks) or every other (rays: what is asked for comes with the next).
-  const std::uint64_t steps = total(ample, &PassCounts::granted_count) + ample.passes[0].counts.active_count;
+  // A block or a ray's end in every pass (blocks) or every other (rays: what is asked for comes
+  // with the next).
+  const std::uint64_t steps =
+      total(ample, &PassCounts::granted_count) + ample.passes[0].counts.active_count;
   const std::uint64_t bound = is_blocks() ? steps : 2 * steps;
   for (const std::uint32_t limit : {1u, 64u}) {
     SCOPED_TRACE(limit);
-    const FrameStats stats = check(volume, {.size = kTiny, .cache_slots = 8, .max_speculation = limit});
+    const FrameStats stats =
+        check(volume, {.size = kTiny, .cache_slots = 8, .max_speculation = limit});
     EXPECT_GT(total(stats, &PassCounts::requested_count), total(stats, &PassCounts::decoded_count))
         << "else this scene tests nothing";
     EXPECT_LE(stats.passes.size(), bound);
@@ -170,7 +179,8 @@ TEST_P(InvarianceOnDevice, CacheSizes) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
     const ImageSize size = slots <= 64 ? kSmall : kMedium;
     const FrameStats stats = check(volume, {.size = size, .cache_slots = slots});
-    const bool waited = total(stats, &PassCounts::requested_count) > total(stats, &PassCounts::decoded_count);
+    const bool waited =
+        total(stats, &PassCounts::requested_count) > total(stats, &PassCounts::decoded_count);
     if (is_blocks()) {
       EXPECT_EQ(waited, slots < blocks) << "else this scene tests nothing";
     }
@@ -178,14 +188,16 @@ TEST_P(InvarianceOnDevice, CacheSizes) {
   }
 }
 
-/// Slots are taken over and over; every block that comes back must be decoded again, to its own values.
+/// Slots are taken over and over; every block that comes back must be decoded again, to its own
+/// values.
 TEST_P(InvarianceOnDevice, ManyViewsThroughFewSlots) {
   const TestVolume volume = medium_volume();
   constexpr ImageSize size{14, 10};
   for (const std::uint32_t slots : {13u, 9u, 31u}) {
     if (is_slow() && slots != 13) continue;
     SCOPED_TRACE(fmt::format("{} slots", slots));
-    Renderer renderer(device_, volume.compressed, GetParam().with({.size = size, .cache_slots = slots}));
+    Renderer renderer(device_, volume.compressed,
+                      GetParam().with({.size = size, .cache_slots = slots}));
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
       expect_consistent(renderer.render(camera, kIsovalue), renderer.options());
       expect_same_hits(renderer.hits(), twin_hits(volume, camera, size, kIsovalue), size.width);
@@ -256,12 +268,16 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
   std::mt19937 random(kSeed);
   SCOPED_TRACE(fmt::format("seed {}", kSeed));
   for (const std::uint32_t slots : {0u, 150u}) {
-    Renderer renderer(device_, volume.compressed, GetParam().with({.size = kFrame, .cache_slots = slots}));
+    Renderer renderer(device_, volume.compressed,
+                      GetParam().with({.size = kFrame, .cache_slots = slots}));
     std::shuffle(frames.begin(), frames.end(), random);
     for (const Frame &frame : frames) {
-      SCOPED_TRACE(fmt::format("{} slots, isovalue {}, view {}", slots, isovalues[frame.iso], frame.view));
-      expect_consistent(renderer.render(cameras[frame.view], isovalues[frame.iso]), renderer.options());
-      expect_same_hits(renderer.hits(), twin_hits(volume, cameras[frame.view], kFrame, isovalues[frame.iso]),
+      SCOPED_TRACE(
+          fmt::format("{} slots, isovalue {}, view {}", slots, isovalues[frame.iso], frame.view));
+      expect_consistent(renderer.render(cameras[frame.view], isovalues[frame.iso]),
+                        renderer.options());
+      expect_same_hits(renderer.hits(),
+                       twin_hits(volume, cameras[frame.view], kFrame, isovalues[frame.iso]),
                        kFrame.width);
     }
   }
@@ -269,7 +285,8 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
 
 TEST_P(InvarianceOnDevice, MemoryIsFixedBeforeTheFirstFrame) {
   const TestVolume volume = small_volume();
-  Renderer renderer(device_, volume.compressed, GetParam().with({.size = kTiny, .cache_slots = 20}));
+  Renderer renderer(device_, volume.compressed,
+                    GetParam().with({.size = kTiny, .cache_slots = 20}));
   const ocl::MemoryLedger &ledger = device_.ledger();
   const std::uint64_t current = ledger.current(), peak = ledger.peak();
   EXPECT_GT(current, 0u);
@@ -301,8 +318,9 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
   const auto expected = twin_hits(volume, camera, kFrame, kIsovalue);
   for (const std::uint32_t slots : {0u, 100u}) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
-    Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.size = kFrame, .cache_slots = slots, .max_speculation = 4}));
+    Renderer renderer(
+        device_, volume.compressed,
+        GetParam().with({.size = kFrame, .cache_slots = slots, .max_speculation = 4}));
     std::uint64_t found = 0;
     std::size_t calls = 0;
     const FrameStats stats = renderer.render(camera, kIsovalue, [&](const PassStats &pass) {
@@ -332,11 +350,12 @@ TEST_P(InvarianceOnDevice, CancelledFrameLeavesNoTrace) {
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
-    const FrameStats cancelled =
-        renderer.render(cameras[0], kIsovalue, [&](const PassStats &) { return ++calls < stop_after; });
+    const FrameStats cancelled = renderer.render(
+        cameras[0], kIsovalue, [&](const PassStats &) { return ++calls < stop_after; });
     EXPECT_TRUE(cancelled.cancelled);
     EXPECT_EQ(cancelled.passes.size(), stop_after);
-    EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u) << "else there was nothing to cancel";
+    EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u)
+        << "else there was nothing to cancel";
     EXPECT_EQ(test::num_hits(renderer.hits()), cancelled.rays_hit);
     expect_consistent(cancelled, renderer.options());
     const FrameStats next = renderer.render(cameras[1], kIsovalue);
@@ -355,9 +374,9 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   expect_consistent(stats, renderer.options());
   for (const PassStats &pass : stats.passes) {
-    const auto stages =
-        is_blocks() ? std::vector{"traverse", "request", "cache", "decode", "group", "intersect", "composite"}
-                    : std::vector{"march"};
+    const auto stages = is_blocks() ? std::vector{"traverse", "request",   "cache",    "decode",
+                                                  "group",    "intersect", "composite"}
+                                    : std::vector{"march"};
     for (const char *stage : stages) EXPECT_TRUE(pass.stage_ms.contains(stage)) << stage;
   }
 }

@@ -1,5 +1,5 @@
-// Headers and voxels against ITK, which shares nothing with our readers: the same type, grid and values, bit for bit
-// but for what a test says.
+// Headers and voxels against ITK, which shares nothing with our readers: the same type, grid and
+// values, bit for bit but for what a test says.
 
 #include <gtest/gtest.h>
 #include <itkMetaImageIO.h>
@@ -87,7 +87,8 @@ void expect_agreement(const fs::path &path, double tolerance, std::optional<Voxe
   EXPECT_EQ(info.origin, itk.info.origin);
   for (int axis = 0; axis < 3; ++axis) {
     for (int row = 0; row < 3; ++row) {
-      EXPECT_NEAR(info.direction[axis][row], itk.info.direction[axis][row], tolerance) << axis << " " << row;
+      EXPECT_NEAR(info.direction[axis][row], itk.info.direction[axis][row], tolerance)
+          << axis << " " << row;
     }
   }
   const std::vector<float> voxels = test::read_all(*reader);
@@ -127,7 +128,8 @@ TEST_F(NrrdAgreement, Geometry) {
 }
 
 TEST_F(NrrdAgreement, TypesOrdersAndEncodings) {
-  const auto header = [](const std::string &type, const std::string &order, const std::string &encoding) {
+  const auto header = [](const std::string &type, const std::string &order,
+                         const std::string &encoding) {
     return "NRRD0001\r\ntype: " + type + "\r\ndimension: 3\r\nsizes: 3 4 5\r\nendian: " + order +
            "\r\nencoding: " + encoding + "\r\n\r\n";
   };
@@ -151,22 +153,27 @@ TEST_F(NrrdAgreement, TypesOrdersAndEncodings) {
     }
   }
   std::string numbers;
-  for (int i = 0; i < 60; ++i) numbers += fmt::format("{}{}", i * 1.25 - 30, i % 7 == 0 ? "\n" : " ");
+  for (int i = 0; i < 60; ++i)
+    numbers += fmt::format("{}{}", i * 1.25 - 30, i % 7 == 0 ? "\n" : " ");
   check("a.nrrd", header("float", "little", "ascii") + numbers);
   const std::string sizes = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 3 4 5\n";
   check("a.nrrd", sizes + "line skip: 2\nbyte skip: 3\nencoding: raw\n\na\nb\nxyz" + ramp());
   check("a.nrrd", sizes + "byte skip: -1\nencoding: raw\n\nxyz" + ramp());
-  check("a.nrrd", sizes + "line skip: 1\nbyte skip: 3\nencoding: gzip\n\na\n" + gzip("xyz" + ramp()));
+  check("a.nrrd",
+        sizes + "line skip: 1\nbyte skip: 3\nencoding: gzip\n\na\n" + gzip("xyz" + ramp()));
 }
 
 TEST_F(MetaImageAgreement, Geometry) {
-  const std::string head = "ObjectType = Image\nNDims = 3\nDimSize = 3 4 5\nElementType = MET_UCHAR\n";
+  const std::string head =
+      "ObjectType = Image\nNDims = 3\nDimSize = 3 4 5\nElementType = MET_UCHAR\n";
   for (const char *fields :
        {"", "TransformMatrix = 0 1 0 1 0 0 0.1 0 -1\nElementSpacing = 1 -2 3\nOffset = 1 2.5 -3\n",
         "Orientation = 0 1 0 1 0 0 0 0 -1\nPosition = 1 2 3\nElementSize = 2 3 4\n",
-        "Rotation = 0 0 1 0 1 0 1 0 0\nOrigin = 1 2 3\n", "ElementSize = 2 3 4\nElementSpacing = 3 4 5\n",
+        "Rotation = 0 0 1 0 1 0 1 0 0\nOrigin = 1 2 3\n",
+        "ElementSize = 2 3 4\nElementSpacing = 3 4 5\n",
         "CenterOfRotation = 1 2 3\nAnatomicalOrientation = RAI\nDistanceUnits = um\n",
-        "0008|0060 = MR\nComment = a = b\nElementMin = 1\nColor = 1 0 0 1\n\n", "ImagePosition = 1 2 3\n"}) {
+        "0008|0060 = MR\nComment = a = b\nElementMin = 1\nColor = 1 0 0 1\n\n",
+        "ImagePosition = 1 2 3\n"}) {
     SCOPED_TRACE(fields);
     check("a.mha", head + fields + "ElementDataFile = LOCAL\n" + ramp());
   }
@@ -182,8 +189,8 @@ TEST_F(MetaImageAgreement, TypesOrdersAndEncodings) {
            "ElementDataFile = LOCAL\n";
   };
   for (const bool big : {false, true}) {
-    const std::string order =
-        fmt::format("{}ByteOrderMSB = {}\n", big ? "Element" : "BinaryData", big ? "True" : "False");
+    const std::string order = fmt::format("{}ByteOrderMSB = {}\n", big ? "Element" : "BinaryData",
+                                          big ? "True" : "False");
     for (const auto &[type, bytes] :
          std::vector<std::pair<std::string, std::string>>{{"CHAR", ramp<std::int8_t>(big)},
                                                           {"USHORT", ramp<std::uint16_t>(big)},
@@ -197,13 +204,15 @@ TEST_F(MetaImageAgreement, TypesOrdersAndEncodings) {
       SCOPED_TRACE(type);
       check("a.mha", header(type, order) + bytes);
       const std::string packed = test::zlib(bytes);
-      check("a.mha", header(type, order + fmt::format("CompressedData = True\nCompressedDataSize = {}\n",
-                                                      packed.size())) +
-                         packed);
+      check("a.mha",
+            header(type, order + fmt::format("CompressedData = True\nCompressedDataSize = {}\n",
+                                             packed.size())) +
+                packed);
     }
   }
   std::string numbers;
-  for (int i = 0; i < 60; ++i) numbers += fmt::format("{}{}", i * 1e3 - 500, i % 7 == 0 ? "\n" : " ");
+  for (int i = 0; i < 60; ++i)
+    numbers += fmt::format("{}{}", i * 1e3 - 500, i % 7 == 0 ? "\n" : " ");
   check("a.mha", header("INT", "BinaryData = False\n") + numbers);
   check("a.mha", header("UCHAR", "HeaderSize = -1\n") + "xyz" + ramp());
   const std::string far = header("UCHAR", "HeaderSize = 300\n");
@@ -219,12 +228,15 @@ TEST_F(NiftiAgreement, Geometry) {
   check("a.nii", NiftiFields{.sform_code = 0}.bytes() + ramp());
   check("a.nii", NiftiFields{.sform_code = 0, .pixdim = {1, 0, 2, 3}}.bytes() + ramp());
   check("a.nii", NiftiFields{.dim = {5, 3, 4, 5, 1, 1, 1, 1}, .vox_offset = 400}.bytes() + ramp());
+  check(
+      "a.nii",
+      NiftiFields{.qform_code = 1, .sform_code = 2, .quatern = {0.1f, 0.2f, 0.3f}}.bytes() + ramp(),
+      kFloatMatrix);
   check("a.nii",
-        NiftiFields{.qform_code = 1, .sform_code = 2, .quatern = {0.1f, 0.2f, 0.3f}}.bytes() + ramp(),
-        kFloatMatrix);
+        NiftiFields{.qform_code = 2, .sform_code = 1, .quatern = {0.1f, 0.2f, 0.3f}}.bytes() +
+            ramp());
   check("a.nii",
-        NiftiFields{.qform_code = 2, .sform_code = 1, .quatern = {0.1f, 0.2f, 0.3f}}.bytes() + ramp());
-  check("a.nii", NiftiFields{.qform_code = 1, .sform_code = 0, .quatern = {1, 0, 0}}.bytes() + ramp(),
+        NiftiFields{.qform_code = 1, .sform_code = 0, .quatern = {1, 0, 0}}.bytes() + ramp(),
         kFloatMatrix);
   NiftiFields sheared{.qform_code = 1, .sform_code = 1};
   sheared.sform[0][1] = 0.2f;
@@ -234,8 +246,10 @@ TEST_F(NiftiAgreement, Geometry) {
   check("a.nii", metres.bytes() + ramp());
   std::mt19937 random(11);
   for (int i = 0; i < 40; ++i) {
-    NiftiFields fields{.qform_code = 1, .sform_code = 0, .pixdim = {i % 2 == 0 ? -1.0f : 1.0f, 0.5f, 2, 3}};
-    std::uniform_real_distribution<float> component(-0.57f, 0.57f);  // three of them are no longer than 1
+    NiftiFields fields{
+        .qform_code = 1, .sform_code = 0, .pixdim = {i % 2 == 0 ? -1.0f : 1.0f, 0.5f, 2, 3}};
+    std::uniform_real_distribution<float> component(-0.57f,
+                                                    0.57f);  // three of them are no longer than 1
     for (float &value : fields.quatern) value = component(random);
     check("a.nii", fields.bytes() + ramp(), kFloatMatrix);
   }
@@ -244,14 +258,15 @@ TEST_F(NiftiAgreement, Geometry) {
 TEST_F(NiftiAgreement, TypesOrdersAndScales) {
   for (const bool big : {false, true}) {
     for (const auto &[datatype, bits, bytes] :
-         std::vector<std::tuple<std::int16_t, std::int16_t, std::string>>{{2, 8, ramp()},
-                                                                          {256, 8, ramp<std::int8_t>(big)},
-                                                                          {4, 16, ramp<std::int16_t>(big)},
-                                                                          {512, 16, ramp<std::uint16_t>(big)},
-                                                                          {8, 32, ramp<std::int32_t>(big)},
-                                                                          {768, 32, ramp<std::uint32_t>(big)},
-                                                                          {16, 32, ramp<float>(big)},
-                                                                          {64, 64, ramp<double>(big)}}) {
+         std::vector<std::tuple<std::int16_t, std::int16_t, std::string>>{
+             {2, 8, ramp()},
+             {256, 8, ramp<std::int8_t>(big)},
+             {4, 16, ramp<std::int16_t>(big)},
+             {512, 16, ramp<std::uint16_t>(big)},
+             {8, 32, ramp<std::int32_t>(big)},
+             {768, 32, ramp<std::uint32_t>(big)},
+             {16, 32, ramp<float>(big)},
+             {64, 64, ramp<double>(big)}}) {
       for (const auto &[slope, inter] : {std::pair(0.0f, 0.0f),
                                          {1.0f, 0.0f},
                                          {0.1f, -3.3f},
@@ -259,8 +274,11 @@ TEST_F(NiftiAgreement, TypesOrdersAndScales) {
                                          {1.0f, 1e-3f},
                                          {std::nanf(""), std::nanf("")}}) {
         SCOPED_TRACE(fmt::format("datatype {} slope {} inter {}", datatype, slope, inter));
-        NiftiFields fields{
-            .datatype = datatype, .bitpix = bits, .scl_slope = slope, .scl_inter = inter, .big_endian = big};
+        NiftiFields fields{.datatype = datatype,
+                           .bitpix = bits,
+                           .scl_slope = slope,
+                           .scl_inter = inter,
+                           .big_endian = big};
         // ITK has scaled voxels in float32, which would lose what the bounds of errors must count.
         const bool is_scaled = slope == slope && slope != 0 && (slope != 1 || inter != 0);
         check("a.nii", fields.bytes() + bytes, 0,

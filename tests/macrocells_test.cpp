@@ -71,8 +71,8 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Builds the ranges of a volume and checks them and the masks of many isovalues.
   void expect_exact(const CompressedVolume &volume, std::size_t max_ranges = 20) {
     const glm::uvec3 dims = volume.info.dims;
-    SCOPED_TRACE(
-        fmt::format("{} x {} x {}, {} bits per block", dims.x, dims.y, dims.z, volume.bits_per_block));
+    SCOPED_TRACE(fmt::format("{} x {} x {}, {} bits per block", dims.x, dims.y, dims.z,
+                             volume.bits_per_block));
     FrameParams params = grid_frame(dims);
     const DeviceStream stream(device_, volume);
     Macrocells macrocells(device_, params, stream);
@@ -89,7 +89,8 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       expect_mask(macrocells, params, expected, isovalue, num_selected, num_in_range);
       if (HasFatalFailure()) return;
     }
-    /* Not every selected block holds the isovalue, for a range has 8 bits; but a mask of ones would be useless. */
+    /* Not every selected block holds the isovalue, for a range has 8 bits; but a mask of ones would
+     * be useless. */
     EXPECT_LE(num_selected, 3 * num_in_range + 2 * expected.size());
   }
 
@@ -110,7 +111,8 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const int got_end[3] = {params.active_end_x, params.active_end_y, params.active_end_z};
     const uint dims[3] = {params.dims_x, params.dims_y, params.dims_z};
     for (int axis = 0; axis < 3; ++axis) {
-      ASSERT_EQ(got_end[axis], std::min(end[axis], int(num_owning_blocks(dims[axis])))) << "axis " << axis;
+      ASSERT_EQ(got_end[axis], std::min(end[axis], int(num_owning_blocks(dims[axis]))))
+          << "axis " << axis;
       if (end[axis] != 0) {
         ASSERT_EQ(got_begin[axis], begin[axis]) << "axis " << axis;
       }
@@ -149,10 +151,11 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     return (masks[2 * coarse + bit / 32] >> bit % 32 & 1) != 0;
   }
 
-  /// A block whose dual cells hold values on both sides must be selected; one that owns no cell must not.
+  /// A block whose dual cells hold values on both sides must be selected; one that owns no cell
+  /// must not.
   static void expect_mask(const Macrocells &macrocells, const FrameParams &params,
-                          const std::vector<Range> &expected, float isovalue, std::size_t &num_selected,
-                          std::size_t &num_in_range) {
+                          const std::vector<Range> &expected, float isovalue,
+                          std::size_t &num_selected, std::size_t &num_in_range) {
     const std::vector<uint> masks = macrocells.masks().read();
     const std::vector<float> &thresholds = macrocells.thresholds();
     const std::vector<cl_ushort> ranges = macrocells.ranges().read();
@@ -163,7 +166,8 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       const Range &range = expected[b];
       const bool in_range = range.holds(isovalue);
       if (in_range) {
-        ASSERT_TRUE(selected) << "block " << b << " of [" << range.min << ", " << range.max << "] is missed";
+        ASSERT_TRUE(selected) << "block " << b << " of [" << range.min << ", " << range.max
+                              << "] is missed";
       }
       if (range.min > range.max) {
         ASSERT_FALSE(selected) << "block " << b << " owns no dual cell";
@@ -195,8 +199,9 @@ std::vector<float> sphere_voxels(const glm::uvec3 &dims) {
   return voxels;
 }
 
-constexpr glm::uvec3 kAwkwardDims[] = {{2, 2, 2},   {4, 4, 4},   {5, 5, 5},    {2, 19, 21}, {17, 2, 9},
-                                       {13, 22, 2}, {9, 10, 11}, {41, 41, 41}, {70, 18, 33}};
+constexpr glm::uvec3 kAwkwardDims[] = {{2, 2, 2},   {4, 4, 4},    {5, 5, 5},
+                                       {2, 19, 21}, {17, 2, 9},   {13, 22, 2},
+                                       {9, 10, 11}, {41, 41, 41}, {70, 18, 33}};
 
 TEST_P(MacrocellsOnDevice, SmallPartialBlocks) {
   const glm::uvec3 dims(5, 6, 9);
@@ -214,7 +219,8 @@ TEST_P(MacrocellsOnDevice, SmoothVolumesOfAwkwardDims) {
     expect_exact(compress_with_libzfp(sphere_voxels(dims), dims, 1024));
 }
 
-/// Ranges are those of the volume; what the isovalue touches where each block is raised or lowered by its own bound follows from them.
+/// Ranges are those of the volume; what the isovalue touches where each block is raised or lowered
+/// by its own bound follows from them.
 TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
   const glm::uvec3 dims(17, 10, 9);
   CompressedVolume volume = compress_with_libzfp(sphere_voxels(dims), dims, 1024);
@@ -230,8 +236,10 @@ TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
     const ValueOffset offset{0, sign * std::ldexp(1.0f, volume.bounds.exponent)};
     std::vector<float> moved = decoded;
     for (std::size_t i = 0; i < moved.size(); ++i) {
-      const std::size_t x = i % dims.x / 4, y = i / dims.x % dims.y / 4, z = i / dims.x / dims.y / 4;
-      moved[i] += offset_of_voxel(offset, volume.bounds, x + params.blocks_x * (y + params.blocks_y * z), 0);
+      const std::size_t x = i % dims.x / 4, y = i / dims.x % dims.y / 4,
+                        z = i / dims.x / dims.y / 4;
+      moved[i] += offset_of_voxel(offset, volume.bounds,
+                                  x + params.blocks_x * (y + params.blocks_y * z), 0);
     }
     const std::vector<Range> expected = dual_cell_ranges(dims, moved);
     for (const float isovalue : awkward_isovalues(expected, 4)) {
@@ -246,7 +254,8 @@ TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
       const std::vector<uint> by_block = masks(0, offset.unit), alike = masks(sign * 0.5f, 0);
       for (uint b = 0; b < expected.size(); ++b) {
         const bool selected = is_selected(by_block, params, b);
-        ASSERT_TRUE(selected || !expected[b].holds(isovalue)) << "block " << b << " at " << isovalue;
+        ASSERT_TRUE(selected || !expected[b].holds(isovalue))
+            << "block " << b << " at " << isovalue;
         num_selected += selected;
         num_in_range += expected[b].holds(isovalue);
         num_if_all_alike += is_selected(alike, params, b);
@@ -269,8 +278,8 @@ TEST_P(MacrocellsOnDevice, OvershootAtOneBitPerVoxel) {
   expect_exact(volume);
 }
 
-/// What lies in the padding of the last blocks is no part of the volume. libzfp pads with copies of voxels, which
-/// would go unnoticed; another writer need not.
+/// What lies in the padding of the last blocks is no part of the volume. libzfp pads with copies of
+/// voxels, which would go unnoticed; another writer need not.
 TEST_P(MacrocellsOnDevice, PaddingIsNotCounted) {
   const glm::uvec3 dims(14, 10, 7), padded(16, 12, 8);
   std::vector<float> voxels = random_voxels(padded, -1, 1, 4);
@@ -294,12 +303,13 @@ TEST_P(MacrocellsOnDevice, Outliers) {
   FrameParams params = grid_frame(dims);
   const DeviceStream stream(device_, volume);
   const Macrocells macrocells(device_, params, stream);
-  const auto within =
-      std::ranges::count_if(macrocells.thresholds(), [](float t) { return t > -1.0f && t < 100.0f; });
+  const auto within = std::ranges::count_if(macrocells.thresholds(),
+                                            [](float t) { return t > -1.0f && t < 100.0f; });
   EXPECT_GT(within, 200);
 }
 
-/// Nearly all distinct values are noise upon two plateaus; a table of quantiles alone would take all between for one.
+/// Nearly all distinct values are noise upon two plateaus; a table of quantiles alone would take
+/// all between for one.
 TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
   const glm::uvec3 dims(64, 40, 40);
   std::vector<float> voxels = random_voxels(dims, 0, 1, 5);
@@ -317,22 +327,24 @@ TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
   EXPECT_GT(between, 100);
 }
 
-/// Masks of a volume and of its bounds are kept side by side: whoever draws them by turns finds them as they were.
+/// Masks of a volume and of its bounds are kept side by side: whoever draws them by turns finds
+/// them as they were.
 TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
   const glm::uvec3 dims(24, 20, 18);
   const CompressedVolume volume = compress_with_libzfp(sphere_voxels(dims), dims, 2048);
   const DeviceStream stream(device_, volume);
-  const auto select = [&](Macrocells &macrocells, std::size_t selection, float isovalue, double value_error) {
+  const auto select = [&](Macrocells &macrocells, std::size_t selection, float isovalue,
+                          double value_error) {
     FrameParams params = grid_frame(dims);
     params.isovalue = isovalue;
     macrocells.use(selection);
     macrocells.select(params, value_error, &stream);
     macrocells.set_index(params);
     macrocells.set_active_box(params);
-    return std::pair(
-        macrocells.masks().read(),
-        std::array{static_cast<int>(params.isovalue_index), params.active_begin_x, params.active_begin_y,
-                   params.active_begin_z, params.active_end_x, params.active_end_y, params.active_end_z});
+    return std::pair(macrocells.masks().read(),
+                     std::array{static_cast<int>(params.isovalue_index), params.active_begin_x,
+                                params.active_begin_y, params.active_begin_z, params.active_end_x,
+                                params.active_end_y, params.active_end_z});
   };
   const auto alone = [&](float isovalue, double value_error) {
     Macrocells macrocells(device_, grid_frame(dims), stream);
@@ -340,8 +352,8 @@ TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
   };
   Macrocells macrocells(
       device_, grid_frame(dims), stream,
-      std::make_shared<MacrocellBuffers>(device_, volume.block_count(), num_macrocells(grid_frame(dims)),
-                                         kNumFieldBounds));
+      std::make_shared<MacrocellBuffers>(device_, volume.block_count(),
+                                         num_macrocells(grid_frame(dims)), kNumFieldBounds));
   const float first = sphere_voxels(dims)[1000], other = sphere_voxels(dims)[5000];
   const auto expected = alone(first, 0), wider = alone(first, 0.2), another = alone(other, 0);
   EXPECT_NE(expected, wider);
@@ -355,7 +367,8 @@ TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
   EXPECT_EQ(select(macrocells, 0, first, 0), expected);
 }
 
-/// Rows of 128 blocks and one sample for 128 blocks: were it always the first, the sample would be one face of the volume.
+/// Rows of 128 blocks and one sample for 128 blocks: were it always the first, the sample would be
+/// one face of the volume.
 TEST(Macrocells, SampleOfLongRows) {
   std::set<uint> seen;
   for (uint begin = 0; begin < 128 * 128 * 128; begin += 128) {
@@ -382,7 +395,8 @@ TEST_P(MacrocellsOnDevice, FewDistinctValues) {
   expect_exact(compress_with_libzfp(voxels, dims, 2048));
 }
 
-/// More blocks than the sample for the table takes: the rest may hold values beyond every threshold.
+/// More blocks than the sample for the table takes: the rest may hold values beyond every
+/// threshold.
 TEST_P(MacrocellsOnDevice, MoreBlocksThanSamples) {
   const glm::uvec3 dims(130, 126, 66);  // 33 * 32 * 17 = 17,952 blocks: every second is sampled
   std::vector<float> voxels = sphere_voxels(dims);

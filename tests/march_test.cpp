@@ -1,5 +1,5 @@
-// core/march, stage by stage: which rays start and where, what they ask for, and when they hit. Whole frames are in
-// render_test.cpp and invariance_test.cpp.
+// core/march, stage by stage: which rays start and where, what they ask for, and when they hit.
+// Whole frames are in render_test.cpp and invariance_test.cpp.
 
 #include "core/stages/march.hpp"
 
@@ -23,8 +23,8 @@ constexpr float kIsovalue = 0.3f;
 
 /// A frame at its beginning, nothing cached.
 struct MarchWorld {
-  MarchWorld(ocl::Device &device, const test::TestVolume &test_volume, const Camera &camera, ImageSize size,
-             std::uint32_t spec_count)
+  MarchWorld(ocl::Device &device, const test::TestVolume &test_volume, const Camera &camera,
+             ImageSize size, std::uint32_t spec_count)
       : volume(test_volume),
         frame(make_frame_params(volume.info(), camera, size, kIsovalue)),
         stream(device, volume.compressed),
@@ -52,7 +52,8 @@ struct MarchWorld {
                z = block / frame.blocks_x / frame.blocks_y;
     const uint coarse_x = (frame.blocks_x + 3) / 4, coarse_y = (frame.blocks_y + 3) / 4;
     const uint bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
-    return (masks[2 * (x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4))) + bit / 32] >> bit % 32 & 1u) != 0;
+    return (masks[2 * (x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4))) + bit / 32] >> bit % 32 &
+            1u) != 0;
   }
 
   PassCounts counts() const { return rays.counts.read().front(); }
@@ -63,7 +64,8 @@ struct MarchWorld {
     rays.next_active_ray_ids.read(entries);
     const std::vector<uint> blocks = rays.ray_block_ids.read();
     std::map<uint, uint> waiting;
-    for (const uint entry : entries) waiting.emplace(entry & ISO_RAY_PIXEL, blocks[entry & ISO_RAY_PIXEL]);
+    for (const uint entry : entries)
+      waiting.emplace(entry & ISO_RAY_PIXEL, blocks[entry & ISO_RAY_PIXEL]);
     EXPECT_EQ(waiting.size(), entries.size()) << "a ray is listed twice";
     return waiting;
   }
@@ -141,7 +143,8 @@ class MarchOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   static std::set<uint> touched_ahead(const MarchWorld &world, const std::map<uint, uint> &waiting,
                                       std::uint32_t most) {
     const FrameParams &frame = world.frame;
-    const auto spec = std::clamp(frame.width * frame.height / static_cast<uint>(waiting.size()), 1u, most);
+    const auto spec =
+        std::clamp(frame.width * frame.height / static_cast<uint>(waiting.size()), 1u, most);
     const LastPlanes last = last_planes(&frame);
     std::set<uint> touched;
     for (const auto &[pixel, block_id] : waiting) {
@@ -154,7 +157,8 @@ class MarchOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         for (uint corner = 0; corner < 8; ++corner) {
           if ((corners >> corner & 1u) != 0)
             touched.insert(x + (corner & 1) +
-                           frame.blocks_x * (y + (corner >> 1 & 1) + frame.blocks_y * (z + (corner >> 2))));
+                           frame.blocks_x *
+                               (y + (corner >> 1 & 1) + frame.blocks_y * (z + (corner >> 2))));
         }
       }
     }
@@ -172,7 +176,8 @@ TEST_P(MarchOnDevice, StartsAsksAndHits) {
   expect_frame({30, 27, 33}, {200, 3}, 64);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, MarchOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, MarchOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 }  // namespace
 }  // namespace isowave

@@ -1,4 +1,5 @@
-// The plan of all device memory against what is really booked, and budgets that are kept or refused.
+// The plan of all device memory against what is really booked, and budgets that are kept or
+// refused.
 
 #include "core/render/memory_plan.hpp"
 
@@ -55,15 +56,17 @@ TEST_P(MemoryPlanOnDevice, PlanIsWhatIsBooked) {
     const TestVolume fixed_rate(test::grid_info(dims), voxels, 8);
     const TestVolume accurate(test::grid_info(dims), voxels, ErrorGoal{0.01});
     for (const TestVolume *volume : {&fixed_rate, &accurate}) {
-      for (const auto &[slots, place] :
-           {std::pair(0u, StreamPlace::kDevice), {8u, StreamPlace::kDevice}, {100u, StreamPlace::kHost}}) {
-        SCOPED_TRACE(fmt::format("{} x {} x {}, {} bits per block, {} slots", dims.x, dims.y, dims.z,
-                                 volume->compressed.bits_per_block, slots));
+      for (const auto &[slots, place] : {std::pair(0u, StreamPlace::kDevice),
+                                         {8u, StreamPlace::kDevice},
+                                         {100u, StreamPlace::kHost}}) {
+        SCOPED_TRACE(fmt::format("{} x {} x {}, {} bits per block, {} slots", dims.x, dims.y,
+                                 dims.z, volume->compressed.bits_per_block, slots));
         ocl::Device device(GetParam().device);
-        const Renderer renderer(
-            device, volume->compressed,
-            GetParam().with(
-                {.size = size_, .cache_slots = slots, .stream = place, .with_kept_picture = slots == 8}));
+        const Renderer renderer(device, volume->compressed,
+                                GetParam().with({.size = size_,
+                                                 .cache_slots = slots,
+                                                 .stream = place,
+                                                 .with_kept_picture = slots == 8}));
         expect_booked(device, renderer.memory_plan());
       }
     }
@@ -76,11 +79,13 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   const auto expected = test::twin_hits(volume, camera, size_, kIsovalue);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-    const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64, place};
+    const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64,
+                                place};
     const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
     std::uint32_t last_slots = 0;
     for (const std::uint64_t budget : {least, least + 10'000, least + 50'000, least + 1'000'000}) {
-      SCOPED_TRACE(fmt::format("stream on {}, budget {}, least {}", to_string(place), budget, least));
+      SCOPED_TRACE(
+          fmt::format("stream on {}, budget {}, least {}", to_string(place), budget, least));
       ocl::Device device(GetParam().device);
       Renderer renderer(device, volume.compressed,
                         GetParam().with({.size = size_, .memory_budget = budget, .stream = place}));
@@ -102,7 +107,8 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
   }
 }
 
-/// As the budget grows, the stream moves from the host to the device, once; the smallest budget is below the stream's size.
+/// As the budget grows, the stream moves from the host to the device, once; the smallest budget is
+/// below the stream's size.
 TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
   const TestVolume volume({30, 27, 33}, test::gyroid_field(10), 32);
   const std::uint64_t stream_bytes = volume.compressed.word_count() * sizeof(uint);
@@ -113,11 +119,12 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
   const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
   EXPECT_LT(least, stream_bytes) << "else this scene tests nothing";
   std::vector<StreamPlace> places;
-  for (const std::uint64_t budget :
-       {least, stream_bytes - 1, least + stream_bytes, least + 2 * stream_bytes, least + 10 * stream_bytes}) {
+  for (const std::uint64_t budget : {least, stream_bytes - 1, least + stream_bytes,
+                                     least + 2 * stream_bytes, least + 10 * stream_bytes}) {
     SCOPED_TRACE(fmt::format("budget {}, least {}, stream {}", budget, least, stream_bytes));
     ocl::Device device(GetParam().device);
-    Renderer renderer(device, volume.compressed, GetParam().with({.size = size_, .memory_budget = budget}));
+    Renderer renderer(device, volume.compressed,
+                      GetParam().with({.size = size_, .memory_budget = budget}));
     const FrameStats stats = renderer.render(camera, kIsovalue);
     test::expect_same_hits(renderer.hits(), expected, size_.width);
     renderer.shade();
@@ -139,7 +146,8 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
               HasSubstr(fmt::format("{} would do", least)));
 }
 
-/// Slots that were asked for leave the choice to the budget too; a place that was asked for is never left.
+/// Slots that were asked for leave the choice to the budget too; a place that was asked for is
+/// never left.
 TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
   const TestVolume volume({17, 18, 19}, test::noise_field(3), 32);
   MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
@@ -173,7 +181,8 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
     Renderer(device, volume.compressed,
              GetParam().with({.size = size_, .memory_budget = budget, .cache_slots = slots}));
   };
-  EXPECT_THAT(refusal([&] { render_within(least - 1, 0); }), HasSubstr(fmt::format("{} would do", least)));
+  EXPECT_THAT(refusal([&] { render_within(least - 1, 0); }),
+              HasSubstr(fmt::format("{} would do", least)));
   EXPECT_THAT(refusal([&] { render_within(1, 0); }), HasSubstr(fmt::format("{} would do", least)));
   EXPECT_THAT(refusal([&] { render_within(least, 9); }), HasSubstr("more than the budget"));
   EXPECT_EQ(device.ledger().peak(), 0u) << "refused before any memory was taken";

@@ -14,8 +14,8 @@ namespace {
 
 using test::sample;
 
-/// Sum over triangles of the volume between them and the origin [voxels^3]: of a closed surface, what it encloses,
-/// positive when its triangles are counter-clockwise from outside.
+/// Sum over triangles of the volume between them and the origin [voxels^3]: of a closed surface,
+/// what it encloses, positive when its triangles are counter-clockwise from outside.
 double enclosed_volume(const IsoMesh &mesh) {
   double sum = 0;
   for (const auto &triangle : mesh.triangles) {
@@ -30,8 +30,9 @@ double enclosed_volume(const IsoMesh &mesh) {
 }
 
 TEST(IsoMesh, OfASphereIsClosed) {
-  const auto voxels =
-      sample({23, 25, 27}, [](const glm::dvec3 &p) { return 9 - glm::length(p - glm::dvec3(11, 12, 13)); });
+  const auto voxels = sample({23, 25, 27}, [](const glm::dvec3 &p) {
+    return 9 - glm::length(p - glm::dvec3(11, 12, 13));
+  });
   const IsoMesh mesh = extract_isosurface(voxels, {23, 25, 27}, 0);
   EXPECT_GT(mesh.triangles.size(), 1000u);
   EXPECT_EQ(num_open_edges(mesh), 0u);
@@ -64,7 +65,8 @@ TEST(IsoMesh, OfNoiseAndPlateausIsClosed) {
     const auto noise = test::noise_field(5);
     const auto voxels = sample({13, 12, 11}, [&](const glm::dvec3 &p) {
       const double value = plateaus ? std::round(2 * noise(p)) : noise(p);
-      const bool border = glm::any(glm::lessThan(p, glm::dvec3(1))) || p.x > 11 || p.y > 10 || p.z > 9;
+      const bool border =
+          glm::any(glm::lessThan(p, glm::dvec3(1))) || p.x > 11 || p.y > 10 || p.z > 9;
       return border ? -2 : value;
     });
     const IsoMesh mesh =
@@ -76,7 +78,8 @@ TEST(IsoMesh, OfNoiseAndPlateausIsClosed) {
 
 TEST(IsoMesh, IsOpenWhereItLeavesTheVolume) {
   const auto voxels = sample({5, 4, 4}, [](const glm::dvec3 &p) { return p.x; });
-  // 3 x 3 faces of a cell's cross section; each border edge of the sheet crosses 2 triangles of a face's four.
+  // 3 x 3 faces of a cell's cross section; each border edge of the sheet crosses 2 triangles of a
+  // face's four.
   EXPECT_GT(num_open_edges(extract_isosurface(voxels, {5, 4, 4}, 2.25f)), 0u);
 }
 
@@ -95,7 +98,8 @@ TEST(MeshOracle, FindsAPlane) {
 }
 
 TEST(MeshOracle, FindsASaddle) {
-  // (x - 2)(y - 2) = 0 is two planes between voxels, where the field is 0 at every node: triangles lie in them.
+  // (x - 2)(y - 2) = 0 is two planes between voxels, where the field is 0 at every node: triangles
+  // lie in them.
   const auto voxels = sample({5, 5, 5}, [](const glm::dvec3 &p) { return (p.x - 2) * (p.y - 2); });
   const MeshOracle oracle(voxels, {5, 5, 5}, 0);
   EXPECT_NEAR(oracle.first_hit({{1, 1.125, 2.25}, {1, 1.5, 0}}), 0.875 / 1.5, 1e-6);
@@ -103,16 +107,18 @@ TEST(MeshOracle, FindsASaddle) {
 }
 
 TEST(MeshOracle, FindsASphere) {
-  // As for the cell oracle: linear interpolation over any corners is too large by their weights' variance, at most 3/4.
+  // As for the cell oracle: linear interpolation over any corners is too large by their weights'
+  // variance, at most 3/4.
   const auto voxels =
       sample(glm::uvec3(49), [](const glm::dvec3 &p) { return -glm::dot(p - 24.0, p - 24.0); });
   const MeshOracle oracle(voxels, {49, 49, 49}, -400);
   for (int i = 0; i < 200; ++i) {
     const double angle = 0.0314159 * i;
     const glm::dvec3 eye = 24.0 + 100.0 * glm::dvec3(std::cos(angle), 0.3, std::sin(angle));
-    const glm::dvec3 direction =
-        glm::normalize(glm::dvec3(24 + 15 * std::sin(3 * angle), 24, 24 + 5 * std::cos(angle)) - eye);
-    const double t = oracle.first_hit({{eye.x, eye.y, eye.z}, {direction.x, direction.y, direction.z}});
+    const glm::dvec3 direction = glm::normalize(
+        glm::dvec3(24 + 15 * std::sin(3 * angle), 24, 24 + 5 * std::cos(angle)) - eye);
+    const double t =
+        oracle.first_hit({{eye.x, eye.y, eye.z}, {direction.x, direction.y, direction.z}});
     ASSERT_LT(t, kInfinity) << i;
     const glm::dvec3 at = eye + t * direction - 24.0;
     EXPECT_LE(glm::dot(at, at), 400 + 1e-3);  // float32: 2^-24 * 100 voxels, times twice the radius
@@ -133,7 +139,8 @@ TEST(MeshOracle, RefusesEyesOutOfEmbreesReach) {
   EXPECT_THROW(oracle.first_hit({{1e5, 1, 1}, {-1, 0, 0}}), std::invalid_argument);
 }
 
-/// Every sign case in a single cell: the sheets that triangles connect differently must be explained by refinement.
+/// Every sign case in a single cell: the sheets that triangles connect differently must be
+/// explained by refinement.
 TEST(MeshOracle, AgreesWithTheTwinInAllSignCases) {
   std::mt19937 random(16);
   std::uniform_real_distribution<float> uniform(0.05f, 1);
@@ -146,7 +153,8 @@ TEST(MeshOracle, AgreesWithTheTwinInAllSignCases) {
     }
     const MeshOracle oracle(voxels, {4, 4, 4}, 0);
     const Camera camera = test::camera_along({-4, 9, 7}, {5.5, -7.5, -5.5}, {0, 1, 0}, 30);
-    const FrameParams frame = make_frame_params(test::grid_info(glm::uvec3(4)), camera, {12, 10}, 0);
+    const FrameParams frame =
+        make_frame_params(test::grid_info(glm::uvec3(4)), camera, {12, 10}, 0);
     merge(tally, judge_frame(oracle, frame, render_scalar(frame, voxels)));
   }
   EXPECT_EQ(tally.failures(), 0u);
@@ -155,14 +163,15 @@ TEST(MeshOracle, AgreesWithTheTwinInAllSignCases) {
 
 class MeshOracleFrame : public testing::Test {
  protected:
-  Accuracy judge_hits(const test::TestVolume &volume, float isovalue, const std::vector<HitRecord> &hits) {
+  Accuracy judge_hits(const test::TestVolume &volume, float isovalue,
+                      const std::vector<HitRecord> &hits) {
     const glm::uvec3 dims = volume.info().dims;
     const MeshOracle oracle(volume.voxels, {dims.x, dims.y, dims.z}, isovalue);
     return judge_frame(oracle, frame(volume, isovalue), hits);
   }
   FrameParams frame(const test::TestVolume &volume, float isovalue) {
-    return make_frame_params(volume.info(), test::camera_along({-10, 25, 32}, {21, -15, -22}), {64, 48},
-                             isovalue);
+    return make_frame_params(volume.info(), test::camera_along({-10, 25, 32}, {21, -15, -22}),
+                             {64, 48}, isovalue);
   }
   std::vector<HitRecord> twin(const test::TestVolume &volume, float isovalue) {
     return render_scalar(frame(volume, isovalue), volume.voxels);
@@ -205,7 +214,8 @@ TEST_F(MeshOracleFrame, WithAHitInAnotherBlockIsWrong) {
   EXPECT_EQ(tally.wrong_places, 1u) << "it is not on its ray";
 }
 
-/// Refinement excuses disagreements; on a noise volume, the worst case, lost hits must still be seen.
+/// Refinement excuses disagreements; on a noise volume, the worst case, lost hits must still be
+/// seen.
 TEST_F(MeshOracleFrame, SeesHolesEvenInNoise) {
   auto hits = twin(noise, 0.5f);
   const Accuracy before = judge_hits(noise, 0.5f, hits);

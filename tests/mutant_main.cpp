@@ -1,5 +1,5 @@
-// A program built with one planted bug in the portable headers (mutants.cmake). Succeeds if the stability
-// suite or the watertight test finds it.
+// A program built with one planted bug in the portable headers (mutants.cmake). Succeeds if the
+// stability suite or the watertight test finds it.
 
 #include <fmt/format.h>
 
@@ -13,11 +13,12 @@ int main() {
     const CaseResult result = run_case(stability_case, kDefaultSolver);
     if (passes(result)) continue;
     ++failed_cases;
-    fmt::print("{}: {} missed, {} false, {} resumed differently, residual p99 {:.1e}\n", stability_case.name,
-               result.accuracy.missed, result.accuracy.false_hits, result.resumed_differently,
-               quantiles(result.accuracy.residual).p99);
+    fmt::print("{}: {} missed, {} false, {} resumed differently, residual p99 {:.1e}\n",
+               stability_case.name, result.accuracy.missed, result.accuracy.false_hits,
+               result.resumed_differently, quantiles(result.accuracy.residual).p99);
   }
-  for (const WatertightResult &result : run_watertight(100000, 20231, kDefaultSolver)) leaks += result.leaks;
+  for (const WatertightResult &result : run_watertight(100000, 20231, kDefaultSolver))
+    leaks += result.leaks;
   fmt::print("{} cases failed, {} leaks\n", failed_cases, leaks);
   return failed_cases + leaks > 0 ? 0 : 1;
 }

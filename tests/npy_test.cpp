@@ -78,7 +78,9 @@ TEST_F(NpyTest, KeepsEveryBit) {
     EXPECT_EQ(back.width, width);
     EXPECT_EQ(back.height, height);
     ASSERT_EQ(back.pixels.size(), image.pixels.size());
-    EXPECT_EQ(std::memcmp(back.pixels.data(), image.pixels.data(), image.pixels.size() * sizeof(float)), 0);
+    EXPECT_EQ(
+        std::memcmp(back.pixels.data(), image.pixels.data(), image.pixels.size() * sizeof(float)),
+        0);
     EXPECT_TRUE(std::isinf(back.pixels[0]) && back.pixels[0] > 0);
     EXPECT_EQ(folder_.num_files(), 1u) << "a temporary file was left";
   }
@@ -102,8 +104,9 @@ TEST_F(NpyTest, ReadsOtherWritersOfTheFormat) {
     EXPECT_EQ(image.width, 3u);
     EXPECT_EQ(image.height, 2u);
   }
-  EXPECT_TRUE(read_npy(write_bytes(file(1, "{'shape':(0,3),'descr':'<f4','fortran_order':False}\n", 0)))
-                  .pixels.empty());
+  EXPECT_TRUE(
+      read_npy(write_bytes(file(1, "{'shape':(0,3),'descr':'<f4','fortran_order':False}\n", 0)))
+          .pixels.empty());
 }
 
 TEST_F(NpyTest, RefusesWrongAndTruncatedFiles) {
@@ -113,7 +116,8 @@ TEST_F(NpyTest, RefusesWrongAndTruncatedFiles) {
   EXPECT_THAT(refusal("\x89PNG\r\n\x1a\n----------"), HasSubstr("not a .npy file"));
   EXPECT_THAT(refusal(file(9, "{}", 0)), HasSubstr("format 9"));
 
-  const std::string good = file(1, "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n", 24);
+  const std::string good =
+      file(1, "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n", 24);
   EXPECT_EQ(refusal(good), "accepted");
   for (std::size_t length = 0; length < good.size(); ++length) {
     EXPECT_NE(refusal(good.substr(0, length)), "accepted") << length << " bytes";
@@ -122,9 +126,11 @@ TEST_F(NpyTest, RefusesWrongAndTruncatedFiles) {
 }
 
 TEST_F(NpyTest, RefusesOtherArrays) {
-  const auto with = [](const std::string &descr, const std::string &fortran, const std::string &shape) {
-    return file(1, "{'descr': " + descr + ", 'fortran_order': " + fortran + ", 'shape': " + shape + ", }\n",
-                24);
+  const auto with = [](const std::string &descr, const std::string &fortran,
+                       const std::string &shape) {
+    return file(
+        1, "{'descr': " + descr + ", 'fortran_order': " + fortran + ", 'shape': " + shape + ", }\n",
+        24);
   };
   EXPECT_EQ(refusal(with("'<f4'", "False", "(2, 3)")), "accepted");
   EXPECT_THAT(refusal(with("'<f8'", "False", "(1, 3)")), HasSubstr("'<f8'"));
@@ -138,7 +144,8 @@ TEST_F(NpyTest, RefusesOtherArrays) {
   EXPECT_THAT(refusal(with("'<f4'", "False", "(2, 3")), HasSubstr("bad shape"));
   EXPECT_THAT(refusal(with("'<f4'", "False", "(4294967295, 4294967295)")), HasSubstr("needs"));
   EXPECT_THAT(refusal(with("'<f4'", "False", "(4294967296, 0)")), HasSubstr("too large"));
-  EXPECT_THAT(refusal(file(1, "{'descr': '<f4', 'shape': (2, 3)}\n", 24)), HasSubstr("fortran_order"));
+  EXPECT_THAT(refusal(file(1, "{'descr': '<f4', 'shape': (2, 3)}\n", 24)),
+              HasSubstr("fortran_order"));
   EXPECT_THAT(refusal(with("'<f4'", "False", "(2, 3), \"shape\": (3, 2)")),
               HasSubstr("'shape' is given twice"));
 }

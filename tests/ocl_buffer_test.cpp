@@ -1,4 +1,5 @@
-// core/ocl/buffer and memory_ledger: transfers, ranges, fills, and what the ledger counts through moves.
+// core/ocl/buffer and memory_ledger: transfers, ranges, fills, and what the ledger counts through
+// moves.
 
 #include "core/ocl/buffer.hpp"
 
@@ -89,7 +90,8 @@ TEST_P(OclBufferOnDevice, RefusesRangesPastTheEnd) {
   EXPECT_THROW(buffer.write(values, 7), std::invalid_argument);
   EXPECT_THROW(buffer.read(values, 7), std::invalid_argument);
   EXPECT_THROW(buffer.read(values, 11), std::invalid_argument);
-  EXPECT_THROW(buffer.read(values, std::numeric_limits<std::size_t>::max() - 1), std::invalid_argument);
+  EXPECT_THROW(buffer.read(values, std::numeric_limits<std::size_t>::max() - 1),
+               std::invalid_argument);
   EXPECT_THROW(buffer.read_async(values, event, 7), std::invalid_argument);
   EXPECT_THROW(buffer.fill(1, 8, 3), std::invalid_argument);
   try {
@@ -203,14 +205,16 @@ TEST_P(OclBufferOnDevice, SwapKeepsTheBooks) {
 
 TEST_P(OclBufferOnDevice, TooLargeIsRefusedBeforeAnyWork) {
   const std::uint64_t largest = device_.capabilities().largest_allocation;
-  for (const std::size_t count : {std::size_t(largest / 4 + 1), std::numeric_limits<std::size_t>::max()}) {
+  for (const std::size_t count :
+       {std::size_t(largest / 4 + 1), std::numeric_limits<std::size_t>::max()}) {
     try {
       ocl::Buffer<std::uint32_t> huge(device_, "huge", count);
       FAIL() << "was allocated";
     } catch (const Error &error) {
-      EXPECT_THAT(error.what(),
-                  AllOf(HasSubstr("'huge'"), HasSubstr("MiB"), HasSubstr(GetParam().name),
-                        HasSubstr(fmt::format("{:.1f}", static_cast<double>(largest) / (1 << 20)))));
+      EXPECT_THAT(
+          error.what(),
+          AllOf(HasSubstr("'huge'"), HasSubstr("MiB"), HasSubstr(GetParam().name),
+                HasSubstr(fmt::format("{:.1f}", static_cast<double>(largest) / (1 << 20)))));
     }
   }
   EXPECT_EQ(device_.ledger().peak(), 0u);

@@ -34,7 +34,8 @@ std::string message_of(const Action &action) {
   return {};
 }
 
-ocl::DeviceInfo made_up(std::uint32_t index, std::string name, std::string platform, ocl::DeviceType type) {
+ocl::DeviceInfo made_up(std::uint32_t index, std::string name, std::string platform,
+                        ocl::DeviceType type) {
   ocl::DeviceInfo info;
   info.index = index;
   info.name = std::move(name);
@@ -152,7 +153,8 @@ TEST_P(OclDeviceOnDevice, VanishedDeviceIsAnError) {
 TEST_P(OclDeviceOnDevice, TooLittleLocalMemoryIsRefused) {
   ocl::DeviceInfo info = GetParam();
   info.capabilities.local_memory = 16 << 10;
-  EXPECT_THAT(message_of<Error>([&] { ocl::Device device(info); }), HasSubstr("16 KiB of local memory"));
+  EXPECT_THAT(message_of<Error>([&] { ocl::Device device(info); }),
+              HasSubstr("16 KiB of local memory"));
 }
 
 TEST_P(OclDeviceOnDevice, ProgramsAreBuiltOncePerDefines) {
@@ -186,17 +188,19 @@ TEST_P(OclDeviceOnDevice, BuildErrorsNameFileAndLine) {
     return;
   }
   // After two includes the numbers must still be those of the .cl file.
-  EXPECT_THAT(in_kernel, HasSubstr(fmt::format("shared_types.cl:{}:",
-                                               line_of("shared_types.cl", "void shared_type_sizes"))));
-  EXPECT_THAT(in_header,
-              HasSubstr(fmt::format("shared_types.h:{}:", line_of("shared_types.h", "uint isovalue_index"))));
+  EXPECT_THAT(in_kernel,
+              HasSubstr(fmt::format("shared_types.cl:{}:",
+                                    line_of("shared_types.cl", "void shared_type_sizes"))));
+  EXPECT_THAT(in_header, HasSubstr(fmt::format("shared_types.h:{}:",
+                                               line_of("shared_types.h", "uint isovalue_index"))));
 }
 
 TEST_P(OclDeviceOnDevice, MisuseIsAnInvalidArgument) {
   ocl::Device device(GetParam());
   EXPECT_THAT(message_of<std::invalid_argument>([&] { device.program("no_such_stem"); }),
               HasSubstr("no_such_stem.cl"));
-  EXPECT_THROW(device.program("launch_probe", {{"ISO_A", "1 -cl-fast-relaxed-math"}}), std::invalid_argument);
+  EXPECT_THROW(device.program("launch_probe", {{"ISO_A", "1 -cl-fast-relaxed-math"}}),
+               std::invalid_argument);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, OclDeviceOnDevice, testing::ValuesIn(devices_under_test()),

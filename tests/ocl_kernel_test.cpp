@@ -29,13 +29,14 @@ using testing::HasSubstr;
 using ScaleKernel = ocl::Kernel<In<uint>, uint, uint, Out<uint>>;
 
 // The C++ compiler refuses other arguments.
+static_assert(std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint,
+                                  ocl::Buffer<uint> &>);
+static_assert(!std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<float> &, uint, uint,
+                                   ocl::Buffer<uint> &>);
+static_assert(!std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint,
+                                   const ocl::Buffer<uint> &>);
 static_assert(
-    std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint, ocl::Buffer<uint> &>);
-static_assert(
-    !std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<float> &, uint, uint, ocl::Buffer<uint> &>);
-static_assert(
-    !std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint, const ocl::Buffer<uint> &>);
-static_assert(!std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, ocl::Buffer<uint> &>);
+    !std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, ocl::Buffer<uint> &>);
 
 class OclKernelOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
@@ -71,7 +72,8 @@ TEST_P(OclKernelOnDevice, SmallLocalMemoryAndGroups) {
 
 TEST_P(OclKernelOnDevice, SmallStructsPassByValue) {
   ocl::Buffer<PairHit> stored(device_, "stored", 1);
-  ocl::Kernel<PairHit, Out<PairHit>>(device_, "launch_probe", "store_pair_hit")({1, 1}, {42, 0.25f}, stored);
+  ocl::Kernel<PairHit, Out<PairHit>>(device_, "launch_probe", "store_pair_hit")({1, 1}, {42, 0.25f},
+                                                                                stored);
   EXPECT_EQ(stored.read().front().cell, 42u);
   EXPECT_EQ(stored.read().front().s, 0.25f);
 }
@@ -79,7 +81,8 @@ TEST_P(OclKernelOnDevice, SmallStructsPassByValue) {
 TEST_P(OclKernelOnDevice, SmallKernelsOfOneProgramKeepTheirOwnArguments) {
   const ocl::Buffer<uint> input(device_, "input", std::vector<uint>{1});
   ocl::Buffer<uint> twice(device_, "twice", 1), thrice(device_, "thrice", 1);
-  ScaleKernel first(device_, "launch_probe", "scale_values"), second(device_, "launch_probe", "scale_values");
+  ScaleKernel first(device_, "launch_probe", "scale_values"),
+      second(device_, "launch_probe", "scale_values");
   first({1, 1}, input, 1, 2, twice);
   second({1, 1}, input, 1, 3, thrice);
   EXPECT_EQ(twice.read().front(), 2u);

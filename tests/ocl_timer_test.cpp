@@ -25,7 +25,8 @@ class OclTimerOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     constexpr uint kCount = 1u << 14;
     const ocl::Buffer<uint> input(device, "input", kCount);
     ocl::Buffer<uint> output(device, "output", kCount);
-    ocl::Kernel<ocl::In<uint>, uint, uint, ocl::Out<uint>> scale(device, "launch_probe", "scale_values");
+    ocl::Kernel<ocl::In<uint>, uint, uint, ocl::Out<uint>> scale(device, "launch_probe",
+                                                                 "scale_values");
     scale(ocl::Range::strided(kCount, 64, device), input, kCount, 3, output);
   }
 };

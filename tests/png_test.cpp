@@ -1,4 +1,5 @@
-// PNG images: round trips keep every byte; other, truncated and broken files are refused in one line.
+// PNG images: round trips keep every byte; other, truncated and broken files are refused in one
+// line.
 
 #include "core/io/png.hpp"
 
@@ -53,7 +54,8 @@ class PngTest : public testing::Test {
 
   static std::string chunk(const std::string &type, const std::string &data) {
     const std::string body = type + data;
-    const uLong crc = crc32(0, reinterpret_cast<const Bytef *>(body.data()), static_cast<uInt>(body.size()));
+    const uLong crc =
+        crc32(0, reinterpret_cast<const Bytef *>(body.data()), static_cast<uInt>(body.size()));
     return big_endian(static_cast<std::uint32_t>(data.size())) + body +
            big_endian(static_cast<std::uint32_t>(crc));
   }
@@ -103,7 +105,8 @@ TEST_F(PngTest, WidensGreyAndPalettes) {
   const Image8 grey = read_png(write_bytes(png(2, 1, 8, 0, "", string("\0\x10\xff", 3))));
   EXPECT_EQ(grey.channels, 3u);
   EXPECT_THAT(grey.pixels, ElementsAre(16, 16, 16, 255, 255, 255));
-  const string palette = chunk("PLTE", "\x01\x02\x03\x04\x05\x06") + chunk("tRNS", string("\x80", 1));
+  const string palette =
+      chunk("PLTE", "\x01\x02\x03\x04\x05\x06") + chunk("tRNS", string("\x80", 1));
   const Image8 indexed = read_png(write_bytes(png(2, 1, 1, 3, palette, string("\0\x40", 2))));
   EXPECT_EQ(indexed.channels, 4u);
   EXPECT_THAT(indexed.pixels, ElementsAre(1, 2, 3, 128, 4, 5, 6, 255));
@@ -137,7 +140,8 @@ long peak_of_compare(const std::filesystem::path &path) {
 TEST_F(PngTest, TakesNoMoreMemoryThanItsPixelsNeed) {
   constexpr long kMostMib = 400;  // the program alone takes 9
   const std::string pixel("\0abc", 4);
-  // 3 GB by a header in a file of 70 bytes; and 14 GB, where the file is as long as it could hold with blank pixels.
+  // 3 GB by a header in a file of 70 bytes; and 14 GB, where the file is as long as it could hold
+  // with blank pixels.
   write_bytes(png(32000, 32000, 8, 2, "", pixel));
   EXPECT_LT(peak_of_compare(folder_ / "image.png"), kMostMib);
   const std::string transparent = chunk("tRNS", std::string("\0\1", 2));
@@ -155,7 +159,8 @@ TEST_F(PngTest, ReadsInterlacedPictures) {
   // Of 2 x 2 pixels, Adam7's passes 1, 6 and 7 hold (0,0), (1,0) and the row below.
   std::string file = png(2, 2, 8, 2, "", std::string("\0abc\0def\0ghijkl", 15));
   constexpr std::size_t kHeaderAt = 8, kHeaderBytes = 25, kDataAt = 16, kDataBeforeInterlace = 12;
-  file.replace(kHeaderAt, kHeaderBytes, chunk("IHDR", file.substr(kDataAt, kDataBeforeInterlace) + '\1'));
+  file.replace(kHeaderAt, kHeaderBytes,
+               chunk("IHDR", file.substr(kDataAt, kDataBeforeInterlace) + '\1'));
   const Image8 image = read_png(write_bytes(file));
   EXPECT_EQ(std::string(image.pixels.begin(), image.pixels.end()), "abcdefghijkl");
 }

@@ -1,4 +1,5 @@
-// Levels of detail: their voxels against a plain triple loop, and volumes that have them in memory and in files.
+// Levels of detail: their voxels against a plain triple loop, and volumes that have them in memory
+// and in files.
 
 #include "core/volume/pyramid.hpp"
 
@@ -24,11 +25,12 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// The definition, one voxel at a time: weights -1, 4, 10, 4, -1 along each axis, held to the values, and copies of the border.
+/// The definition, one voxel at a time: weights -1, 4, 10, 4, -1 along each axis, held to the
+/// values, and copies of the border.
 std::vector<float> plain_downsample(const glm::ivec3 &dims, const std::vector<float> &voxels) {
   const auto weighted = [](auto &&value_at, int k) {
-    const std::array values{value_at(2 * k - 2), value_at(2 * k - 1), value_at(2 * k), value_at(2 * k + 1),
-                            value_at(2 * k + 2)};
+    const std::array values{value_at(2 * k - 2), value_at(2 * k - 1), value_at(2 * k),
+                            value_at(2 * k + 1), value_at(2 * k + 2)};
     const double sum = -values[0] + 4 * values[1] + 10 * values[2] + 4 * values[3] - values[4];
     return std::clamp(sum / 16, std::ranges::min(values), std::ranges::max(values));
   };
@@ -43,7 +45,9 @@ std::vector<float> plain_downsample(const glm::ivec3 &dims, const std::vector<fl
         const auto along_y = [&](int fx, int fz) {
           return weighted([&](int fy) { return fine(fx, fy, fz); }, y);
         };
-        const auto along_x = [&](int fz) { return weighted([&](int fx) { return along_y(fx, fz); }, x); };
+        const auto along_x = [&](int fz) {
+          return weighted([&](int fx) { return along_y(fx, fz); }, x);
+        };
         coarse.push_back(float(weighted(along_x, z)));
       }
     }
@@ -51,7 +55,8 @@ std::vector<float> plain_downsample(const glm::ivec3 &dims, const std::vector<fl
   return coarse;
 }
 
-/// Multiples of 1/8 below 2^8: every voxel of the next level is exact in float, in whatever order it is summed.
+/// Multiples of 1/8 below 2^8: every voxel of the next level is exact in float, in whatever order
+/// it is summed.
 std::vector<float> exact_voxels(const glm::uvec3 &dims, std::uint32_t seed = 5) {
   std::mt19937 random(seed);
   std::vector<float> voxels(std::size_t{dims.x} * dims.y * dims.z);
@@ -69,7 +74,8 @@ TEST(Pyramid, VoxelsAreMeansOfFinerOnes) {
   }
 }
 
-/// Where a field bends evenly, voxels keep their values; means of positive weights would move every surface.
+/// Where a field bends evenly, voxels keep their values; means of positive weights would move every
+/// surface.
 TEST(Pyramid, SmoothFieldsStayWhereTheyAre) {
   const glm::uvec3 dims{33, 33, 33};
   const std::vector<float> fine =
@@ -81,8 +87,8 @@ TEST(Pyramid, SmoothFieldsStayWhereTheyAre) {
 
 TEST(Pyramid, StepsDoNotRing) {
   const glm::uvec3 dims{20, 9, 12};
-  const std::vector<float> coarse =
-      downsample(dims, test::sample(dims, [](const glm::dvec3 &p) { return p.x < 8.5 ? -3e38 : 3e38; }));
+  const std::vector<float> coarse = downsample(
+      dims, test::sample(dims, [](const glm::dvec3 &p) { return p.x < 8.5 ? -3e38 : 3e38; }));
   for (const float value : coarse) EXPECT_LE(std::abs(value), 3e38f);
 }
 
@@ -137,7 +143,8 @@ TEST(Pyramid, LevelsAreTheVolumesOfTheirVoxels) {
       const CompressedVolume expected = compress(alone, {.rate = 11});
       EXPECT_EQ(level.words, expected.words);
       EXPECT_EQ(level.info.dims, expected.info.dims);
-      EXPECT_EQ(level.info.spacing, glm::dvec3(1, 2, 3) * double(1 << (&level - volume.coarser.data() + 1)));
+      EXPECT_EQ(level.info.spacing,
+                glm::dvec3(1, 2, 3) * double(1 << (&level - volume.coarser.data() + 1)));
     }
   }
 }
@@ -236,7 +243,8 @@ TEST_F(PyramidFile, BeginsAsTheVolumeWithoutLevels) {
   const std::string with = test::read_file(folder_ / "a.zfp");
   const CompressedVolume alone = write({.rate = 6});
   const std::size_t stream_bytes = 12 + alone.payload_bits() / 8;
-  EXPECT_EQ(with.substr(0, stream_bytes), test::read_file(folder_ / "a.zfp").substr(0, stream_bytes));
+  EXPECT_EQ(with.substr(0, stream_bytes),
+            test::read_file(folder_ / "a.zfp").substr(0, stream_bytes));
 }
 
 TEST_F(PyramidFile, DamageIsFound) {

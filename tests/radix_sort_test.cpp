@@ -1,5 +1,5 @@
-// core/radix_sort against std::stable_sort. Values are the places of their keys before sorting, so that a
-// swap of equal keys shows.
+// core/radix_sort against std::stable_sort. Values are the places of their keys before sorting, so
+// that a swap of equal keys shows.
 
 #include "core/stages/radix_sort.hpp"
 
@@ -58,7 +58,8 @@ struct RankingOnDevice {
 };
 
 void PrintTo(const RankingOnDevice &param, std::ostream *out) {
-  *out << (param.ranking == RadixRanking::kSerial ? "serial" : "together") << " on " << param.device.name;
+  *out << (param.ranking == RadixRanking::kSerial ? "serial" : "together") << " on "
+       << param.device.name;
 }
 
 /// Either way of ranking on every device, whichever suits it.
@@ -84,9 +85,10 @@ class RadixSortOnDevice : public testing::TestWithParam<RankingOnDevice> {
   }
 
   /// Sorts `count` of max_count pairs; those behind must not take part.
-  void expect_sorted(RadixSort &sort, uint max_count, KeyKind kind, uint count, uint key_bits, uint seed) {
-    SCOPED_TRACE(fmt::format("count {} of {}, key bits {}, key kind {}, seed {}", count, max_count, key_bits,
-                             static_cast<int>(kind), seed));
+  void expect_sorted(RadixSort &sort, uint max_count, KeyKind kind, uint count, uint key_bits,
+                     uint seed) {
+    SCOPED_TRACE(fmt::format("count {} of {}, key bits {}, key kind {}, seed {}", count, max_count,
+                             key_bits, static_cast<int>(kind), seed));
     std::vector<uint> keys = make_keys(kind, count, key_bits, seed), values(max_count);
     keys.resize(max_count, 0);  // smaller than the others: they would come first
     std::iota(values.begin(), values.end(), 0u);
@@ -168,8 +170,8 @@ TEST_P(RadixSortOnDevice, SortsEveryDistribution) {
   }
 }
 
-/// Every pass has the digits that the pass before left, with no pair between: all keys but a few are of two
-/// digits.
+/// Every pass has the digits that the pass before left, with no pair between: all keys but a few
+/// are of two digits.
 TEST_P(RadixSortOnDevice, SortsWhereMostDigitsHaveNoPairs) {
   constexpr uint kCount = 9000;
   RadixSort sort = make_sort(kCount, 64);

@@ -16,8 +16,8 @@ struct CameraCase {
   Camera camera;
 };
 
-/// Spacing 1, origin 0: index space is world space. With an odd image size the middle row and column have
-/// direction components that are exactly 0 where the camera looks along an axis.
+/// Spacing 1, origin 0: index space is world space. With an odd image size the middle row and
+/// column have direction components that are exactly 0 where the camera looks along an axis.
 inline std::vector<CameraCase> camera_cases(const glm::uvec3 &dims) {
   const glm::dvec3 last = glm::dvec3(dims) - 1.0, centre = 0.5 * last;
   const glm::dvec3 middle_voxel = glm::floor(centre), y(0, 1, 0), z(0, 0, 1);
@@ -41,7 +41,8 @@ inline std::vector<CameraCase> camera_cases(const glm::uvec3 &dims) {
       {"eye on the last voxel, looking out", {last, last + glm::dvec3(1, 2, 3), y, 80}},
       {"eye on a plane", {{middle_voxel.x, centre.y + 0.3, -11}, centre, y, 50}},
       {"3000 voxels away", {{1700, 1600, 1900}, centre, y, 1.2}},
-      {"3000 voxels away, along an axis", {{3000, middle_voxel.y, middle_voxel.z}, middle_voxel, y, 0.9}},
+      {"3000 voxels away, along an axis",
+       {{3000, middle_voxel.y, middle_voxel.z}, middle_voxel, y, 0.9}},
       {"a million voxels away", {{6.1e5, 5.3e5, 7.2e5}, centre, y, 0.002}},
       {"looking away", {{-5, -5, -5}, {-50, -60, -40}, y, 60}},
       {"beside the volume", {{-30, centre.y, -3}, {30, centre.y, -3}, y, 3}},
@@ -49,8 +50,8 @@ inline std::vector<CameraCase> camera_cases(const glm::uvec3 &dims) {
 }
 
 /// Frame of a camera case. Odd image size; isovalue_index and max_spec_count are the caller's.
-inline FrameParams case_frame(const glm::uvec3 &dims, const CameraCase &c, ImageSize size = {23, 17},
-                              float isovalue = 0) {
+inline FrameParams case_frame(const glm::uvec3 &dims, const CameraCase &c,
+                              ImageSize size = {23, 17}, float isovalue = 0) {
   VolumeInfo info;
   info.dims = dims;
   return make_frame_params(info, c.camera, size, isovalue);
@@ -63,10 +64,11 @@ inline std::vector<uint> blocks_of_ray(const FrameParams &frame, uint pixel) {
   std::vector<uint> blocks;
   RayEvent enter;
   if (!domain_entry(&ray, last, &enter)) return blocks;
-  GridWalk cell =
-      walk_from(&ray, locate(ray.x, 0, enter, 1, 0, last.x - 1), locate(ray.y, 1, enter, 1, 0, last.y - 1),
-                locate(ray.z, 2, enter, 1, 0, last.z - 1), 1, last);
-  while (cell.x >= 0 && cell.x < last.x && cell.y >= 0 && cell.y < last.y && cell.z >= 0 && cell.z < last.z) {
+  GridWalk cell = walk_from(&ray, locate(ray.x, 0, enter, 1, 0, last.x - 1),
+                            locate(ray.y, 1, enter, 1, 0, last.y - 1),
+                            locate(ray.z, 2, enter, 1, 0, last.z - 1), 1, last);
+  while (cell.x >= 0 && cell.x < last.x && cell.y >= 0 && cell.y < last.y && cell.z >= 0 &&
+         cell.z < last.z) {
     const uint block =
         uint(cell.x / 4) + frame.blocks_x * (uint(cell.y / 4) + frame.blocks_y * uint(cell.z / 4));
     if (blocks.empty() || blocks.back() != block) blocks.push_back(block);

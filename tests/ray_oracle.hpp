@@ -1,7 +1,7 @@
 #pragma once
-// Rays in double precision and where fields with closed-form roots cross an isovalue along them. Shares
-// nothing with the renderer but the camera's definition: what the twin and the kernels have in common is
-// judged here.
+// Rays in double precision and where fields with closed-form roots cross an isovalue along them.
+// Shares nothing with the renderer but the camera's definition: what the twin and the kernels have
+// in common is judged here.
 
 #include <gtest/gtest.h>
 
@@ -23,18 +23,20 @@ struct OracleRay {
 };
 
 /// The ray of pixel (column, row), row 0 at the top.
-inline OracleRay oracle_ray(const Camera &camera, ImageSize size, std::uint32_t column, std::uint32_t row) {
+inline OracleRay oracle_ray(const Camera &camera, ImageSize size, std::uint32_t column,
+                            std::uint32_t row) {
   const glm::dvec3 fwd = glm::normalize(camera.at - camera.eye);
   const glm::dvec3 right = glm::normalize(glm::cross(fwd, camera.up));
   const glm::dvec3 up = glm::cross(right, fwd);
-  const double a = std::tan(glm::radians(camera.fovy_deg) / 2), width = size.width, height = size.height;
+  const double a = std::tan(glm::radians(camera.fovy_deg) / 2), width = size.width,
+               height = size.height;
   const double u = (2 * (column + 0.5) / width - 1) * a * width / height;
   const double v = (1 - 2 * (row + 0.5) / height) * a;
   return {camera.eye, glm::normalize(fwd + u * right + v * up)};
 }
 
-/// [enter, exit] of the ray in the box from voxel 0 to voxel dims - 1 of a volume whose axes are the world's;
-/// enter is not below 0. Empty: enter > exit.
+/// [enter, exit] of the ray in the box from voxel 0 to voxel dims - 1 of a volume whose axes are
+/// the world's; enter is not below 0. Empty: enter > exit.
 struct OracleInterval {
   double enter, exit;
 };
@@ -75,7 +77,8 @@ inline std::vector<double> quadratic_roots(double a, double b, double c) {
 
 /// n.p - d.
 inline ExactField plane_field(const glm::dvec3 &n, double d) {
-  return {[=](const glm::dvec3 &p) { return glm::dot(n, p) - d; }, [=](const glm::dvec3 &) { return n; },
+  return {[=](const glm::dvec3 &p) { return glm::dot(n, p) - d; },
+          [=](const glm::dvec3 &) { return n; },
           [=](const glm::dvec3 &o, const glm::dvec3 &r) {
             return quadratic_roots(0.0, glm::dot(n, r), glm::dot(n, o) - d);
           }};
@@ -109,22 +112,27 @@ inline ExactField three_planes_field(const glm::dvec3 &c) {
           }};
 }
 
-/// How far t of a float32 renderer may be from the root t of `field` along a ray: every term of the position
-/// and of the field's value, over the slope, plus the root finder's last step. u = 2^-24, half an ulp of 1.
+/// How far t of a float32 renderer may be from the root t of `field` along a ray: every term of the
+/// position and of the field's value, over the slope, plus the root finder's last step. u = 2^-24,
+/// half an ulp of 1.
 ///
-/// Direction, per axis: the basis is rounded (1 u), u and v are products of two rounded factors (2 u), two
-/// fma (2 u), the length (4 u) and the division (1 u), on terms that sum to at most sqrt(3): below 16 u.
-/// Position in the cell: that times t, the rounded eye, and the rounding to float32. Value: three levels of
-/// lerp and three of de Casteljau, two roundings each on convex combinations of corners, which differ from 0
-/// by at most the gradient's absolute sum there: below 20 u of it (corners are exact here).
+/// Direction, per axis: the basis is rounded (1 u), u and v are products of two rounded factors (2
+/// u), two fma (2 u), the length (4 u) and the division (1 u), on terms that sum to at most
+/// sqrt(3): below 16 u. Position in the cell: that times t, the rounded eye, and the rounding to
+/// float32. Value: three levels of lerp and three of de Casteljau, two roundings each on convex
+/// combinations of corners, which differ from 0 by at most the gradient's absolute sum there: below
+/// 20 u of it (corners are exact here).
 inline double depth_tolerance(const ExactField &field, const VolumeInfo &info, const OracleRay &ray,
                               double t) {
   constexpr double u = 0x1p-24;
-  const glm::dvec3 eye = (ray.eye - info.origin) / info.spacing, direction = ray.direction / info.spacing;
+  const glm::dvec3 eye = (ray.eye - info.origin) / info.spacing,
+                   direction = ray.direction / info.spacing;
   const glm::dvec3 position = eye + t * direction;
   double value_error = 0.0, corner_sum = 0.0, longest = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {  // the gradient of a trilinear field is largest in a corner
-    const glm::dvec3 at = glm::floor(position) + glm::dvec3{corner & 1, corner >> 1 & 1, corner >> 2};
+  for (int corner = 0; corner < 8;
+       ++corner) {  // the gradient of a trilinear field is largest in a corner
+    const glm::dvec3 at =
+        glm::floor(position) + glm::dvec3{corner & 1, corner >> 1 & 1, corner >> 2};
     const glm::dvec3 gradient = glm::abs(field.gradient(at));
     const glm::dvec3 position_error = 16 * u * t / info.spacing + u * glm::abs(eye) + u;
     value_error = std::max(value_error, glm::dot(gradient, position_error));
@@ -136,19 +144,23 @@ inline double depth_tolerance(const ExactField &field, const VolumeInfo &info, c
   return (value_error + 20 * u * corner_sum) / slope + 0x1p-22 * cell_length + 3 * u * t;
 }
 
-/// Compares a frame with the first change of `field >= 0` along every ray. Pixels whose answer hangs on less
-/// than the tolerance are left out: rays along the box's edges, roots at the ends of the interval, and pairs
-/// of roots that touch; at most `max_ambiguous` of all pixels may be such. Returns the number of hits.
+/// Compares a frame with the first change of `field >= 0` along every ray. Pixels whose answer
+/// hangs on less than the tolerance are left out: rays along the box's edges, roots at the ends of
+/// the interval, and pairs of roots that touch; at most `max_ambiguous` of all pixels may be such.
+/// Returns the number of hits.
 inline std::size_t expect_first_changes(const std::vector<HitRecord> &hits, const ExactField &field,
-                                        const VolumeInfo &info, const Camera &camera, ImageSize size,
-                                        double max_ambiguous = 0.02) {
+                                        const VolumeInfo &info, const Camera &camera,
+                                        ImageSize size, double max_ambiguous = 0.02) {
   std::size_t num_ambiguous = 0, num_wrong = 0, num_found = 0;
   for (std::uint32_t pixel = 0; pixel < hits.size(); ++pixel) {
     const HitRecord &hit = hits[pixel];
     const OracleRay ray = oracle_ray(camera, size, pixel % size.width, pixel / size.width);
     const OracleInterval box = oracle_interval(ray, info);
-    const glm::dvec3 eye = (ray.eye - info.origin) / info.spacing, direction = ray.direction / info.spacing;
-    const auto edge = [&](double t) { return 64 * 0x1p-24 * (std::abs(t) + glm::length(info.spacing)); };
+    const glm::dvec3 eye = (ray.eye - info.origin) / info.spacing,
+                     direction = ray.direction / info.spacing;
+    const auto edge = [&](double t) {
+      return 64 * 0x1p-24 * (std::abs(t) + glm::length(info.spacing));
+    };
     std::vector<double> roots = field.roots(eye, direction);
     std::sort(roots.begin(), roots.end());
     bool ambiguous = false;
@@ -157,7 +169,8 @@ inline std::size_t expect_first_changes(const std::vector<HitRecord> &hits, cons
          i < roots.size() && box.exit > box.enter - edge(box.enter) && !std::isfinite(first); ++i) {
       const double t = roots[i];
       const double error = depth_tolerance(field, info, ray, t);
-      ambiguous |= std::abs(t - box.enter) < error + edge(t) || std::abs(t - box.exit) < error + edge(t);
+      ambiguous |=
+          std::abs(t - box.enter) < error + edge(t) || std::abs(t - box.exit) < error + edge(t);
       ambiguous |= i + 1 < roots.size() && roots[i + 1] - t < 8 * error && t > box.enter - error;
       if (t > box.enter && t < box.exit) first = t;
     }
@@ -171,8 +184,8 @@ inline std::size_t expect_first_changes(const std::vector<HitRecord> &hits, cons
       right = std::abs(hit.t - first) <= depth_tolerance(field, info, ray, first);
     }
     if (!right && ++num_wrong <= 3) {
-      ADD_FAILURE() << "pixel (" << pixel % size.width << "," << pixel / size.width << "): t " << hit.t
-                    << ", expected " << first << " within "
+      ADD_FAILURE() << "pixel (" << pixel % size.width << "," << pixel / size.width << "): t "
+                    << hit.t << ", expected " << first << " within "
                     << (std::isfinite(first) ? depth_tolerance(field, info, ray, first) : 0.0);
     }
   }

@@ -12,7 +12,8 @@
 namespace isowave {
 namespace {
 
-const std::filesystem::path kRoot = std::filesystem::path(ISOWAVE_TEST_DATA).parent_path().parent_path();
+const std::filesystem::path kRoot =
+    std::filesystem::path(ISOWAVE_TEST_DATA).parent_path().parent_path();
 
 /// The stems of README's table of stages.
 std::vector<std::string> stage_stems() {
@@ -44,15 +45,17 @@ TEST(Readme, EveryStageHasItsFiles) {
 }
 
 TEST(Readme, AutoIsTheSamePipelineEverywhere) {
-  EXPECT_THAT(test::read_file(kRoot / "README.md"), testing::HasSubstr("`--pipeline auto` takes `rays`"));
+  EXPECT_THAT(test::read_file(kRoot / "README.md"),
+              testing::HasSubstr("`--pipeline auto` takes `rays`"));
   EXPECT_THAT(test::run_isowave("render --help").out, testing::HasSubstr("auto (rays,"));
-  EXPECT_THAT(test::run_isowave("render --help").out, testing::HasSubstr("what the driver takes for itself"));
+  EXPECT_THAT(test::run_isowave("render --help").out,
+              testing::HasSubstr("what the driver takes for itself"));
   const test::TemporaryFolder folder;
   const std::string stats = test::quoted(folder / "stats.json");
-  const auto run =
-      test::run_isowave("render " ISOWAVE_TEST_DATA
-                        "/nucleon_41x41x41_uint8.raw.gz -i 80 --size 16x12 --pipeline auto --stats " +
-                        stats);
+  const auto run = test::run_isowave(
+      "render " ISOWAVE_TEST_DATA
+      "/nucleon_41x41x41_uint8.raw.gz -i 80 --size 16x12 --pipeline auto --stats " +
+      stats);
   EXPECT_EQ(run.status, 0) << run.err;
   EXPECT_THAT(test::read_file(folder / "stats.json"), testing::HasSubstr("\"pipeline\": \"rays\""));
 }

@@ -1,4 +1,5 @@
-// Whole frames on every device: the hit buffer must equal the twin's bit for bit, whatever is drawn.
+// Whole frames on every device: the hit buffer must equal the twin's bit for bit, whatever is
+// drawn.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -21,7 +22,8 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Draws all isovalues from all cameras with one renderer. Returns the number of hits.
   std::uint64_t check(const TestVolume &volume, const std::vector<Camera> &cameras,
-                      const std::vector<float> &isovalues, ImageSize size, RendererOptions options = {}) {
+                      const std::vector<float> &isovalues, ImageSize size,
+                      RendererOptions options = {}) {
     std::uint64_t hits = 0;
     options.size = size;
     Renderer renderer(device_, volume.compressed, options);
@@ -37,13 +39,15 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     }
     return hits;
   }
-  std::uint64_t check(const TestVolume &volume, const std::vector<float> &isovalues, ImageSize size) {
+  std::uint64_t check(const TestVolume &volume, const std::vector<float> &isovalues,
+                      ImageSize size) {
     return check(volume, orbit_cameras(volume.info(), 2), isovalues, size);
   }
 
   ocl::Device device_{GetParam()};
 };
-INSTANTIATE_TEST_SUITE_P(Devices, RenderOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, RenderOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 constexpr ImageSize kSmall{12, 8};
 constexpr ImageSize kMedium{96, 64};
@@ -109,27 +113,31 @@ TEST_P(RenderOnDevice, ErrorBounds) {
   const VolumeInfo info = test::grid_info({37, 30, 26});
   for (const double tolerance : {0.5, 0.01, 1e-6}) {
     SCOPED_TRACE(tolerance);
-    const TestVolume volume(info, test::sample(info.dims, test::gyroid_field(9)), ErrorGoal{tolerance});
+    const TestVolume volume(info, test::sample(info.dims, test::gyroid_field(9)),
+                            ErrorGoal{tolerance});
     EXPECT_GT(check(volume, {0.2f}, kMedium), 500u);
   }
 }
 
-/// Fewer bit planes than the volume has: the twin of voxels that libzfp decodes likewise; and all of them again.
+/// Fewer bit planes than the volume has: the twin of voxels that libzfp decodes likewise; and all
+/// of them again.
 TEST_P(RenderOnDevice, SmallValueErrors) {
   const VolumeInfo info = test::grid_info({9, 10, 11});
   const std::vector<float> source = test::sample(info.dims, test::gyroid_field(7));
   const Camera camera = orbit_cameras(info, 1)[0];
-  for (const TestVolume &volume : {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
+  for (const TestVolume &volume :
+       {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
     Renderer renderer(device_, volume.compressed, {.size = kSmall});
     for (const double value_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
-      SCOPED_TRACE(
-          fmt::format("{} bits per block, value error {}", volume.compressed.bits_per_block, value_error));
+      SCOPED_TRACE(fmt::format("{} bits per block, value error {}",
+                               volume.compressed.bits_per_block, value_error));
       const std::vector<float> voxels = decode_with_libzfp(volume.compressed, value_error);
       for (std::size_t i = 0; i < voxels.size(); ++i)
         ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), value_error);
       renderer.set_value_error(value_error);
       renderer.render(camera, 0.1f);
-      expect_same_hits(renderer.hits(), render_scalar(make_frame_params(info, camera, kSmall, 0.1f), voxels),
+      expect_same_hits(renderer.hits(),
+                       render_scalar(make_frame_params(info, camera, kSmall, 0.1f), voxels),
                        kSmall.width);
     }
     for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
@@ -170,7 +178,8 @@ TEST_P(RenderOnDevice, SheetsAndNoiseAtEveryRate) {
   for (const std::uint32_t rate : {1u, 4u, 32u}) {
     SCOPED_TRACE(fmt::format("rate {}", rate));
     EXPECT_GT(check(TestVolume({37, 30, 26}, test::gyroid_field(9), rate), {0.2f}, kMedium), 500u);
-    EXPECT_GT(check(TestVolume({19, 22, 17}, test::noise_field(rate), rate), {0.7f}, kMedium), 500u);
+    EXPECT_GT(check(TestVolume({19, 22, 17}, test::noise_field(rate), rate), {0.7f}, kMedium),
+              500u);
   }
 }
 
@@ -191,15 +200,17 @@ TEST_P(RenderOnDevice, DimsNotMultiplesOfFour) {
 
 TEST_P(RenderOnDevice, SaddleAndAnisotropicSpacing) {
   const glm::uvec3 dims(21, 18, 23);
-  const auto voxels =
-      test::sample(dims, [](const glm::dvec3 &p) { return (p.x - 9.5) * (p.y - 8.25) + 4 * (p.z - 11); });
-  for (const glm::dvec3 &spacing : {glm::dvec3(1), glm::dvec3(1, 1, 1000), glm::dvec3(1e-3, 5e-3, 2e-3)}) {
+  const auto voxels = test::sample(
+      dims, [](const glm::dvec3 &p) { return (p.x - 9.5) * (p.y - 8.25) + 4 * (p.z - 11); });
+  for (const glm::dvec3 &spacing :
+       {glm::dvec3(1), glm::dvec3(1, 1, 1000), glm::dvec3(1e-3, 5e-3, 2e-3)}) {
     const TestVolume volume(test::grid_info(dims, spacing), voxels, 16);
     std::vector<Camera> cameras = orbit_cameras(volume.info(), 2);
     // And one that sees the pillar of 1:1:1000 end on.
     const glm::dvec3 extent = spacing * glm::dvec3(dims - 1u);
     const glm::dvec3 eye = extent * glm::dvec3(0.6, 0.57, -0.3);
-    const double fovy = 2 * std::atan(std::max(extent.x, extent.y) / glm::length(0.5 * extent - eye));
+    const double fovy =
+        2 * std::atan(std::max(extent.x, extent.y) / glm::length(0.5 * extent - eye));
     cameras.push_back(camera_along(eye, 0.5 * extent - eye, {0, 1, 0}, glm::degrees(fovy)));
     EXPECT_GT(check(volume, cameras, {0, 13.25f}, kMedium), 500u);
   }
@@ -212,7 +223,8 @@ TEST_P(RenderOnDevice, ConstantVolumes) {
   EXPECT_EQ(check(zeros, {-1, 0, 1}, kMedium), 0u);
 }
 
-/// Isovalues that are voxels: at block borders, the smallest and the largest of all, and just beside them.
+/// Isovalues that are voxels: at block borders, the smallest and the largest of all, and just
+/// beside them.
 TEST_P(RenderOnDevice, IsovaluesExactlyAtVoxels) {
   const TestVolume volume({13, 12, 10}, test::noise_field(11), 6);
   const auto [low, high] = std::minmax_element(volume.voxels.begin(), volume.voxels.end());
@@ -277,8 +289,10 @@ TEST_P(RenderOnDevice, AxisParallelRays) {
 TEST_P(RenderOnDevice, DiagonalRaysThroughEdgesAndCorners) {
   const TestVolume volume({17, 17, 17}, test::gyroid_field(8), 8);
   std::vector<Camera> cameras;
-  for (const glm::dvec3 &direction : {glm::dvec3(1, 1, 1), {-1, 1, 1}, {1, 1, 0}, {0, -1, 1}, {-1, 0, -1}}) {
-    cameras.push_back(camera_along(glm::dvec3(8) - 20.0 * direction, direction, {0.1, 1.0, 0.3}, 40));
+  for (const glm::dvec3 &direction :
+       {glm::dvec3(1, 1, 1), {-1, 1, 1}, {1, 1, 0}, {0, -1, 1}, {-1, 0, -1}}) {
+    cameras.push_back(
+        camera_along(glm::dvec3(8) - 20.0 * direction, direction, {0.1, 1.0, 0.3}, 40));
   }
   EXPECT_GT(check(volume, cameras, {0.05f}, {33, 33}), 1000u);
 }
@@ -299,20 +313,23 @@ TEST_P(RenderOnDevice, FlippedAndTurnedAxes) {
   VolumeInfo info = test::grid_info(dims, {1.0, 0.5, 2.0});
   info.origin = {-40, 7, 300};
   info.direction = glm::dmat3{{0, -1, 0}, {0.8, 0, 0.6}, {0.6, 0, -0.8}};
-  EXPECT_GT(check(TestVolume(info, test::sample(dims, test::gyroid_field(8)), 8), {0.1f}, kMedium), 500u);
+  EXPECT_GT(check(TestVolume(info, test::sample(dims, test::gyroid_field(8)), 8), {0.1f}, kMedium),
+            500u);
 }
 
-/// Values near the ends of what zfp holds: overflow must not tell devices apart, nor denormals where they are kept.
+/// Values near the ends of what zfp holds: overflow must not tell devices apart, nor denormals
+/// where they are kept.
 TEST_P(RenderOnDevice, TinyAndHugeValues) {
   for (const int k : {-95, -60, 60, 120}) {
-    // Products of values of 2^-95 and positions in a cell are denormal, which OpenCL lets a device flush
-    // (README "Devices"): no bits to compare there. llvmpipe is the one that does.
+    // Products of values of 2^-95 and positions in a cell are denormal, which OpenCL lets a device
+    // flush (README "Devices"): no bits to compare there. llvmpipe is the one that does.
     if (k == -95 && !GetParam().capabilities.denormals) continue;
     SCOPED_TRACE(fmt::format("times 2^{}", k));
-    const auto voxels = test::sample({11, 12, 10}, [k, noise = test::noise_field(5)](const glm::dvec3 &p) {
-      return std::ldexp(noise(p), k);
-    });
-    EXPECT_GT(check(TestVolume(test::grid_info({11, 12, 10}), voxels, 16), {std::ldexp(0.25f, k)}, kMedium),
+    const auto voxels = test::sample(
+        {11, 12, 10},
+        [k, noise = test::noise_field(5)](const glm::dvec3 &p) { return std::ldexp(noise(p), k); });
+    EXPECT_GT(check(TestVolume(test::grid_info({11, 12, 10}), voxels, 16), {std::ldexp(0.25f, k)},
+                    kMedium),
               500u);
   }
 }
@@ -365,8 +382,9 @@ TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
   for (const Camera &bad :
        {Camera{camera.eye, camera.eye, camera.up}, Camera{camera.eye, camera.at, {0, 0, 0}},
         Camera{camera.eye, camera.at, camera.at - camera.eye},
-        Camera{camera.eye, camera.at, camera.up, 180.0}, Camera{camera.eye, camera.at, camera.up, 0.0},
-        Camera{{NAN, 0, 0}, camera.at, camera.up}, Camera{{1e9, 0, 0}, camera.at, camera.up}}) {
+        Camera{camera.eye, camera.at, camera.up, 180.0},
+        Camera{camera.eye, camera.at, camera.up, 0.0}, Camera{{NAN, 0, 0}, camera.at, camera.up},
+        Camera{{1e9, 0, 0}, camera.at, camera.up}}) {
     EXPECT_THROW(renderer.render(bad, 0.1f), Error);
   }
   renderer.render(camera, 0.1f);

@@ -43,7 +43,8 @@ class ResidentOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     }
     return hits;
   }
-  std::uint64_t check(const TestVolume &volume, const std::vector<float> &isovalues, ImageSize size) {
+  std::uint64_t check(const TestVolume &volume, const std::vector<float> &isovalues,
+                      ImageSize size) {
     return check(volume, orbit_cameras(volume.info(), 2), isovalues, size);
   }
 
@@ -87,7 +88,8 @@ TEST_P(ResidentOnDevice, SheetsAndNoise) {
   EXPECT_GT(check(TestVolume({19, 22, 17}, test::noise_field(8)), {0.7f, 0.0f}, kMedium), 1000u);
 }
 
-/// Flat steps at low rates: values near, at and beyond the isovalue, where float arithmetic is in doubt.
+/// Flat steps at low rates: values near, at and beyond the isovalue, where float arithmetic is in
+/// doubt.
 TEST_P(ResidentOnDevice, Plateaus) {
   for (const std::uint32_t rate : {1u, 4u, 16u}) {
     SCOPED_TRACE(fmt::format("rate {}", rate));
@@ -97,7 +99,8 @@ TEST_P(ResidentOnDevice, Plateaus) {
 
 TEST_P(ResidentOnDevice, EqualsBothPipelines) {
   const glm::uvec3 dims(62, 47, 53);
-  const TestVolume volume(test::grid_info(dims, {1, 0.5, 2}), test::sample(dims, test::gyroid_field(12)), 4);
+  const TestVolume volume(test::grid_info(dims, {1, 0.5, 2}),
+                          test::sample(dims, test::gyroid_field(12)), 4);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Resident resident(device_, volume.compressed, kMedium);
   resident.render(camera, 0.3f);
@@ -114,7 +117,8 @@ TEST_P(ResidentOnDevice, SaysWhatDoesNotFit) {
   CompressedVolume huge;
   huge.info.dims = glm::uvec3(16384);
   huge.bits_per_block = 256;
-  EXPECT_THAT(Resident::obstacle(device_, huge, kSmall).value(), testing::HasSubstr("largest allocation"));
+  EXPECT_THAT(Resident::obstacle(device_, huge, kSmall).value(),
+              testing::HasSubstr("largest allocation"));
 }
 
 }  // namespace

@@ -36,7 +36,8 @@ TEST(RootOracle, FindsAPlaneExactly) {
 
 TEST(RootOracle, FindsBothSheetsOfASaddle) {
   // (x - 2)(y - 2) along x = 1 + t, y = 1 + 1.5 t: zero at t = 2/3 and t = 1.
-  const auto voxels = sampled({5, 5, 5}, [](double x, double y, double) { return (x - 2) * (y - 2); });
+  const auto voxels =
+      sampled({5, 5, 5}, [](double x, double y, double) { return (x - 2) * (y - 2); });
   const RootOracle oracle(voxels, {5, 5, 5}, 0);
   const OracleHit first = oracle.first_hit({{1, 1, 2}, {1, 1.5, 0}});
   ASSERT_TRUE(first.hit);
@@ -47,8 +48,9 @@ TEST(RootOracle, FindsBothSheetsOfASaddle) {
 }
 
 TEST(RootOracle, StartingInsideIsAState) {
-  const auto voxels =
-      sampled({17, 17, 17}, [](double x, double y, double z) { return 5 - std::hypot(x - 8, y - 8, z - 8); });
+  const auto voxels = sampled({17, 17, 17}, [](double x, double y, double z) {
+    return 5 - std::hypot(x - 8, y - 8, z - 8);
+  });
   const RootOracle oracle(voxels, {17, 17, 17}, 0);
   const OracleHit hit = oracle.first_hit({{8, 8, 8}, {1, 0, 0}});
   ASSERT_TRUE(hit.hit);
@@ -62,7 +64,8 @@ std::vector<float> touching() {
 
 TEST(RootOracle, DecidesTouchingByTheHalfOpenRule) {
   const OracleRay diagonal{{-1, -1, 0.5}, {1, 1, 0}};
-  // The field along the diagonal is 1 -> 1/2 -> 1. At isovalue 1/2 it touches from inside, which is still inside.
+  // The field along the diagonal is 1 -> 1/2 -> 1. At isovalue 1/2 it touches from inside, which is
+  // still inside.
   EXPECT_FALSE(RootOracle(touching(), {2, 2, 2}, 0.5f).first_hit(diagonal).hit);
   const float above = std::nextafter(0.5f, 1.0f);
   EXPECT_TRUE(RootOracle(touching(), {2, 2, 2}, above).first_hit(diagonal).hit);
@@ -92,16 +95,18 @@ TEST(RootOracle, TakesCrossingsAtVerticesInAnyOrder) {
 TEST(RootOracle, SeesTwoUlpsOfDepth) {
   // Half the cells are one ulp above the isovalue, so hits depend on single bits of voxels.
   const float isovalue = 1.0f, above = std::nextafter(1.0f, 2.0f);
-  const auto voxels = sampled({3, 3, 3}, [&](double x, double, double) { return x == 1 ? above : 0.5; });
+  const auto voxels =
+      sampled({3, 3, 3}, [&](double x, double, double) { return x == 1 ? above : 0.5; });
   EXPECT_TRUE(RootOracle(voxels, {3, 3, 3}, isovalue).first_hit({{-1, 1, 1}, {1, 0, 0}}).hit);
   EXPECT_TRUE(RootOracle(voxels, {3, 3, 3}, above).first_hit({{-1, 1, 1}, {1, 0, 0}}).hit);
-  EXPECT_FALSE(
-      RootOracle(voxels, {3, 3, 3}, std::nextafter(above, 2.0f)).first_hit({{-1, 1, 1}, {1, 0, 0}}).hit);
+  EXPECT_FALSE(RootOracle(voxels, {3, 3, 3}, std::nextafter(above, 2.0f))
+                   .first_hit({{-1, 1, 1}, {1, 0, 0}})
+                   .hit);
 }
 
 TEST(RootOracle, GradientIsTheFieldsDerivative) {
-  const auto voxels =
-      sampled({3, 3, 3}, [](double x, double y, double z) { return 2 * x + 3 * y - z + x * y * z; });
+  const auto voxels = sampled(
+      {3, 3, 3}, [](double x, double y, double z) { return 2 * x + 3 * y - z + x * y * z; });
   const RootOracle oracle(voxels, {3, 3, 3}, 0);
   const std::array<double, 3> p{0.3, 1.4, 0.8}, g = oracle.gradient(p);
   const double h = 1e-6;

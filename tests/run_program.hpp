@@ -25,7 +25,8 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "isowave_test_XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make a temporary folder");
+    if (::mkdtemp(name.data()) == nullptr)
+      throw std::runtime_error("cannot make a temporary folder");
     path_ = name;
   }
   ~TemporaryFolder() {
@@ -56,8 +57,8 @@ inline void write_file(const std::filesystem::path &path, std::string_view text)
 
 template <class T>
 void write_file(const std::filesystem::path &path, const std::vector<T> &values) {
-  write_file(path,
-             std::string_view(reinterpret_cast<const char *>(values.data()), values.size() * sizeof(T)));
+  write_file(path, std::string_view(reinterpret_cast<const char *>(values.data()),
+                                    values.size() * sizeof(T)));
 }
 
 struct ProgramResult {
@@ -100,7 +101,8 @@ inline long peak_of_isowave(std::vector<std::string> arguments) {
   argv.push_back(nullptr);
   const pid_t child = ::fork();
   if (child == 0) {
-    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(::open("/dev/null", O_WRONLY), stream);
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO})
+      ::dup2(::open("/dev/null", O_WRONLY), stream);
     ::execv(program.c_str(), argv.data());
     ::_exit(127);
   }
@@ -116,13 +118,14 @@ inline ProgramResult run_isowave(const std::string &arguments) {
   return run_command(isowave_program() + " " + arguments);
 }
 
-/// `isowave ARGUMENTS` must fail with status 1, nothing on stdout and one line on stderr that contains
-/// `text`.
+/// `isowave ARGUMENTS` must fail with status 1, nothing on stdout and one line on stderr that
+/// contains `text`.
 inline void expect_one_line_error(const std::string &arguments, std::string_view text) {
   const ProgramResult result = run_isowave(arguments);
   EXPECT_EQ(result.status, 1) << arguments;
   EXPECT_EQ(result.out, "") << arguments;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << arguments << "\n" << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << arguments << "\n"
+                                                                       << result.err;
   EXPECT_TRUE(result.err.ends_with('\n')) << arguments;
   EXPECT_NE(result.err.find(text), std::string::npos) << arguments << "\n" << result.err;
 }

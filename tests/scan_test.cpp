@@ -23,8 +23,8 @@ uint tile_of(uint group_size) {
 }
 
 enum class MaskKind { kZeros, kOnes, kRandom, kSparse, kOtherThanOne };
-constexpr MaskKind kMaskKinds[] = {MaskKind::kZeros, MaskKind::kOnes, MaskKind::kRandom, MaskKind::kSparse,
-                                   MaskKind::kOtherThanOne};
+constexpr MaskKind kMaskKinds[] = {MaskKind::kZeros, MaskKind::kOnes, MaskKind::kRandom,
+                                   MaskKind::kSparse, MaskKind::kOtherThanOne};
 
 std::vector<uint> make_mask(MaskKind kind, uint count, uint seed) {
   Random random(seed);
@@ -77,7 +77,8 @@ class ScanOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   void expect_compaction(Compaction &compaction, MaskKind kind, uint count, uint seed) {
-    SCOPED_TRACE(fmt::format("count {}, mask kind {}, seed {}", count, static_cast<int>(kind), seed));
+    SCOPED_TRACE(
+        fmt::format("count {}, mask kind {}, seed {}", count, static_cast<int>(kind), seed));
     const std::vector<uint> mask = make_mask(kind, count, seed);
     std::vector<uint> values(count), expected;
     Random random(seed + 1);
@@ -93,7 +94,8 @@ class ScanOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     start.active_count = count;
     CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
 
-    compaction(d_mask, d_values, counts, ISO_COUNT_FIELD(active_count), out, ISO_COUNT_FIELD(granted_count));
+    compaction(d_mask, d_values, counts, ISO_COUNT_FIELD(active_count), out,
+               ISO_COUNT_FIELD(granted_count));
 
     start.granted_count = static_cast<uint>(expected.size());
     expected.resize(count + 1, kSentinel);
@@ -116,8 +118,10 @@ TEST_P(ScanOnDevice, ScansAtAwkwardCounts) {
     ExclusiveScan scan(device_, group_size);
     uint seed = 200;
     std::vector<uint> counts = awkward_counts(tile_of(group_size));
-    for (const uint other_tile : {tile_of(8), tile_of(64), tile_of(256)}) counts.push_back(other_tile + 1);
-    counts.push_back(500009);  // one group: llvmpipe's 65,535 turns (Device::max_resident_groups) suffice
+    for (const uint other_tile : {tile_of(8), tile_of(64), tile_of(256)})
+      counts.push_back(other_tile + 1);
+    counts.push_back(
+        500009);  // one group: llvmpipe's 65,535 turns (Device::max_resident_groups) suffice
     for (const uint count : counts) expect_scan(scan, count, 1, ++seed);
   }
 }
@@ -183,7 +187,8 @@ TEST_P(ScanOnDevice, CompactsAMillion) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, ScanOnDevice, testing::ValuesIn(devices_under_test()), device_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, ScanOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 }  // namespace
 }  // namespace isowave

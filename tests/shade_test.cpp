@@ -39,8 +39,8 @@ std::vector<double> mean_of_tiles(const Image8 &fine, std::uint32_t samples) {
 class ShadeOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
   ShadeOnDevice()
-      : volume_(test::grid_info({9, 10, 11}, {1, 2, 0.5}), test::sample({9, 10, 11}, test::gyroid_field(7)),
-                8),
+      : volume_(test::grid_info({9, 10, 11}, {1, 2, 0.5}),
+                test::sample({9, 10, 11}, test::gyroid_field(7)), 8),
         camera_(orbit_cameras(volume_.info(), 1)[0]) {}
 
   TestVolume volume_;
@@ -66,7 +66,8 @@ TEST_P(ShadeOnDevice, SmallPictureIsTheTwins) {
   }
 }
 
-/// The rays of several for each pixel are those of a picture with as many pixels; what a pixel shows is their mean.
+/// The rays of several for each pixel are those of a picture with as many pixels; what a pixel
+/// shows is their mean.
 TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
   for (const std::uint32_t samples : {2u, 3u}) {
     SCOPED_TRACE(fmt::format("{} x {} rays a pixel", samples, samples));
@@ -87,7 +88,8 @@ TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
     EXPECT_EQ(got.width, size.width);
     EXPECT_EQ(got.height, size.height);
     EXPECT_EQ(got.pixels, expected.pixels);
-    const std::vector<double> mean = mean_of_tiles(shade_scalar(frame, params, expected_hits), samples);
+    const std::vector<double> mean =
+        mean_of_tiles(shade_scalar(frame, params, expected_hits), samples);
     ASSERT_EQ(got.pixels.size(), mean.size());
     std::size_t num_mixed = 0;
     for (std::size_t i = 0; i < mean.size(); ++i) {
@@ -101,7 +103,8 @@ TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
 TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
   Renderer renderer(device_, volume_.compressed, GetParam().with({.size = {20, 14, 4}}));
   for (const ImageSize size : {ImageSize{20, 14, 4}, {40, 28, 2}, {80, 56}, {9, 7, 8}, {5, 4, 3}}) {
-    SCOPED_TRACE(fmt::format("{}x{}, {} x {} rays", size.width, size.height, size.samples, size.samples));
+    SCOPED_TRACE(
+        fmt::format("{}x{}, {} x {} rays", size.width, size.height, size.samples, size.samples));
     renderer.set_size(size);
     renderer.render(camera_, 0.1f);
     const FrameParams frame = make_frame_params(volume_.info(), camera_, size, 0.1f);
@@ -109,12 +112,17 @@ TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
     test::expect_same_hits(renderer.hits(), hits, size.ray_columns());
     const Image8 got = renderer.shade();
     EXPECT_EQ(got.width, size.width);
-    EXPECT_EQ(got.pixels,
-              shade_scalar(frame, make_shade_params(volume_.info(), {}), hits, size.samples).pixels);
+    EXPECT_EQ(
+        got.pixels,
+        shade_scalar(frame, make_shade_params(volume_.info(), {}), hits, size.samples).pixels);
   }
   EXPECT_THROW(renderer.set_size({20, 14, 5}), Error) << "more rays";
   EXPECT_THROW(renderer.set_size({1, 1, 0}), Error);
-  EXPECT_THAT([&] { renderer.set_size({1, 1, 9}); }, ThrowsMessage<Error>(HasSubstr("9 x 9 rays a pixel")));
+  EXPECT_THAT(
+      [&] {
+        renderer.set_size({1, 1, 9});
+      },
+      ThrowsMessage<Error>(HasSubstr("9 x 9 rays a pixel")));
 }
 
 }  // namespace

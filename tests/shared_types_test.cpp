@@ -23,8 +23,8 @@ class SharedTypesOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   offsets.push_back(static_cast<uint>(offsetof(Object, field))); \
   listed_bytes += sizeof(Object::field);
 
-/// The fields' offsets in the order of shared_types.cl. Fails when a struct has fields that are not listed:
-/// there is no padding in any of them, so the listed sizes must add up.
+/// The fields' offsets in the order of shared_types.cl. Fails when a struct has fields that are not
+/// listed: there is no padding in any of them, so the listed sizes must add up.
 std::vector<uint> host_offsets() {
   std::vector<uint> offsets;
   std::size_t listed_bytes = 0;
@@ -62,8 +62,9 @@ std::vector<uint> host_offsets() {
 }
 
 TEST_P(SharedTypesOnDevice, SmallSizesAreTheHosts) {
-  const std::vector<uint> expected = {sizeof(FrameParams), sizeof(PairHit),      sizeof(BlockRays),
-                                      sizeof(HitRecord),   sizeof(StreamLayout), sizeof(PassCounts)};
+  const std::vector<uint> expected = {sizeof(FrameParams),  sizeof(PairHit),
+                                      sizeof(BlockRays),    sizeof(HitRecord),
+                                      sizeof(StreamLayout), sizeof(PassCounts)};
   ocl::Buffer<uint> sizes(device_, "sizes", expected.size());
   ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_sizes"}({1, 1}, sizes);
   EXPECT_EQ(sizes.read(), expected);

@@ -1,5 +1,5 @@
-// core/solve_cells: every solver of the family gives the same bits on the device as on the host, also where it fails; and
-// whole frames drawn with each.
+// core/solve_cells: every solver of the family gives the same bits on the device as on the host,
+// also where it fails; and whole frames drawn with each.
 
 #include "core/stages/solve_cells.hpp"
 
@@ -18,8 +18,8 @@
 namespace isowave {
 namespace {
 
-/// A cubic of one kind of trouble. Its values are at least 1e-6 or 0, so that no product becomes denormal, which llvmpipe
-/// flushes.
+/// A cubic of one kind of trouble. Its values are at least 1e-6 or 0, so that no product becomes
+/// denormal, which llvmpipe flushes.
 Cubic random_cubic(Random &random) {
   const auto coefficient = [&] { return static_cast<float>(random.in(-1, 1)); };
   const std::uint32_t kind = random.below(6);
@@ -29,13 +29,14 @@ Cubic random_cubic(Random &random) {
     return {b0, b0 + (b3 - b0) / 3 + bend, b3 - (b3 - b0) / 3, b3};
   }
   if (kind == 2) {  // three roots, close together or one
-    const double at = random.in(0, 1), apart = random.below(3) == 0 ? 0 : std::pow(10, random.in(-4, -1));
+    const double at = random.in(0, 1),
+                 apart = random.below(3) == 0 ? 0 : std::pow(10, random.in(-4, -1));
     const double r[3] = {at - apart, at, at + apart * random.in(0, 2)};
     const auto blossom = [&](double s, double t, double u) {  // mean over the orders of (s,t,u)
       const auto term = [&](int i, int j, int k) { return (s - r[i]) * (t - r[j]) * (u - r[k]); };
-      return static_cast<float>(
-          (term(0, 1, 2) + term(0, 2, 1) + term(1, 0, 2) + term(1, 2, 0) + term(2, 0, 1) + term(2, 1, 0)) /
-          6);
+      return static_cast<float>((term(0, 1, 2) + term(0, 2, 1) + term(1, 0, 2) + term(1, 2, 0) +
+                                 term(2, 0, 1) + term(2, 1, 0)) /
+                                6);
     };
     return {blossom(0, 0, 0), blossom(0, 0, 1), blossom(0, 1, 1), blossom(1, 1, 1)};
   }
@@ -45,7 +46,8 @@ Cubic random_cubic(Random &random) {
             values[random.below(3)]};
   }
   const float scale = kind == 4 ? 1e12f : 1e-6f;
-  return {scale * coefficient(), scale * coefficient(), scale * coefficient(), scale * coefficient()};
+  return {scale * coefficient(), scale * coefficient(), scale * coefficient(),
+          scale * coefficient()};
 }
 
 class SolveCellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
@@ -72,8 +74,8 @@ class SolveCellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         }
         const Cubic &c = cubics[i];
         ADD_FAILURE() << fmt::format("{} {}: {:a} {:a} {:a} {:a} gives {:a}, expected {:a}",
-                                     to_string(solver), solver.max_steps, c.b0, c.b1, c.b2, c.b3, got[i],
-                                     expected);
+                                     to_string(solver), solver.max_steps, c.b0, c.b1, c.b2, c.b3,
+                                     got[i], expected);
       }
       EXPECT_EQ(differing, 0u) << to_string(solver);
       EXPECT_GT(found, count / 8);
@@ -104,15 +106,16 @@ TEST_P(SolveCellsOnDevice, FramesOfEverySolverEqualTheTwins) {
     options.solver = solver_from_string(name);
     Renderer renderer(device_, volume.compressed, options);
     renderer.render(camera, 0.1f);
-    test::expect_same_hits(
-        renderer.hits(),
-        render_scalar(make_frame_params(volume.info(), camera, size, 0.1f), volume.voxels, options.solver),
-        size.width);
+    test::expect_same_hits(renderer.hits(),
+                           render_scalar(make_frame_params(volume.info(), camera, size, 0.1f),
+                                         volume.voxels, options.solver),
+                           size.width);
   }
 }
 
 TEST(Solvers, AreFoundByName) {
-  for (const std::string_view name : kSolverNames) EXPECT_EQ(to_string(solver_from_string(name)), name);
+  for (const std::string_view name : kSolverNames)
+    EXPECT_EQ(to_string(solver_from_string(name)), name);
   EXPECT_THROW(solver_from_string("newton"), Error);
 }
 

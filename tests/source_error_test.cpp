@@ -1,5 +1,5 @@
-// Errors are those against the source in its own type: what float32 cannot hold counts, tiny values that become 0
-// count.
+// Errors are those against the source in its own type: what float32 cannot hold counts, tiny values
+// that become 0 count.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,21 +49,29 @@ double noise(std::size_t i) {
 
 std::vector<Source> sources() {
   return {
-      {"float64 ramp at 1e9", VoxelType::kFloat64, [](std::size_t i) { return 1e9 + 0.37 * double(i); }},
+      {"float64 ramp at 1e9", VoxelType::kFloat64,
+       [](std::size_t i) { return 1e9 + 0.37 * double(i); }},
       {"float64 noise", VoxelType::kFloat64, noise},
-      {"float64 below float32", VoxelType::kFloat64, [](std::size_t i) { return 1e-50 * (noise(i) - 0.5); }},
-      {"float64 denormal floats", VoxelType::kFloat64, [](std::size_t i) { return 1e-40 * noise(i); }},
+      {"float64 below float32", VoxelType::kFloat64,
+       [](std::size_t i) { return 1e-50 * (noise(i) - 0.5); }},
+      {"float64 denormal floats", VoxelType::kFloat64,
+       [](std::size_t i) { return 1e-40 * noise(i); }},
       {"float64 tiny among large", VoxelType::kFloat64,
        [](std::size_t i) { return i % 7 == 0 ? 1e-31 : 1e8 * noise(i); }},
       {"int32 odd ramp beyond 2^24", VoxelType::kInt32,
        [](std::size_t i) { return 16777217.0 + 2 * double(i); }},
-      {"int32 around 2^24", VoxelType::kInt32, [](std::size_t i) { return 16777216.0 - 3000 + double(i); }},
+      {"int32 around 2^24", VoxelType::kInt32,
+       [](std::size_t i) { return 16777216.0 - 3000 + double(i); }},
       {"int32 negative", VoxelType::kInt32,
        [](std::size_t i) { return std::floor(-2147483648.0 + 4e9 * noise(i)); }},
-      {"uint32", VoxelType::kUint32, [](std::size_t i) { return std::floor(4294967295.0 * noise(i)); }},
-      {"float32 tiny", VoxelType::kFloat32, [](std::size_t i) { return i % 3 == 0 ? -0.0 : double(1e-35f); }},
+      {"uint32", VoxelType::kUint32,
+       [](std::size_t i) { return std::floor(4294967295.0 * noise(i)); }},
+      {"float32 tiny", VoxelType::kFloat32,
+       [](std::size_t i) { return i % 3 == 0 ? -0.0 : double(1e-35f); }},
       {"float32 some tiny", VoxelType::kFloat32,
-       [](std::size_t i) { return double(i % 5 == 0 ? 5e-30f : static_cast<float>(1e-29 * noise(i))); }},
+       [](std::size_t i) {
+         return double(i % 5 == 0 ? 5e-30f : static_cast<float>(1e-29 * noise(i)));
+       }},
   };
 }
 
@@ -75,7 +83,8 @@ double true_error(const CompressedVolume &volume, const std::vector<double> &sou
   return error;
 }
 
-/// No voxel of a level is farther off than its block's bound says; the finest one's bounds are by place.
+/// No voxel of a level is farther off than its block's bound says; the finest one's bounds are by
+/// place.
 void expect_bounds_hold(const CompressedVolume &volume, const std::vector<double> &source) {
   std::uint32_t step = 1;
   const CompressedVolume *level = &volume;
@@ -88,11 +97,13 @@ void expect_bounds_hold(const CompressedVolume &volume, const std::vector<double
     for (std::size_t i = 0; i < decoded.size(); ++i) {
       const glm::uvec3 at(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y), fine = step * at;
       if (glm::any(glm::greaterThanEqual(fine, kDims))) continue;  // behind the volume
-      const std::size_t block = at.x / 4 + blocks.x * (at.y / 4 + std::size_t{blocks.y} * (at.z / 4));
-      const float bound =
-          offset_of_voxel(offset, level->bounds, block, at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4));
+      const std::size_t block =
+          at.x / 4 + blocks.x * (at.y / 4 + std::size_t{blocks.y} * (at.z / 4));
+      const float bound = offset_of_voxel(offset, level->bounds, block,
+                                          at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4));
       const double exact = source[fine.x + kDims.x * (fine.y + std::size_t{kDims.y} * fine.z)];
-      ASSERT_LE(std::abs(double{decoded[i]} - exact), double{bound}) << "level " << number << ", voxel " << i;
+      ASSERT_LE(std::abs(double{decoded[i]} - exact), double{bound})
+          << "level " << number << ", voxel " << i;
     }
   }
 }
@@ -102,11 +113,13 @@ TEST(SourceError, OfRatesAndTheirLevels) {
     for (const std::uint32_t rate : {2u, 12u, 32u}) {
       SCOPED_TRACE(fmt::format("{}, rate {}", source.name, rate));
       ArrayReader reader = source.reader();
-      const CompressedVolume volume = compress(reader, {.rate = rate, .measure_error = true, .levels = 0});
+      const CompressedVolume volume =
+          compress(reader, {.rate = rate, .measure_error = true, .levels = 0});
       const double error = true_error(volume, reader.voxels());
       EXPECT_GE(*volume.max_error, error);
-      // The sum of what the cast has lost and of what zfp has, which is at most error + lost. No float32 is closer to a
-      // voxel than its cast is, so that lost is at most the error; it is rounded up.
+      // The sum of what the cast has lost and of what zfp has, which is at most error + lost. No
+      // float32 is closer to a voxel than its cast is, so that lost is at most the error; it is
+      // rounded up.
       EXPECT_LE(*volume.max_error, 3 * error + double{std::numeric_limits<float>::denorm_min()});
       expect_bounds_hold(volume, reader.voxels());
     }
@@ -129,7 +142,8 @@ TEST(SourceError, OfTolerancesAndTheirLevels) {
       } catch (const Error &error) {
         EXPECT_THAT(error.what(), HasSubstr("cannot be kept"));
         // The cast and zfp lose 2^-24 each, at most, of the next power of two above the values.
-        EXPECT_LT(tolerance, std::max(0x1p-22 * std::max(-least, largest), 2 * double{kMinMagnitude}));
+        EXPECT_LT(tolerance,
+                  std::max(0x1p-22 * std::max(-least, largest), 2 * double{kMinMagnitude}));
       }
     }
   }
@@ -154,7 +168,8 @@ TEST(SourceError, RefusedTolerancesNameTheSmallest) {
     EXPECT_LE(true_error(volume, reader.voxels()), smallest);
     EXPECT_THROW(choose_error_bound(reader, {0.9 * smallest}, {}), Error);
     double lost = 0;
-    for (const double value : reader.voxels()) lost = std::max(lost, std::abs(value - double(float(value))));
+    for (const double value : reader.voxels())
+      lost = std::max(lost, std::abs(value - double(float(value))));
     EXPECT_GE(smallest, lost) << "no float32 is closer";
   }
 }
@@ -237,17 +252,18 @@ TEST(SourceError, FilesAreReadExactly) {
   test::write_file(folder / "i_3x4x5_int32.raw", integers);
   test::write_file(folder / "d_3x4x5_float64.raw", doubles);
   const auto with_header = [](const std::string &header, const auto &values) {
-    return header +
-           std::string(reinterpret_cast<const char *>(values.data()), values.size() * sizeof(values[0]));
+    return header + std::string(reinterpret_cast<const char *>(values.data()),
+                                values.size() * sizeof(values[0]));
   };
   test::write_file(folder / "i.nrrd",
                    with_header("NRRD0004\ntype: int\ndimension: 3\nsizes: 3 4 5\nendian: little\n"
                                "encoding: raw\n\n",
                                integers));
-  test::write_file(folder / "d.mha", with_header("ObjectType = Image\nNDims = 3\nBinaryData = True\n"
-                                                 "BinaryDataByteOrderMSB = False\nDimSize = 3 4 5\n"
-                                                 "ElementType = MET_DOUBLE\nElementDataFile = LOCAL\n",
-                                                 doubles));
+  test::write_file(folder / "d.mha",
+                   with_header("ObjectType = Image\nNDims = 3\nBinaryData = True\n"
+                               "BinaryDataByteOrderMSB = False\nDimSize = 3 4 5\n"
+                               "ElementType = MET_DOUBLE\nElementDataFile = LOCAL\n",
+                               doubles));
   for (const std::string name : {"i_3x4x5_int32.raw", "d_3x4x5_float64.raw", "i.nrrd", "d.mha"}) {
     SCOPED_TRACE(name);
     const auto reader = open_volume(folder / name);
@@ -267,7 +283,8 @@ TEST(SourceError, FilesAreReadExactly) {
   generated->read_exact_layers(0, kDims.z, exact);
   generated->read_layers(0, kDims.z, casts);
   EXPECT_FALSE(std::ranges::equal(exact, casts));
-  EXPECT_TRUE(std::ranges::equal(exact, casts, [](double a, float b) { return static_cast<float>(a) == b; }));
+  EXPECT_TRUE(std::ranges::equal(exact, casts,
+                                 [](double a, float b) { return static_cast<float>(a) == b; }));
 }
 
 // ---- the program
@@ -275,14 +292,18 @@ TEST(SourceError, FilesAreReadExactly) {
 TEST(SourceErrorOfTheProgram, RelativeTolerancesAreOfTheSourcesRange) {
   const TemporaryFolder folder;
   std::vector<double> voxels(kNumVoxels);
-  for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = 1e9 + 10 * noise(i);  // one float32 or two
+  for (std::size_t i = 0; i < voxels.size(); ++i)
+    voxels[i] = 1e9 + 10 * noise(i);  // one float32 or two
   const auto path = folder / "a_21x18x17_float64.raw";
   test::write_file(path, voxels);
   const std::string out = test::quoted(folder / "a.zfp");
-  test::expect_one_line_error("convert " + test::quoted(path) + " --tolerance-relative 0.1 -o " + out,
-                              "cannot be kept: voxels are stored as float32");
-  EXPECT_EQ(test::run_isowave("convert " + test::quoted(path) + " --tolerance-relative 1.1 -o " + out).status,
-            0);
+  test::expect_one_line_error(
+      "convert " + test::quoted(path) + " --tolerance-relative 0.1 -o " + out,
+      "cannot be kept: voxels are stored as float32");
+  EXPECT_EQ(
+      test::run_isowave("convert " + test::quoted(path) + " --tolerance-relative 1.1 -o " + out)
+          .status,
+      0);
   const auto info = test::run_isowave("info --json " + test::quoted(path));
   EXPECT_EQ(info.out.find("1000000000.0,"), std::string::npos) << info.out;
 }
@@ -318,9 +339,9 @@ TEST(SourceErrorOfTheProgram, VerifyComparesWithTheSource) {
     voxels[i] = 1e7 + double(i % kDims.x) + 0.31 * double(i / kDims.x % kDims.y);
   const auto path = folder / "a_21x18x17_float64.raw";
   test::write_file(path, voxels);
-  const auto run =
-      test::run_isowave("verify " + test::quoted(path) +
-                        " -i 10000012 --device cpu --size 48x32 --orbit 2 --tolerance 0.75 --max-error 4");
+  const auto run = test::run_isowave(
+      "verify " + test::quoted(path) +
+      " -i 10000012 --device cpu --size 48x32 --orbit 2 --tolerance 0.75 --max-error 4");
   EXPECT_EQ(run.status, 0) << run.out << run.err;
 }
 

@@ -26,10 +26,11 @@ TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
   rays.frame.height = kHeight;
   for (const uint most : {1u, 7u, 64u}) {
     rays.frame.max_spec_count = most;
-    for (const uint active : {0u, 1u, 2u, 3u, 5u, kPixels / 7, kPixels / 2 + 1, kPixels - 1, kPixels}) {
+    for (const uint active :
+         {0u, 1u, 2u, 3u, 5u, kPixels / 7, kPixels / 2 + 1, kPixels - 1, kPixels}) {
       for (const bool scarce : {false, true}) {
-        SCOPED_TRACE(
-            fmt::format("at most {}, {} active, slots {}", most, active, scarce ? "ran out" : "sufficed"));
+        SCOPED_TRACE(fmt::format("at most {}, {} active, slots {}", most, active,
+                                 scarce ? "ran out" : "sufficed"));
         const PassCounts before = [&] {
           PassCounts counts = distinct_counts();
           counts.next_active_count = active;
@@ -46,8 +47,10 @@ TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
         expected.spec_count = active == 0 ? 0 : std::min(most, kPixels / active);
         expected.window_count = std::min(active, scarce ? 10u : 51u);
         expected.pair_slot_count = expected.window_count * expected.spec_count;
-        expected.pair_count = expected.ahead_count = expected.granted_count = expected.visible_count = 0;
-        expected.requested_count = expected.decoded_count = expected.recycled_count = expected.hit_count = 0;
+        expected.pair_count = expected.ahead_count = expected.granted_count =
+            expected.visible_count = 0;
+        expected.requested_count = expected.decoded_count = expected.recycled_count =
+            expected.hit_count = 0;
         expect_counts(rays.counts, expected);
       }
     }

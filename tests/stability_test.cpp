@@ -1,4 +1,5 @@
-// The stability suite and the watertight test at a size that every test run can afford (`isowave verify` runs them large).
+// The stability suite and the watertight test at a size that every test run can afford (`isowave
+// verify` runs them large).
 
 #include "reference/stability_suite.hpp"
 
@@ -38,7 +39,8 @@ TEST(StabilitySuite, ShowsWhereTheOtherSolversFail) {
     for (const StabilityCase &stability_case : stability_cases(300, kSeed)) {
       failures += run_case(stability_case, solver_from_string(name)).failures();
     }
-    EXPECT_GT(failures, 0u) << name << ": a suite that every solver passes proves nothing of the default one";
+    EXPECT_GT(failures, 0u)
+        << name << ": a suite that every solver passes proves nothing of the default one";
   }
 }
 
@@ -59,13 +61,15 @@ TEST(Watertight, NotOneRayLeaks) {
 }
 
 TEST(Watertight, NotOneRayLeaksBetweenLevelsOfDetail) {
-  for (const WatertightResult &result : run_watertight(100000, kSeed, kDefaultSolver, RayBands::kLevels))
+  for (const WatertightResult &result :
+       run_watertight(100000, kSeed, kDefaultSolver, RayBands::kLevels))
     EXPECT_EQ(result.leaks, 0u) << result.surface;
 }
 
 TEST(Watertight, FindsTheLeaksOfALeakySolver) {
   std::uint64_t leaks = 0;
-  for (const WatertightResult &result : run_watertight(100000, kSeed, solver_from_string("analytic")))
+  for (const WatertightResult &result :
+       run_watertight(100000, kSeed, solver_from_string("analytic")))
     leaks += result.leaks;
   EXPECT_GT(leaks, 0u);
 }

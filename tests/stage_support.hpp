@@ -1,5 +1,6 @@
 #pragma once
-// What tests of several stages need: awkward sizes, counts on the device, volumes compressed by libzfp alone.
+// What tests of several stages need: awkward sizes, counts on the device, volumes compressed by
+// libzfp alone.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -24,8 +25,9 @@
 namespace isowave {
 
 /// std::mt19937, but its numbers are of 32 bits also by type.
-using Random = std::mersenne_twister_engine<std::uint32_t, 32, 624, 397, 31, 0x9908B0DFu, 11, 0xFFFFFFFFu, 7,
-                                            0x9D2C5680u, 15, 0xEFC60000u, 18, 1812433253u>;
+using Random =
+    std::mersenne_twister_engine<std::uint32_t, 32, 624, 397, 31, 0x9908B0DFu, 11, 0xFFFFFFFFu, 7,
+                                 0x9D2C5680u, 15, 0xEFC60000u, 18, 1812433253u>;
 
 inline constexpr std::array<uint, 3> kGroupSizes = {8, 64, 256};
 
@@ -82,8 +84,8 @@ inline std::vector<std::uint32_t> index_by_decoding(const CompressedVolume &volu
   return index.finish();
 }
 
-/// Compresses [nz][ny][nx] voxels by one call of libzfp, at any number of bits per block, 9..2048; 0: with the bit planes of
-/// min_exponent.
+/// Compresses [nz][ny][nx] voxels by one call of libzfp, at any number of bits per block, 9..2048;
+/// 0: with the bit planes of min_exponent.
 inline CompressedVolume compress_with_libzfp(std::vector<float> voxels, const glm::uvec3 &dims,
                                              std::uint32_t bits_per_block,
                                              std::int32_t min_exponent = ISO_ALL_PLANES) {
@@ -93,15 +95,18 @@ inline CompressedVolume compress_with_libzfp(std::vector<float> voxels, const gl
   volume.error_bound.min_exponent = min_exponent;
   std::vector<std::uint64_t> words(volume.block_count() * volume.max_block_bits() / 64 + 2);
   const ZfpStream stream = make_zfp_stream(bits_per_block, min_exponent);
-  const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint64_t)), &stream_close);
-  const ZfpField field(zfp_field_3d(voxels.data(), zfp_type_float, dims.x, dims.y, dims.z), &zfp_field_free);
+  const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint64_t)),
+                     &stream_close);
+  const ZfpField field(zfp_field_3d(voxels.data(), zfp_type_float, dims.x, dims.y, dims.z),
+                       &zfp_field_free);
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   const std::size_t bytes = zfp_compress(stream.get(), field.get());
   if (bytes == 0) throw std::logic_error("zfp: cannot compress");
   volume.indexed_bits = 8 * bytes;
   volume.words.resize((volume.payload_bits() + 31) / 32 + 2);
-  std::memcpy(volume.words.data(), words.data(),
-              std::min(volume.words.size() * sizeof(std::uint32_t), words.size() * sizeof(std::uint64_t)));
+  std::memcpy(
+      volume.words.data(), words.data(),
+      std::min(volume.words.size() * sizeof(std::uint32_t), words.size() * sizeof(std::uint64_t)));
   if (volume.is_indexed()) {
     volume.index = index_by_decoding(volume);
     volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
@@ -110,8 +115,8 @@ inline CompressedVolume compress_with_libzfp(std::vector<float> voxels, const gl
   return volume;
 }
 
-/// The 64 values of every block, padding too: [num_blocks * 64], x + 4y + 16z in a block. By libzfp, which
-/// decodes padding when told that the volume is made of whole blocks.
+/// The 64 values of every block, padding too: [num_blocks * 64], x + 4y + 16z in a block. By
+/// libzfp, which decodes padding when told that the volume is made of whole blocks.
 inline std::vector<float> decode_blocks_with_libzfp(CompressedVolume volume) {
   const glm::uvec3 blocks = volume.num_blocks();
   volume.info.dims = 4u * blocks;
@@ -123,7 +128,8 @@ inline std::vector<float> decode_blocks_with_libzfp(CompressedVolume volume) {
       for (std::size_t x = 0; x < blocks.x; ++x, ++block_id) {
         for (std::size_t v = 0; v < 64; ++v) {
           values[64 * block_id + v] =
-              voxels[4 * x + v % 4 + 4 * blocks.x * (4 * y + v / 4 % 4 + 4 * blocks.y * (4 * z + v / 16))];
+              voxels[4 * x + v % 4 +
+                     4 * blocks.x * (4 * y + v / 4 % 4 + 4 * blocks.y * (4 * z + v / 16))];
         }
       }
     }

@@ -89,18 +89,20 @@ struct StageWorld {
 
   /// [blocks] slot of each block, ISO_BLOCK_ABSENT if it is not cached.
   std::vector<uint> slots_by_block() const {
-    std::vector<uint> slots(std::size_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z, ISO_BLOCK_ABSENT);
+    std::vector<uint> slots(std::size_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z,
+                            ISO_BLOCK_ABSENT);
     for (const BlockEntry &entry : cache.table.read()) {
       if (entry.block_id != ISO_INVALID_ID) slots.at(entry.block_id) = entry.slot;
     }
     return slots;
   }
 
-  /// Instead of decoding: puts the voxels [nz][ny][nx] of the blocks just granted into their slots, and NaN into
-  /// padding, which nobody may use.
+  /// Instead of decoding: puts the voxels [nz][ny][nx] of the blocks just granted into their slots,
+  /// and NaN into padding, which nobody may use.
   void fill_slots(const std::vector<float> &voxels) {
     const uint granted = counts().decoded_count;
-    const std::vector<uint> blocks = cache.request_block_ids.read(), slots = cache.decode_slots.read();
+    const std::vector<uint> blocks = cache.request_block_ids.read(),
+                            slots = cache.decode_slots.read();
     std::vector<float> values = cache.values.read();
     for (uint i = 0; i < granted; ++i) {
       const uint x0 = 4 * (blocks[i] % frame.blocks_x),
@@ -137,8 +139,8 @@ inline FrameParams plain_frame(const glm::uvec3 &dims, uint width, uint height =
 }
 
 /// Corners of dual cell (x,y,z), corner x + 2y + 4z, minus the isovalue.
-inline std::array<float, 8> cell_corners(const FrameParams &frame, const std::vector<float> &voxels, int x,
-                                         int y, int z) {
+inline std::array<float, 8> cell_corners(const FrameParams &frame, const std::vector<float> &voxels,
+                                         int x, int y, int z) {
   std::array<float, 8> w;
   for (int corner = 0; corner < 8; ++corner) {
     const auto vx = static_cast<std::size_t>(x + (corner & 1)),

@@ -2,7 +2,8 @@
 // The devices that tests of kernels run on.
 //
 //   class ScanTest : public testing::TestWithParam<ocl::DeviceInfo> {};
-//   INSTANTIATE_TEST_SUITE_P(Devices, ScanTest, testing::ValuesIn(devices_under_test()), device_test_name);
+//   INSTANTIATE_TEST_SUITE_P(Devices, ScanTest, testing::ValuesIn(devices_under_test()),
+//   device_test_name);
 
 #include <gtest/gtest.h>
 
@@ -23,16 +24,18 @@ inline void PrintTo(const DeviceInfo &info, std::ostream *out) {
 }
 }  // namespace ocl
 
-/// The device that ISOWAVE_DEVICE chooses when it is set, else every device. Empty when there is none:
-/// GoogleTest then fails the suite, since a suite that is instantiated with nothing is an error.
+/// The device that ISOWAVE_DEVICE chooses when it is set, else every device. Empty when there is
+/// none: GoogleTest then fails the suite, since a suite that is instantiated with nothing is an
+/// error.
 inline std::vector<ocl::DeviceInfo> devices_under_test() {
   const char *chosen = std::getenv("ISOWAVE_DEVICE");
   if (chosen && *chosen) return {ocl::choose_device()};
   return ocl::list_devices();
 }
 
-/// Mesa's llvmpipe, which prepares a kernel anew for each launch: milliseconds of processor time for a small one, a tenth of a
-/// second for `intersect`; and compiles `march` for a minute. There the long tests draw fewer frames.
+/// Mesa's llvmpipe, which prepares a kernel anew for each launch: milliseconds of processor time
+/// for a small one, a tenth of a second for `intersect`; and compiles `march` for a minute. There
+/// the long tests draw fewer frames.
 inline bool is_llvmpipe(const ocl::DeviceInfo &device) {
   return device.platform == "rusticl";
 }

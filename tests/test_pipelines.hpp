@@ -34,15 +34,17 @@ inline void PrintTo(const PipelineOnDevice &param, std::ostream *out) {
 inline std::vector<PipelineOnDevice> pipelines_under_test() {
   std::vector<PipelineOnDevice> params;
   for (const ocl::DeviceInfo &device : devices_under_test()) {
-    params.push_back({device, "blocks", PipelineKind::kBlocks, Grouping::kRadix, ClosestHit::kScan, false});
+    params.push_back(
+        {device, "blocks", PipelineKind::kBlocks, Grouping::kRadix, ClosestHit::kScan, false});
     params.push_back(
         {device, "rays_per_ray", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, true});
     if (is_llvmpipe(device)) continue;
-    params.push_back({device, "blocks_counting_atomic_min", PipelineKind::kBlocks, Grouping::kCounting,
-                      ClosestHit::kAtomicMin, false});
+    params.push_back({device, "blocks_counting_atomic_min", PipelineKind::kBlocks,
+                      Grouping::kCounting, ClosestHit::kAtomicMin, false});
+    params.push_back({device, "blocks_per_ray", PipelineKind::kBlocks, Grouping::kCounting,
+                      ClosestHit::kAtomicMin, true});
     params.push_back(
-        {device, "blocks_per_ray", PipelineKind::kBlocks, Grouping::kCounting, ClosestHit::kAtomicMin, true});
-    params.push_back({device, "rays", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, false});
+        {device, "rays", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, false});
   }
   return params;
 }

@@ -1,4 +1,5 @@
-// Frames within a time: the steps that are drawn, what shows where time was over, and a clock that this file winds itself.
+// Frames within a time: the steps that are drawn, what shows where time was over, and a clock that
+// this file winds itself.
 
 #include "core/render/time_budget.hpp"
 
@@ -28,12 +29,14 @@ bool same_bits(const HitRecord &a, const HitRecord &b) {
   return std::memcmp(&a, &b, sizeof(HitRecord)) == 0;
 }
 
-/// The picture of `size` made of a smaller one: each pixel has what covers its centre, both being views of the same height.
+/// The picture of `size` made of a smaller one: each pixel has what covers its centre, both being
+/// views of the same height.
 Hits enlarged(const Hits &small, ImageSize from, ImageSize size) {
   Hits hits;
   for (std::uint32_t row = 0; row < size.height; ++row) {
     for (std::uint32_t column = 0; column < size.width; ++column) {
-      const double scale = double(from.height) / size.height, tiny = 1e-9;  // for centres on an edge
+      const double scale = double(from.height) / size.height,
+                   tiny = 1e-9;  // for centres on an edge
       const double x = (column + 0.5 - 0.5 * size.width) * scale + 0.5 * from.width;
       const double y = (row + 0.5) * scale;
       const auto at = [&](double place, std::uint32_t end) {
@@ -53,7 +56,8 @@ TEST_P(KeptPictureOnDevice, SmallPicturesCoverLargerOnes) {
   ocl::Device device(GetParam());
   for (const ImageSize full : {ImageSize{27, 21}, {16, 8}, {3, 3}, {5, 2}}) {
     const ImageSize small = halved(full, 1);
-    SCOPED_TRACE(fmt::format("{} x {} of {} x {}", small.width, small.height, full.width, full.height));
+    SCOPED_TRACE(
+        fmt::format("{} x {} of {} x {}", small.width, small.height, full.width, full.height));
     Wavefront rays(device, full.num_pixels(), false);
     KeptPicture kept(device, small);
     Hits before(small.num_pixels()), now(full.num_pixels());
@@ -90,8 +94,9 @@ class TimeBudgetOnDevice : public testing::TestWithParam<PipelineOnDevice> {
         device_(GetParam().device),
         renderer_(device_, volume_.compressed,
                   GetParam().with({.size = kSize, .cache_slots = 24, .with_kept_picture = true})),
-        frames_(renderer_,
-                [this] { return ms_ += double(renderer_.options().size.num_pixels()) / kPixelsPerMs; }) {}
+        frames_(renderer_, [this] {
+          return ms_ += double(renderer_.options().size.num_pixels()) / kPixelsPerMs;
+        }) {}
 
   /// What the renderer draws without a budget.
   Hits picture_of(ImageSize size) {
@@ -131,10 +136,12 @@ TEST_P(TimeBudgetOnDevice, AmpleTimeGivesTheWholePicture) {
   EXPECT_TRUE(frame.complete);
   EXPECT_NEAR(frame.stats.total_ms, ms_ - kFullLook, 1e-6);
   EXPECT_FALSE(frame.stats.cancelled);
-  expect_same_hits(renderer_.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue), kSize.width);
+  expect_same_hits(renderer_.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
+                   kSize.width);
 }
 
-/// Whatever time there is: each pixel is of the picture cancelled last, or, without a hit there, of the whole one before.
+/// Whatever time there is: each pixel is of the picture cancelled last, or, without a hit there, of
+/// the whole one before.
 TEST_P(TimeBudgetOnDevice, ThePictureBeforeShowsThrough) {
   std::size_t num_mixed = 0, num_complete = 0;
   for (double budget = 20; budget < 2e4; budget *= 1.5) {
@@ -169,14 +176,17 @@ TEST_P(TimeBudgetOnDevice, ThePictureBeforeShowsThrough) {
     }
     if (!frame.steps.back().cancelled) expect_same_hits(shown, expected, kSize.width);
     num_complete += frame.complete;
-    EXPECT_EQ(frame.complete, !frame.steps.back().cancelled && frame.steps.back().size.width == kSize.width);
+    EXPECT_EQ(frame.complete,
+              !frame.steps.back().cancelled && frame.steps.back().size.width == kSize.width);
   }
   EXPECT_GT(num_complete, 0u);
   EXPECT_GT(num_mixed, 0u);
-  expect_same_hits(picture_of(kSize), test::twin_hits(volume_, camera_, kSize, kIsovalue), kSize.width);
+  expect_same_hits(picture_of(kSize), test::twin_hits(volume_, camera_, kSize, kIsovalue),
+                   kSize.width);
 }
 
-/// The budget is kept where passes take no longer than the one before, but for the first picture and what follows the last pass.
+/// The budget is kept where passes take no longer than the one before, but for the first picture
+/// and what follows the last pass.
 TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
   for (double budget = 15; budget < 1000; budget *= 1.4) {
     renderer_.clear_cache();
@@ -189,12 +199,14 @@ TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
 /// With several rays a pixel, steps count rays; each but the last has one for each of its pixels.
 TEST_P(TimeBudgetOnDevice, SeveralRaysAPixel) {
   constexpr ImageSize kNine{9, 7, 3};
-  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = kNine, .with_kept_picture = true}));
+  Renderer renderer(device_, volume_.compressed,
+                    GetParam().with({.size = kNine, .with_kept_picture = true}));
   TimedFrames frames(renderer);
   const TimedFrame whole = frames.render(camera_, kIsovalue, 1e9);
   EXPECT_TRUE(whole.complete);
   EXPECT_EQ(whole.steps.back().size.samples, 3u);
-  expect_same_hits(renderer.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue), kSize.width);
+  expect_same_hits(renderer.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
+                   kSize.width);
   const TimedFrame coarse = frames.render(camera_, kIsovalue, 1e-6);
   EXPECT_EQ(coarse.steps[0].size.width, 4u);
   EXPECT_EQ(coarse.steps[0].size.samples, 1u);
@@ -223,7 +235,8 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
   const Camera camera = orbit_cameras(volume.info, 1)[0];
   for (const ocl::DeviceInfo &info : devices_under_test()) {
     ocl::Device device(info);
-    Renderer renderer(device, volume, {.size = kSize, .max_pixel_error = 1, .with_kept_picture = true});
+    Renderer renderer(device, volume,
+                      {.size = kSize, .max_pixel_error = 1, .with_kept_picture = true});
     renderer.set_max_pixel_error(0);
     TimedFrames frames(renderer);
     const TimedFrame coarse = frames.render(camera, 0.5f, 1e-6);
@@ -236,7 +249,8 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
     EXPECT_EQ(fine.stats.last_level, 0u);
     const std::vector<float> voxels = decode_with_libzfp(volume);
     expect_same_hits(renderer.hits(),
-                     render_scalar(make_frame_params(volume.info, camera, kSize, 0.5f), voxels), kSize.width);
+                     render_scalar(make_frame_params(volume.info, camera, kSize, 0.5f), voxels),
+                     kSize.width);
   }
 }
 

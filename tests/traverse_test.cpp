@@ -1,5 +1,6 @@
 // core/traverse: the blocks of each ray against a walk over every cell (the same
-// arithmetic, so equal), and against slabs in double (its own, so every block that a ray crosses must be there).
+// arithmetic, so equal), and against slabs in double (its own, so every block that a ray crosses
+// must be there).
 
 #include "core/stages/traverse.hpp"
 
@@ -56,13 +57,15 @@ BlockLists walk_cells(const FrameParams &frame, const Selection &selected) {
 
 /// Length of a ray within the dual cells of a block, in voxels; negative when it misses them.
 double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
-  const double b[3] = {4.0 * (block % frame.blocks_x), 4.0 * (block / frame.blocks_x % frame.blocks_y),
+  const double b[3] = {4.0 * (block % frame.blocks_x),
+                       4.0 * (block / frame.blocks_x % frame.blocks_y),
                        4.0 * (block / frame.blocks_x / frame.blocks_y)};
   const double last[3] = {frame.dims_x - 1.0, frame.dims_y - 1.0, frame.dims_z - 1.0};
   const RayAxis axes[3] = {ray.x, ray.y, ray.z};
   double enter = 0, exit = 1e30;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = b[axis], high = std::min(low + 4, last[axis]), o = axes[axis].o, d = axes[axis].d;
+    const double low = b[axis], high = std::min(low + 4, last[axis]), o = axes[axis].o,
+                 d = axes[axis].d;
     if (high <= low) return -1;
     if (d == 0) {  // a ray within a shared face belongs to one side only: not asked for
       if (o <= low || o >= high) return -1;
@@ -76,8 +79,8 @@ double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
 
 class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  using TraverseKernel = ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
-                                     ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>;
+  using TraverseKernel = ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>,
+                                     ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>;
 
   /// The kernel itself, since masks that no isovalue makes are wanted.
   struct Stages {
@@ -99,7 +102,8 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   BlockLists traverse_all(Stages &stages, const FrameParams &frame, const Selection &selected,
                           uint spec_count) {
     Wavefront &rays = stages.rays;
-    const ocl::Buffer<uint> masks(device_, "masks", std::span<const uint>(masks_of(frame, selected)));
+    const ocl::Buffer<uint> masks(device_, "masks",
+                                  std::span<const uint>(masks_of(frame, selected)));
     const uint num_pixels = frame.width * frame.height;
     ocl::Buffer<uint> pairs(device_, "pairs", std::size_t{num_pixels} * spec_count);
     rays.frame = frame;
@@ -116,7 +120,8 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         break;
       }
       pairs.fill(0xABCDEF01u);
-      std::vector<uint> entries = active;  // each looks ahead by its own number, where the frame says so
+      std::vector<uint> entries =
+          active;  // each looks ahead by its own number, where the frame says so
       for (uint &entry : entries) entry |= entry % 7 << ISO_RAY_AHEAD_SHIFT;
       entries.resize(rays.num_rays);  // whole: see README "Devices", Oclgrind
       rays.active_ray_ids.write(entries);
@@ -127,8 +132,8 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       counts.spec_count = spec_count;
       counts.pair_count = counts.ahead_count = 0;
       rays.counts.write({&counts, 1});
-      stages.kernel(stages.range, rays.frame, masks, rays.counts, rays.active_ray_ids, rays.ray_block_ids,
-                    pairs, rays.closest_pairs);
+      stages.kernel(stages.range, rays.frame, masks, rays.counts, rays.active_ray_ids,
+                    rays.ray_block_ids, pairs, rays.closest_pairs);
       const std::vector<uint> got = pairs.read(), states = rays.ray_block_ids.read();
       counts.pair_count = collect(got, active, spec_count, frame.per_ray_speculation, lists);
       for (const uint ray : active)
@@ -152,8 +157,8 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   /// Appends a pass's pairs to the lists; returns how many there are.
-  static uint collect(const std::vector<uint> &pairs, const std::vector<uint> &active, uint spec_count,
-                      bool per_ray, BlockLists &lists) {
+  static uint collect(const std::vector<uint> &pairs, const std::vector<uint> &active,
+                      uint spec_count, bool per_ray, BlockLists &lists) {
     uint num_pairs = 0;
     for (std::size_t a = 0; a < active.size(); ++a) {
       bool ended = false;
@@ -184,9 +189,9 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       const Selection selected = random_selection(frame, one_in, 1);
       const BlockLists expected = walk_cells(frame, selected);
       for (const uint spec_count : spec_counts) {
-        SCOPED_TRACE(
-            fmt::format("{} x {} x {}, camera '{}', one block in {}, spec count {}, group size {}, seed 1",
-                        dims.x, dims.y, dims.z, c.name, one_in, spec_count, group_size));
+        SCOPED_TRACE(fmt::format(
+            "{} x {} x {}, camera '{}', one block in {}, spec count {}, group size {}, seed 1",
+            dims.x, dims.y, dims.z, c.name, one_in, spec_count, group_size));
         const BlockLists got = traverse_all(stages, frame, selected, spec_count);
         ASSERT_EQ(first_difference(got, expected), kNoDifference) << "(a pixel)";
       }
@@ -208,7 +213,8 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       for (const uint block : lists[pixel]) {
         const RayAxis axes[3] = {ray.x, ray.y, ray.z};
         if (axes[0].d == 0 || axes[1].d == 0 || axes[2].d == 0) continue;
-        ASSERT_GT(stay_in_block(frame, ray, block), -1e-4) << "block " << block << ", pixel " << pixel;
+        ASSERT_GT(stay_in_block(frame, ray, block), -1e-4)
+            << "block " << block << ", pixel " << pixel;
       }
     }
   }
@@ -251,7 +257,8 @@ TEST_P(TraverseOnDevice, FewBlocksSelected) {
 TEST_P(TraverseOnDevice, GroupSizesDoNotMatter) {
   const glm::uvec3 dims(38, 41, 35);
   for (const uint group_size : kGroupSizes) {
-    expect_walks(dims, {camera_cases(dims)[0], camera_cases(dims)[2]}, 4, {3}, {71, 53}, group_size);
+    expect_walks(dims, {camera_cases(dims)[0], camera_cases(dims)[2]}, 4, {3}, {71, 53},
+                 group_size);
   }
 }
 

@@ -102,7 +102,8 @@ inline std::vector<float> read_all(VolumeReader &reader) {
   return voxels;
 }
 
-/// The message of the Error, in one line, with which opening or reading the file ends; "" where it is read to its end.
+/// The message of the Error, in one line, with which opening or reading the file ends; "" where it
+/// is read to its end.
 inline std::string error_of(const std::filesystem::path &path) {
   try {
     read_all(*open_volume(path));

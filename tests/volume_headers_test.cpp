@@ -1,5 +1,5 @@
-// NRRD, MetaImage and NIfTI: geometry in one world convention (LPS), voxels to the byte, and headers that must be
-// refused in one line. itk_agreement_test.cpp compares the same with ITK.
+// NRRD, MetaImage and NIfTI: geometry in one world convention (LPS), voxels to the byte, and
+// headers that must be refused in one line. itk_agreement_test.cpp compares the same with ITK.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,7 +49,9 @@ void expect_near(const glm::dvec3 &a, const glm::dvec3 &b) {
 
 /// The same place in the world from all formats: the defaults of NiftiFields.
 void expect_geometry(const VolumeInfo &info) {
-  const auto world = [&](const glm::dvec3 &index) { return info.origin + info.index_to_world() * index; };
+  const auto world = [&](const glm::dvec3 &index) {
+    return info.origin + info.index_to_world() * index;
+  };
   expect_near(info.spacing, {0.5, 2, 3});
   expect_near(world({0, 0, 0}), {-10, -20, 30});  // LPS
   expect_near(world({2, 1, 1}), {-11, -18, 33});
@@ -59,8 +61,8 @@ std::string nrrd(const std::string &lines, const std::string &type = "uint8") {
   return "NRRD0004\ntype: " + type + "\ndimension: 3\nsizes: 3 4 5\n" + lines;
 }
 std::string meta_image(const std::string &lines, const std::string &type = "UCHAR") {
-  return "ObjectType = Image\nNDims = 3\nDimSize = 3 4 5\nElementType = MET_" + type + "\n" + lines +
-         "ElementDataFile = LOCAL\n";
+  return "ObjectType = Image\nNDims = 3\nDimSize = 3 4 5\nElementType = MET_" + type + "\n" +
+         lines + "ElementDataFile = LOCAL\n";
 }
 
 class Headers : public testing::Test {
@@ -84,7 +86,8 @@ using NiftiFile = Headers;
 using DetachedFile = Headers;
 
 TEST_F(NrrdFile, SpaceDirections) {
-  const auto read = [&](const std::string &space, const std::string &directions, const std::string &origin) {
+  const auto read = [&](const std::string &space, const std::string &directions,
+                        const std::string &origin) {
     write_file(folder_ / "a.nrrd", nrrd("space: " + space + "\nspace directions: " + directions +
                                         "\nspace origin: " + origin + "\nencoding: raw\n\n") +
                                        ramp());
@@ -100,7 +103,8 @@ TEST_F(NrrdFile, SpaceDirections) {
 TEST_F(NrrdFile, SpacingFromTheEndsOfAxes) {
   write_file(
       folder_ / "a.nrrd",
-      nrrd("axis mins: 1 0 0\naxis maxs: 4 6 -8\ncenters: cell node node\nencoding: raw\n\n") + ramp());
+      nrrd("axis mins: 1 0 0\naxis maxs: 4 6 -8\ncenters: cell node node\nencoding: raw\n\n") +
+          ramp());
   const VolumeInfo info = open_volume(folder_ / "a.nrrd")->info();
   EXPECT_EQ(info.spacing, glm::dvec3(1, 2, 2));
   EXPECT_EQ(info.origin, glm::dvec3(1.5, 0, 0));
@@ -110,29 +114,36 @@ TEST_F(NrrdFile, SpacingFromTheEndsOfAxes) {
 TEST_F(NrrdFile, ValidHeadersOfAllKinds) {
   const std::string raw = "encoding: raw\n\n";
   std::string comments;
-  while (comments.size() < 3u << 20) comments += "# " + std::string(comments.size() % 90000, 'x') + "\n";
+  while (comments.size() < 3u << 20)
+    comments += "# " + std::string(comments.size() % 90000, 'x') + "\n";
   for (const std::string &fields :
-       {std::string("key:=value\ntype:=of a key: what\n"), std::string("line skip: 0\nbyte skip: 0\n"),
-        comments, "key:=" + std::string(200000, 'v') + "\n",
+       {std::string("key:=value\ntype:=of a key: what\n"),
+        std::string("line skip: 0\nbyte skip: 0\n"), comments,
+        "key:=" + std::string(200000, 'v') + "\n",
         std::string("content: a: b\nnumber: 60\nmin: 1\nold max: nan\n"),
-        std::string("labels: \"x\" \"a \\\" b\" \"\"\nunits: \"mm\" \"mm\" \"mm\"\nthicknesses: nan 1 1\n"),
         std::string(
-            "space: lps\nspace units: \"mm\" \"mm\" \"mm\"\nmeasurement frame: (1,0,0) (0,1,0) (0,0,1)\n"),
+            "labels: \"x\" \"a \\\" b\" \"\"\nunits: \"mm\" \"mm\" \"mm\"\nthicknesses: nan 1 1\n"),
+        std::string("space: lps\nspace units: \"mm\" \"mm\" \"mm\"\nmeasurement frame: (1,0,0) "
+                    "(0,1,0) (0,0,1)\n"),
         std::string("Sample Units: any\nkinds: space domain ???\nCENTERINGS: cell node none\n")}) {
     expect_read("a.nrrd", nrrd(fields + raw) + ramp());
-    expect_read("a.nrrd", "NRRD0004\n" + fields + nrrd(raw).substr(9) + ramp());  // before the others
+    expect_read("a.nrrd",
+                "NRRD0004\n" + fields + nrrd(raw).substr(9) + ramp());  // before the others
   }
-  for (std::size_t length = 65530; length < 65545; ++length) {  // where a line is cut and a buffer ends
+  for (std::size_t length = 65530; length < 65545;
+       ++length) {  // where a line is cut and a buffer ends
     expect_read("a.nrrd", nrrd("#" + std::string(length, '#') + "\r\n" + raw) + ramp());
     expect_read("a.nrrd", nrrd("key:=" + std::string(2 * length, ':') + "\n" + raw) + ramp());
   }
-  expect_read("a.nrrd", nrrd("encoding: gzip\n\n") + gzip(ramp().substr(0, 31)) + gzip(ramp().substr(31)));
+  expect_read("a.nrrd",
+              nrrd("encoding: gzip\n\n") + gzip(ramp().substr(0, 31)) + gzip(ramp().substr(31)));
   std::string commas;
   for (int i = 1; i <= 60; ++i) commas += fmt::format("{}, ", i);
   expect_read("a.nrrd", nrrd("encoding: ascii\n\n") + commas + "\n \t\n");
   write_file(folder_ / "named.raw", "a\n" + ramp());
   expect_read("a.nhdr", nrrd("line skip: 1\nencoding: raw\ndata file: named.raw\n"));
-  expect_read("a.nhdr", nrrd("byte skip: -1\nencoding: raw\ndatafile: ./named.raw"));  // no end of line
+  expect_read("a.nhdr",
+              nrrd("byte skip: -1\nencoding: raw\ndatafile: ./named.raw"));  // no end of line
 }
 
 TEST_F(NrrdFile, WrongVoxelsAreRefused) {
@@ -141,7 +152,8 @@ TEST_F(NrrdFile, WrongVoxelsAreRefused) {
   };
   expect_refused("a.nrrd", with("raw", ramp().substr(1)),
                  "truncated: 3x4x5 uint8 voxels need 60 bytes, found 59");
-  expect_refused("a.nrrd", with("raw", ramp() + "x"), "too long: 3x4x5 uint8 voxels need 60 bytes, found 61");
+  expect_refused("a.nrrd", with("raw", ramp() + "x"),
+                 "too long: 3x4x5 uint8 voxels need 60 bytes, found 61");
   const std::string packed = gzip(ramp());
   EXPECT_EQ(error_of(folder_ / "a.nrrd", with("gzip", packed)), "");
   expect_refused("a.nrrd", with("gzip", zlib(ramp())), "not a gzip file");
@@ -173,14 +185,18 @@ TEST_F(NrrdFile, WrongVoxelsAreRefused) {
   for (int i = 1; i <= 59; ++i) numbers += fmt::format("{} ", i);
   EXPECT_EQ(error_of(folder_ / "a.nrrd", with("ascii", numbers + "60")), "");
   EXPECT_EQ(error_of(folder_ / "a.nrrd", with("ascii", numbers + "2.55e2\n")), "");
-  expect_refused("a.nrrd", with("ascii", numbers), "truncated: 3x4x5 uint8 voxels need 60 bytes, found 59");
+  expect_refused("a.nrrd", with("ascii", numbers),
+                 "truncated: 3x4x5 uint8 voxels need 60 bytes, found 59");
   expect_refused("a.nrrd", with("ascii", numbers + "60 61"), "too long");
-  for (const char *word : {"256", "-1", "1.5", "abc", "nan", "1e999", "0x10", "6;0", "--1", "1e", "+-1"}) {
+  for (const char *word :
+       {"256", "-1", "1.5", "abc", "nan", "1e999", "0x10", "6;0", "--1", "1e", "+-1"}) {
     expect_refused("a.nrrd", with("ascii", numbers + word), "is no uint8 voxel");
   }
   expect_refused("a.nrrd", with("ascii", numbers + std::string(1 << 20, '1')), "is no voxel");
-  EXPECT_EQ(error_of(folder_ / "a.nrrd", nrrd("encoding: ascii\n\n", "float") + numbers + "1e-50"), "");
-  expect_refused("a.nrrd", nrrd("encoding: ascii\n\n", "float") + numbers + "1e39", "is no float32 voxel");
+  EXPECT_EQ(error_of(folder_ / "a.nrrd", nrrd("encoding: ascii\n\n", "float") + numbers + "1e-50"),
+            "");
+  expect_refused("a.nrrd", nrrd("encoding: ascii\n\n", "float") + numbers + "1e39",
+                 "is no float32 voxel");
 }
 
 TEST_F(NrrdFile, RefusedHeaders) {
@@ -196,20 +212,27 @@ TEST_F(NrrdFile, RefusedHeaders) {
   expect_refused("a.nrrd", with("spacings 1 2 3\n"), "line 5");
   expect_refused("a.nrrd", with("bad \x01\xff: 1\n"), R"('bad \x01\xff: 1')");
   expect_refused("a.nrrd", with("sizes: 3 4 5\n"), "'sizes' is given twice");
-  expect_refused("a.nrrd", with("axismins: 0 0 0\naxis mins: 0 0 0\n"), "'axis mins' is given twice");
-  for (const char *spacings : {"1 2", "1 2 3 4", "1 2 x", "1 2 inf", "1 2 1e999", "1 2 3,", "1 2 0x3", ""}) {
-    expect_refused("a.nrrd", with(fmt::format("spacings: {}\n", spacings)), "broken header: spacings");
+  expect_refused("a.nrrd", with("axismins: 0 0 0\naxis mins: 0 0 0\n"),
+                 "'axis mins' is given twice");
+  for (const char *spacings :
+       {"1 2", "1 2 3 4", "1 2 x", "1 2 inf", "1 2 1e999", "1 2 3,", "1 2 0x3", ""}) {
+    expect_refused("a.nrrd", with(fmt::format("spacings: {}\n", spacings)),
+                   "broken header: spacings");
   }
-  for (const char *value : {"(1,0,0) (0,1,0)", "(1,0,0) (0,1,0) (0,0,inf)", "(1,0) (0,1) (0,0)", "1 2 3",
-                            "(1,0,0) (0,1,0) (0,0,1", "(1,0,0) (0,1,0) (0,0,1) (0,0,1)",
+  for (const char *value : {"(1,0,0) (0,1,0)", "(1,0,0) (0,1,0) (0,0,inf)", "(1,0) (0,1) (0,0)",
+                            "1 2 3", "(1,0,0) (0,1,0) (0,0,1", "(1,0,0) (0,1,0) (0,0,1) (0,0,1)",
                             "(1,0,0,0) (0,1,0) (0,0,1)", "(1,,0) (0,1,0) (0,0,1)"}) {
     expect_refused("a.nrrd", with(fmt::format("space: LPS\nspace directions: {}\n", value)),
                    "space directions");
   }
-  expect_refused("a.nrrd", with("space: LPS\nspace directions: none none none\n"), "need a volume of 3");
-  expect_refused("a.nrrd", with("space: LPS\nspace directions: (1,0,0) (2,0,0) (0,0,1)\n"), "singular");
-  expect_refused("a.nrrd", with("space: LPS\nspace directions: (0,0,0) (0,1,0) (0,0,1)\n"), "spacing");
-  expect_refused("a.nrrd", with("space: LPS\nspace directions: (1e300,0,0) (0,1,0) (0,0,1)\n"), "spacing");
+  expect_refused("a.nrrd", with("space: LPS\nspace directions: none none none\n"),
+                 "need a volume of 3");
+  expect_refused("a.nrrd", with("space: LPS\nspace directions: (1,0,0) (2,0,0) (0,0,1)\n"),
+                 "singular");
+  expect_refused("a.nrrd", with("space: LPS\nspace directions: (0,0,0) (0,1,0) (0,0,1)\n"),
+                 "spacing");
+  expect_refused("a.nrrd", with("space: LPS\nspace directions: (1e300,0,0) (0,1,0) (0,0,1)\n"),
+                 "spacing");
   expect_refused("a.nrrd", with("space: LPS\nspacings: 1 1 1\n"), "spacings");
   expect_refused("a.nrrd", with("space: LPST\n"), "space 'LPST'");
   expect_refused("a.nrrd", with("space dimension: 2\n"), "space dimension");
@@ -225,16 +248,19 @@ TEST_F(NrrdFile, RefusedHeaders) {
   expect_refused("a.nrrd", with("byte skip: 9223372036854775807\n"), "truncated");
   expect_refused("a.nrrd", with("byte skip: 9223372036854775808\n"), "byte skip");
   expect_refused("a.nrrd", with("endian: middle\n"), "endian");
-  expect_refused("a.nrrd", with("content: " + std::string(1 << 20, 'x') + "\n"), "'content' is too long");
+  expect_refused("a.nrrd", with("content: " + std::string(1 << 20, 'x') + "\n"),
+                 "'content' is too long");
   expect_refused("a.nrrd", nrrd(raw, "int16") + ramp<std::int16_t>(), "no 'endian'");
-  expect_refused("a.nrrd", nrrd("endian: little\n" + raw, "int64") + ramp<std::int64_t>(), "type 'int64'");
+  expect_refused("a.nrrd", nrrd("endian: little\n" + raw, "int64") + ramp<std::int64_t>(),
+                 "type 'int64'");
   expect_refused("a.nrrd", nrrd("encoding: bzip2\n\n") + ramp(), "encoding 'bzip2'");
   const auto sizes = [&](const std::string &dimension, const std::string &value) {
-    return "NRRD0004\ntype: double\nendian: little\ndimension: " + dimension + "\nsizes: " + value + "\n" +
-           raw + ramp();
+    return "NRRD0004\ntype: double\nendian: little\ndimension: " + dimension + "\nsizes: " + value +
+           "\n" + raw + ramp();
   };
   expect_refused("a.nrrd", sizes("3", "60000 60000 60000"), "truncated");
-  expect_refused("a.nrrd", sizes("3", "3 4 9999999999"), "sizes '3 4 9999999999': each must be 1 to 65536");
+  expect_refused("a.nrrd", sizes("3", "3 4 9999999999"),
+                 "sizes '3 4 9999999999': each must be 1 to 65536");
   expect_refused("a.nrrd", sizes("3", "3 4 1"), "dims 3x4x1: each must be 2 to 65536");
   expect_refused("a.nrrd", sizes("3", "3 4 99999999999999999999"), "sizes");
   expect_refused("a.nrrd", sizes("3", "3 4 -5"), "sizes");
@@ -245,21 +271,24 @@ TEST_F(NrrdFile, RefusedHeaders) {
 
 TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
   const std::string header =
-      "NRRD0001\ndatafile: ./a.raw\ndimension: 3\nsizes: 3 4 5\nspacings: 1 2 3\ntype: uchar\nencoding: "
+      "NRRD0001\ndatafile: ./a.raw\ndimension: 3\nsizes: 3 4 5\nspacings: 1 2 3\ntype: "
+      "uchar\nencoding: "
       "raw\n";
   expect_refused("a.nhdr", header, "its data file './a.raw': no such file");
   write_file(folder_ / "a.raw", ramp());
   expect_read("a.nhdr", header);
-  EXPECT_EQ(
-      open_volume(folder_ / "a.nhdr", {.dims = {}, .type = {}, .spacing = glm::dvec3(7)})->info().spacing,
-      glm::dvec3(7));
+  EXPECT_EQ(open_volume(folder_ / "a.nhdr", {.dims = {}, .type = {}, .spacing = glm::dvec3(7)})
+                ->info()
+                .spacing,
+            glm::dvec3(7));
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: a.raw" + std::string(1, '\0') + "x\n"),
                  "no file can have this name");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: \x1b[1m\xff.raw\n"),
                  R"(its data file '\x1b[1m\xff.raw': no such file)");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: Sch\u00e4del.raw\n"),
                  "its data file 'Sch\u00e4del.raw': no such file");
-  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: slice%03d.raw 1 5 1\n"), "several files");
+  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: slice%03d.raw 1 5 1\n"),
+                 "several files");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: LIST\na.raw\n"), "is neither a field");
   std::string meta = meta_image("");
   for (const char *name : {"LIST", "slice%03d.raw 1 5 1"}) {
@@ -267,8 +296,10 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
   }
   expect_read("a.mhd", meta.substr(0, meta.size() - 6) + "a.raw\n");
   ASSERT_EQ(::mkfifo((folder_ / "pipe.raw").c_str(), 0600), 0);
-  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: pipe.raw\n"), "'pipe.raw': not a regular file");
-  expect_refused("a.mhd", meta.substr(0, meta.size() - 6) + "pipe.raw\n", "'pipe.raw': not a regular file");
+  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: pipe.raw\n"),
+                 "'pipe.raw': not a regular file");
+  expect_refused("a.mhd", meta.substr(0, meta.size() - 6) + "pipe.raw\n",
+                 "'pipe.raw': not a regular file");
   for (const char *name :
        {"a_3x4x5_uint8.raw", "a_3x4x5_uint8.raw.gz", "p.nrrd", "p.mha", "p.nii", "p.nii.gz"}) {
     ASSERT_EQ(::mkfifo((folder_ / name).c_str(), 0600), 0);
@@ -345,14 +376,14 @@ TEST(Extensions, InAnyCase) {
   const TemporaryFolder folder;
   const std::string nifti = NiftiFields().bytes() + ramp();
   const std::string meta = meta_image("") + ramp();
-  for (const auto &[name, bytes] :
-       std::vector<std::pair<std::string, std::string>>{{"a.NII", nifti},
-                                                        {"a.Nii.GZ", gzip(nifti)},
-                                                        {"a.nii.GZ", gzip(nifti)},
-                                                        {"a.MHA", meta},
-                                                        {"a.NRRD", nrrd("encoding: raw\n\n") + ramp()},
-                                                        {"a_3x4x5_uint8.RAW", ramp()},
-                                                        {"a_3x4x5_uint8.Raw.GZ", gzip(ramp())}}) {
+  for (const auto &[name, bytes] : std::vector<std::pair<std::string, std::string>>{
+           {"a.NII", nifti},
+           {"a.Nii.GZ", gzip(nifti)},
+           {"a.nii.GZ", gzip(nifti)},
+           {"a.MHA", meta},
+           {"a.NRRD", nrrd("encoding: raw\n\n") + ramp()},
+           {"a_3x4x5_uint8.RAW", ramp()},
+           {"a_3x4x5_uint8.Raw.GZ", gzip(ramp())}}) {
     EXPECT_EQ(error_of(folder / name, bytes), "") << name;
   }
   EXPECT_THAT(error_of(folder / "b.nii.GZ", nifti), HasSubstr("not a gzip file"));
@@ -364,10 +395,10 @@ TEST_F(MetaImageFile, FlippedDirection) {
       "TransformMatrix = -1 0 0 0 1 0 0 0 1\nOffset = -10 -20 30\nElementSpacing = 0.5 2 3\n";
   const std::string packed = zlib(ramp());
   write_file(folder_ / "raw.mha", meta_image(grid + "CompressedData = False\n") + ramp());
-  write_file(
-      folder_ / "packed.mha",
-      meta_image(grid + fmt::format("CompressedData = True\nCompressedDataSize = {}\n", packed.size())) +
-          packed);
+  write_file(folder_ / "packed.mha",
+             meta_image(grid + fmt::format("CompressedData = True\nCompressedDataSize = {}\n",
+                                           packed.size())) +
+                 packed);
   for (const char *name : {"raw.mha", "packed.mha"}) {
     SCOPED_TRACE(name);
     const auto reader = open_volume(folder_ / name);
@@ -386,7 +417,8 @@ TEST_F(MetaImageFile, CompressedVoxelsEndWithTheFile) {
   const auto plus = [&](int bytes) { return fmt::format("{}", int(packed.size()) + bytes); };
   for (const std::string &size : {plus(0), std::string(), std::string("0")}) {
     expect_read("a.mha", with(size, packed));
-    expect_refused("a.mha", with(size, packed + "x"), size == plus(0) ? "but the header says" : "follow it");
+    expect_refused("a.mha", with(size, packed + "x"),
+                   size == plus(0) ? "but the header says" : "follow it");
     expect_refused("a.mha", with(size, packed.substr(0, packed.size() - 1)),
                    size == plus(0) ? "but the header says" : "truncated");
   }
@@ -408,7 +440,8 @@ TEST_F(MetaImageFile, WhereVoxelsBegin) {
   expect_read("a.mha", meta_image("HeaderSize = 0\n") + ramp());
   expect_read("a.mha", meta_image("HeaderSize = -1\n") + "any" + ramp());
   for (const char *size : {"1", "10", "-2", "1e2", "9223372036854775808", ""}) {
-    expect_refused("a.mha", meta_image(fmt::format("HeaderSize = {}\n", size)) + ramp(), "HeaderSize");
+    expect_refused("a.mha", meta_image(fmt::format("HeaderSize = {}\n", size)) + ramp(),
+                   "HeaderSize");
   }
   const std::string head = meta_image("HeaderSize = 200\n");
   expect_read("a.mha", head + std::string(200 - head.size(), '#') + ramp());
@@ -416,7 +449,8 @@ TEST_F(MetaImageFile, WhereVoxelsBegin) {
   expect_refused("a.mha", head + ramp().substr(30), "truncated");
   expect_refused("a.mha", meta_image("") + ramp() + "x", "too long");
   expect_refused("a.mha", meta_image("HeaderSize = -1\n") + ramp().substr(1), "truncated");
-  expect_refused("a.mha", meta_image("HeaderSize = -1\nBinaryData = False\n") + ramp(), "HeaderSize");
+  expect_refused("a.mha", meta_image("HeaderSize = -1\nBinaryData = False\n") + ramp(),
+                 "HeaderSize");
 }
 
 TEST_F(MetaImageFile, Numbers) {
@@ -440,22 +474,26 @@ TEST_F(MetaImageFile, RefusedHeaders) {
     for (const char *matrix : {"", "TransformMatrix = 1 0 0 0 1 0 0 0 1\n"}) {
       expect_refused(
           "a.mha",
-          fmt::format("NDims = {}\nDimSize = 3 4 5\nElementType = MET_UCHAR\n{}ElementDataFile = LOCAL\n",
-                      axes, matrix) +
+          fmt::format(
+              "NDims = {}\nDimSize = 3 4 5\nElementType = MET_UCHAR\n{}ElementDataFile = LOCAL\n",
+              axes, matrix) +
               ramp(),
           "NDims");
     }
   }
   expect_refused("a.mha", with(std::string(300, 'k') + " = 1\n"), "is not like 'Key = Value'");
-  expect_refused("a.mha", with("Offset = " + std::string(1 << 20, '1') + "\n"), "'Offset' is too long");
+  expect_refused("a.mha", with("Offset = " + std::string(1 << 20, '1') + "\n"),
+                 "'Offset' is too long");
   for (const char *value : {"yes", "1", "", "True False"}) {
-    expect_refused("a.mha", with(fmt::format("CompressedData = {}\n", value)), "must be True or False");
+    expect_refused("a.mha", with(fmt::format("CompressedData = {}\n", value)),
+                   "must be True or False");
     expect_refused("a.mha", with(fmt::format("BinaryData = {}\n", value)), "must be True or False");
   }
   expect_refused("a.mha", with("CompressedData = False\nCompressedData = True\n"),
                  "'CompressedData' is given twice");
   expect_refused("a.mha", with("compresseddata = True\n"), "must be written 'CompressedData'");
-  expect_refused("a.mha", with("CompressedData = True\nBinaryData = False\n"), "not with BinaryData");
+  expect_refused("a.mha", with("CompressedData = True\nBinaryData = False\n"),
+                 "not with BinaryData");
   expect_refused("a.mha", with("ElementByteOrderMSB = True\nBinaryDataByteOrderMSB = False\n"),
                  "says otherwise");
   expect_refused("a.mha", with("Offset = 1 2 3\nPosition = 1 2 4\n"), "says otherwise");
@@ -466,14 +504,16 @@ TEST_F(MetaImageFile, RefusedHeaders) {
   expect_refused("a.mha", with("TransformMatrix = 1 0 0 0 1 0 0 0\n"), "TransformMatrix");
   expect_refused("a.mha", with("TransformMatrix = 1 0 0 0 1 0 0 0 0\n"), "singular");
   expect_refused("a.mha", with("ElementNumberOfChannels = 3\n"), "3 components");
-  expect_refused("a.mha", with("ElementToIntensityFunctionSlope = 2\n"), "ElementToIntensityFunctionSlope");
+  expect_refused("a.mha", with("ElementToIntensityFunctionSlope = 2\n"),
+                 "ElementToIntensityFunctionSlope");
   expect_refused("a.mha", meta_image("", "LONG_LONG") + ramp<std::int64_t>(), "MET_LONG_LONG");
   std::string tube = with("");
   expect_refused("a.mha", tube.replace(tube.find("Image"), 5, "Tube"), "ObjectType");
   for (const char *sizes : {"3 4", "3 4 0", "3 4 -5", "3 4 5 6", "3 4 5.5", "3 4 4294967301",
                             "60000 60000 60000", "3 4 99999999999999999999"}) {
     std::string header = with("");
-    EXPECT_NE(error_of(folder_ / "a.mha", header.replace(header.find("3 4 5"), 5, sizes)), "") << sizes;
+    EXPECT_NE(error_of(folder_ / "a.mha", header.replace(header.find("3 4 5"), 5, sizes)), "")
+        << sizes;
   }
 }
 
@@ -491,7 +531,8 @@ TEST_F(NiftiFile, RasBecomesLps) {
 
 TEST_F(NiftiFile, OtherFilesOfTheNameAreNotRead) {
   write_file(folder_ / "a.nii", NiftiFields().bytes() + std::string(60, 'x'));
-  expect_read("a.nii.gz", gzip(NiftiFields().bytes() + ramp()));  // ITK would take the voxels of a.nii
+  expect_read("a.nii.gz",
+              gzip(NiftiFields().bytes() + ramp()));  // ITK would take the voxels of a.nii
 }
 
 TEST_F(NiftiFile, OriginInTheUnitOfTheSpacings) {
@@ -507,7 +548,8 @@ TEST_F(NiftiFile, OriginInTheUnitOfTheSpacings) {
 TEST_F(NiftiFile, ScaledVoxelsAreFloat64) {
   const auto path = folder_ / "a.nii";
   const auto check = [&](const NiftiFields &fields, const auto &voxels) {
-    const std::string bytes(reinterpret_cast<const char *>(voxels.data()), voxels.size() * sizeof(voxels[0]));
+    const std::string bytes(reinterpret_cast<const char *>(voxels.data()),
+                            voxels.size() * sizeof(voxels[0]));
     write_file(path, fields.bytes() + bytes);
     const auto reader = open_volume(path);
     EXPECT_EQ(reader->info().type, VoxelType::kFloat64);
@@ -534,8 +576,8 @@ TEST_F(NiftiFile, ScaledVoxelsAreFloat64) {
   check({.datatype = 16, .bitpix = 32, .scl_slope = 3, .scl_inter = 1e6f}, floats);
   check({.datatype = 4, .bitpix = 16, .scl_slope = 1e-3f, .scl_inter = 1e6f}, shorts);
   // Up to 1e6, float32's steps are of 1/16.
-  const auto run =
-      test::run_isowave("convert " + test::quoted(path) + " --rate 32 -o " + test::quoted(folder_ / "a.zfp"));
+  const auto run = test::run_isowave("convert " + test::quoted(path) + " --rate 32 -o " +
+                                     test::quoted(folder_ / "a.zfp"));
   const std::size_t at = run.out.find("max error ");
   ASSERT_NE(at, std::string::npos) << run.out << run.err;
   EXPECT_GT(std::stod(run.out.substr(at + 10)), 0.02) << run.out;
@@ -565,12 +607,15 @@ TEST_F(NiftiFile, NumbersThatAreNoneAreRefused) {
     expect_refused("a.nii", NiftiFields{.vox_offset = value}.bytes() + ramp(), "vox_offset");
   }
   expect_refused("a.nii", NiftiFields{.scl_slope = kInfinity}.bytes() + ramp(), "scl_slope");
-  expect_refused("a.nii", NiftiFields{.scl_slope = 1, .scl_inter = kNan}.bytes() + ramp(), "scl_inter");
-  expect_refused("a.nii", NiftiFields{.scl_inter = 1}.bytes() + ramp(), "scl_inter 1 without a scl_slope");
+  expect_refused("a.nii", NiftiFields{.scl_slope = 1, .scl_inter = kNan}.bytes() + ramp(),
+                 "scl_inter");
+  expect_refused("a.nii", NiftiFields{.scl_inter = 1}.bytes() + ramp(),
+                 "scl_inter 1 without a scl_slope");
 }
 
 TEST_F(NiftiFile, HugeNumbersEnd) {
-  for (const float value : {0x1p127f, -0x1p127f, std::numeric_limits<float>::max(), 1e20f, 1e-38f, 0.0f}) {
+  for (const float value :
+       {0x1p127f, -0x1p127f, std::numeric_limits<float>::max(), 1e20f, 1e-38f, 0.0f}) {
     for (std::size_t i = 0; i < 12; ++i) {
       NiftiFields fields;
       fields.sform[i / 4][i % 4] = value;
@@ -588,9 +633,12 @@ TEST_F(NiftiFile, RefusedHeaders) {
   expect_refused("a.nii", std::string(352, 'x'), "not a NIfTI-1 file");
   expect_refused("a.nii.gz", gzip(std::string(352, 'x')), "not a NIfTI-1 file");
   expect_refused("a.nii", NiftiFields{.sizeof_hdr = 540}.bytes() + ramp(), "NIfTI-2");
-  expect_refused("a.nii", NiftiFields{.magic = std::string("ni1\0", 4)}.bytes() + ramp(), ".img file");
-  expect_refused("a.nii", NiftiFields{.magic = std::string(4, '\0')}.bytes() + ramp(), "not a NIfTI-1 file");
-  expect_refused("a.nii", NiftiFields{.dim = {3, -3, 4, 5}}.bytes() + ramp(), "-3 voxels along axis 1");
+  expect_refused("a.nii", NiftiFields{.magic = std::string("ni1\0", 4)}.bytes() + ramp(),
+                 ".img file");
+  expect_refused("a.nii", NiftiFields{.magic = std::string(4, '\0')}.bytes() + ramp(),
+                 "not a NIfTI-1 file");
+  expect_refused("a.nii", NiftiFields{.dim = {3, -3, 4, 5}}.bytes() + ramp(),
+                 "-3 voxels along axis 1");
   expect_refused("a.nii", NiftiFields{.dim = {3, 32767, 4, 5}}.bytes() + ramp(), "truncated");
   expect_refused("a.nii", NiftiFields{.dim = {4, 3, 4, 5, 2}}.bytes() + ramp() + ramp(),
                  "an image of 4 axes");
@@ -598,7 +646,8 @@ TEST_F(NiftiFile, RefusedHeaders) {
   expect_refused("a.nii", NiftiFields{.dim = {8, 3, 4, 5}}.bytes() + ramp(), "8 axes");
   expect_refused("a.nii", NiftiFields{.datatype = 128, .bitpix = 24}.bytes() + ramp(false, 180),
                  "datatype 128");
-  expect_refused("a.nii", NiftiFields{.datatype = 1024, .bitpix = 64}.bytes() + ramp<std::int64_t>(),
+  expect_refused("a.nii",
+                 NiftiFields{.datatype = 1024, .bitpix = 64}.bytes() + ramp<std::int64_t>(),
                  "datatype 1024");
   expect_refused("a.nii", NiftiFields{.bitpix = 16}.bytes() + ramp(), "bitpix 16");
   expect_refused("a.nii", NiftiFields{.intent = 1004}.bytes() + ramp(), "matrices");
@@ -622,7 +671,8 @@ TEST_F(NiftiFile, RefusedHeaders) {
   NiftiFields sheared;
   sheared.sform[0][1] = 0.2f;
   expect_refused("a.nii", sheared.bytes() + ramp(), "shear");
-  expect_refused("a.nii", NiftiFields{.pixdim = {1, 0.6f, 2, 3}}.bytes() + ramp(), "shear or other spacings");
+  expect_refused("a.nii", NiftiFields{.pixdim = {1, 0.6f, 2, 3}}.bytes() + ramp(),
+                 "shear or other spacings");
 }
 
 }  // namespace

@@ -60,9 +60,10 @@ TEST(RawName, Pattern) {
   EXPECT_EQ(name->name, "my_head");
   EXPECT_EQ(name->dims, glm::uvec3(256, 255, 113));
   EXPECT_EQ(name->type, VoxelType::kUint16);
-  for (const char *bad : {"", "head", "_2x2x2_uint8_", "head_2x2_uint8", "head_2x2x2", "head_2x2x2x2_uint8",
-                          "head_2x-2x2_uint8", "head_2x2x2_uint7", "head_2x2x 2_uint8",
-                          "head_99999999999x2x2_uint8", "head_x2x2_uint8", "2x2x2_uint8"}) {
+  for (const char *bad :
+       {"", "head", "_2x2x2_uint8_", "head_2x2_uint8", "head_2x2x2", "head_2x2x2x2_uint8",
+        "head_2x-2x2_uint8", "head_2x2x2_uint7", "head_2x2x 2_uint8", "head_99999999999x2x2_uint8",
+        "head_x2x2_uint8", "2x2x2_uint8"}) {
     EXPECT_FALSE(parse_raw_name(bad)) << bad;
   }
 }
@@ -90,14 +91,15 @@ TYPED_TEST(RawTypes, EveryVoxelArrivesAsFloat) {
     const TemporaryFolder folder;
     const std::string_view bytes(reinterpret_cast<const char *>(voxels.data()),
                                  voxels.size() * sizeof(TypeParam));
-    const auto path =
-        folder / fmt::format("a_3x2x4_{}.raw{}", to_string(voxel_type<TypeParam>()), gzipped ? ".gz" : "");
+    const auto path = folder / fmt::format("a_3x2x4_{}.raw{}", to_string(voxel_type<TypeParam>()),
+                                           gzipped ? ".gz" : "");
     write_file(path, gzipped ? gzip(bytes) : std::string(bytes));
     const auto reader = open_volume(path);
     EXPECT_EQ(reader->info().dims, glm::uvec3(3, 2, 4));
     EXPECT_EQ(reader->info().type, voxel_type<TypeParam>());
     const std::vector<float> got = read_all(*reader);
-    for (std::size_t i = 0; i < voxels.size(); ++i) EXPECT_EQ(got[i], static_cast<float>(voxels[i])) << i;
+    for (std::size_t i = 0; i < voxels.size(); ++i)
+      EXPECT_EQ(got[i], static_cast<float>(voxels[i])) << i;
   }
 }
 
@@ -111,7 +113,8 @@ TEST(RawReader, LayersInPiecesAndWithGaps) {
        {std::pair(0u, 1u), std::pair(1u, 4u), std::pair(9u, 2u), std::pair(38u, 3u)}) {
     std::vector<float> got(layer * count);
     reader->read_layers(z, count, got);
-    EXPECT_TRUE(std::equal(got.begin(), got.end(), all.begin() + std::ptrdiff_t(layer * z))) << "layer " << z;
+    EXPECT_TRUE(std::equal(got.begin(), got.end(), all.begin() + std::ptrdiff_t(layer * z)))
+        << "layer " << z;
   }
   std::vector<float> again(layer);
   EXPECT_THROW(reader->read_layers(5, 1, again), std::invalid_argument);
@@ -125,10 +128,12 @@ TEST(RawReader, WrongSizesAreRefused) {
     open_volume(folder / "a_4x4x4_int16.raw");
   };
   EXPECT_NO_THROW(open(right));
-  EXPECT_THAT([&] { open(right.substr(1)); },
-              ThrowsMessage<Error>(AllOf(HasSubstr("truncated"), HasSubstr("need 128 bytes, found 127"))));
-  EXPECT_THAT([&] { open(right + "x"); },
-              ThrowsMessage<Error>(AllOf(HasSubstr("too long"), HasSubstr("need 128 bytes, found 129"))));
+  EXPECT_THAT(
+      [&] { open(right.substr(1)); },
+      ThrowsMessage<Error>(AllOf(HasSubstr("truncated"), HasSubstr("need 128 bytes, found 127"))));
+  EXPECT_THAT(
+      [&] { open(right + "x"); },
+      ThrowsMessage<Error>(AllOf(HasSubstr("too long"), HasSubstr("need 128 bytes, found 129"))));
 
   const auto read_gzip = [&](const std::string &file) {
     write_file(folder / "a_4x4x4_int16.raw.gz", file);
@@ -177,26 +182,29 @@ TEST(RawReader, OverridesReplaceTheName) {
   write_file(folder / "head.raw", std::string(24, 'a'));
   EXPECT_THAT([&] { open_volume(folder / "head.raw"); },
               ThrowsMessage<Error>(HasSubstr("--dims and --type")));
-  EXPECT_THROW(open_volume(folder / "head.raw", {.dims = glm::uvec3(2, 3, 4), .type = {}, .spacing = {}}),
-               Error);
-  const auto reader =
-      open_volume(folder / "head.raw",
-                  {.dims = glm::uvec3(2, 3, 4), .type = VoxelType::kUint8, .spacing = glm::dvec3(1, 2, 3)});
+  EXPECT_THROW(
+      open_volume(folder / "head.raw", {.dims = glm::uvec3(2, 3, 4), .type = {}, .spacing = {}}),
+      Error);
+  const auto reader = open_volume(
+      folder / "head.raw",
+      {.dims = glm::uvec3(2, 3, 4), .type = VoxelType::kUint8, .spacing = glm::dvec3(1, 2, 3)});
   EXPECT_EQ(read_all(*reader), std::vector<float>(24, 97.0f));
   EXPECT_EQ(reader->info().index_to_world() * glm::dvec3(1, 1, 1), glm::dvec3(1, 2, 3));
 
   write_file(folder / "a_2x3x4_uint8.raw", std::string(48, 'a'));
-  EXPECT_NO_THROW(
-      open_volume(folder / "a_2x3x4_uint8.raw", {.dims = {}, .type = VoxelType::kInt16, .spacing = {}}));
+  EXPECT_NO_THROW(open_volume(folder / "a_2x3x4_uint8.raw",
+                              {.dims = {}, .type = VoxelType::kInt16, .spacing = {}}));
 }
 
 TEST(OpenVolume, UnknownOrMissingFiles) {
   const TemporaryFolder folder;
   write_file(folder / "a.png", std::string_view("x"));
-  EXPECT_THAT([&] { open_volume(folder / "a.png"); }, ThrowsMessage<Error>(HasSubstr("unknown kind")));
+  EXPECT_THAT([&] { open_volume(folder / "a.png"); },
+              ThrowsMessage<Error>(HasSubstr("unknown kind")));
   EXPECT_THAT([&] { open_volume(folder / "b_2x2x2_uint8.raw"); },
               ThrowsMessage<Error>(HasSubstr("no such file")));
-  EXPECT_THAT([&] { open_volume(folder.path()); }, ThrowsMessage<Error>(HasSubstr("not a regular file")));
+  EXPECT_THAT([&] { open_volume(folder.path()); },
+              ThrowsMessage<Error>(HasSubstr("not a regular file")));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Volumes with a bound on the error: streams against libzfp, the index, the choice of bit planes, files and what is
-// refused.
+// Volumes with a bound on the error: streams against libzfp, the index, the choice of bit planes,
+// files and what is refused.
 
 #include "core/zfp/zfp_accuracy.hpp"
 
@@ -63,7 +63,8 @@ TEST(ErrorBoundCoder, SameStreamAsLibzfpOnTheWholeArray) {
                                  static_cast<int>(kind), exponent));
         std::vector<float> stored = voxels;
         for (float &voxel : stored) voxel = std::abs(voxel) < kMinMagnitude ? 0.0f : voxel;
-        expect_same(compress_to(exponent, dims, voxels), compress_with_libzfp(stored, dims, 0, exponent));
+        expect_same(compress_to(exponent, dims, voxels),
+                    compress_with_libzfp(stored, dims, 0, exponent));
       }
     }
   }
@@ -96,12 +97,13 @@ TEST(ErrorBoundCoder, DecodedOnTheHostAsByLibzfp) {
       for (const std::int32_t exponent : kExponents) {
         SCOPED_TRACE(fmt::format("{}x{}x{}, values {}, planes to 2^{}", dims.x, dims.y, dims.z,
                                  static_cast<int>(kind), exponent));
-        const CompressedVolume volume = compress_with_libzfp(make_voxels(kind, dims, 3), dims, 0, exponent);
+        const CompressedVolume volume =
+            compress_with_libzfp(make_voxels(kind, dims, 3), dims, 0, exponent);
         const std::vector<float> expected = decode_blocks_with_libzfp(volume);
         std::vector<float> values(expected.size());
         for (std::uint32_t b = 0; b < volume.block_count(); ++b) {
-          zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b), exponent,
-                           values.data() + 64 * std::size_t{b});
+          zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
+                           exponent, values.data() + 64 * std::size_t{b});
         }
         EXPECT_EQ(std::memcmp(values.data(), expected.data(), values.size() * sizeof(float)), 0);
       }
@@ -119,7 +121,8 @@ TEST(ErrorBoundCoder, FewerPlanesOfAFinerStreamAreTheCoarserStream) {
         decode_blocks_with_libzfp(compress_with_libzfp(voxels, dims, 0, exponent));
     for (std::uint32_t b = 0; b < fine.block_count(); ++b) {
       float values[64];
-      zfp_decode_block(fine.words.data(), fine.block_begin(b), fine.block_bits(b), exponent, values);
+      zfp_decode_block(fine.words.data(), fine.block_begin(b), fine.block_bits(b), exponent,
+                       values);
       EXPECT_EQ(std::memcmp(values, expected.data() + 64 * std::size_t{b}, sizeof(values)), 0)
           << "block " << b << ", planes to 2^" << exponent;
     }
@@ -140,7 +143,8 @@ TEST(ErrorBoundCoder, RandomBitsAreNoLongerThanABlockCanBe) {
     for (std::uint32_t b = 0; b < volume.block_count(); ++b) {
       ASSERT_LE(volume.block_bits(b), ISO_MAX_BLOCK_BITS);
       float values[64];
-      zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b), exponent, values);
+      zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b), exponent,
+                       values);
       ASSERT_EQ(std::memcmp(values, expected.data() + 64 * std::size_t{b}, sizeof(values)), 0)
           << "block " << b;
     }
@@ -273,8 +277,8 @@ TEST(ErrorBoundFile, KeepsAllAndZfpsOwnToolDecodesIt) {
         EXPECT_EQ(words, in_memory.words);
       }
       EXPECT_EQ(read_zfp_file_info(folder / "a.zfp").rate(), in_memory.rate());
-      const auto run = test::run_command(
-          fmt::format("zfp -q -h -z '{}' -o '{}'", (folder / "a.zfp").string(), (folder / "a.f32").string()));
+      const auto run = test::run_command(fmt::format(
+          "zfp -q -h -z '{}' -o '{}'", (folder / "a.zfp").string(), (folder / "a.f32").string()));
       ASSERT_EQ(run.status, 0) << run.err;
       const std::vector<float> ours = decode_with_libzfp(in_memory);
       const std::string theirs = read_file(folder / "a.f32");
@@ -291,16 +295,18 @@ TEST(ErrorBoundFile, FilesOfZfpsOwnTool) {
   write_file(folder / "raw",
              std::string_view(reinterpret_cast<const char *>(voxels.data()), voxels.size() * 4));
   const std::string packed = (folder / "a.zfp").string();
-  const auto run = test::run_command(
-      fmt::format("zfp -q -h -f -3 37 18 23 -a 0.03 -i '{}' -z '{}'", (folder / "raw").string(), packed));
+  const auto run = test::run_command(fmt::format("zfp -q -h -f -3 37 18 23 -a 0.03 -i '{}' -z '{}'",
+                                                 (folder / "raw").string(), packed));
   ASSERT_EQ(run.status, 0) << run.err;
   const CompressedVolume volume = read_zfp_file(packed);
   expect_same(volume, compress_to(-6, dims, voxels));  // 2^-6 <= 0.03
   const std::string bytes = read_file(packed);
   write_file(folder / "cut.zfp", bytes.substr(0, bytes.size() / 2));
-  EXPECT_THAT([&] { read_zfp_file(folder / "cut.zfp"); }, ThrowsMessage<Error>(HasSubstr("truncated")));
+  EXPECT_THAT([&] { read_zfp_file(folder / "cut.zfp"); },
+              ThrowsMessage<Error>(HasSubstr("truncated")));
   write_file(folder / "more.zfp", bytes + std::string(9, '\0'));
-  EXPECT_THAT([&] { read_zfp_file(folder / "more.zfp"); }, ThrowsMessage<Error>(HasSubstr("unknown bytes")));
+  EXPECT_THAT([&] { read_zfp_file(folder / "more.zfp"); },
+              ThrowsMessage<Error>(HasSubstr("unknown bytes")));
 }
 
 class DamagedErrorBoundFile : public testing::Test {
@@ -336,11 +342,13 @@ TEST_F(DamagedErrorBoundFile, AnyFlippedBitIsNoticed) {
 }
 
 TEST_F(DamagedErrorBoundFile, AnyCutIsNoticedButTheLossOfTheWholeTrailer) {
-  const std::size_t stream_end = 12 + (volume_.payload_bits() + 7) / 8, plain_zfp = (stream_end + 7) / 8 * 8;
+  const std::size_t stream_end = 12 + (volume_.payload_bits() + 7) / 8,
+                    plain_zfp = (stream_end + 7) / 8 * 8;
   for (std::size_t length = 0; length < right_.size(); ++length) {
     write_file(folder_ / "b.zfp", right_.substr(0, length));
     if (length >= stream_end && length <= plain_zfp) {
-      EXPECT_NO_THROW(read_zfp_file(folder_ / "b.zfp")) << "a plain zfp file of " << length << " bytes";
+      EXPECT_NO_THROW(read_zfp_file(folder_ / "b.zfp"))
+          << "a plain zfp file of " << length << " bytes";
     } else {
       EXPECT_THROW(read_zfp_file(folder_ / "b.zfp"), Error) << "cut to " << length;
     }
@@ -363,11 +371,12 @@ TEST_F(DamagedErrorBoundFile, LyingLengthsAreRefused) {
   expect_refused(lying, "not those of its stream");
   lying.index = index_of([&](std::uint32_t b) { return b == 3 ? 0 : volume_.block_bits(b); });
   expect_refused(lying, "not those of its stream");
-  lying.index =
-      index_of([&](std::uint32_t b) { return b == 3 ? ISO_MAX_BLOCK_BITS + 1 : volume_.block_bits(b); });
+  lying.index = index_of(
+      [&](std::uint32_t b) { return b == 3 ? ISO_MAX_BLOCK_BITS + 1 : volume_.block_bits(b); });
   expect_refused(lying, "not those of its stream");
   lying = volume_;
-  for (const std::uint64_t bits : {std::uint64_t{0}, volume_.indexed_bits + 64, std::uint64_t{1} << 63}) {
+  for (const std::uint64_t bits :
+       {std::uint64_t{0}, volume_.indexed_bits + 64, std::uint64_t{1} << 63}) {
     lying.indexed_bits = bits;
     expect_refused(lying, "not as long as its trailer says");
   }

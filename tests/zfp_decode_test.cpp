@@ -1,4 +1,5 @@
-// kernels_cl/portable/zfp_codec.h, on the host and through core/zfp_decode, against libzfp: the same bits.
+// kernels_cl/portable/zfp_codec.h, on the host and through core/zfp_decode, against libzfp: the
+// same bits.
 
 #include "core/stages/zfp_decode.hpp"
 
@@ -35,7 +36,9 @@ std::ptrdiff_t first_other_bits(const std::vector<float> &got, const std::vector
       std::memcmp(got.data(), expected.data(), got.size() * sizeof(float)) == 0)
     return kNoDifference;
   std::size_t i = 0;
-  while (i < got.size() && i < expected.size() && std::memcmp(&got[i], &expected[i], sizeof(float)) == 0) ++i;
+  while (i < got.size() && i < expected.size() &&
+         std::memcmp(&got[i], &expected[i], sizeof(float)) == 0)
+    ++i;
   return static_cast<std::ptrdiff_t>(i);
 }
 
@@ -51,9 +54,12 @@ TEST(ZfpCodec, EveryRateAndKindEqualsLibzfp) {
   const glm::uvec3 dims(21, 6, 9);
   for (const std::uint32_t bits_per_block : awkward_bits_per_block()) {
     for (const ValueKind kind : kValueKinds) {
-      SCOPED_TRACE(fmt::format("{} bits per block, values {}", bits_per_block, static_cast<int>(kind)));
-      const CompressedVolume volume = compress_with_libzfp(make_voxels(kind, dims, 1), dims, bits_per_block);
-      EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)), kNoDifference);
+      SCOPED_TRACE(
+          fmt::format("{} bits per block, values {}", bits_per_block, static_cast<int>(kind)));
+      const CompressedVolume volume =
+          compress_with_libzfp(make_voxels(kind, dims, 1), dims, bits_per_block);
+      EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)),
+                kNoDifference);
     }
   }
 }
@@ -64,7 +70,8 @@ TEST(ZfpCodec, DenormalsEqualLibzfp) {
     std::vector<float> voxels = random_voxels(dims, -1.0f, 1.0f, 2);
     for (float &v : voxels) v *= scale;
     const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
-    EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)), kNoDifference)
+    EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)),
+              kNoDifference)
         << scale;
   }
 }
@@ -78,7 +85,8 @@ TEST(ZfpCodec, RandomBitsEqualLibzfp) {
     volume.bits_per_block = bits_per_block;
     volume.words.resize((volume.block_count() * bits_per_block + 31) / 32 + 2);
     std::generate(volume.words.begin(), volume.words.end() - 2, std::ref(random));
-    EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)), kNoDifference)
+    EXPECT_EQ(first_other_bits(decode_on_host(volume), decode_blocks_with_libzfp(volume)),
+              kNoDifference)
         << bits_per_block << " bits per block, seed 3";
   }
 }
@@ -95,11 +103,12 @@ TEST(ZfpCodec, PartialBlocksEqualTheVolume) {
       std::vector<float> gathered(voxels.size());
       for (std::size_t i = 0; i < voxels.size(); ++i) {
         const std::size_t x = i % dims.x, y = i / dims.x % dims.y, z = i / dims.x / dims.y;
-        gathered[i] = values[64 * (x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))) + x % 4 + 4 * (y % 4) +
-                             16 * (z % 4)];
+        gathered[i] = values[64 * (x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))) + x % 4 +
+                             4 * (y % 4) + 16 * (z % 4)];
       }
       EXPECT_EQ(first_other_bits(gathered, voxels), kNoDifference)
-          << dims.x << " x " << dims.y << " x " << dims.z << ", " << bits_per_block << " bits per block";
+          << dims.x << " x " << dims.y << " x " << dims.z << ", " << bits_per_block
+          << " bits per block";
     }
   }
 }
@@ -108,7 +117,8 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   static constexpr float kSentinel = -12345.0f;
 
-  /// Decodes a random part of a shuffled list of blocks to random slots; all other slots keep their values.
+  /// Decodes a random part of a shuffled list of blocks to random slots; all other slots keep their
+  /// values.
   void expect_decoded(const CompressedVolume &volume, uint seed) {
     SCOPED_TRACE(fmt::format("{} bits per block, {} blocks, seed {}", volume.bits_per_block,
                              volume.block_count(), seed));
@@ -148,7 +158,8 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (uint i = 0; i < start.decoded_count; ++i) {
       std::uint64_t expected_inside = 0;
       for (uint v = 0; v < 64; ++v)
-        expected_inside |= std::uint64_t{expected[64 * std::size_t{slots[i]} + v] >= frame.isovalue} << v;
+        expected_inside |= std::uint64_t{expected[64 * std::size_t{slots[i]} + v] >= frame.isovalue}
+                           << v;
       ASSERT_EQ(got_inside[slots[i]], expected_inside) << "request " << i;
     }
   }
@@ -210,9 +221,11 @@ TEST_P(ZfpDecodeOnDevice, NothingToDecodeTouchesNothing) {
 
 /// Bits past 2^32 of the stream: the bit offset of a block does not fit 32 bits.
 TEST_P(ZfpDecodeOnDevice, BlocksBehind32BitsOfBits) {
-  constexpr std::uint32_t kBits = 2048, kFirst = (1u << 21) + 3;  // block kFirst begins past bit 2^32
+  constexpr std::uint32_t kBits = 2048,
+                          kFirst = (1u << 21) + 3;  // block kFirst begins past bit 2^32
   const std::uint64_t bytes = (std::uint64_t{kFirst} + 8) * kBits / 8;
-  if (bytes > device_.capabilities().largest_allocation) GTEST_SKIP() << "the device allocates no 512 MiB";
+  if (bytes > device_.capabilities().largest_allocation)
+    GTEST_SKIP() << "the device allocates no 512 MiB";
   const glm::uvec3 dims(8, 8, 8);
   const CompressedVolume volume = compress_with_libzfp(random_voxels(dims, -1, 1, 15), dims, kBits);
   CompressedVolume nothing;

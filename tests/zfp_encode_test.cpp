@@ -1,5 +1,5 @@
-// kernels_cl/portable/zfp_encode.h, on the host and through core/zfp_encode, against libzfp: the same bits. Then whole
-// volumes compressed on a device against the host.
+// kernels_cl/portable/zfp_encode.h, on the host and through core/zfp_encode, against libzfp: the
+// same bits. Then whole volumes compressed on a device against the host.
 
 #include "core/zfp/zfp_encode.hpp"
 
@@ -41,7 +41,8 @@ std::vector<uint> encode_on_host(const std::vector<float> &voxels, const glm::uv
   const glm::uvec3 blocks = (dims + 3u) / 4u;
   std::vector<uint> words;
   for (uint b = 0; b < blocks.x * blocks.y * blocks.z; ++b) {
-    const glm::uvec3 begin = 4u * glm::uvec3(b % blocks.x, b / blocks.x % blocks.y, b / blocks.x / blocks.y);
+    const glm::uvec3 begin =
+        4u * glm::uvec3(b % blocks.x, b / blocks.x % blocks.y, b / blocks.x / blocks.y);
     const glm::uvec3 count = glm::min(dims - begin, 4u);
     std::array<float, 64> values{};
     for (uint v = 0; v < 64; ++v) {
@@ -51,14 +52,16 @@ std::vector<uint> encode_on_host(const std::vector<float> &voxels, const glm::uv
       values[v] = voxels[(std::size_t{z} * dims.y + y) * dims.x + x];
     }
     words.resize(words.size() + bits_per_block / 32, 0xDEADBEEFu);
-    zfp_encode_block(values.data(), bits_per_block, words.data() + words.size() - bits_per_block / 32);
+    zfp_encode_block(values.data(), bits_per_block,
+                     words.data() + words.size() - bits_per_block / 32);
   }
   words.resize(words.size() + 2);
   return words;
 }
 
 /// Values whose coefficients are random bits, most of them in few bit planes of one exponent.
-std::vector<float> voxels_of_random_bits(const glm::uvec3 &dims, std::uint32_t bits_per_block, uint seed) {
+std::vector<float> voxels_of_random_bits(const glm::uvec3 &dims, std::uint32_t bits_per_block,
+                                         uint seed) {
   Random random(seed);
   CompressedVolume volume;
   volume.info.dims = dims;
@@ -67,7 +70,8 @@ std::vector<float> voxels_of_random_bits(const glm::uvec3 &dims, std::uint32_t b
   for (std::size_t i = 0; i < volume.words.size() - 2; ++i) {
     // Fewer ones make longer runs.
     volume.words[i] = seed % 2 == 0 ? random() : random() & random() & random();
-    if (i % (bits_per_block / 32) == 0) volume.words[i] = (volume.words[i] & ~0x1FFu) | 1u | 127u << 1;
+    if (i % (bits_per_block / 32) == 0)
+      volume.words[i] = (volume.words[i] & ~0x1FFu) | 1u | 127u << 1;
   }
   return decode_with_libzfp(volume);
 }
@@ -85,7 +89,8 @@ TEST(ZfpEncodeBlock, EveryRateAndKindEqualsLibzfp) {
   for (const ValueKind kind : kValueKinds) {
     SCOPED_TRACE(fmt::format("values {}", static_cast<int>(kind)));
     const std::vector<float> voxels = flushed(make_voxels(kind, dims, 1));
-    for (std::uint32_t bits = 32; bits <= 2048; bits += 32) expect_encoded_on_host(voxels, dims, bits);
+    for (std::uint32_t bits = 32; bits <= 2048; bits += 32)
+      expect_encoded_on_host(voxels, dims, bits);
   }
 }
 
@@ -104,7 +109,8 @@ TEST(ZfpEncodeBlock, AnyCoefficientsEqualLibzfp) {
     for (uint seed = 0; seed < 4; ++seed) {
       SCOPED_TRACE(fmt::format("values of {} random bits, seed {}", source_bits, seed));
       const std::vector<float> voxels = voxels_of_random_bits(dims, source_bits, seed);
-      for (const std::uint32_t bits : {32u, 64u, 96u, 128u, 192u, 320u, 512u, 1024u, 1728u, 2048u}) {
+      for (const std::uint32_t bits :
+           {32u, 64u, 96u, 128u, 192u, 320u, 512u, 1024u, 1728u, 2048u}) {
         expect_encoded_on_host(voxels, dims, bits);
       }
     }
@@ -113,12 +119,14 @@ TEST(ZfpEncodeBlock, AnyCoefficientsEqualLibzfp) {
 
 TEST(ZfpEncodeBlock, OneVoxelAndLimitsEqualLibzfp) {
   const glm::uvec3 dims(4, 4, 4 * 64);
-  for (const float value : {1.0f, -1.0f, 0x1.fffffep0f, kMinMagnitude, std::nextafter(kMaxMagnitude, 0.0f)}) {
+  for (const float value :
+       {1.0f, -1.0f, 0x1.fffffep0f, kMinMagnitude, std::nextafter(kMaxMagnitude, 0.0f)}) {
     for (const float others : {0.0f, -0.0f, kMinMagnitude, -value}) {
       SCOPED_TRACE(fmt::format("one voxel of {}, others {}", value, others));
       std::vector<float> voxels(64 * 64, others);
       for (std::size_t block = 0; block < 64; ++block) voxels[65 * block] = value;
-      for (std::uint32_t bits = 64; bits <= 2048; bits += 64) expect_encoded_on_host(voxels, dims, bits);
+      for (std::uint32_t bits = 64; bits <= 2048; bits += 64)
+        expect_encoded_on_host(voxels, dims, bits);
     }
   }
 }
@@ -129,7 +137,8 @@ TEST(ZfpEncodeBlock, IntegersEqualLibzfp) {
   for (const uint largest : {1u, 3u, 255u, 65535u}) {
     std::vector<float> voxels(std::size_t{32} * 32 * 32);
     for (float &voxel : voxels) voxel = static_cast<float>(random() & largest);
-    for (std::uint32_t bits = 64; bits <= 2048; bits += 64) expect_encoded_on_host(voxels, dims, bits);
+    for (std::uint32_t bits = 64; bits <= 2048; bits += 64)
+      expect_encoded_on_host(voxels, dims, bits);
   }
 }
 
@@ -140,7 +149,8 @@ class ZfpEncodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Words and errors of a call; what lies behind the words stays.
   void expect_encoded(const std::vector<float> &voxels, const glm::uvec3 &dims,
                       std::uint32_t bits_per_block) {
-    SCOPED_TRACE(fmt::format("{}x{}x{}, {} bits per block", dims.x, dims.y, dims.z, bits_per_block));
+    SCOPED_TRACE(
+        fmt::format("{}x{}x{}, {} bits per block", dims.x, dims.y, dims.z, bits_per_block));
     const CompressedVolume expected = compress_with_libzfp(voxels, dims, bits_per_block);
     const std::size_t num_words = expected.words.size() - 2, num_blocks = expected.block_count();
     const ocl::Buffer<float> d_voxels(device_, "voxels", std::span<const float>(voxels));
@@ -158,14 +168,16 @@ class ZfpEncodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     encode_.measure_errors(d_voxels, dims, bits_per_block, words, errors);
     const std::vector<float> pairs = errors.read(), decoded = decode_with_libzfp(expected);
     const glm::uvec3 blocks = expected.num_blocks();
-    std::vector<double> got_errors(ISO_BOUND_PLACES * num_blocks), expected_errors(got_errors.size());
+    std::vector<double> got_errors(ISO_BOUND_PLACES * num_blocks),
+        expected_errors(got_errors.size());
     for (std::size_t i = 0; i < got_errors.size(); ++i)
       got_errors[i] = double{pairs[2 * i]} + double{pairs[2 * i + 1]};
     for (std::size_t i = 0; i < voxels.size(); ++i) {
       const std::size_t x = i % dims.x, y = i / dims.x % dims.y, z = i / dims.x / dims.y;
       const uint place = bound_place(static_cast<uint>(x % 4 + 4 * (y % 4) + 16 * (z % 4)));
       double &largest =
-          expected_errors[ISO_BOUND_PLACES * (x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))) + place];
+          expected_errors[ISO_BOUND_PLACES * (x / 4 + blocks.x * (y / 4 + blocks.y * (z / 4))) +
+                          place];
       largest = std::max(largest, std::abs(double{decoded[i]} - double{voxels[i]}));
     }
     EXPECT_EQ(first_difference(got_errors, expected_errors), kNoDifference);
@@ -215,7 +227,8 @@ TEST_P(ZfpEncodeOnDevice, MisuseIsRefused) {
     EXPECT_THROW(encode_(voxels, {4, 4, 4}, bits, words), std::invalid_argument) << bits;
   }
   EXPECT_THROW(encode_(voxels, {5, 4, 4}, 32, words), std::invalid_argument);
-  EXPECT_THROW(encode_.measure_errors(voxels, {4, 4, 4}, 128, words, errors), std::invalid_argument);
+  EXPECT_THROW(encode_.measure_errors(voxels, {4, 4, 4}, 128, words, errors),
+               std::invalid_argument);
   EXPECT_THROW(encode_.measure_errors(voxels, {4, 4, 4}, 96, words, errors), std::invalid_argument);
 }
 
@@ -303,8 +316,9 @@ TEST_P(CompressOnDevice, RefusesAndMapsAsTheHost) {
 
   voxels.back() = kMaxMagnitude;
   ArrayReader too_large(dims, voxels);
-  EXPECT_THAT([&] { compress(too_large, options); },
-              ThrowsMessage<Error>(AllOf(HasSubstr("1 of 4680000 voxels"), HasSubstr("(599,599,12)"))));
+  EXPECT_THAT(
+      [&] { compress(too_large, options); },
+      ThrowsMessage<Error>(AllOf(HasSubstr("1 of 4680000 voxels"), HasSubstr("(599,599,12)"))));
   options.rate = 33;
   EXPECT_THROW(compress(reader, options), Error);
   EXPECT_EQ(device_.ledger().current(), 0u);
@@ -315,7 +329,8 @@ TEST_P(CompressOnDevice, FailuresOnTheWayAreReported) {
   class FailingReader : public ArrayReader {
    public:
     using ArrayReader::ArrayReader;
-    void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
+    void read_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                     std::span<float> out) override {
       if (z_begin > 0) throw Error("no more layers");
       ArrayReader::read_layers(z_begin, num_layers, out);
     }

@@ -25,14 +25,16 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// Smooth with noise on top, so that blocks differ in exponent and in how many bits they would like.
+/// Smooth with noise on top, so that blocks differ in exponent and in how many bits they would
+/// like.
 std::vector<float> wavy(const glm::uvec3 &dims, std::uint32_t seed = 1) {
   std::mt19937 random(seed);
   std::vector<float> voxels;
   for (std::uint32_t z = 0; z < dims.z; ++z) {
     for (std::uint32_t y = 0; y < dims.y; ++y) {
       for (std::uint32_t x = 0; x < dims.x; ++x) {
-        const double smooth = std::sin(0.3 * x) * std::cos(0.2 * y + 0.1 * z) * std::exp2(double(x / 8) - 4);
+        const double smooth =
+            std::sin(0.3 * x) * std::cos(0.2 * y + 0.1 * z) * std::exp2(double(x / 8) - 4);
         voxels.push_back(float(smooth + 1e-3 * double(random() % 1000)));
       }
     }
@@ -41,7 +43,8 @@ std::vector<float> wavy(const glm::uvec3 &dims, std::uint32_t seed = 1) {
 }
 
 /// A whole array compressed by one call of libzfp, with zfp's full header.
-std::string zfp_file(std::vector<float> &voxels, const glm::uvec3 &dims, std::uint32_t bits_per_block) {
+std::string zfp_file(std::vector<float> &voxels, const glm::uvec3 &dims,
+                     std::uint32_t bits_per_block) {
   zfp_stream *stream = zfp_stream_open(nullptr);
   zfp_stream_set_params(stream, bits_per_block, bits_per_block, ZFP_MAX_PREC, ZFP_MIN_EXP);
   zfp_field *field = zfp_field_3d(voxels.data(), zfp_type_float, dims.x, dims.y, dims.z);
@@ -56,7 +59,8 @@ std::string zfp_file(std::vector<float> &voxels, const glm::uvec3 &dims, std::ui
   return bytes;
 }
 
-const std::vector<glm::uvec3> kDims{{2, 2, 2}, {4, 4, 4}, {5, 7, 9}, {64, 33, 18}, {3, 130, 2}, {41, 2, 41}};
+const std::vector<glm::uvec3> kDims{{2, 2, 2},    {4, 4, 4},   {5, 7, 9},
+                                    {64, 33, 18}, {3, 130, 2}, {41, 2, 41}};
 
 TEST(Compress, SameBytesAsLibzfpOnTheWholeArray) {
   for (const glm::uvec3 &dims : kDims) {
@@ -75,7 +79,8 @@ TEST(Compress, SameBytesAsLibzfpOnTheWholeArray) {
       const CompressedVolume from_file = read_zfp_file(folder / "a.zfp");
       EXPECT_EQ(in_memory.words, from_file.words);
       ASSERT_EQ(in_memory.words.size(), in_memory.block_count() * 2 * rate + 2);
-      EXPECT_EQ(std::memcmp(in_memory.words.data(), expected.data() + 12, 8 * rate * in_memory.block_count()),
+      EXPECT_EQ(std::memcmp(in_memory.words.data(), expected.data() + 12,
+                            8 * rate * in_memory.block_count()),
                 0);
     }
   }
@@ -119,8 +124,8 @@ TEST(ZfpFile, ZfpsOwnToolDecodesIt) {
     CompressOptions options;
     options.rate = rate;
     compress_to_file(*reader, options, folder / "a.zfp");
-    const auto run = test::run_command(
-        fmt::format("zfp -q -h -z '{}' -o '{}'", (folder / "a.zfp").string(), (folder / "a.f32").string()));
+    const auto run = test::run_command(fmt::format(
+        "zfp -q -h -z '{}' -o '{}'", (folder / "a.zfp").string(), (folder / "a.f32").string()));
     ASSERT_EQ(run.status, 0) << run.err;
     const std::vector<float> ours = decode_with_libzfp(read_zfp_file(folder / "a.zfp"));
     const std::string theirs = test::read_file(folder / "a.f32");
@@ -188,10 +193,12 @@ TEST(Compress, MagnitudesThatZfpCannotHold) {
     EXPECT_THAT([&] { compress(reader, options); },
                 ThrowsMessage<Error>(AllOf(HasSubstr("1 of 512 voxels"), HasSubstr("(1,1,0)"))));
   }
-  // Largest and smallest allowed magnitudes of either sign at random: decoded, all finite and none denormal.
+  // Largest and smallest allowed magnitudes of either sign at random: decoded, all finite and none
+  // denormal.
   std::mt19937 random(7);
-  for (const float scale : {std::nextafter(kMaxMagnitude, 0.0f), kMinMagnitude,
-                            std::nextafter(kMinMagnitude, 0.0f), std::numeric_limits<float>::denorm_min()}) {
+  for (const float scale :
+       {std::nextafter(kMaxMagnitude, 0.0f), kMinMagnitude, std::nextafter(kMinMagnitude, 0.0f),
+        std::numeric_limits<float>::denorm_min()}) {
     for (float &voxel : voxels) voxel = random() % 2 == 0 ? scale : -scale;
     ArrayReader reader(dims, voxels);
     for (options.rate = 1; options.rate <= 32; ++options.rate) {
@@ -205,7 +212,8 @@ TEST(Compress, MagnitudesThatZfpCannotHold) {
 TEST(Compress, RangeOfValuesThatNeedAndNeedNoLook) {
   CompressOptions options;
   options.input.map_nan = 5.0f;
-  for (const float other : {-0.0f, 1e-40f, -1e-40f, std::numeric_limits<float>::infinity(), -3.0f}) {
+  for (const float other :
+       {-0.0f, 1e-40f, -1e-40f, std::numeric_limits<float>::infinity(), -3.0f}) {
     for (const float most : {0.0f, -0.0f, 2.0f}) {
       std::vector<float> voxels(64 * 8, most);
       voxels[77] = other;
@@ -244,8 +252,8 @@ TEST(ZfpFile, FilesOfOtherWriters) {
       EXPECT_EQ(volume.value_range[1], std::numeric_limits<float>::infinity());
       EXPECT_FALSE(volume.max_error);
 
-      const auto run = test::run_command(
-          fmt::format("zfp -q -h -z '{}' -o '{}'", (folder / "a.zfp").string(), (folder / "a.f32").string()));
+      const auto run = test::run_command(fmt::format(
+          "zfp -q -h -z '{}' -o '{}'", (folder / "a.zfp").string(), (folder / "a.f32").string()));
       ASSERT_EQ(run.status, 0) << run.err;
       const std::vector<float> ours = decode_with_libzfp(volume);
       const std::string theirs = test::read_file(folder / "a.f32");
@@ -256,7 +264,8 @@ TEST(ZfpFile, FilesOfOtherWriters) {
 }
 
 TEST(ZfpFile, LongModeHeader) {
-  // libzfp writes the long form only for modes that the short one cannot say; other writers may always do.
+  // libzfp writes the long form only for modes that the short one cannot say; other writers may
+  // always do.
   const glm::uvec3 dims(9, 6, 5);
   std::vector<float> voxels = wavy(dims);
   const TemporaryFolder folder;
@@ -273,7 +282,8 @@ TEST(ZfpFile, LongModeHeader) {
   stream_write_bits(bits, ZFP_MAX_PREC - 1, 7);
   stream_write_bits(bits, std::uint64_t(ZFP_MIN_EXP + 16495), 15);
   const std::size_t length = zfp_compress(stream, field);
-  write_file(folder / "long.zfp", std::string_view(reinterpret_cast<const char *>(buffer.data()), length));
+  write_file(folder / "long.zfp",
+             std::string_view(reinterpret_cast<const char *>(buffer.data()), length));
   zfp_field_free(field);
   zfp_stream_close(stream);
   stream_close(bits);
@@ -296,19 +306,21 @@ TEST(ZfpFile, OtherKindsAreRefusedByName) {
                                         {"-f -3 8 8 8 -c 512 512 12 -1074", "expert"},
                                         {"-f -3 8 8 8 -r 33", "2112 bits per zfp block"},
                                         {"-f -3 8 1 64 -r 8", "8x1x64"}}) {
-    const auto run = test::run_command(fmt::format("zfp -q -h {} -i '{}' -z '{}'", arguments, raw, packed));
+    const auto run =
+        test::run_command(fmt::format("zfp -q -h {} -i '{}' -z '{}'", arguments, raw, packed));
     ASSERT_EQ(run.status, 0) << arguments << run.err;
     EXPECT_THAT([&] { read_zfp_file(packed); }, ThrowsMessage<Error>(HasSubstr(text))) << arguments;
   }
 }
 
 TEST(ZfpFile, FewerBitsThanAnExponentAreRefused) {
-  // libzfp itself writes and reads past such blocks (its tool crashes), so only the mode bits are changed
-  // here.
+  // libzfp itself writes and reads past such blocks (its tool crashes), so only the mode bits are
+  // changed here.
   const TemporaryFolder folder;
   std::vector<float> voxels = wavy({8, 8, 8});
   std::string bytes = zfp_file(voxels, {8, 8, 8}, 64);
-  constexpr std::size_t kModeAt = 84 / 8;  // the 12 bits behind magic (32) and dims (52): bits per block - 1
+  constexpr std::size_t kModeAt =
+      84 / 8;  // the 12 bits behind magic (32) and dims (52): bits per block - 1
   for (const std::uint32_t bits : {1u, 5u, 8u}) {
     bytes[kModeAt] = char((bytes[kModeAt] & 0xF) | ((bits - 1) & 0xF) << 4);
     bytes[kModeAt + 1] = char((bits - 1) >> 4);
@@ -327,8 +339,8 @@ TEST(ZfpFile, AnyFlippedBitIsNoticed) {
   const std::string right = test::read_file(folder / "a.zfp");
   constexpr std::size_t kHeaderBits = 12 * 8, kFooterBits = 24 * 8;
   for (std::size_t bit = 0; bit < right.size() * 8; ++bit) {
-    // Every bit of header and footer, one of each other byte: a test of seconds, not of minutes under
-    // sanitizers.
+    // Every bit of header and footer, one of each other byte: a test of seconds, not of minutes
+    // under sanitizers.
     const bool in_the_middle = bit >= kHeaderBits && bit < right.size() * 8 - kFooterBits;
     if (in_the_middle && bit % 8 != bit / 8 * 5 % 8) continue;
     std::string wrong = right;
@@ -349,7 +361,8 @@ TEST(ZfpFile, AnyCutIsNoticedButTheLossOfTheWholeTrailer) {
   for (std::size_t length = 0; length < right.size(); ++length) {
     write_file(folder / "b.zfp", right.substr(0, length));
     if (length >= last_payload_byte && length <= plain_zfp) {
-      EXPECT_NO_THROW(read_zfp_file(folder / "b.zfp")) << "a plain zfp file of " << length << " bytes";
+      EXPECT_NO_THROW(read_zfp_file(folder / "b.zfp"))
+          << "a plain zfp file of " << length << " bytes";
     } else {
       EXPECT_THROW(read_zfp_file(folder / "b.zfp"), Error) << "cut to " << length;
     }

@@ -1,6 +1,6 @@
 #pragma once
-// `.zfp` files with other trailers, whose checksums are right. Made from the description of the format, not from its
-// writer.
+// `.zfp` files with other trailers, whose checksums are right. Made from the description of the
+// format, not from its writer.
 
 #include <zlib.h>
 
@@ -18,12 +18,15 @@ inline std::uint32_t crc_of(std::string_view bytes) {
 }
 
 /// A trailer whose checksums are right, for what stands before it.
-inline std::string with_trailer(const std::string &before, const std::string &text, std::uint32_t version) {
+inline std::string with_trailer(const std::string &before, const std::string &text,
+                                std::uint32_t version) {
   const std::array<std::uint32_t, 3> numbers{version, static_cast<std::uint32_t>(text.size()),
                                              crc_of(before)};
-  std::string end = text + std::string(reinterpret_cast<const char *>(numbers.data()), sizeof(numbers));
+  std::string end =
+      text + std::string(reinterpret_cast<const char *>(numbers.data()), sizeof(numbers));
   const std::uint32_t crc = crc_of(end);
-  return before + end + std::string(reinterpret_cast<const char *>(&crc), sizeof(crc)) + "ISOWAVE\n";
+  return before + end + std::string(reinterpret_cast<const char *>(&crc), sizeof(crc)) +
+         "ISOWAVE\n";
 }
 
 /// A file that has a trailer, cut before and behind its JSON text.

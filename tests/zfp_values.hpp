@@ -11,9 +11,9 @@
 namespace isowave {
 
 enum class ValueKind { kRandom, kSmooth, kConstant, kZero, kHuge, kTiny, kMixed };
-inline constexpr ValueKind kValueKinds[] = {ValueKind::kRandom, ValueKind::kSmooth, ValueKind::kConstant,
-                                            ValueKind::kZero,   ValueKind::kHuge,   ValueKind::kTiny,
-                                            ValueKind::kMixed};
+inline constexpr ValueKind kValueKinds[] = {
+    ValueKind::kRandom, ValueKind::kSmooth, ValueKind::kConstant, ValueKind::kZero,
+    ValueKind::kHuge,   ValueKind::kTiny,   ValueKind::kMixed};
 
 inline std::vector<float> make_voxels(ValueKind kind, const glm::uvec3 &dims, uint seed) {
   std::vector<float> voxels = random_voxels(dims, -1.0f, 1.0f, seed);

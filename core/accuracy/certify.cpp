@@ -19,8 +19,9 @@ namespace isowave {
 namespace {
 
 constexpr float kNotCertain = std::numeric_limits<float>::infinity();
-/// What the t of a drawn hit and that of a bound's may have lost in float32 (make_hit()): each half an ulp of itself, and eight roundings of
-/// the ray's length in the cell: two of the step between its faces, one of the sum, and those of the root (ISO_ROOT_STEP).
+/// What the t of a drawn hit and that of a bound's may have lost in float32 (make_hit()): each half
+/// an ulp of itself, and eight roundings of the ray's length in the cell: two of the step between
+/// its faces, one of the sum, and those of the root (ISO_ROOT_STEP).
 constexpr double kDistanceRounding = 2 * 0x1p-24, kCellRounding = 2 * 0x1p-21;
 
 /// A level's decoded voxels, block by block as they are asked for. Not thread-safe.
@@ -37,7 +38,8 @@ class BlockValues {
       const glm::uvec3 at = glm::uvec3(cell) + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
       const std::uint32_t id = at.x / 4 + blocks.x * (at.y / 4 + blocks.y * (at.z / 4));
       const std::uint32_t voxel = at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4);
-      const float value = decoded(id)[voxel], offset = offset_of_voxel(upper_, volume_.bounds, id, voxel);
+      const float value = decoded(id)[voxel],
+                  offset = offset_of_voxel(upper_, volume_.bounds, id, voxel);
       lower[corner] = value - offset - isovalue;
       upper[corner] = value + offset - isovalue;
     }
@@ -49,7 +51,8 @@ class BlockValues {
     if (!is_new) return entry->second;
     const std::uint32_t bits = volume_.block_bits(id);
     std::array<std::uint32_t, ISO_MAX_BLOCK_BITS / 32 + 1 + kDecoderAhead> words{};
-    volume_.read_words(volume_.block_begin(id), std::span(words).first((bits + 31) / 32 + kDecoderAhead));
+    volume_.read_words(volume_.block_begin(id),
+                       std::span(words).first((bits + 31) / 32 + kDecoderAhead));
     std::array<float, 64> &values = entry->second;
     zfp_decode_block(words.data(), 0, bits, bound_.min_exponent, values.data());
     if (bound_.whole_numbers)
@@ -95,13 +98,14 @@ std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel
 
 }  // namespace
 
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Camera &camera, float isovalue,
-                    std::span<const HitRecord> drawn) {
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
+                    float isovalue, std::span<const HitRecord> drawn) {
   const auto begin = std::chrono::steady_clock::now();
   const RendererOptions &options = renderer.options();
   if (!finds_all(options.solver)) {
     throw Error(
-        "the error of frames drawn with solver {} has no bound, since it may miss a surface: take bernstein",
+        "the error of frames drawn with solver {} has no bound, since it may miss a surface: take "
+        "bernstein",
         to_string(options.solver));
   }
   Certificate certificate;
@@ -121,17 +125,19 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   }
   renderer.draw_bound(FieldBound::kNone);
 
-  const std::vector<const CompressedVolume *> levels = levels_of(volume, options.max_pixel_error > 0);
+  const std::vector<const CompressedVolume *> levels =
+      levels_of(volume, options.max_pixel_error > 0);
   std::vector<ValueOffset> offsets;
   std::vector<double> value_errors;
   for (const CompressedVolume *level : levels) {
     value_errors.push_back(value_error_of(renderer.value_error(), value_errors.size()));
     offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
-                                   plane_error(level->error_bound, value_errors.back()), volume.value_range));
+                                   plane_error(level->error_bound, value_errors.back()),
+                                   volume.value_range));
   }
   const std::vector<FrameParams> frames =
-      make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size, isovalue,
-                        options.max_pixel_error);
+      make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size,
+                        isovalue, options.max_pixel_error);
   std::size_t coarsest = levels.size() - 1;
   while (!draws(frames[coarsest])) --coarsest;
   const glm::dmat3 voxel = levels[coarsest]->info.index_to_world();
@@ -140,28 +146,30 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / options.size.height;
   certificate.bounds.assign(drawn.size(), kNotCertain);
   constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks
-  parallel_for((options.size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
-    std::vector<BlockValues> values;
-    for (std::size_t i = 0; i < levels.size(); ++i)
-      values.emplace_back(*levels[i], value_errors[i], offsets[i]);
-    const auto first = static_cast<std::uint32_t>(part * kRows * options.size.ray_columns());
-    const std::uint32_t end =
-        std::min(first + kRows * options.size.ray_columns(), static_cast<std::uint32_t>(drawn.size()));
-    for (std::uint32_t pixel = first; pixel < end; ++pixel) {
-      const double t = double{drawn[pixel].t}, first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
-                   last_t = double{std::max(lower[pixel].t, upper[pixel].t)};
-      const std::array<double, 2> way = way_through(frames[0], pixel);
-      float &bound = certificate.bounds[pixel];
-      if (std::isinf(t) && std::isinf(first_t)) {
-        if (way[0] > way[1] || starts_certainly(frames, values, pixel)) bound = 0;
-      } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] && last_t <= way[1] &&
-                 starts_certainly(frames, values, pixel)) {
-        const double rounding = kDistanceRounding * last_t + cell_rounding;
-        const double distance = std::max(t - first_t, last_t - t) + rounding;
-        bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
-      }
-    }
-  });
+  parallel_for(
+      (options.size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
+        std::vector<BlockValues> values;
+        for (std::size_t i = 0; i < levels.size(); ++i)
+          values.emplace_back(*levels[i], value_errors[i], offsets[i]);
+        const auto first = static_cast<std::uint32_t>(part * kRows * options.size.ray_columns());
+        const std::uint32_t end = std::min(first + kRows * options.size.ray_columns(),
+                                           static_cast<std::uint32_t>(drawn.size()));
+        for (std::uint32_t pixel = first; pixel < end; ++pixel) {
+          const double t = double{drawn[pixel].t},
+                       first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
+                       last_t = double{std::max(lower[pixel].t, upper[pixel].t)};
+          const std::array<double, 2> way = way_through(frames[0], pixel);
+          float &bound = certificate.bounds[pixel];
+          if (std::isinf(t) && std::isinf(first_t)) {
+            if (way[0] > way[1] || starts_certainly(frames, values, pixel)) bound = 0;
+          } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] &&
+                     last_t <= way[1] && starts_certainly(frames, values, pixel)) {
+            const double rounding = kDistanceRounding * last_t + cell_rounding;
+            const double distance = std::max(t - first_t, last_t - t) + rounding;
+            bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
+          }
+        }
+      });
   certificate.total_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   return certificate;

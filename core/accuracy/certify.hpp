@@ -1,11 +1,13 @@
 #pragma once
-// How far a drawn surface may be from the true one: the isosurface of the volume before compression, trilinear between its voxels.
+// How far a drawn surface may be from the true one: the isosurface of the volume before
+// compression, trilinear between its voxels.
 //
-// Where the decoded field is known to within a bound, the true surface lies between the surfaces of the lower and of the upper
-// bound (Renderer::draw_bound()): along a ray that begins outside of both, or inside of both, the first crossing of the true field is
-// not before the first crossing of one of them, and not behind that of the other. Pixels where only one is met, where a ray begins between
-// them, or where one is met outside of the volume, which coarse levels reach a little out of, are not certified: any error there could make
-// or end a surface.
+// Where the decoded field is known to within a bound, the true surface lies between the surfaces of
+// the lower and of the upper bound (Renderer::draw_bound()): along a ray that begins outside of
+// both, or inside of both, the first crossing of the true field is not before the first crossing of
+// one of them, and not behind that of the other. Pixels where only one is met, where a ray begins
+// between them, or where one is met outside of the volume, which coarse levels reach a little out
+// of, are not certified: any error there could make or end a surface.
 
 #include <cstdint>
 #include <span>
@@ -16,24 +18,27 @@
 namespace isowave {
 
 struct Certificate {
-  /// Of each ray: the distance between the drawn and the true hit along it, at most [pixels: what a pixel covers at the
-  /// drawn hit's distance]; 0 where both miss for certain; infinity where nothing is certain.
+  /// Of each ray: the distance between the drawn and the true hit along it, at most [pixels: what a
+  /// pixel covers at the drawn hit's distance]; 0 where both miss for certain; infinity where
+  /// nothing is certain.
   std::vector<float> bounds;
-  double total_ms = 0;               ///< wall clock, of both bounds' frames and what the host makes of them
+  double total_ms = 0;  ///< wall clock, of both bounds' frames and what the host makes of them
   std::uint64_t decoded_blocks = 0;  ///< for them
 };
 
-/// Bounds the error of a frame that `renderer`, made with_bounds, has just drawn. volume: what it was made for. drawn: its hits. Its cache is cold afterwards.
-/// Throws Error where the volume's error is not known, or where the solver may miss crossings.
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Camera &camera, float isovalue,
-                    std::span<const HitRecord> drawn);
+/// Bounds the error of a frame that `renderer`, made with_bounds, has just drawn. volume: what it
+/// was made for. drawn: its hits. Its cache is cold afterwards. Throws Error where the volume's
+/// error is not known, or where the solver may miss crossings.
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
+                    float isovalue, std::span<const HitRecord> drawn);
 
 /// What a certificate says of pixels that are not certain to miss.
 struct CertificateSummary {
-  std::uint64_t num_pixels = 0;         ///< of those
-  std::uint64_t num_certified = 0;      ///< with a bound of at most the limit
-  std::uint64_t num_uncertain = 0;      ///< without a bound
-  double median = 0, p99 = 0, max = 0;  ///< bounds of those that have one; 0 if there are none [pixels]
+  std::uint64_t num_pixels = 0;     ///< of those
+  std::uint64_t num_certified = 0;  ///< with a bound of at most the limit
+  std::uint64_t num_uncertain = 0;  ///< without a bound
+  double median = 0, p99 = 0,
+         max = 0;  ///< bounds of those that have one; 0 if there are none [pixels]
 };
 /// limit: pixels.
 CertificateSummary summarize(const Certificate &certificate, double limit);

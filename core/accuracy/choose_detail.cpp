@@ -14,7 +14,8 @@ namespace {
 
 /// Of the small picture: a pixel for so many of the frame along each axis, but no fewer rows.
 constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
-/// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave less.
+/// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave
+/// less.
 constexpr int kNumPixelErrors = 41;
 std::vector<double> pixel_errors() {
   std::vector<double> errors;
@@ -23,8 +24,8 @@ std::vector<double> pixel_errors() {
   return errors;
 }
 
-/// What values may lose: an eighth of their range, and so many times half of it, as long as that matters beside the error that the volume
-/// has anyway, and leaves out bit planes.
+/// What values may lose: an eighth of their range, and so many times half of it, as long as that
+/// matters beside the error that the volume has anyway, and leaves out bit planes.
 constexpr int kNumValueErrors = 8;
 std::vector<double> value_errors(const CompressedVolume &volume, double error) {
   const double range = double{volume.value_range[1]} - double{volume.value_range[0]};
@@ -37,15 +38,16 @@ std::vector<double> value_errors(const CompressedVolume &volume, double error) {
   return errors;
 }
 
-/// Blocks that frames of levels of detail decode for these hits, against those of the finest level alone: a pixel covers blocks by the
-/// square of its distance, and of each level a quarter as many.
+/// Blocks that frames of levels of detail decode for these hits, against those of the finest level
+/// alone: a pixel covers blocks by the square of its distance, and of each level a quarter as many.
 double blocks_share(std::span<const HitRecord> hits, std::span<const FrameParams> frames) {
   double with_levels = 0, finest = 0;
   for (const HitRecord &hit : hits) {
     if (std::isinf(hit.t)) continue;
     int level = 0;
     for (std::size_t i = 1; i < frames.size(); ++i) {
-      if (draws(frames[i]) && frames[i].begin_t * frames[i].t_scale <= hit.t) level = static_cast<int>(i);
+      if (draws(frames[i]) && frames[i].begin_t * frames[i].t_scale <= hit.t)
+        level = static_cast<int>(i);
     }
     const double blocks = double{hit.t} * double{hit.t};
     finest += blocks;
@@ -54,8 +56,9 @@ double blocks_share(std::span<const HitRecord> hits, std::span<const FrameParams
   return finest == 0 ? 1.0 : with_levels / finest;
 }
 
-/// An error of at least so much can be kept in any volume of these values: 2^-24 of the next power of two above them is lost by the cast
-/// to float32 and another by zfp, at most, or all of a value that is flushed to 0.
+/// An error of at least so much can be kept in any volume of these values: 2^-24 of the next power
+/// of two above them is lost by the cast to float32 and another by zfp, at most, or all of a value
+/// that is flushed to 0.
 double least_tolerance(const std::array<float, 2> &range) {
   return std::max(std::ldexp(double{std::max(std::abs(range[0]), std::abs(range[1]))}, -22),
                   2 * double{kMinMagnitude});
@@ -77,15 +80,16 @@ void advise(const CompressedVolume &volume, double error, double max_error, Deta
   const std::string half =
       fmt::format("at full detail half of those with a bound are within {:.3g}", choice.median);
   if (choice.tolerance) {
-    choice.advice =
-        fmt::format("{}; a volume converted with --tolerance {:.2g} would do", half, *choice.tolerance);
+    choice.advice = fmt::format("{}; a volume converted with --tolerance {:.2g} would do", half,
+                                *choice.tolerance);
   } else if (error <= least) {
     choice.advice = "voxels can hardly be stored with a smaller error than these have";
   } else if (choice.median > max_error) {
     choice.advice = fmt::format("{}; no error that voxels can be stored with would do", half);
   } else {
     choice.advice = fmt::format(
-        "most have no bound at all; with voxels that are off by less than these, by up to {:.3g}, more would",
+        "most have no bound at all; with voxels that are off by less than these, by up to {:.3g}, "
+        "more would",
         error);
   }
 }
@@ -125,7 +129,8 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
     const CertificateSummary summary =
         summarize(certify(renderer, volume, camera, isovalue, hits), max_error / stride);
     const double all = std::max<double>(double(summary.num_pixels), 1);
-    choice.tries.push_back({detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
+    choice.tries.push_back(
+        {detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
     return std::pair(summary, std::move(hits));
   };
   renderer.set_size(small);
@@ -139,10 +144,11 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
       try_out(detail);
       return choice.tries.back().certified >= best - kLostShare;
     };
-    // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with any less, too: a bisection.
+    // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so
+    // with any less, too: a bisection.
     const auto first_to_suffice = [&](const std::vector<double> &numbers, const auto &detail_of) {
-      const auto found =
-          std::ranges::partition_point(numbers, [&](double number) { return !suffices(detail_of(number)); });
+      const auto found = std::ranges::partition_point(
+          numbers, [&](double number) { return !suffices(detail_of(number)); });
       return found == numbers.end() ? 0.0 : *found;
     };
     if (choice.reachable && renderer.has_levels()) {
@@ -151,12 +157,14 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
       });
       const std::vector<FrameParams> frames =
           make_level_frames(level_infos(volume, true), camera, size, isovalue, coarsest);
-      if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.max_pixel_error = coarsest;
+      if (blocks_share(finest_hits, frames) <= kMaxBlocksShare)
+        choice.detail.max_pixel_error = coarsest;
     }
     if (choice.reachable && volume.rate() > kMinPlaneRate) {
-      choice.detail.value_error = first_to_suffice(value_errors(volume, error), [&](double value_error) {
-        return Detail{choice.detail.max_pixel_error, value_error};
-      });
+      choice.detail.value_error =
+          first_to_suffice(value_errors(volume, error), [&](double value_error) {
+            return Detail{choice.detail.max_pixel_error, value_error};
+          });
     }
   } catch (...) {
     renderer.set_size(size);

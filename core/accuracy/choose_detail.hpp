@@ -1,5 +1,6 @@
 #pragma once
-// The cheapest way to draw a frame within an error: how coarse its levels of detail, how few its bit planes may be.
+// The cheapest way to draw a frame within an error: how coarse its levels of detail, how few its
+// bit planes may be.
 
 #include <optional>
 #include <string>
@@ -18,11 +19,13 @@ struct DetailChoice {
   Detail detail;
   bool reachable = true;  ///< most pixels keep the error at full detail
   double median = 0;      ///< bound there [pixels]
-  /// Where it is not reachable: what would help. tolerance: error of the volume's voxels, smaller than it is, with which the median
-  /// would be max_error; none where none is known that any volume can be stored with.
+  /// Where it is not reachable: what would help. tolerance: error of the volume's voxels, smaller
+  /// than it is, with which the median would be max_error; none where none is known that any volume
+  /// can be stored with.
   std::optional<double> tolerance{};
   std::string advice{};
-  /// What was tried, and the share of pixels that are not certain to miss and keep the error with it.
+  /// What was tried, and the share of pixels that are not certain to miss and keep the error with
+  /// it.
   struct Try {
     Detail detail;
     double certified = 0;
@@ -33,23 +36,27 @@ struct DetailChoice {
 
 /// Share of the pixels that may lose their certificate, against full detail.
 inline constexpr double kLostShare = 0.01;
-/// Coarser levels are taken where they leave at most so much of the finest level's blocks: a frame of several levels costs more beside
-/// that. A judgement: on the H100, frames with 0.5, 0.64, 0.71 of the blocks took 0.89, 0.81, 0.87 of the time, others with 0.58 and 0.63
-/// took 1.19 and 1.04 (README "Levels of detail").
+/// Coarser levels are taken where they leave at most so much of the finest level's blocks: a frame
+/// of several levels costs more beside that. A judgement: on the H100, frames with 0.5, 0.64, 0.71
+/// of the blocks took 0.89, 0.81, 0.87 of the time, others with 0.58 and 0.63 took 1.19 and 1.04
+/// (README "Levels of detail").
 inline constexpr double kMaxBlocksShare = 2.0 / 3;
 
-/// Bit planes are left out only of volumes with more bits a voxel. The others' frames would take about a twentieth less, for a bound that is
-/// zfp's promise instead of what was measured block by block (README "An error asked for").
+/// Bit planes are left out only of volumes with more bits a voxel. The others' frames would take
+/// about a twentieth less, for a bound that is zfp's promise instead of what was measured block by
+/// block (README "An error asked for").
 inline constexpr double kMinPlaneRate = 16;
 
-/// What a renderer must be made with for choose_detail(): bounds, and all levels of detail that the volume has.
+/// What a renderer must be made with for choose_detail(): bounds, and all levels of detail that the
+/// volume has.
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
 
-/// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so many pixels, and their bounds
-/// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail first, then bit planes: the
-/// coarsest that lose no more than kLostShare; no levels that spare hardly any blocks (kMaxBlocksShare), nor planes of volumes of few bits (kMinPlaneRate). Full detail, where most pixels do not
-/// keep max_error even so. max_error: pixels, above 0.
-/// Throws Error as certify() does.
+/// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so
+/// many pixels, and their bounds (certify()); so the choice depends on data, camera and size, never
+/// on timings. Levels of detail first, then bit planes: the coarsest that lose no more than
+/// kLostShare; no levels that spare hardly any blocks (kMaxBlocksShare), nor planes of volumes of
+/// few bits (kMinPlaneRate). Full detail, where most pixels do not keep max_error even so.
+/// max_error: pixels, above 0. Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
                            float isovalue, double max_error);
 

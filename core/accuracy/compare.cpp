@@ -10,8 +10,8 @@
 namespace isowave {
 namespace {
 
-/// Nearest rank: the smallest value that at least `percent` of all values do not exceed. Reorders `values`,
-/// not empty.
+/// Nearest rank: the smallest value that at least `percent` of all values do not exceed. Reorders
+/// `values`, not empty.
 double percentile(std::vector<double> &values, std::size_t percent) {
   const std::size_t rank = std::max<std::size_t>((values.size() * percent + 99) / 100, 1);
   const auto nth = values.begin() + static_cast<std::ptrdiff_t>(rank - 1);
@@ -37,7 +37,8 @@ DepthComparison compare_depth(const FloatImage &a, const FloatImage &b) {
   }
   result.hit_both = errors.size();
   if (!errors.empty()) {
-    result.error = DepthError{percentile(errors, 50), percentile(errors, 99), percentile(errors, 100)};
+    result.error =
+        DepthError{percentile(errors, 50), percentile(errors, 99), percentile(errors, 100)};
   }
   return result;
 }
@@ -54,7 +55,8 @@ ColourComparison compare_colour(const Image8 &a, const Image8 &b) {
     bool differs = false;
     for (std::size_t channel = 0; channel < a.channels; ++channel) {
       const std::size_t i = pixel * a.channels + channel;
-      const auto difference = static_cast<std::uint32_t>(std::abs(int(a.pixels[i]) - int(b.pixels[i])));
+      const auto difference =
+          static_cast<std::uint32_t>(std::abs(int(a.pixels[i]) - int(b.pixels[i])));
       differs |= difference != 0;
       result.max_channel_difference = std::max(result.max_channel_difference, difference);
       sum_of_squares += std::uint64_t(difference) * difference;

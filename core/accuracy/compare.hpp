@@ -30,7 +30,7 @@ struct ColourComparison {
   std::uint64_t num_pixels = 0;
   std::uint64_t num_differing = 0;           ///< pixels of which any channel differs
   std::uint32_t max_channel_difference = 0;  ///< 0..255
-  std::optional<double> psnr_db;             ///< over all channels, peak 255; none (infinite) when equal
+  std::optional<double> psnr_db;  ///< over all channels, peak 255; none (infinite) when equal
 };
 
 /// Throws Error when the images differ in size.

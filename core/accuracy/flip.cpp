@@ -42,7 +42,8 @@ Weights normalized(Weights kernel) {
   return kernel;
 }
 
-/// Along rows with some weights, then along columns with others; beyond its borders the picture goes on as at them.
+/// Along rows with some weights, then along columns with others; beyond its borders the picture
+/// goes on as at them.
 Plane filtered(const Plane &in, const Weights &along_x, const Weights &along_y) {
   const std::size_t width = in.width;
   Plane rows{in.width, in.height, std::vector<double>(in.values.size(), 0.0)}, result = rows;
@@ -61,7 +62,8 @@ Plane filtered(const Plane &in, const Weights &along_x, const Weights &along_y) 
     double *to = &result.values[y * width];
     for (std::size_t i = 0; i < along_y.size(); ++i) {
       const std::int64_t at = std::int64_t(y + i) - std::int64_t(along_y.size() / 2);
-      const auto clamped = std::size_t(std::clamp(at, std::int64_t{0}, std::int64_t{in.height} - 1));
+      const auto clamped =
+          std::size_t(std::clamp(at, std::int64_t{0}, std::int64_t{in.height} - 1));
       const double *from = &rows.values[clamped * width];
       for (std::size_t x = 0; x < width; ++x) to[x] += along_y[i] * from[x];
     }
@@ -72,8 +74,8 @@ Plane filtered(const Plane &in, const Weights &along_x, const Weights &along_y) 
 // ---- colours
 
 /// sRGB's primaries, by columns, and its white (IEC 61966-2-1).
-const glm::dmat3 kRgbToXyz(0.41238656, 0.21263682, 0.01933062, 0.35759149, 0.71518298, 0.11919716, 0.18045049,
-                           0.0721802, 0.95037259);
+const glm::dmat3 kRgbToXyz(0.41238656, 0.21263682, 0.01933062, 0.35759149, 0.71518298, 0.11919716,
+                           0.18045049, 0.0721802, 0.95037259);
 const glm::dmat3 kXyzToRgb = glm::inverse(kRgbToXyz);
 const glm::dvec3 kWhite = kRgbToXyz * glm::dvec3(1);
 
@@ -123,7 +125,8 @@ Planes opponent_planes(const Image8 &image) {
 
 // ---- the two parts of the error
 
-/// What the eye resolves of each channel of YCxCz, sums of Gaussians (table 1 of the paper), as colours for hyab().
+/// What the eye resolves of each channel of YCxCz, sums of Gaussians (table 1 of the paper), as
+/// colours for hyab().
 std::vector<glm::dvec3> as_seen(const Planes &picture, double pixels_per_degree) {
   struct Gaussian {
     double a, b;
@@ -139,9 +142,11 @@ std::vector<glm::dvec3> as_seen(const Planes &picture, double pixels_per_degree)
       const Weights gauss = sampled(radius, [&, b = b](double x) {
         return std::exp(-kPi * kPi * x * x / (b * pixels_per_degree * pixels_per_degree));
       });
-      const double sum = std::accumulate(gauss.begin(), gauss.end(), 0.0), weight = a * std::sqrt(kPi / b);
+      const double sum = std::accumulate(gauss.begin(), gauss.end(), 0.0),
+                   weight = a * std::sqrt(kPi / b);
       const Plane plane = filtered(picture[std::size_t(channel)], gauss, gauss);
-      for (std::size_t i = 0; i < result.size(); ++i) result[i][channel] += weight * plane.values[i];
+      for (std::size_t i = 0; i < result.size(); ++i)
+        result[i][channel] += weight * plane.values[i];
       total[channel] += weight * sum * sum;
     }
   }
@@ -159,15 +164,17 @@ std::vector<double> features(const Plane &lightness, double pixels_per_degree, b
   const int radius = int(std::ceil(3 * sigma));
   const auto gauss = [sigma](double x) { return std::exp(-x * x / (2 * sigma * sigma)); };
   const Weights smooth = normalized(sampled(radius, gauss));
-  const Weights derivative = normalized(sampled(
-      radius, [&](double x) { return points ? (x * x / (sigma * sigma) - 1) * gauss(x) : -x * gauss(x); }));
+  const Weights derivative = normalized(sampled(radius, [&](double x) {
+    return points ? (x * x / (sigma * sigma) - 1) * gauss(x) : -x * gauss(x);
+  }));
   std::vector<double> result = filtered(lightness, derivative, smooth).values;
   const std::vector<double> along_y = filtered(lightness, smooth, derivative).values;
   for (std::size_t i = 0; i < result.size(); ++i) result[i] = std::hypot(result[i], along_y[i]);
   return result;
 }
 
-/// Colour distances as errors: the 0.7th power, of which the first 40 % of the largest fill 95 % of [0,1].
+/// Colour distances as errors: the 0.7th power, of which the first 40 % of the largest fill 95 % of
+/// [0,1].
 double color_error(double distance) {
   constexpr double kPower = 0.7, kBreak = 0.4, kBreakError = 0.95;
   static const double kLargest =
@@ -190,7 +197,8 @@ Flip::View Flip::view_of(const Image8 &image, double pixels_per_degree) {
   Plane lightness = picture[0];
   for (double &value : lightness.values) value = (value + 16) / 116;
   return {image.width, image.height, as_seen(picture, pixels_per_degree),
-          features(lightness, pixels_per_degree, false), features(lightness, pixels_per_degree, true)};
+          features(lightness, pixels_per_degree, false),
+          features(lightness, pixels_per_degree, true)};
 }
 
 Flip::Flip(const Image8 &reference, double pixels_per_degree)
@@ -207,7 +215,8 @@ double Flip::error(const Image8 &test) const {
   parallel_for(a.height, 0, [&](std::uint64_t row, std::uint32_t) {
     for (std::size_t i = row * a.width; i < (row + 1) * a.width; ++i) {
       const double color = color_error(hyab(a.colors[i], b.colors[i]));
-      const double feature = std::max(std::abs(a.edges[i] - b.edges[i]), std::abs(a.points[i] - b.points[i]));
+      const double feature =
+          std::max(std::abs(a.edges[i] - b.edges[i]), std::abs(a.points[i] - b.points[i]));
       sums[row] += std::pow(color, 1 - std::sqrt(feature / std::numbers::sqrt2));
     }
   });

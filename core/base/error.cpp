@@ -13,7 +13,8 @@ struct Character {
   bool valid = false;
 };
 
-/// The character that a text, not empty, begins with. By UTF-8's rules: no longer form than needed, no surrogates.
+/// The character that a text, not empty, begins with. By UTF-8's rules: no longer form than needed,
+/// no surrogates.
 Character first_character(std::string_view text) {
   const auto lead = static_cast<unsigned char>(text[0]);
   if (lead < 0x80) return {1, lead, true};
@@ -26,7 +27,8 @@ Character first_character(std::string_view text) {
     code = code << 6 | (next & 0x3Fu);
   }
   constexpr std::uint32_t kSmallest[] = {0, 0, 0x80, 0x800, 0x10000};
-  const bool valid = code >= kSmallest[size] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF);
+  const bool valid =
+      code >= kSmallest[size] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF);
   return valid ? Character{size, code, true} : Character{};
 }
 
@@ -50,7 +52,8 @@ std::string one_line(std::string_view text) {
     } else if (bytes == "\t") {
       result += "\\t";
     } else {
-      for (const char byte : bytes) result += fmt::format("\\x{:02x}", static_cast<unsigned char>(byte));
+      for (const char byte : bytes)
+        result += fmt::format("\\x{:02x}", static_cast<unsigned char>(byte));
     }
     text.remove_prefix(character.size);
   }

@@ -10,12 +10,13 @@
 
 namespace isowave {
 
-/// Escapes, as \n, \t or \x1b, what would end a line or move a cursor, and bytes that are not UTF-8: names of files and
-/// strings from files may hold any.
+/// Escapes, as \n, \t or \x1b, what would end a line or move a cursor, and bytes that are not
+/// UTF-8: names of files and strings from files may hold any.
 std::string one_line(std::string_view text);
 
 /// Anything a user can cause or fix: a bad file, a missing device, a budget too small.
-/// what() is one line without a trailing newline (see one_line()); tools print it and exit with status 1.
+/// what() is one line without a trailing newline (see one_line()); tools print it and exit with
+/// status 1.
 class Error : public std::runtime_error {
  public:
   explicit Error(const std::string &message) : std::runtime_error(one_line(message)) {}
@@ -25,7 +26,8 @@ class Error : public std::runtime_error {
       : Error(fmt::format(format, std::forward<Args>(args)...)) {}
 };
 
-/// What a compiler of kernels refused: what() names the first error, log() is all that the compiler said.
+/// What a compiler of kernels refused: what() names the first error, log() is all that the compiler
+/// said.
 class BuildError : public Error {
  public:
   BuildError(const std::string &message, std::string log) : Error(message), log_(std::move(log)) {}

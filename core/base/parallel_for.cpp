@@ -10,7 +10,8 @@
 namespace isowave {
 
 std::uint32_t thread_count(std::uint32_t requested) {
-  return requested > 0 ? std::min(requested, kMaxThreads) : std::max(1u, std::thread::hardware_concurrency());
+  return requested > 0 ? std::min(requested, kMaxThreads)
+                       : std::max(1u, std::thread::hardware_concurrency());
 }
 
 void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,

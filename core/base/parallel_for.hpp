@@ -10,9 +10,10 @@ inline constexpr std::uint32_t kMaxThreads = 1024;
 /// Threads used for `requested`: 0 means one per processor; never more than kMaxThreads.
 std::uint32_t thread_count(std::uint32_t requested);
 
-/// Calls body(item, thread) once for each item in [0, num_items), in any order, from up to `num_threads`
-/// threads (0: one per processor); thread is in [0, thread_count(num_threads)). Returns when all are done.
-/// The first exception stops the hand-out of further items and is rethrown here.
+/// Calls body(item, thread) once for each item in [0, num_items), in any order, from up to
+/// `num_threads` threads (0: one per processor); thread is in [0, thread_count(num_threads)).
+/// Returns when all are done. The first exception stops the hand-out of further items and is
+/// rethrown here.
 void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,
                   const std::function<void(std::uint64_t item, std::uint32_t thread)> &body);
 

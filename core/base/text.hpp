@@ -18,8 +18,8 @@ inline std::string lower_case(std::string_view text) {
   return result;
 }
 
-/// The whole text as a number in decimal, of any type that std::from_chars() knows: no blanks, no plus; NaN and infinities by
-/// name. Nothing if it is none, or does not fit the type.
+/// The whole text as a number in decimal, of any type that std::from_chars() knows: no blanks, no
+/// plus; NaN and infinities by name. Nothing if it is none, or does not fit the type.
 template <class Number>
 std::optional<Number> parse_all(std::string_view text) {
   Number number{};

@@ -70,10 +70,12 @@ double shell(const glm::dvec3 &p) {
 
 }  // namespace
 
-std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims, std::uint64_t seed) {
+std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims,
+                                           std::uint64_t seed) {
   switch (field) {
     case Field::kSphere:
-      return make_analytic(dims, [](const glm::dvec3 &p) { return 1 - length(p) / std::sqrt(3.0); });
+      return make_analytic(dims,
+                           [](const glm::dvec3 &p) { return 1 - length(p) / std::sqrt(3.0); });
     case Field::kPlane:
       return make_analytic(dims, plane);
     case Field::kSaddle:

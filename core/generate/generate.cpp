@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 7> kFieldNames{"sphere", "plane",        "saddle", "marschner_lobb",
-                                                      "gyroid", "mixing_layer", "shell"};
+constexpr std::array<std::string_view, 7> kFieldNames{
+    "sphere", "plane", "saddle", "marschner_lobb", "gyroid", "mixing_layer", "shell"};
 constexpr std::uint64_t kChunkBytes = 1u << 24;
 
 VolumeInfo info_of(const GenerateOptions &options) {
@@ -61,7 +61,8 @@ class GeneratedReader : public VolumeReader {
       convert_to_float(info_.type, voxels, out.subspan(row * info_.dims.x, info_.dims.x));
     });
   }
-  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                         std::span<double> out) override {
     check_range(z_begin, num_layers, out.size());
     for_rows(z_begin, num_layers, [&](std::uint64_t row, std::span<const std::byte> voxels) {
       convert_to_double(info_.type, voxels, out.subspan(row * info_.dims.x, info_.dims.x));
@@ -69,7 +70,8 @@ class GeneratedReader : public VolumeReader {
   }
 
   /// The voxels in their own type.
-  void read_stored(std::uint32_t z_begin, std::uint32_t num_layers, std::span<std::byte> out) const {
+  void read_stored(std::uint32_t z_begin, std::uint32_t num_layers,
+                   std::span<std::byte> out) const {
     check_range(z_begin, num_layers, out.size() / size_of(info_.type));
     for_rows(z_begin, num_layers, [&](std::uint64_t row, std::span<const std::byte> voxels) {
       std::memcpy(out.data() + row * voxels.size(), voxels.data(), voxels.size());
@@ -77,10 +79,12 @@ class GeneratedReader : public VolumeReader {
   }
 
  private:
-  void check_range(std::uint32_t z_begin, std::uint32_t num_layers, std::uint64_t num_voxels) const {
+  void check_range(std::uint32_t z_begin, std::uint32_t num_layers,
+                   std::uint64_t num_voxels) const {
     if (num_layers > info_.dims.z || z_begin > info_.dims.z - num_layers ||
         num_voxels != std::uint64_t(info_.dims.x) * info_.dims.y * num_layers) {
-      throw std::invalid_argument("GeneratedReader: layers outside the volume, or out of a wrong size");
+      throw std::invalid_argument(
+          "GeneratedReader: layers outside the volume, or out of a wrong size");
     }
   }
 
@@ -97,7 +101,8 @@ class GeneratedReader : public VolumeReader {
       auto &[values, voxels] = scratch[thread];
       values.resize(info_.dims.x);
       voxels.resize(info_.dims.x * size_of(info_.type));
-      const auto y = std::uint32_t(row % info_.dims.y), z = std::uint32_t(z_begin + row / info_.dims.y);
+      const auto y = std::uint32_t(row % info_.dims.y),
+                 z = std::uint32_t(z_begin + row / info_.dims.y);
       rows_->evaluate(y, z, values);
       store(info_.type, values, voxels.data());
       consume(row, std::span<const std::byte>(voxels));
@@ -108,19 +113,20 @@ class GeneratedReader : public VolumeReader {
   std::unique_ptr<FieldRows> rows_;
 };
 
-/// The file to write: a folder gets the Open-SciVis name, and a name in that pattern must tell the truth.
+/// The file to write: a folder gets the Open-SciVis name, and a name in that pattern must tell the
+/// truth.
 fs::path output_path(const GenerateOptions &options, const fs::path &path) {
   if (path.filename().empty() || fs::is_directory(path)) {
-    return path / fmt::format("{}_{}x{}x{}_{}.raw", to_string(options.field), options.dims.x, options.dims.y,
-                              options.dims.z, to_string(options.type));
+    return path / fmt::format("{}_{}x{}x{}_{}.raw", to_string(options.field), options.dims.x,
+                              options.dims.y, options.dims.z, to_string(options.type));
   }
   if (path.extension() != ".raw")
     throw Error("{}: generate writes raw voxels: end the name in .raw", path.string());
   const std::optional<RawName> name = parse_raw_name(path.stem().string());
   if (name && (name->dims != options.dims || name->type != options.type)) {
-    throw Error("{}: the name says {}x{}x{} {}, the voxels are {}x{}x{} {}", path.string(), name->dims.x,
-                name->dims.y, name->dims.z, to_string(name->type), options.dims.x, options.dims.y,
-                options.dims.z, to_string(options.type));
+    throw Error("{}: the name says {}x{}x{} {}, the voxels are {}x{}x{} {}", path.string(),
+                name->dims.x, name->dims.y, name->dims.z, to_string(name->type), options.dims.x,
+                options.dims.y, options.dims.z, to_string(options.type));
   }
   return path;
 }
@@ -134,8 +140,10 @@ std::string_view to_string(Field field) {
 Field field_from_string(std::string_view name) {
   const auto found = std::find(kFieldNames.begin(), kFieldNames.end(), name);
   if (found != kFieldNames.end()) return Field(found - kFieldNames.begin());
-  throw Error("unknown field '{}': use sphere, plane, saddle, marschner_lobb, gyroid, mixing_layer or shell",
-              name);
+  throw Error(
+      "unknown field '{}': use sphere, plane, saddle, marschner_lobb, gyroid, mixing_layer or "
+      "shell",
+      name);
 }
 
 std::vector<std::string> field_names() {
@@ -147,13 +155,15 @@ std::unique_ptr<VolumeReader> open_generated(const GenerateOptions &options) {
   return std::make_unique<GeneratedReader>(options);
 }
 
-fs::path generate_to_file(const GenerateOptions &options, const fs::path &path, const Progress &progress) {
+fs::path generate_to_file(const GenerateOptions &options, const fs::path &path,
+                          const Progress &progress) {
   const VolumeInfo info = info_of(options);
   fs::path target = output_path(options, path);
   AtomicFile file(target);
   const GeneratedReader reader(options);
   const std::uint64_t layer_bytes = std::uint64_t(info.dims.x) * info.dims.y * size_of(info.type);
-  const auto chunk = std::uint32_t(std::clamp<std::uint64_t>(kChunkBytes / layer_bytes, 1, info.dims.z));
+  const auto chunk =
+      std::uint32_t(std::clamp<std::uint64_t>(kChunkBytes / layer_bytes, 1, info.dims.z));
   std::vector<std::byte> voxels;
   for (std::uint32_t z = 0; z < info.dims.z; z += chunk) {
     const std::uint32_t layers = std::min(chunk, info.dims.z - z);

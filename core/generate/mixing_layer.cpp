@@ -1,15 +1,15 @@
 // A turbulent mixing layer: a smooth step across the mid-plane of y,
 //
-//   s = (y + displacement) / thickness + strength * envelope(y) * turbulence,   f = (1 + s / sqrt(1 + s^2)) /
-//   2,
+//   s = (y + displacement) / thickness + strength * envelope(y) * turbulence
+//   f = (1 + s / sqrt(1 + s^2)) / 2
 //
-// where displacement is large-scale and turbulence multi-octave gradient noise [Perlin 1985], the amplitude
-// of an octave falling with its frequency to the power -1/3 (velocities of a k^(-5/3) spectrum). All of it is
-// additions, products, quotients and roots: the same bits on every machine.
+// where displacement is large-scale and turbulence multi-octave gradient noise [Perlin 1985], the
+// amplitude of an octave falling with its frequency to the power -1/3 (velocities of a k^(-5/3)
+// spectrum). All of it is additions, products, quotients and roots: the same bits on every machine.
 //
-// Noise along x: with y and z fixed, the two lattice planes around a voxel each contribute a straight line
-// in x, the same for all voxels of a lattice cell. So a row needs four hashes per lattice node, not eight
-// per voxel.
+// Noise along x: with y and z fixed, the two lattice planes around a voxel each contribute a
+// straight line in x, the same for all voxels of a lattice cell. So a row needs four hashes per
+// lattice node, not eight per voxel.
 
 #include <algorithm>
 #include <array>
@@ -43,7 +43,8 @@ std::uint64_t mix(std::uint64_t x) {  // finalizer of splitmix64 [Steele et al. 
   return x ^ (x >> 31);
 }
 
-/// What one lattice plane x = const contributes to a row: offset + slope * (distance from the plane).
+/// What one lattice plane x = const contributes to a row: offset + slope * (distance from the
+/// plane).
 struct Line {
   double offset = 0, slope = 0;
 };
@@ -63,13 +64,15 @@ class Octave {
   }
 
   /// Adds the row (y, z) to `row` [nx]; `lines` is scratch.
-  void add(std::uint32_t y, std::uint32_t z, std::span<double> row, std::vector<Line> &lines) const {
-    const double position_y = y * cells_per_voxel_ + shift_, position_z = z * cells_per_voxel_ + shift_;
+  void add(std::uint32_t y, std::uint32_t z, std::span<double> row,
+           std::vector<Line> &lines) const {
+    const double position_y = y * cells_per_voxel_ + shift_,
+                 position_z = z * cells_per_voxel_ + shift_;
     const double cell_y = std::floor(position_y), cell_z = std::floor(position_z);
     lines.resize(columns_.back().cell + 2);
     for (std::uint32_t plane = 0; plane < lines.size(); ++plane) {
-      lines[plane] = make_line(plane, std::uint32_t(cell_y), std::uint32_t(cell_z), position_y - cell_y,
-                               position_z - cell_z);
+      lines[plane] = make_line(plane, std::uint32_t(cell_y), std::uint32_t(cell_z),
+                               position_y - cell_y, position_z - cell_z);
     }
     for (std::size_t x = 0; x < row.size(); ++x) {
       const Column &column = columns_[x];
@@ -86,7 +89,8 @@ class Octave {
     double local, weight;
   };
 
-  Line make_line(std::uint32_t x, std::uint32_t y, std::uint32_t z, double local_y, double local_z) const {
+  Line make_line(std::uint32_t x, std::uint32_t y, std::uint32_t z, double local_y,
+                 double local_z) const {
     const std::array<double, 2> weight_y{1 - fade(local_y), fade(local_y)};
     const std::array<double, 2> weight_z{1 - fade(local_z), fade(local_z)};
     Line line;

@@ -40,7 +40,8 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {
   if (target_.filename().empty()) throw Error("'{}': cannot write: no file name", target.string());
   struct stat status {};
   if (::stat(target_.c_str(), &status) == 0) {
-    // rename() would replace a device such as /dev/null, and fails on a folder only after all the work.
+    // rename() would replace a device such as /dev/null, and fails on a folder only after all the
+    // work.
     if (!S_ISREG(status.st_mode))
       throw Error("{}: cannot write: it exists and is not a regular file", target.string());
     // It would replace a file that is not to be written, too.
@@ -62,7 +63,8 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {
 void AtomicFile::choose_temporary_name() {
   static std::atomic<unsigned> next_id{0};
   // Not of the target's name, which may be as long as names may be.
-  temporary_ = target_.parent_path() / fmt::format(".isowave.{}.{}.tmp", ::getpid(), next_id.fetch_add(1));
+  temporary_ =
+      target_.parent_path() / fmt::format(".isowave.{}.{}.tmp", ::getpid(), next_id.fetch_add(1));
 }
 
 int AtomicFile::open_temporary() {
@@ -94,7 +96,8 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
 
 void AtomicFile::read_back(const std::function<void(std::span<const std::byte>)> &take) {
   errno = 0;
-  if (std::ferror(file_) != 0 || ::fseeko(file_, 0, SEEK_SET) != 0) fail(target_, errno != 0 ? errno : EIO);
+  if (std::ferror(file_) != 0 || ::fseeko(file_, 0, SEEK_SET) != 0)
+    fail(target_, errno != 0 ? errno : EIO);
   std::vector<std::byte> piece(1u << 16);
   while (const std::size_t count = std::fread(piece.data(), 1, piece.size(), file_))
     take(std::span(piece).first(count));

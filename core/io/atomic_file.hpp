@@ -10,17 +10,19 @@
 
 namespace isowave {
 
-/// What the name leads to: a file, or the name at which writing through symbolic links would make one. Throws Error
-/// where links go in circles.
+/// What the name leads to: a file, or the name at which writing through symbolic links would make
+/// one. Throws Error where links go in circles.
 std::filesystem::path follow_links(const std::filesystem::path &path);
 
-/// Writes to a temporary file beside the target; commit() renames it over the target. Destroyed without
-/// commit(), it removes what it wrote. A target that exists stays as it was until commit(); a symbolic link stays one.
-/// Where the system has files without a name (Linux, most file systems), not even a killed program leaves anything
-/// behind. Every failure throws Error in one line with the target's name and the system's reason.
+/// Writes to a temporary file beside the target; commit() renames it over the target. Destroyed
+/// without commit(), it removes what it wrote. A target that exists stays as it was until commit();
+/// a symbolic link stays one. Where the system has files without a name (Linux, most file systems),
+/// not even a killed program leaves anything behind. Every failure throws Error in one line with
+/// the target's name and the system's reason.
 class AtomicFile {
  public:
-  /// Opens the temporary file. Throws Error: folder missing or not writable, target not a regular file or not writable.
+  /// Opens the temporary file. Throws Error: folder missing or not writable, target not a regular
+  /// file or not writable.
   explicit AtomicFile(const std::filesystem::path &target);
   ~AtomicFile();
   AtomicFile(const AtomicFile &) = delete;
@@ -47,7 +49,8 @@ class AtomicFile {
 
   std::filesystem::path target_, temporary_;
   std::FILE *file_ = nullptr;
-  bool nameless_ = false;  ///< the file has no name yet; temporary_ is the one that commit() will give it
+  bool nameless_ =
+      false;  ///< the file has no name yet; temporary_ is the one that commit() will give it
 };
 
 }  // namespace isowave

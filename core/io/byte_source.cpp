@@ -8,7 +8,8 @@
 
 namespace isowave {
 
-FileSource::FileSource(std::shared_ptr<const InputFile> file, std::uint64_t offset, std::uint64_t size)
+FileSource::FileSource(std::shared_ptr<const InputFile> file, std::uint64_t offset,
+                       std::uint64_t size)
     : file_(std::move(file)), offset_(offset), left_(size) {}
 
 std::size_t FileSource::read(std::span<std::byte> bytes) {
@@ -25,10 +26,12 @@ InflateSource::InflateSource(FileSource packed, Packing packing)
   refill();
   const bool has_magic =
       stream_.avail_in >= kMagicBytes && stream_.next_in[0] == 0x1f && stream_.next_in[1] == 0x8b;
-  if (packing == Packing::kGzip && !has_magic) throw Error("{}: not a gzip file, as it should be", what());
+  if (packing == Packing::kGzip && !has_magic)
+    throw Error("{}: not a gzip file, as it should be", what());
   is_gzip_ = has_magic && packing != Packing::kZlib;
   constexpr int kLargestWindow = 15, kGzipHeader = 16;
-  if (::inflateInit2(&stream_, kLargestWindow + (is_gzip_ ? kGzipHeader : 0)) != Z_OK) throw std::bad_alloc();
+  if (::inflateInit2(&stream_, kLargestWindow + (is_gzip_ ? kGzipHeader : 0)) != Z_OK)
+    throw std::bad_alloc();
 }
 
 InflateSource::~InflateSource() {
@@ -55,7 +58,8 @@ std::size_t InflateSource::read(std::span<std::byte> bytes) {
     if (code == Z_STREAM_END) {
       end_stream();
     } else if (code == Z_BUF_ERROR) {  // no progress: all input is used up
-      if (stream_.avail_in == 0) throw Error("{}: truncated: its {} stream ends too early", what(), name);
+      if (stream_.avail_in == 0)
+        throw Error("{}: truncated: its {} stream ends too early", what(), name);
     } else if (code != Z_OK) {
       throw Error("{}: broken {} stream ({})", what(), name,
                   stream_.msg != nullptr ? stream_.msg : ::zError(code));

@@ -41,8 +41,8 @@ class FileSource : public ByteSource {
 /// gzip: one or more members, as the gzip tool writes and joins them. zlib: one stream.
 enum class Packing { kGzip, kZlib, kGzipOrZlib };
 
-/// Unpacks compressed data, which must end where the part of the file does. Throws Error where the data are broken, end
-/// early, have a wrong checksum, or are followed by anything else.
+/// Unpacks compressed data, which must end where the part of the file does. Throws Error where the
+/// data are broken, end early, have a wrong checksum, or are followed by anything else.
 class InflateSource : public ByteSource {
  public:
   InflateSource(FileSource packed, Packing packing);

@@ -14,7 +14,8 @@ namespace isowave {
 
 InputFile::InputFile(const std::filesystem::path &path, std::string what)
     : path_(path), what_(std::move(what)) {
-  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe's would wait for a writer
+  descriptor_ =
+      ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe's would wait for a writer
   if (descriptor_ < 0) {
     if (errno == ENOENT) throw Error("{}: no such file", what_);
     throw Error("{}: cannot open: {}", what_, std::strerror(errno));

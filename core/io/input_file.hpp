@@ -1,6 +1,6 @@
 #pragma once
-// Files that are read. They are not mapped into memory: touching a page of a file that somebody else has made shorter
-// would end the process.
+// Files that are read. They are not mapped into memory: touching a page of a file that somebody
+// else has made shorter would end the process.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,11 +10,12 @@
 
 namespace isowave {
 
-/// A regular file, open for reading. Anything else is refused: reading a pipe would wait for whoever writes to it, and
-/// a device may never end.
+/// A regular file, open for reading. Anything else is refused: reading a pipe would wait for
+/// whoever writes to it, and a device may never end.
 class InputFile {
  public:
-  /// what: how messages name the file. Throws Error: there is none, it cannot be opened, or it is not a regular file.
+  /// what: how messages name the file. Throws Error: there is none, it cannot be opened, or it is
+  /// not a regular file.
   InputFile(const std::filesystem::path &path, std::string what);
   explicit InputFile(const std::filesystem::path &path) : InputFile(path, path.string()) {}
   ~InputFile();
@@ -25,9 +26,9 @@ class InputFile {
   const std::string &what() const { return what_; }
   /// In bytes, when the file was opened: what is appended to it later is not read.
   std::uint64_t size() const { return size_; }
-  /// Reads all of `out` from byte `offset` on. Thread-safe. Throws Error: the file has become too short for that, or
-  /// cannot be read. Who writes into the file meanwhile changes what is read; who replaces it by another of its name
-  /// does not.
+  /// Reads all of `out` from byte `offset` on. Thread-safe. Throws Error: the file has become too
+  /// short for that, or cannot be read. Who writes into the file meanwhile changes what is read;
+  /// who replaces it by another of its name does not.
   void read(std::uint64_t offset, std::span<std::byte> out) const;
 
  private:

@@ -111,16 +111,17 @@ VoxelType meta_voxel_type(const HeaderFields &fields) {
     std::string_view name;
     VoxelType type;
   };
-  constexpr std::array<Name, 10> kNames{{{"MET_CHAR", VoxelType::kInt8},
-                                         {"MET_UCHAR", VoxelType::kUint8},
-                                         {"MET_SHORT", VoxelType::kInt16},
-                                         {"MET_USHORT", VoxelType::kUint16},
-                                         {"MET_INT", VoxelType::kInt32},
-                                         {"MET_UINT", VoxelType::kUint32},
-                                         {"MET_LONG", VoxelType::kInt32},  // 4 bytes, on all systems
-                                         {"MET_ULONG", VoxelType::kUint32},
-                                         {"MET_FLOAT", VoxelType::kFloat32},
-                                         {"MET_DOUBLE", VoxelType::kFloat64}}};
+  constexpr std::array<Name, 10> kNames{
+      {{"MET_CHAR", VoxelType::kInt8},
+       {"MET_UCHAR", VoxelType::kUint8},
+       {"MET_SHORT", VoxelType::kInt16},
+       {"MET_USHORT", VoxelType::kUint16},
+       {"MET_INT", VoxelType::kInt32},
+       {"MET_UINT", VoxelType::kUint32},
+       {"MET_LONG", VoxelType::kInt32},  // 4 bytes, on all systems
+       {"MET_ULONG", VoxelType::kUint32},
+       {"MET_FLOAT", VoxelType::kFloat32},
+       {"MET_DOUBLE", VoxelType::kFloat64}}};
   std::string_view name = fields["ElementType"];
   constexpr std::string_view kArray = "_ARRAY";  // of one: ElementNumberOfChannels
   if (name.ends_with(kArray)) name.remove_suffix(kArray.size());
@@ -139,7 +140,8 @@ std::size_t read_meta_dims(const HeaderFields &fields, const std::string &what, 
   if (num_axes < 1 || num_axes > kMaxAxes) fields.fail("NDims", "must be 1 to 10");
   const std::vector<std::int64_t> sizes = fields.integers("DimSize", std::size_t(num_axes));
   for (const std::int64_t size : sizes) {
-    if (size < 1 || size > kMaxDim) fields.fail("DimSize", fmt::format("each must be 1 to {}", kMaxDim));
+    if (size < 1 || size > kMaxDim)
+      fields.fail("DimSize", fmt::format("each must be 1 to {}", kMaxDim));
   }
   if (num_axes < 3 ||
       std::any_of(sizes.begin() + 3, sizes.end(), [](std::int64_t size) { return size != 1; })) {
@@ -151,8 +153,10 @@ std::size_t read_meta_dims(const HeaderFields &fields, const std::string &what, 
 
 /// The matrix has a row for each axis of the volume.
 void set_meta_geometry(const HeaderFields &fields, std::size_t num_axes, VolumeInfo &info) {
-  const auto offset = numbers_of(fields, {"Position", "Offset", "Origin", "ImagePosition"}, num_axes);
-  const auto matrix = numbers_of(fields, {"Orientation", "Rotation", "TransformMatrix"}, num_axes * num_axes);
+  const auto offset =
+      numbers_of(fields, {"Position", "Offset", "Origin", "ImagePosition"}, num_axes);
+  const auto matrix =
+      numbers_of(fields, {"Orientation", "Rotation", "TransformMatrix"}, num_axes * num_axes);
   auto spacing = numbers_of(fields, {"ElementSpacing"}, num_axes);
   const auto size = numbers_of(fields, {"ElementSize"}, num_axes);
   if (!spacing) spacing = size;
@@ -160,7 +164,8 @@ void set_meta_geometry(const HeaderFields &fields, std::size_t num_axes, VolumeI
     glm::dvec3 direction(0.0);
     direction[int(i)] = 1.0;
     if (matrix)
-      direction = {(*matrix)[i * num_axes], (*matrix)[i * num_axes + 1], (*matrix)[i * num_axes + 2]};
+      direction = {(*matrix)[i * num_axes], (*matrix)[i * num_axes + 1],
+                   (*matrix)[i * num_axes + 2]};
     set_axis(info, int(i), spacing ? (*spacing)[i] : 1.0, direction);
     if (offset) info.origin[int(i)] = (*offset)[i] + 0.0;
   }
@@ -170,13 +175,14 @@ void check_other_meta_fields(const HeaderFields &fields, std::size_t num_axes) {
   for (const std::string_view key : {"CenterOfRotation", "SequenceID"}) {
     if (fields.has(key)) fields.numbers(key, num_axes);
   }
-  for (const std::string_view key : {"ElementMin", "ElementMax", "CompressionLevel", "ID", "ParentID"}) {
+  for (const std::string_view key :
+       {"ElementMin", "ElementMax", "CompressionLevel", "ID", "ParentID"}) {
     if (fields.has(key)) fields.numbers(key, 1, HeaderFields::Nan::kUnknown);
   }
   if (fields.has("Color")) fields.numbers("Color", 4);
   if (fields.has("ElementNumberOfChannels") && fields.integer("ElementNumberOfChannels") != 1) {
-    fields.fail("ElementNumberOfChannels",
-                fmt::format("{} components per voxel, need 1", fields.integer("ElementNumberOfChannels")));
+    fields.fail("ElementNumberOfChannels", fmt::format("{} components per voxel, need 1",
+                                                       fields.integer("ElementNumberOfChannels")));
   }
   if (fields.has("ElementToIntensityFunctionSlope") &&
       fields.number("ElementToIntensityFunctionSlope") != 1.0) {
@@ -241,7 +247,9 @@ VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file
     voxels.file = file;
     set_meta_offset(fields, lines.end(), voxels);
   } else if (name.starts_with("LIST") || name.find('%') != name.npos) {
-    throw Error("{}: its voxels lie in several files, which is not supported: convert it to one file", what);
+    throw Error(
+        "{}: its voxels lie in several files, which is not supported: convert it to one file",
+        what);
   } else {
     if (name.empty()) fields.fail(kLastMetaKey, "need a file's name or LOCAL");
     voxels.file = open_data_file(*file, name);

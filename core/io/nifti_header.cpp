@@ -28,11 +28,15 @@ class NiftiHeader {
       source = std::make_unique<FileSource>(file, 0);
     }
     if (source->read(bytes_) != kNiftiHeaderBytes) fail("shorter than a NIfTI header");
-    constexpr std::int32_t kNifti1 = kNiftiHeaderBytes, kNifti2 = 540;  // each begins with its header's size
-    const auto has_size = [&] { return get<std::int32_t>(0) == kNifti1 || get<std::int32_t>(0) == kNifti2; };
+    constexpr std::int32_t kNifti1 = kNiftiHeaderBytes,
+                           kNifti2 = 540;  // each begins with its header's size
+    const auto has_size = [&] {
+      return get<std::int32_t>(0) == kNifti1 || get<std::int32_t>(0) == kNifti2;
+    };
     is_swapped_ = !has_size();
     if (!has_size()) fail("not a NIfTI-1 file");
-    if (get<std::int32_t>(0) == kNifti2) fail("NIfTI-2, which is not supported: convert it to NIfTI-1");
+    if (get<std::int32_t>(0) == kNifti2)
+      fail("NIfTI-2, which is not supported: convert it to NIfTI-1");
   }
 
   bool is_big_endian() const { return is_swapped_; }
@@ -88,8 +92,10 @@ VoxelType nifti_voxel_type(const NiftiHeader &header) {
     }
     return candidate.type;
   }
-  header.fail("NIfTI datatype {} is not supported: need one number of at most 32 bits, or float64, per voxel",
-              code);
+  header.fail(
+      "NIfTI datatype {} is not supported: need one number of at most 32 bits, or float64, per "
+      "voxel",
+      code);
 }
 
 void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
@@ -108,7 +114,8 @@ void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
   }
   if (!is_volume) header.fail("an image of {} axes, need a volume of 3", num_axes);
   constexpr std::int16_t kMatrixIntent = 1004;
-  if (header.get<std::int16_t>(68) == kMatrixIntent) header.fail("matrices as voxels are not supported");
+  if (header.get<std::int16_t>(68) == kMatrixIntent)
+    header.fail("matrices as voxels are not supported");
 }
 
 /// pixdim, where 0 is unknown.
@@ -134,13 +141,16 @@ Placement read_qform(const NiftiHeader &header) {
   const double flip = header.get_finite(76, "pixdim[0]") < 0 ? -1.0 : 1.0;
   constexpr double kRounding = 1e-5;
   const double squares = b * b + c * c + d * d;
-  if (squares > 1.0 + kRounding) header.fail("broken header: the qform's quaternion is longer than 1");
+  if (squares > 1.0 + kRounding)
+    header.fail("broken header: the qform's quaternion is longer than 1");
   const double a = std::sqrt(std::max(0.0, 1.0 - squares));
   const double length = std::sqrt(a * a + squares);
   const double w = a / length, x = b / length, y = c / length, z = d / length;
   Placement placement;
-  placement.direction[0] = {w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)};
-  placement.direction[1] = {2 * (x * y - w * z), w * w + y * y - x * x - z * z, 2 * (y * z + w * x)};
+  placement.direction[0] = {w * w + x * x - y * y - z * z, 2 * (x * y + w * z),
+                            2 * (x * z - w * y)};
+  placement.direction[1] = {2 * (x * y - w * z), w * w + y * y - x * x - z * z,
+                            2 * (y * z + w * x)};
   placement.direction[2] =
       flip * glm::dvec3(2 * (x * z + w * y), 2 * (y * z - w * x), w * w + z * z - x * x - y * y);
   for (int row = 0; row < 3; ++row)
@@ -162,7 +172,8 @@ std::optional<Placement> read_sform(const NiftiHeader &header, const glm::dvec3 
   constexpr double kSpacingTolerance = 1e-3, kSpacingRatio = 1e-2, kAngleTolerance = 1e-4;
   for (int axis = 0; axis < 3; ++axis) {
     const double length = glm::length(placement.direction[axis]);
-    if (std::abs(length - spacing[axis]) > std::min(kSpacingTolerance, kSpacingRatio * spacing[axis]))
+    if (std::abs(length - spacing[axis]) >
+        std::min(kSpacingTolerance, kSpacingRatio * spacing[axis]))
       return std::nullopt;
     placement.direction[axis] /= length;
   }
@@ -177,14 +188,17 @@ std::optional<Placement> read_placement(const NiftiHeader &header, const glm::dv
   constexpr int kLastCode = 5, kScanner = 1;
   const int qform = header.get<std::int16_t>(252), sform = header.get<std::int16_t>(254);
   for (const int code : {qform, sform}) {
-    if (code < 0 || code > kLastCode) header.fail("broken header: code {} of a qform or sform", code);
+    if (code < 0 || code > kLastCode)
+      header.fail("broken header: code {} of a qform or sform", code);
   }
   if (qform == 0 && sform == 0) return std::nullopt;
-  const std::optional<Placement> by_qform = qform > 0 ? std::optional(read_qform(header)) : std::nullopt;
+  const std::optional<Placement> by_qform =
+      qform > 0 ? std::optional(read_qform(header)) : std::nullopt;
   const std::optional<Placement> by_sform = sform > 0 ? read_sform(header, spacing) : std::nullopt;
   if (by_sform && (!by_qform || sform == kScanner)) return by_sform;
   if (by_qform) return by_qform;
-  header.fail("its sform has shear or other spacings than pixdim, and there is no qform: not supported");
+  header.fail(
+      "its sform has shear or other spacings than pixdim, and there is no qform: not supported");
 }
 
 /// Millimetres in the unit of lengths.
@@ -210,7 +224,8 @@ void set_nifti_geometry(const NiftiHeader &header, VolumeInfo &info) {
   const std::optional<Placement> placement = read_placement(header, spacing);
   if (!placement) return;
   const glm::dvec3 to_lps(-1, -1, 1);
-  for (int axis = 0; axis < 3; ++axis) info.direction[axis] = placement->direction[axis] * to_lps + 0.0;
+  for (int axis = 0; axis < 3; ++axis)
+    info.direction[axis] = placement->direction[axis] * to_lps + 0.0;
   info.origin = placement->origin * to_lps * millimetres + 0.0;
 }
 
@@ -219,8 +234,10 @@ void set_nifti_scale(const NiftiHeader &header, VoxelLayout &voxels) {
   if (std::isinf(slope)) header.fail("broken header: scl_slope is infinite");
   if (slope == 0 || std::isnan(slope)) {
     if (intercept == 0 || std::isnan(intercept)) return;  // voxels are not scaled
-    header.fail("scl_inter {} without a scl_slope, which readers understand differently: set scl_slope to 1",
-                intercept);
+    header.fail(
+        "scl_inter {} without a scl_slope, which readers understand differently: set scl_slope to "
+        "1",
+        intercept);
   }
   voxels.slope = slope;
   voxels.intercept = header.get_finite(116, "scl_inter");

@@ -17,21 +17,25 @@
 namespace isowave {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "'<f4' is written and read as it lies in memory");
+static_assert(std::endian::native == std::endian::little,
+              "'<f4' is written and read as it lies in memory");
 
-// File: magic, version (2 bytes), length of the header (2 bytes in format 1, 4 bytes later), header, voxels.
+// File: magic, version (2 bytes), length of the header (2 bytes in format 1, 4 bytes later),
+// header, voxels.
 constexpr std::string_view kNpyMagic = "\x93NUMPY";
 constexpr std::size_t kPreamble = kNpyMagic.size() + 4;
 constexpr std::size_t kAlignment = 64;          ///< numpy starts the voxels at a multiple of this
 constexpr std::uint32_t kMaxHeader = 1u << 20;  ///< no header of a plain array comes near
 
-/// What stands after `'key':` in the header, a Python dictionary in text, up to the end of the header.
+/// What stands after `'key':` in the header, a Python dictionary in text, up to the end of the
+/// header.
 std::string_view value_of(std::string_view header, std::string_view key, const std::string &where) {
   std::size_t at = header.find(key);
   if (at != header.npos) at = header.find(':', at + key.size());
   if (at != header.npos) at = header.find_first_not_of(" \t", at + 1);
   if (at == header.npos) throw Error("{}: broken .npy header: no {}", where, key);
-  const std::string_view name = key.substr(1, key.size() - 2);  // Python takes quotes of either kind
+  const std::string_view name =
+      key.substr(1, key.size() - 2);  // Python takes quotes of either kind
   if (header.find(name, header.find(name) + 1) != header.npos)
     throw Error("{}: broken .npy header: {} is given twice", where, key);
   return header.substr(at);
@@ -40,7 +44,8 @@ std::string_view value_of(std::string_view header, std::string_view key, const s
 /// The entries of "(3, 4), ...".
 std::vector<std::uint64_t> parse_shape(std::string_view text, const std::string &where) {
   const std::size_t close = text.find(')');
-  if (!text.starts_with('(') || close == text.npos) throw Error("{}: broken .npy header: bad shape", where);
+  if (!text.starts_with('(') || close == text.npos)
+    throw Error("{}: broken .npy header: bad shape", where);
   text = text.substr(1, close - 1);
   std::vector<std::uint64_t> shape;
   for (;;) {
@@ -60,8 +65,8 @@ void write_npy(const FloatImage &image, const std::filesystem::path &path) {
   if (image.pixels.size() != std::size_t(image.width) * image.height) {
     throw std::invalid_argument("write_npy: pixels is not width * height long");
   }
-  std::string header = fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}",
-                                   image.height, image.width);
+  std::string header = fmt::format(
+      "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", image.height, image.width);
   header.append(kAlignment - 1 - (kPreamble + header.size()) % kAlignment, ' ');
   header += '\n';
   const auto length = static_cast<std::uint16_t>(header.size());
@@ -88,11 +93,14 @@ FloatImage read_npy(const std::filesystem::path &path) {
     throw Error("{}: not a .npy file", where);
   }
   if (!get(version, sizeof version)) throw Error("{}: truncated .npy header", where);
-  if (version[0] < 1 || version[0] > 3) throw Error("{}: .npy format {} is unknown", where, version[0]);
+  if (version[0] < 1 || version[0] > 3)
+    throw Error("{}: .npy format {} is unknown", where, version[0]);
   if (!get(length, version[0] == 1 ? 2 : 4)) throw Error("{}: truncated .npy header", where);
   const std::uint32_t header_length = length[0] | std::uint32_t(length[1]) << 8 |
-                                      std::uint32_t(length[2]) << 16 | std::uint32_t(length[3]) << 24;
-  if (header_length > kMaxHeader) throw Error("{}: broken .npy header: {} bytes long", where, header_length);
+                                      std::uint32_t(length[2]) << 16 |
+                                      std::uint32_t(length[3]) << 24;
+  if (header_length > kMaxHeader)
+    throw Error("{}: broken .npy header: {} bytes long", where, header_length);
   std::string header(header_length, '\0');
   if (!get(header.data(), header.size())) throw Error("{}: truncated .npy header", where);
 
@@ -110,12 +118,13 @@ FloatImage read_npy(const std::filesystem::path &path) {
   if (shape.size() != 2) throw Error("{}: has {} dimensions, an image has 2", where, shape.size());
   if (shape[0] > kMax || shape[1] > kMax) throw Error("{}: shape is too large for an image", where);
 
-  // Compared with the file before memory is asked for: the shape of a broken header may be anything. 64 bits
-  // hold the product of two 32-bit extents, and its fourfold is compared by division.
+  // Compared with the file before memory is asked for: the shape of a broken header may be
+  // anything. 64 bits hold the product of two 32-bit extents, and its fourfold is compared by
+  // division.
   const std::uint64_t bytes = in.left();
   if (bytes % sizeof(float) != 0 || bytes / sizeof(float) != shape[0] * shape[1]) {
-    throw Error("{}: shape ({}, {}) needs {} float32 values, the file has {} bytes of them", where, shape[0],
-                shape[1], shape[0] * shape[1], bytes);
+    throw Error("{}: shape ({}, {}) needs {} float32 values, the file has {} bytes of them", where,
+                shape[0], shape[1], shape[0] * shape[1], bytes);
   }
   FloatImage image{static_cast<std::uint32_t>(shape[1]), static_cast<std::uint32_t>(shape[0]), {}};
   image.pixels.resize(shape[0] * shape[1]);

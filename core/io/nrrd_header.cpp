@@ -48,7 +48,8 @@ constexpr std::array<std::string_view, 30> kNrrdFields{"content",
                                                        "sample units",
                                                        "measurement frame"};
 
-/// The field's name as in kNrrdFields; empty if the format has no such field. Case does not matter, nor do blanks.
+/// The field's name as in kNrrdFields; empty if the format has no such field. Case does not matter,
+/// nor do blanks.
 std::string_view field_name(std::string_view text) {
   const auto squeeze = [](std::string_view name) {
     std::string result = lower_case(name);
@@ -73,7 +74,8 @@ void check_nrrd_magic(HeaderLines &lines, const std::string &what) {
   }
 }
 
-/// Reads up to the empty line after which voxels begin, or to the end of the file. Returns whether the line was there.
+/// Reads up to the empty line after which voxels begin, or to the end of the file. Returns whether
+/// the line was there.
 bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields &fields) {
   check_nrrd_magic(lines, what);
   while (lines.next()) {
@@ -81,13 +83,14 @@ bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields 
     if (line.empty()) return true;
     if (line.starts_with('#')) continue;
     const std::size_t colon = line.find(": ");
-    const std::string_view name = colon == line.npos ? std::string_view() : field_name(line.substr(0, colon));
+    const std::string_view name =
+        colon == line.npos ? std::string_view() : field_name(line.substr(0, colon));
     if (!name.empty()) {
       if (lines.is_cut()) throw Error("{}: broken header: '{}' is too long", what, name);
       fields.add(name, trim(line.substr(colon + 2)));
     } else if (line.find(":=") == line.npos) {
-      throw Error("{}: broken header: line {}, {}, is neither a field of NRRD nor a key/value pair", what,
-                  lines.number(), quote(line));
+      throw Error("{}: broken header: line {}, {}, is neither a field of NRRD nor a key/value pair",
+                  what, lines.number(), quote(line));
     }
   }
   return false;
@@ -101,8 +104,10 @@ VoxelType nrrd_voxel_type(const HeaderFields &fields) {
   constexpr std::array<Names, 8> kTypes{
       {{VoxelType::kInt8, {"signed char", "int8", "int8_t"}},
        {VoxelType::kUint8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
-       {VoxelType::kInt16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
-       {VoxelType::kUint16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+       {VoxelType::kInt16,
+        {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+       {VoxelType::kUint16,
+        {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
        {VoxelType::kInt32, {"int", "signed int", "int32", "int32_t"}},
        {VoxelType::kUint32, {"uint", "unsigned int", "uint32", "uint32_t"}},
        {VoxelType::kFloat32, {"float"}},
@@ -116,7 +121,8 @@ VoxelType nrrd_voxel_type(const HeaderFields &fields) {
 }
 
 /// Vectors of three numbers like (1,0,0.5), or `none`.
-std::vector<std::optional<glm::dvec3>> parse_vectors(const HeaderFields &fields, std::string_view name) {
+std::vector<std::optional<glm::dvec3>> parse_vectors(const HeaderFields &fields,
+                                                     std::string_view name) {
   constexpr std::string_view kNone = "none";
   std::vector<std::optional<glm::dvec3>> vectors;
   std::string_view text = fields[name];
@@ -128,7 +134,8 @@ std::vector<std::optional<glm::dvec3>> parse_vectors(const HeaderFields &fields,
       continue;
     }
     const std::size_t end = text.find(')');
-    if (text.front() != '(' || end == text.npos) fields.fail(name, "need vectors like (1,0,0), or none");
+    if (text.front() != '(' || end == text.npos)
+      fields.fail(name, "need vectors like (1,0,0), or none");
     std::string_view inside = text.substr(1, end - 1);
     glm::dvec3 vector(0.0);
     for (int i = 0; i < 3; ++i) {
@@ -225,13 +232,15 @@ std::optional<glm::dvec3> read_nrrd_space(const HeaderFields &fields) {
                                      {"3d-left-handed", "", {1, 1, 1}}}};
   if (!fields.has("space")) {
     if (!fields.has("space dimension")) return std::nullopt;
-    if (fields.integer("space dimension") != 3) fields.fail("space dimension", "not supported: need 3");
+    if (fields.integer("space dimension") != 3)
+      fields.fail("space dimension", "not supported: need 3");
     return glm::dvec3(1.0);
   }
   if (fields.has("space dimension")) fields.fail("space dimension", "given beside 'space'");
   const std::string wanted = lower_case(fields["space"]);
   for (const Space &space : spaces) {
-    if (!wanted.empty() && (wanted == space.name || wanted == space.short_name)) return space.to_lps;
+    if (!wanted.empty() && (wanted == space.name || wanted == space.short_name))
+      return space.to_lps;
   }
   fields.fail("space", "not supported: need one of 3 dimensions");
 }
@@ -257,7 +266,8 @@ std::vector<NrrdAxis> volume_axes(const HeaderFields &fields, std::vector<NrrdAx
       throw Error("{}: an image of {} axes, need a volume of 3", what, axes.size());
     }
   }
-  if (chosen.size() != 3) throw Error("{}: an image of {} axes, need a volume of 3", what, axes.size());
+  if (chosen.size() != 3)
+    throw Error("{}: an image of {} axes, need a volume of 3", what, axes.size());
   return chosen;
 }
 
@@ -267,8 +277,10 @@ void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxi
     const NrrdAxis &axis = axes[std::size_t(i)];
     if (!std::isnan(axis.spacing))
       fields.fail("spacings", "not with a space: its 'space directions' say them");
-    if (!std::isnan(axis.min)) fields.fail("axis mins", "not with a space: its 'space origin' says them");
-    if (!std::isnan(axis.max)) fields.fail("axis maxs", "not with a space: its 'space origin' says them");
+    if (!std::isnan(axis.min))
+      fields.fail("axis mins", "not with a space: its 'space origin' says them");
+    if (!std::isnan(axis.max))
+      fields.fail("axis maxs", "not with a space: its 'space origin' says them");
     if (!axis.direction) continue;  // no axis has one: a unit grid
     const double length = glm::length(*axis.direction);
     set_axis(info, i, length, *axis.direction * (1.0 / length) * to_lps);
@@ -284,9 +296,10 @@ void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxi
   if (fields.has("space units")) check_quoted(fields, "space units", 3);
 }
 
-/// Spacing from the field or from where the axis begins and ends; the first sample lies at its beginning or, where
-/// samples are cells, half a spacing further.
-void set_geometry_by_axes(const HeaderFields &fields, const std::vector<NrrdAxis> &axes, VolumeInfo &info) {
+/// Spacing from the field or from where the axis begins and ends; the first sample lies at its
+/// beginning or, where samples are cells, half a spacing further.
+void set_geometry_by_axes(const HeaderFields &fields, const std::vector<NrrdAxis> &axes,
+                          VolumeInfo &info) {
   for (const std::string_view name :
        {"space directions", "space origin", "measurement frame", "space units"}) {
     if (fields.has(name)) fields.fail(name, "needs 'space' or 'space dimension'");
@@ -315,7 +328,8 @@ VoxelEncoding nrrd_encoding(const HeaderFields &fields) {
   fields.fail("encoding", "not supported: use raw, gzip, hex or ascii");
 }
 
-/// line skip and byte skip: the lines of the file as it is, the bytes of the data as it is unpacked.
+/// line skip and byte skip: the lines of the file as it is, the bytes of the data as it is
+/// unpacked.
 void set_nrrd_skips(const HeaderFields &fields, VoxelLayout &voxels) {
   if (fields.has("line skip")) {
     const std::int64_t lines = fields.integer("line skip");
@@ -387,12 +401,14 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   set_nrrd_skips(fields, voxels);
   if (fields.has("data file")) {
     if (names_several_files(fields["data file"])) {
-      throw Error("{}: its voxels lie in several files, which is not supported: convert it to one file",
-                  what);
+      throw Error(
+          "{}: its voxels lie in several files, which is not supported: convert it to one file",
+          what);
     }
     voxels.file = open_data_file(*file, fields["data file"]);
   } else {
-    if (!has_end) throw Error("{}: broken header: no empty line after it, and no 'data file'", what);
+    if (!has_end)
+      throw Error("{}: broken header: no empty line after it, and no 'data file'", what);
     voxels.file = file;
     voxels.offset = lines.end();
   }

@@ -30,7 +30,8 @@ std::optional<VolumeHeader> read_header(const std::shared_ptr<const InputFile> &
   const fs::path &path = file->path();
   if (has_ending(path, {".nrrd", ".nhdr"})) return read_nrrd_header(file);
   if (has_ending(path, {".mha", ".mhd"})) return read_meta_image_header(file);
-  if (has_ending(path, {".nii", ".nii.gz"})) return read_nifti_header(file, has_ending(path, {".gz"}));
+  if (has_ending(path, {".nii", ".nii.gz"}))
+    return read_nifti_header(file, has_ending(path, {".gz"}));
   return std::nullopt;
 }
 
@@ -44,14 +45,17 @@ std::filesystem::path voxel_file(const fs::path &path) {
 
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {
   const auto file = std::make_shared<const InputFile>(path);
-  if (has_ending(path, {".raw", ".raw.gz"})) return open_raw(file, has_ending(path, {".gz"}), overrides);
+  if (has_ending(path, {".raw", ".raw.gz"}))
+    return open_raw(file, has_ending(path, {".gz"}), overrides);
   std::optional<VolumeHeader> header = read_header(file);
   if (!header) {
-    throw Error("{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
-                path.string());
+    throw Error(
+        "{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
+        path.string());
   }
   if (overrides.dims || overrides.type) {
-    throw Error("{}: --dims and --type are for raw files; this file's header gives its own", path.string());
+    throw Error("{}: --dims and --type are for raw files; this file's header gives its own",
+                path.string());
   }
   if (overrides.spacing) header->info.spacing = *overrides.spacing;
   check_volume_info(header->info, path.string());

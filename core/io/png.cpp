@@ -16,8 +16,9 @@
 namespace isowave {
 namespace {
 
-// libpng reports errors by longjmp. The functions that call setjmp hold no object with a destructor, return
-// false, and leave the message in Message; their callers own everything and throw.
+// libpng reports errors by longjmp. The functions that call setjmp hold no object with a
+// destructor, return false, and leave the message in Message; their callers own everything and
+// throw.
 
 constexpr std::size_t kSignatureBytes = 8;
 
@@ -62,18 +63,19 @@ bool write_image(Writer &writer, std::FILE *file, const Image8 &image) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_init_io(png, file);
   png_set_IHDR(png, writer.info, image.width, image.height, 8,
-               image.channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+               image.channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
   png_write_info(png, writer.info);
   const std::size_t row_bytes = std::size_t(image.width) * image.channels;
-  for (std::size_t y = 0; y < image.height; ++y) png_write_row(png, image.pixels.data() + y * row_bytes);
+  for (std::size_t y = 0; y < image.height; ++y)
+    png_write_row(png, image.pixels.data() + y * row_bytes);
   png_write_end(png, writer.info);
   return true;
 }
 
-/// Reads everything before the pixels and asks for 8-bit RGB or RGBA. Texts, profiles and such are passed over: they
-/// may be large, once they are unpacked.
+/// Reads everything before the pixels and asks for 8-bit RGB or RGBA. Texts, profiles and such are
+/// passed over: they may be large, once they are unpacked.
 bool read_header(Reader &reader, std::FILE *file) {
   png_structp png = reader.png;
   if (setjmp(png_jmpbuf(png)) != 0) return false;
@@ -143,13 +145,16 @@ void write_png(const Image8 &image, const std::filesystem::path &path) {
 Image8 read_png(const std::filesystem::path &path) {
   const std::string where = path.string();
   check_input_file(path);
-  const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(where.c_str(), "rb"), &std::fclose);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(where.c_str(), "rb"),
+                                                              &std::fclose);
   if (!file) throw Error("{}: cannot open", where);
-  {  // A broken header may ask for any size. So nothing is asked for before the file has shown that it holds as much.
+  {  // A broken header may ask for any size. So nothing is asked for before the file has shown that
+     // it holds as much.
     Reader reader;
     begin(reader, file.get(), where);
     std::vector<png_byte> row(png_get_rowbytes(reader.png, reader.info));
-    if (!check_rows(reader, row.data())) throw Error("{}: broken PNG: {}", where, reader.message.text);
+    if (!check_rows(reader, row.data()))
+      throw Error("{}: broken PNG: {}", where, reader.message.text);
   }
   Reader reader;
   begin(reader, file.get(), where);
@@ -161,7 +166,8 @@ Image8 read_png(const std::filesystem::path &path) {
   image.pixels.resize(row_bytes * image.height);
   std::vector<png_bytep> rows(image.height);
   for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = image.pixels.data() + y * row_bytes;
-  if (!read_rows(reader, rows.data())) throw Error("{}: broken PNG: {}", where, reader.message.text);
+  if (!read_rows(reader, rows.data()))
+    throw Error("{}: broken PNG: {}", where, reader.message.text);
   return image;
 }
 

@@ -21,7 +21,8 @@ static_assert(std::endian::native == std::endian::little,
 namespace {
 
 void swap_bytes(std::span<std::byte> bytes, std::size_t voxel_bytes) {
-  for (; !bytes.empty(); bytes = bytes.subspan(voxel_bytes)) std::ranges::reverse(bytes.first(voxel_bytes));
+  for (; !bytes.empty(); bytes = bytes.subspan(voxel_bytes))
+    std::ranges::reverse(bytes.first(voxel_bytes));
 }
 
 std::uint64_t num_bytes(const VolumeInfo &info, const VoxelLayout &voxels) {
@@ -30,8 +31,8 @@ std::uint64_t num_bytes(const VolumeInfo &info, const VoxelLayout &voxels) {
 
 [[noreturn]] void fail_size(const VolumeInfo &info, const VoxelLayout &voxels, std::string_view how,
                             std::string_view needed, std::string_view found) {
-  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", voxels.file->what(), how, info.dims.x,
-              info.dims.y, info.dims.z, to_string(voxels.type), needed, found);
+  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", voxels.file->what(), how,
+              info.dims.x, info.dims.y, info.dims.z, to_string(voxels.type), needed, found);
 }
 
 /// The values of stored voxels, exact.
@@ -46,7 +47,8 @@ void to_float(const VoxelLayout &voxels, std::span<const std::byte> bytes, std::
   if (!voxels.is_scaled()) return convert_to_float(voxels.type, bytes, out);
   std::vector<double> values(out.size());
   to_double(voxels, bytes, values);
-  std::ranges::transform(values, out.begin(), [](double value) { return static_cast<float>(value); });
+  std::ranges::transform(values, out.begin(),
+                         [](double value) { return static_cast<float>(value); });
 }
 
 /// Reads the voxels of a layout from a source that begins with them.
@@ -60,7 +62,8 @@ class RawReader : public VolumeReader {
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
     read_as(z_begin, num_layers, out, &to_float);
   }
-  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                         std::span<double> out) override {
     read_as(z_begin, num_layers, out, &to_double);
   }
 
@@ -83,7 +86,8 @@ class RawReader : public VolumeReader {
     if (next_layer_ == info_.dims.z && !std::exchange(end_checked_, true)) check_end();
   }
 
-  /// Reads the next voxels piece by piece, so that the raw bytes need no buffer of the size of `out`.
+  /// Reads the next voxels piece by piece, so that the raw bytes need no buffer of the size of
+  /// `out`.
   template <class Value, class Convert>
   void read_voxels(std::span<Value> out, const Convert &convert) {
     piece_.resize(kPieceVoxels * size_of(voxels_.type));
@@ -110,7 +114,8 @@ class RawReader : public VolumeReader {
   void skip_bytes(std::uint64_t count) {
     piece_.resize(kPieceVoxels * size_of(voxels_.type));
     while (count > 0) {
-      const std::span bytes = std::span(piece_).first(std::min<std::uint64_t>(piece_.size(), count));
+      const std::span bytes =
+          std::span(piece_).first(std::min<std::uint64_t>(piece_.size(), count));
       if (source_->read(bytes) < bytes.size()) fail_size("truncated");
       count -= bytes.size();
     }
@@ -165,7 +170,8 @@ std::uint64_t find_begin(const VolumeHeader &header) {
     do {
       c = characters.next();
       if (!c)
-        throw Error("{}: truncated: {} lines to skip, found {}", file->what(), voxels.lines_to_skip, line);
+        throw Error("{}: truncated: {} lines to skip, found {}", file->what(), voxels.lines_to_skip,
+                    line);
       ++begin;
     } while (*c != '\n');
   }
@@ -184,8 +190,8 @@ void check_size(const VolumeHeader &header, std::uint64_t found) {
   if (is_compressed(voxels.encoding)) {
     least = bytes / kMaxDeflateRatio;
     if (voxels.packed_bytes && *voxels.packed_bytes != found) {
-      throw Error("{}: {} bytes of compressed voxels, but the header says {}", voxels.file->what(), found,
-                  *voxels.packed_bytes);
+      throw Error("{}: {} bytes of compressed voxels, but the header says {}", voxels.file->what(),
+                  found, *voxels.packed_bytes);
     }
   }
   const bool is_raw = voxels.encoding == VoxelEncoding::kRaw;
@@ -269,13 +275,14 @@ std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   return std::make_unique<RawReader>(remaining, std::move(source));
 }
 
-std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file, bool is_gzipped,
-                                       const RawOverrides &overrides) {
+std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file,
+                                       bool is_gzipped, const RawOverrides &overrides) {
   const fs::path stem = is_gzipped ? file->path().stem().stem() : file->path().stem();
   const std::optional<RawName> name = parse_raw_name(stem.string());
   if (!name && !(overrides.dims && overrides.type)) {
     throw Error(
-        "{}: the name does not end in _XxYxZ_TYPE (as in head_256x256x113_uint16.raw): give --dims and "
+        "{}: the name does not end in _XxYxZ_TYPE (as in head_256x256x113_uint16.raw): give --dims "
+        "and "
         "--type",
         file->what());
   }

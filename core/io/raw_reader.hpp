@@ -1,6 +1,6 @@
 #pragma once
-// Voxels of any file, by what its header said or, for headerless files in the Open-SciVis naming, its name:
-// `NAME_XxYxZ_TYPE.raw`, optionally gzipped (`.raw.gz`).
+// Voxels of any file, by what its header said or, for headerless files in the Open-SciVis naming,
+// its name: `NAME_XxYxZ_TYPE.raw`, optionally gzipped (`.raw.gz`).
 
 #include <cstddef>
 #include <cstdint>
@@ -29,8 +29,8 @@ struct RawName {
   VoxelType type = VoxelType::kUint8;
 };
 
-/// Parses `NAME_XxYxZ_TYPE` (no folder, no extension). Empty unless the whole pattern is there and the type
-/// is known; dims may be anything that fits 32 bits.
+/// Parses `NAME_XxYxZ_TYPE` (no folder, no extension). Empty unless the whole pattern is there and
+/// the type is known; dims may be anything that fits 32 bits.
 std::optional<RawName> parse_raw_name(std::string_view stem);
 
 /// Converts little-endian voxels of `type` to float32. voxels.size() == out.size() * size_of(type).
@@ -38,14 +38,15 @@ void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::sp
 /// The same to float64, which holds all of them exactly.
 void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::span<double> out);
 
-/// Reads the voxels that a header describes, whose info has passed check_volume_info(). Layers are read as
-/// they are asked for, in pieces. Throws Error before anything is allocated where the file has too few bytes for the
-/// voxels: by its exact length where they are not packed, by what could become of it where they are. The reader throws
-/// Error where voxels cannot be unpacked or parsed, and with the last layer where the data does not end with it.
+/// Reads the voxels that a header describes, whose info has passed check_volume_info(). Layers are
+/// read as they are asked for, in pieces. Throws Error before anything is allocated where the file
+/// has too few bytes for the voxels: by its exact length where they are not packed, by what could
+/// become of it where they are. The reader throws Error where voxels cannot be unpacked or parsed,
+/// and with the last layer where the data does not end with it.
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header);
 
 /// Opens a .raw or .raw.gz file; see open_volume.
-std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file, bool is_gzipped,
-                                       const RawOverrides &overrides);
+std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file,
+                                       bool is_gzipped, const RawOverrides &overrides);
 
 }  // namespace isowave

@@ -106,7 +106,8 @@ void HeaderFields::fail(std::string_view name, std::string_view reason) const {
 
 std::vector<std::string_view> HeaderFields::words(std::string_view name, std::size_t count) const {
   std::vector<std::string_view> words = split_words((*this)[name]);
-  if (words.size() != count) fail(name, fmt::format("need {} value{}", count, count == 1 ? "" : "s"));
+  if (words.size() != count)
+    fail(name, fmt::format("need {} value{}", count, count == 1 ? "" : "s"));
   return words;
 }
 
@@ -115,7 +116,8 @@ std::vector<double> HeaderFields::numbers(std::string_view name, std::size_t cou
   for (const std::string_view word : words(name, count)) {
     const std::optional<double> value = parse_number(word);
     if (!value) fail(name, fmt::format("{} is not a number in range", quote(word)));
-    if (std::isinf(*value) || (std::isnan(*value) && nan == Nan::kRefused)) fail(name, "must be finite");
+    if (std::isinf(*value) || (std::isnan(*value) && nan == Nan::kRefused))
+      fail(name, "must be finite");
     values.push_back(*value);
   }
   return values;

@@ -1,5 +1,6 @@
 #pragma once
-// Lines and fields of the text headers of NRRD and MetaImage: bounded memory, linear time, every value read whole.
+// Lines and fields of the text headers of NRRD and MetaImage: bounded memory, linear time, every
+// value read whole.
 
 #include <cstddef>
 #include <cstdint>
@@ -34,8 +35,8 @@ class HeaderLines {
 
   /// Goes on to the next line. False at the end of the file.
   bool next();
-  /// The line without its end (\n or \r\n); of a line longer than kMaxLength only that much, and is_cut(). The rest is
-  /// read only to get to the next line.
+  /// The line without its end (\n or \r\n); of a line longer than kMaxLength only that much, and
+  /// is_cut(). The rest is read only to get to the next line.
   std::string_view line() const { return line_; }
   bool is_cut() const { return is_cut_; }
   std::uint64_t number() const { return number_; }
@@ -56,7 +57,8 @@ class HeaderLines {
   std::uint64_t number_ = 0, end_ = 0;
 };
 
-/// The fields of a header, each given once. All functions throw Error that names the file and the field.
+/// The fields of a header, each given once. All functions throw Error that names the file and the
+/// field.
 class HeaderFields {
  public:
   explicit HeaderFields(std::string what) : what_(std::move(what)) {}
@@ -70,7 +72,8 @@ class HeaderFields {
   std::int64_t integer(std::string_view name) const;
   /// `count` of them.
   enum class Nan { kRefused, kUnknown };
-  std::vector<double> numbers(std::string_view name, std::size_t count, Nan nan = Nan::kRefused) const;
+  std::vector<double> numbers(std::string_view name, std::size_t count,
+                              Nan nan = Nan::kRefused) const;
   std::vector<std::int64_t> integers(std::string_view name, std::size_t count) const;
   std::vector<std::string_view> words(std::string_view name, std::size_t count) const;
   [[noreturn]] void fail(std::string_view name, std::string_view reason) const;

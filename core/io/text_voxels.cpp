@@ -24,7 +24,8 @@ std::optional<float> parse_float(std::string_view text) {
   if (!value) return std::nullopt;
   if (text.starts_with('+')) text.remove_prefix(1);
   float nearest = 0;
-  if (std::from_chars(text.data(), text.data() + text.size(), nearest).ec == std::errc{}) return nearest;
+  if (std::from_chars(text.data(), text.data() + text.size(), nearest).ec == std::errc{})
+    return nearest;
   if (std::abs(*value) > 1.0) return std::nullopt;
   return static_cast<float>(*value);  // below the least float
 }
@@ -99,7 +100,8 @@ std::string_view NumberSource::next_word() {
   while (c && separates(*c)) c = characters_.next();
   for (; c && !separates(*c); c = characters_.next()) {
     word_ += *c;
-    if (word_.size() > kLongest) throw Error("{}: broken: {} is no voxel", characters_.what(), quote(word_));
+    if (word_.size() > kLongest)
+      throw Error("{}: broken: {} is no voxel", characters_.what(), quote(word_));
   }
   return word_;
 }
@@ -110,7 +112,8 @@ std::size_t NumberSource::read(std::span<std::byte> bytes) {
     const std::string_view word = next_word();
     if (word.empty()) return done;
     if (!store(type_, word, &bytes[done])) {
-      throw Error("{}: broken: {} is no {} voxel", characters_.what(), quote(word), to_string(type_));
+      throw Error("{}: broken: {} is no {} voxel", characters_.what(), quote(word),
+                  to_string(type_));
     }
   }
   return bytes.size();

@@ -1,5 +1,6 @@
 #pragma once
-// Voxels written as text, hexadecimal digits or numbers, as the bytes that they stand for (little endian numbers).
+// Voxels written as text, hexadecimal digits or numbers, as the bytes that they stand for (little
+// endian numbers).
 
 #include <memory>
 #include <optional>
@@ -30,7 +31,8 @@ class CharacterSource {
 /// Two hexadecimal digits for each byte, the higher first; white space anywhere.
 class HexSource : public ByteSource {
  public:
-  HexSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset) : characters_(file, offset) {}
+  HexSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset)
+      : characters_(file, offset) {}
   std::size_t read(std::span<std::byte> bytes) override;
 
  private:
@@ -39,8 +41,8 @@ class HexSource : public ByteSource {
   CharacterSource characters_;
 };
 
-/// Decimal numbers between white space or commas. One that is no number of `type` is an Error; integers may be written
-/// like 1e3 or 7.0.
+/// Decimal numbers between white space or commas. One that is no number of `type` is an Error;
+/// integers may be written like 1e3 or 7.0.
 class NumberSource : public ByteSource {
  public:
   NumberSource(const std::shared_ptr<const InputFile> &file, std::uint64_t offset, VoxelType type)

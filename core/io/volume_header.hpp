@@ -1,10 +1,11 @@
 #pragma once
-// What the header of a volume file says: its grid, and where and how its voxels lie. The readers of headers
-// (nrrd_header.hpp, meta_image_header.hpp, nifti_header.hpp) make it, open_voxels() in raw_reader.hpp reads by it.
+// What the header of a volume file says: its grid, and where and how its voxels lie. The readers of
+// headers (nrrd_header.hpp, meta_image_header.hpp, nifti_header.hpp) make it, open_voxels() in
+// raw_reader.hpp reads by it.
 //
-// World space of all formats: millimetres, and where the format is anatomical LPS (+x left, +y posterior,
-// +z superior), so that the same head has the same world coordinates from any of the formats. A negative spacing is
-// stored as a flipped direction.
+// World space of all formats: millimetres, and where the format is anatomical LPS (+x left, +y
+// posterior, +z superior), so that the same head has the same world coordinates from any of the
+// formats. A negative spacing is stored as a flipped direction.
 
 #include <cstdint>
 #include <memory>
@@ -22,10 +23,12 @@ enum class VoxelEncoding { kRaw, kGzip, kGzipOrZlib, kHex, kText };
 struct VoxelLayout {
   std::shared_ptr<const InputFile> file;  ///< the header's own or the one it names
   VoxelEncoding encoding = VoxelEncoding::kRaw;
-  std::uint64_t offset = 0;         ///< bytes of the file before the voxels, but for what is skipped:
+  std::uint64_t offset = 0;  ///< bytes of the file before the voxels, but for what is skipped:
   std::uint64_t lines_to_skip = 0;  ///< lines of the file, and then
-  std::uint64_t bytes_to_skip = 0;  ///< bytes of it, or where it is compressed of what it unpacks to
-  bool from_end = false;  ///< raw: the voxels are the last bytes of the file, whatever is before them
+  std::uint64_t bytes_to_skip =
+      0;  ///< bytes of it, or where it is compressed of what it unpacks to
+  bool from_end =
+      false;  ///< raw: the voxels are the last bytes of the file, whatever is before them
   std::optional<std::uint64_t> packed_bytes;  ///< of compressed data, where the header says so
   VoxelType type = VoxelType::kFloat32;       ///< as stored
   bool big_endian = false;
@@ -36,14 +39,17 @@ struct VoxelLayout {
 };
 
 struct VolumeHeader {
-  VolumeInfo info;  ///< type: of the values: float32, or of 32 bits float64, where stored integers are scaled
+  VolumeInfo info;  ///< type: of the values: float32, or of 32 bits float64, where stored integers
+                    ///< are scaled
   VoxelLayout voxels;
 };
 
-/// Sets direction and spacing of index axis `axis` from a spacing that may be negative and a world direction.
+/// Sets direction and spacing of index axis `axis` from a spacing that may be negative and a world
+/// direction.
 void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &direction);
 
-/// Opens the data file that a detached header names, relative to the header's folder. Throws Error that names both.
+/// Opens the data file that a detached header names, relative to the header's folder. Throws Error
+/// that names both.
 std::shared_ptr<const InputFile> open_data_file(const InputFile &header, const std::string &name);
 
 }  // namespace isowave

@@ -17,7 +17,8 @@ double mebibytes(std::uint64_t bytes) {
 
 /// What a buffer's OpenCL call failed with, as the Error to throw.
 Error failure(const std::string &name, const char *action, const cl::Error &error) {
-  return Error("cannot {} buffer '{}': {}: {}", action, name, error.what(), error_name(error.err()));
+  return Error("cannot {} buffer '{}': {}: {}", action, name, error.what(),
+               error_name(error.err()));
 }
 
 std::vector<cl::Event> events_of(const cl::Event &event) {
@@ -25,25 +26,29 @@ std::vector<cl::Event> events_of(const cl::Event &event) {
 }
 
 template <std::size_t kBytes>
-void enqueue_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern, std::size_t bytes,
-                     std::size_t offset, cl::Event *event) {
+void enqueue_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern,
+                     std::size_t bytes, std::size_t offset, cl::Event *event) {
   std::array<std::byte, kBytes> value;
   std::memcpy(value.data(), pattern, kBytes);
   queue.enqueueFillBuffer(mem, value, offset, bytes, nullptr, event);
 }
 
-/// Oclgrind 21.10 takes filled memory for uninitialized and would report every read of it. What the host
-/// writes counts.
+/// Oclgrind 21.10 takes filled memory for uninitialized and would report every read of it. What the
+/// host writes counts.
 void write_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern,
-                   std::size_t pattern_bytes, std::size_t bytes, std::size_t offset, cl::Event *event) {
+                   std::size_t pattern_bytes, std::size_t bytes, std::size_t offset,
+                   cl::Event *event) {
   std::vector<std::byte> values(bytes);
-  for (std::size_t i = 0; i < bytes; i += pattern_bytes) std::memcpy(&values[i], pattern, pattern_bytes);
+  for (std::size_t i = 0; i < bytes; i += pattern_bytes)
+    std::memcpy(&values[i], pattern, pattern_bytes);
   queue.enqueueWriteBuffer(mem, CL_TRUE, offset, bytes, values.data(), nullptr, event);
 }
 
-/// Fills mem's bytes [offset, offset + bytes) with copies of the pattern; both are multiples of its size.
-void enqueue_fill(Device &device, const cl::Buffer &mem, const void *pattern, std::size_t pattern_bytes,
-                  std::size_t bytes, std::size_t offset, cl::Event *event) {
+/// Fills mem's bytes [offset, offset + bytes) with copies of the pattern; both are multiples of its
+/// size.
+void enqueue_fill(Device &device, const cl::Buffer &mem, const void *pattern,
+                  std::size_t pattern_bytes, std::size_t bytes, std::size_t offset,
+                  cl::Event *event) {
   cl::CommandQueue &queue = device.queue();
   if (device.info().platform == "Oclgrind") {
     return write_pattern(queue, mem, pattern, pattern_bytes, bytes, offset, event);
@@ -78,12 +83,13 @@ RawBuffer::RawBuffer(Device &device, std::string name, std::size_t bytes)
   const std::size_t allocated = std::max<std::size_t>(bytes, 1);  // OpenCL has no empty buffers
   const std::uint64_t largest = device.capabilities().largest_allocation;
   if (allocated > largest) {
-    throw Error("buffer '{}' wants {:.1f} MiB, device '{}' gives at most {:.1f} MiB to one buffer", name_,
-                mebibytes(allocated), device.info().name, mebibytes(largest));
+    throw Error("buffer '{}' wants {:.1f} MiB, device '{}' gives at most {:.1f} MiB to one buffer",
+                name_, mebibytes(allocated), device.info().name, mebibytes(largest));
   }
   try {
     cl::Buffer mem(device.context(), CL_MEM_READ_WRITE, allocated);
-    // Not through the timer: allocating belongs to no stage. Wide patterns are faster where they fit.
+    // Not through the timer: allocating belongs to no stage. Wide patterns are faster where they
+    // fit.
     constexpr std::array<std::byte, 4> kZero{};
     const std::size_t pattern_bytes = allocated % kZero.size() == 0 ? kZero.size() : 1;
     enqueue_fill(device, mem, kZero.data(), pattern_bytes, allocated, 0, nullptr);
@@ -92,9 +98,11 @@ RawBuffer::RawBuffer(Device &device, std::string name, std::size_t bytes)
     mem_ = std::move(mem);
     bytes_ = bytes;
   } catch (const cl::Error &error) {
-    throw Error("device '{}' cannot allocate {:.1f} MiB for buffer '{}' beside the {:.1f} MiB in use: {}: {}",
-                device.info().name, mebibytes(allocated), name_, mebibytes(device.ledger().current()),
-                error.what(), error_name(error.err()));
+    throw Error(
+        "device '{}' cannot allocate {:.1f} MiB for buffer '{}' beside the {:.1f} MiB in use: {}: "
+        "{}",
+        device.info().name, mebibytes(allocated), name_, mebibytes(device.ledger().current()),
+        error.what(), error_name(error.err()));
   }
 }
 
@@ -104,7 +112,8 @@ RawBuffer::~RawBuffer() {
 
 RawBuffer::RawBuffer(RawBuffer &&other) noexcept
     : device_(other.device_),
-      name_(other.name_),  // NOLINT(performance-move-constructor-init): the empty one still says who it was
+      name_(other.name_),  // NOLINT(performance-move-constructor-init): the empty one still says
+                           // who it was
       bytes_(std::exchange(other.bytes_, 0)),
       mem_(std::move(other.mem_)) {}
 
@@ -121,7 +130,8 @@ RawBuffer &RawBuffer::operator=(RawBuffer &&other) noexcept {
 void RawBuffer::release() noexcept {
   if (mem_() == nullptr) return;
   device_->ledger().remove(name_, std::max<std::size_t>(bytes_, 1));
-  // Dies here instead of being overwritten: the bindings' assignment can throw, their destructor cannot.
+  // Dies here instead of being overwritten: the bindings' assignment can throw, their destructor
+  // cannot.
   const cl::Buffer dying(std::move(mem_));
   bytes_ = 0;
 }
@@ -154,7 +164,8 @@ void RawBuffer::read_bytes(void *dst, std::size_t bytes, std::size_t offset, boo
   }
 }
 
-void RawBuffer::upload_bytes(const void *src, std::size_t bytes, const cl::Event &after, cl::Event &done) {
+void RawBuffer::upload_bytes(const void *src, std::size_t bytes, const cl::Event &after,
+                             cl::Event &done) {
   try {
     const std::vector<cl::Event> waits = events_of(after);
     device_->transfer_queue().enqueueWriteBuffer(mem_, CL_FALSE, 0, bytes, src, &waits, &done);
@@ -165,8 +176,8 @@ void RawBuffer::upload_bytes(const void *src, std::size_t bytes, const cl::Event
   }
 }
 
-void RawBuffer::download_bytes(void *dst, std::size_t bytes, std::size_t offset, const cl::Event &after,
-                               cl::Event &done) const {
+void RawBuffer::download_bytes(void *dst, std::size_t bytes, std::size_t offset,
+                               const cl::Event &after, cl::Event &done) const {
   try {
     const std::vector<cl::Event> waits = events_of(after);
     device_->transfer_queue().enqueueReadBuffer(mem_, CL_FALSE, offset, bytes, dst, &waits, &done);
@@ -181,7 +192,8 @@ void RawBuffer::fill_bytes(const void *pattern, std::size_t pattern_bytes, std::
                            std::size_t offset) {
   if (bytes == 0) return;
   try {
-    enqueue_fill(*device_, mem_, pattern, pattern_bytes, bytes, offset, device_->timer().next_event());
+    enqueue_fill(*device_, mem_, pattern, pattern_bytes, bytes, offset,
+                 device_->timer().next_event());
   } catch (const cl::Error &error) {
     throw failure(name_, "fill", error);
   }
@@ -190,7 +202,8 @@ void RawBuffer::fill_bytes(const void *pattern, std::size_t pattern_bytes, std::
 void RawBuffer::copy_bytes(const RawBuffer &from, std::size_t bytes) {
   if (bytes == 0) return;
   try {
-    device_->queue().enqueueCopyBuffer(from.mem_, mem_, 0, 0, bytes, nullptr, device_->timer().next_event());
+    device_->queue().enqueueCopyBuffer(from.mem_, mem_, 0, 0, bytes, nullptr,
+                                       device_->timer().next_event());
   } catch (const cl::Error &error) {
     throw failure(name_, "copy to", error);
   }
@@ -198,8 +211,8 @@ void RawBuffer::copy_bytes(const RawBuffer &from, std::size_t bytes) {
 
 void RawBuffer::check_range(std::size_t count, std::size_t offset, std::size_t size) const {
   if (offset <= size && count <= size - offset) return;
-  throw std::invalid_argument(
-      fmt::format("{} elements from {} on do not fit buffer '{}' of {}", count, offset, name_, size));
+  throw std::invalid_argument(fmt::format("{} elements from {} on do not fit buffer '{}' of {}",
+                                          count, offset, name_, size));
 }
 
 }  // namespace isowave::ocl

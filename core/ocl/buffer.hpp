@@ -18,8 +18,9 @@ namespace isowave::ocl {
 /// A moved-from buffer holds nothing: size 0, no memory, not in the ledger.
 class RawBuffer {
  public:
-  /// Allocates `bytes` (at least 1 is allocated for 0), sets them to zero and waits: drivers allocate lazily,
-  /// and a budget counts only what is really there. Throws Error when the device cannot.
+  /// Allocates `bytes` (at least 1 is allocated for 0), sets them to zero and waits: drivers
+  /// allocate lazily, and a budget counts only what is really there. Throws Error when the device
+  /// cannot.
   RawBuffer(Device &device, std::string name, std::size_t bytes);
   ~RawBuffer();
   RawBuffer(RawBuffer &&) noexcept;
@@ -33,12 +34,14 @@ class RawBuffer {
  protected:
   void write_bytes(const void *src, std::size_t bytes, std::size_t offset, bool blocking);
   /// Sets *event, where given, even for 0 bytes.
-  void read_bytes(void *dst, std::size_t bytes, std::size_t offset, bool blocking, cl::Event *event) const;
+  void read_bytes(void *dst, std::size_t bytes, std::size_t offset, bool blocking,
+                  cl::Event *event) const;
   /// On the transfer queue, which is flushed. A null `after` is no event to wait for.
   void upload_bytes(const void *src, std::size_t bytes, const cl::Event &after, cl::Event &done);
   void download_bytes(void *dst, std::size_t bytes, std::size_t offset, const cl::Event &after,
                       cl::Event &done) const;
-  void fill_bytes(const void *pattern, std::size_t pattern_bytes, std::size_t bytes, std::size_t offset);
+  void fill_bytes(const void *pattern, std::size_t pattern_bytes, std::size_t bytes,
+                  std::size_t offset);
   void copy_bytes(const RawBuffer &from, std::size_t bytes);
   void check_range(std::size_t count, std::size_t offset, std::size_t size) const;
   /// count * element_bytes; SIZE_MAX, which no device has, instead of an overflow.
@@ -70,7 +73,8 @@ class Buffer : public RawBuffer {
 
   std::size_t size() const { return bytes() / sizeof(T); }
 
-  /// Host -> elements [offset, offset + data.size()). Waits. Throws std::invalid_argument past the end.
+  /// Host -> elements [offset, offset + data.size()). Waits. Throws std::invalid_argument past the
+  /// end.
   void write(std::span<const T> data, std::size_t offset = 0) {
     check_range(data.size(), offset, size());
     write_bytes(data.data(), data.size_bytes(), offset * sizeof(T), true);
@@ -90,20 +94,22 @@ class Buffer : public RawBuffer {
     read(out);
     return out;
   }
-  /// As read(), but returns at once, with the queue flushed; `out` is valid when `event` completes and must
-  /// live until then.
+  /// As read(), but returns at once, with the queue flushed; `out` is valid when `event` completes
+  /// and must live until then.
   void read_async(std::span<T> out, cl::Event &event, std::size_t offset = 0) const {
     check_range(out.size(), offset, size());
     read_bytes(out.data(), out.size_bytes(), offset * sizeof(T), false, &event);
   }
-  /// Host -> elements [0, data.size()), which is not 0, on the device's transfer queue, when `after` is complete, if it is an
-  /// event. Returns at once; `data` must live until `done` completes.
+  /// Host -> elements [0, data.size()), which is not 0, on the device's transfer queue, when
+  /// `after` is complete, if it is an event. Returns at once; `data` must live until `done`
+  /// completes.
   void upload(std::span<const T> data, const cl::Event &after, cl::Event &done) {
     check_range(data.size(), 0, size());
     upload_bytes(data.data(), data.size_bytes(), after, done);
   }
   /// Elements [offset, offset + out.size()), which is not 0, -> host, as upload().
-  void download(std::span<T> out, std::size_t offset, const cl::Event &after, cl::Event &done) const {
+  void download(std::span<T> out, std::size_t offset, const cl::Event &after,
+                cl::Event &done) const {
     check_range(out.size(), offset, size());
     download_bytes(out.data(), out.size_bytes(), offset * sizeof(T), after, done);
   }

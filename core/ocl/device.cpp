@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::uint64_t kNeededLocalMemory = 32u << 10;
 
-/// Whether event times are nanoseconds: Mesa rusticl 22.3 gives 0 or the numbers 0, 1, 2, 3 for every command.
+/// Whether event times are nanoseconds: Mesa rusticl 22.3 gives 0 or the numbers 0, 1, 2, 3 for
+/// every command.
 bool reports_event_times(const cl::Context &context, const cl::CommandQueue &queue) {
   constexpr std::size_t kBytes = 4096;
   const cl::Buffer buffer(context, CL_MEM_READ_WRITE, kBytes);
@@ -46,8 +47,10 @@ std::string_view kernel_text(std::string_view stem) {
 /// Bits agree between devices only under these options (README "Arithmetic").
 std::string build_options(const DeviceInfo &device, Defines defines) {
   std::string options = "-cl-std=CL1.2";
-  if (device.capabilities.correctly_rounded_divide) options += " -cl-fp32-correctly-rounded-divide-sqrt";
-  if (device.type == DeviceType::kCpu) defines.emplace("ISO_CPU", "1");  // grid_dda.h, shared_types.h
+  if (device.capabilities.correctly_rounded_divide)
+    options += " -cl-fp32-correctly-rounded-divide-sqrt";
+  if (device.type == DeviceType::kCpu)
+    defines.emplace("ISO_CPU", "1");  // grid_dda.h, shared_types.h
   const auto has_space = [](const std::string &text) {
     return std::ranges::any_of(text, [](unsigned char c) { return std::isspace(c) != 0; });
   };
@@ -81,14 +84,16 @@ Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(de
       throw Error("device '{}' has no OpenCL C compiler: choose another with --device", info_.name);
     }
     if (can.local_memory < kNeededLocalMemory) {
-      throw Error("device '{}' has {} KiB of local memory, {} are needed: choose another with --device",
-                  info_.name, can.local_memory >> 10, kNeededLocalMemory >> 10);
+      throw Error(
+          "device '{}' has {} KiB of local memory, {} are needed: choose another with --device",
+          info_.name, can.local_memory >> 10, kNeededLocalMemory >> 10);
     }
     context_ = cl::Context(device_);
     TimerSource source = TimerSource::kOff;
     if (profiling) {
       queue_ = cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE);
-      source = reports_event_times(context_, queue_) ? TimerSource::kEvents : TimerSource::kWallClock;
+      source =
+          reports_event_times(context_, queue_) ? TimerSource::kEvents : TimerSource::kWallClock;
     }
     if (source != TimerSource::kEvents) queue_ = cl::CommandQueue(context_, device_);
     timer_.start(source, queue_);
@@ -129,8 +134,8 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
                     error_name(error.err()), first_error(log), cache_trouble());
     throw BuildError(message, std::move(log));
   } catch (const cl::Error &error) {
-    throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info_.name, options, error.what(),
-                error_name(error.err()));
+    throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info_.name, options,
+                error.what(), error_name(error.err()));
   }
 }
 
@@ -138,12 +143,14 @@ std::vector<std::string> Device::built_programs() const {
   std::vector<std::string> names;
   for (const auto &[key, program] : programs_) {
     names.push_back(key.first);
-    for (const auto &[name, value] : key.second) names.back() += fmt::format(" -D {}={}", name, value);
+    for (const auto &[name, value] : key.second)
+      names.back() += fmt::format(" -D {}={}", name, value);
   }
   return names;
 }
 
-Device::Compiling::Compiling(Device &device) : device_(device), begin_(std::chrono::steady_clock::now()) {
+Device::Compiling::Compiling(Device &device)
+    : device_(device), begin_(std::chrono::steady_clock::now()) {
   ++device_.compiling_depth_;
 }
 
@@ -154,12 +161,12 @@ Device::Compiling::~Compiling() {
 }
 
 std::uint32_t Device::max_resident_groups() const {
-  // Mesa's llvmpipe ends all loops of a work-item, without a word, after 65,535 turns in all. A work-item that
-  // strides over many elements gets there; one element each does not.
+  // Mesa's llvmpipe ends all loops of a work-item, without a word, after 65,535 turns in all. A
+  // work-item that strides over many elements gets there; one element each does not.
   if (info_.name.find("llvmpipe") != std::string::npos) return 1u << 20;
-  // A GPU's compute unit holds up to 2048 work-items and hides memory latency behind them: 16 groups of 64 to
-  // 128. A CPU driver runs the groups of a unit one after the other; a few per unit even out groups of
-  // unequal work.
+  // A GPU's compute unit holds up to 2048 work-items and hides memory latency behind them: 16
+  // groups of 64 to 128. A CPU driver runs the groups of a unit one after the other; a few per unit
+  // even out groups of unequal work.
   const std::uint32_t groups_per_unit = info_.type == DeviceType::kGpu ? 16 : 4;
   return std::max(1u, info_.capabilities.compute_units * groups_per_unit);
 }

@@ -1,8 +1,9 @@
 #pragma once
-// A device, its in-order queues (one for work, one for transfers beside it), its programs, its memory ledger and its stage timings.
+// A device, its in-order queues (one for work, one for transfers beside it), its programs, its
+// memory ledger and its stage timings.
 //
-// Everything that talks to OpenCL goes through this folder. Objects are RAII; a Device must outlive its
-// buffers and kernels. Not thread-safe: one thread drives one Device.
+// Everything that talks to OpenCL goes through this folder. Objects are RAII; a Device must outlive
+// its buffers and kernels. Not thread-safe: one thread drives one Device.
 
 #include <CL/opencl.hpp>
 #include <chrono>
@@ -23,7 +24,8 @@ namespace isowave::ocl {
 enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
 std::string_view to_string(DeviceType type);
 
-/// What a device can do, probed when it is opened or listed. Optional features have tested fallbacks.
+/// What a device can do, probed when it is opened or listed. Optional features have tested
+/// fallbacks.
 struct Capabilities {
   bool int64_atomics = false;             ///< cl_khr_int64_base_atomics and extended
   bool fp64 = false;                      ///< doubles in kernels
@@ -47,12 +49,13 @@ struct DeviceInfo {
 /// Every OpenCL 1.2 device of every platform, in the loader's order. Empty when there is none.
 std::vector<DeviceInfo> list_devices();
 
-/// Picks a device. `selector`: "" (the ISOWAVE_DEVICE environment variable if set, else the first GPU, else
-/// the first CPU, else the first device), an index, a type ("gpu", "cpu", "accelerator") or a
-/// case-insensitive fragment of the device or platform name. Throws Error naming the devices there are.
+/// Picks a device. `selector`: "" (the ISOWAVE_DEVICE environment variable if set, else the first
+/// GPU, else the first CPU, else the first device), an index, a type ("gpu", "cpu", "accelerator")
+/// or a case-insensitive fragment of the device or platform name. Throws Error naming the devices
+/// there are.
 DeviceInfo choose_device(std::string_view selector = "");
-/// The rule of choose_device() alone. `environment` stands for ISOWAVE_DEVICE and counts when `selector` is
-/// empty. Of several matches the first is taken. Returns a reference into `devices`.
+/// The rule of choose_device() alone. `environment` stands for ISOWAVE_DEVICE and counts when
+/// `selector` is empty. Of several matches the first is taken. Returns a reference into `devices`.
 const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
                               std::string_view environment);
 
@@ -61,8 +64,9 @@ using Defines = std::map<std::string, std::string>;
 
 class Device {
  public:
-  /// Throws Error when the device lacks what core needs: OpenCL 1.2, a compiler, 32 KiB of local memory.
-  /// profiling: record events so that StageTimer reports; costs about 10 us a launch on GPUs.
+  /// Throws Error when the device lacks what core needs: OpenCL 1.2, a compiler, 32 KiB of local
+  /// memory. profiling: record events so that StageTimer reports; costs about 10 us a launch on
+  /// GPUs.
   explicit Device(const DeviceInfo &info, bool profiling = false);
   Device(const Device &) = delete;
   Device &operator=(const Device &) = delete;
@@ -71,21 +75,22 @@ class Device {
   const Capabilities &capabilities() const { return info_.capabilities; }
   const cl::Context &context() const { return context_; }
   cl::CommandQueue &queue() { return queue_; }
-  /// A second in-order queue, made when it is first asked for: for transfers that overlap with the work of queue(). Events
-  /// order the two. Throws Error.
+  /// A second in-order queue, made when it is first asked for: for transfers that overlap with the
+  /// work of queue(). Events order the two. Throws Error.
   cl::CommandQueue &transfer_queue();
   MemoryLedger &ledger() { return ledger_; }
   StageTimer &timer() { return timer_; }
 
-  /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per (stem,
-  /// defines). Throws BuildError when it does not build.
+  /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per
+  /// (stem, defines). Throws BuildError when it does not build.
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
 
   /// The programs built so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".
   std::vector<std::string> built_programs() const;
 
-  /// While one lives, all that happens counts as compiling. For launches that do nothing but make the driver compile: many
-  /// compile a kernel when it is first launched. Each launch is waited for.
+  /// While one lives, all that happens counts as compiling. For launches that do nothing but make
+  /// the driver compile: many compile a kernel when it is first launched. Each launch is waited
+  /// for.
   class Compiling {
    public:
     ~Compiling();
@@ -104,7 +109,9 @@ class Device {
   double compile_ms() const { return compile_ms_; }
 
   /// Will be told the name of each kernel before it is made for the first time.
-  void on_new_kernel(std::function<void(std::string_view)> callback) { on_new_kernel_ = std::move(callback); }
+  void on_new_kernel(std::function<void(std::string_view)> callback) {
+    on_new_kernel_ = std::move(callback);
+  }
   void announce_kernel(std::string_view name) {
     if (on_new_kernel_) on_new_kernel_(name);
   }

@@ -21,7 +21,9 @@ struct ListedDevice {
 
 /// Drivers pad their strings with spaces and zeros.
 std::string trimmed(std::string text) {
-  const auto is_padding = [](char c) { return c == '\0' || std::isspace(static_cast<unsigned char>(c)); };
+  const auto is_padding = [](char c) {
+    return c == '\0' || std::isspace(static_cast<unsigned char>(c));
+  };
   while (!text.empty() && is_padding(text.back())) text.pop_back();
   text.erase(text.begin(), std::find_if_not(text.begin(), text.end(), is_padding));
   return text;
@@ -47,11 +49,14 @@ DeviceType device_type(cl_device_type bits) {
   return DeviceType::kOther;
 }
 
-/// Sub-groups became core in OpenCL 2.1 and optional in 3.0, where a count of 0 says that there are none.
-bool probe_sub_groups(const cl::Device &device, std::string_view extensions, std::uint32_t version) {
+/// Sub-groups became core in OpenCL 2.1 and optional in 3.0, where a count of 0 says that there are
+/// none.
+bool probe_sub_groups(const cl::Device &device, std::string_view extensions,
+                      std::uint32_t version) {
   if (has_word(extensions, "cl_khr_subgroups")) return true;
   if (version < 201) return false;
-  constexpr cl_device_info kMaxNumSubGroups = 0x105C;  // CL_DEVICE_MAX_NUM_SUB_GROUPS, not in 1.2's headers
+  constexpr cl_device_info kMaxNumSubGroups =
+      0x105C;  // CL_DEVICE_MAX_NUM_SUB_GROUPS, not in 1.2's headers
   cl_uint count = 0;
   try {
     device.getInfo(kMaxNumSubGroups, &count);
@@ -67,14 +72,16 @@ Capabilities probe(const cl::Device &device, std::uint32_t version) {
   Capabilities result;
   result.int64_atomics = has_word(extensions, "cl_khr_int64_base_atomics") &&
                          has_word(extensions, "cl_khr_int64_extended_atomics");
-  result.fp64 = has_word(extensions, "cl_khr_fp64") || device.getInfo<CL_DEVICE_DOUBLE_FP_CONFIG>() != 0;
+  result.fp64 =
+      has_word(extensions, "cl_khr_fp64") || device.getInfo<CL_DEVICE_DOUBLE_FP_CONFIG>() != 0;
   result.sub_groups = probe_sub_groups(device, extensions, version);
   result.correctly_rounded_divide = (floats & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
   result.denormals = (floats & CL_FP_DENORM) != 0;
   result.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
   result.largest_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
   result.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
-  result.max_work_group_size = static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
+  result.max_work_group_size =
+      static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
   result.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
   return result;
 }
@@ -125,7 +132,8 @@ std::string describe(std::span<const DeviceInfo> devices) {
   std::string text;
   for (const DeviceInfo &info : devices) {
     if (!text.empty()) text += ", ";
-    text += fmt::format("{} '{}' ({}, {})", info.index, info.name, to_string(info.type), info.platform);
+    text +=
+        fmt::format("{} '{}' ({}, {})", info.index, info.name, to_string(info.type), info.platform);
   }
   return text;
 }
@@ -175,8 +183,8 @@ cl::Device device_handle(const DeviceInfo &info) {
       return device.handle;
     }
   }
-  throw Error("device {} '{}' ({}) is not there any more: list the devices again", info.index, info.name,
-              info.platform);
+  throw Error("device {} '{}' ({}) is not there any more: list the devices again", info.index,
+              info.name, info.platform);
 }
 
 const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
@@ -214,8 +222,8 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
     });
   }
   if (!match) {
-    throw Error("no device is '{}'{}; there are: {}", selector.empty() ? environment : selector, source,
-                describe(devices));
+    throw Error("no device is '{}'{}; there are: {}", selector.empty() ? environment : selector,
+                source, describe(devices));
   }
   return *match;
 }

@@ -11,7 +11,8 @@ namespace isowave::ocl {
 Range Range::strided(std::size_t max_count, std::size_t group_size, const Device &device,
                      std::size_t oversubscribe) {
   Range range = covering(max_count, group_size);
-  range.num_groups = std::min<std::size_t>(range.num_groups, oversubscribe * device.max_resident_groups());
+  range.num_groups =
+      std::min<std::size_t>(range.num_groups, oversubscribe * device.max_resident_groups());
   return range;
 }
 
@@ -27,11 +28,12 @@ void RawKernel::make(std::size_t num_params) {
     if (num_args == num_params) kernel_ = std::move(kernel);
     is_new_ = true;
   } catch (const cl::Error &error) {
-    throw Error("{}.cl gives no kernel '{}': {}: {}", stem_, name_, error.what(), error_name(error.err()));
+    throw Error("{}.cl gives no kernel '{}': {}: {}", stem_, name_, error.what(),
+                error_name(error.err()));
   }
   if (num_args != num_params) {
-    throw std::invalid_argument(
-        fmt::format("kernel '{}' takes {} arguments, its C++ type names {}", name_, num_args, num_params));
+    throw std::invalid_argument(fmt::format("kernel '{}' takes {} arguments, its C++ type names {}",
+                                            name_, num_args, num_params));
   }
 }
 
@@ -60,7 +62,8 @@ void RawKernel::set_mem(cl_uint index, const cl::Buffer &mem) {
   try {
     kernel_.setArg(index, mem);
   } catch (const cl::Error &error) {
-    throw Error("kernel '{}', argument {}: {}: {}", name_, index, error.what(), error_name(error.err()));
+    throw Error("kernel '{}', argument {}: {}: {}", name_, index, error.what(),
+                error_name(error.err()));
   }
 }
 

@@ -4,8 +4,8 @@
 //   Kernel<In<uint>, uint, Out<uint>> scale_{device, "scale", "scale_values"};
 //   scale_(Range::strided(count, 64, device), input, factor, output);
 //
-// Its program is built when it is first launched, so that what is not used is not built. Whoever times launches does one before
-// that has nothing to do.
+// Its program is built when it is first launched, so that what is not used is not built. Whoever
+// times launches does one before that has nothing to do.
 
 #include <CL/opencl.hpp>
 #include <cstddef>
@@ -20,10 +20,12 @@
 
 namespace isowave::ocl {
 
-/// Parameter tags for buffers: `global const T *` and `global T *` (or `constant T *`) of the kernel.
+/// Parameter tags for buffers: `global const T *` and `global T *` (or `constant T *`) of the
+/// kernel.
 template <class T>
 struct In {
-  In(const Buffer<T> &buffer) : mem(buffer.mem()) {}  // NOLINT(google-explicit-constructor): tags convert
+  In(const Buffer<T> &buffer)
+      : mem(buffer.mem()) {}  // NOLINT(google-explicit-constructor): tags convert
   const cl::Buffer &mem;
 };
 template <class T>
@@ -50,7 +52,8 @@ struct Range {
     return {(count + group_size - 1) / group_size, group_size};
   }
   /// For grid-stride kernels: as covering(), but never more groups than keep the device busy.
-  /// oversubscribe: this many times as many, for kernels so lean that a device holds more groups than of others.
+  /// oversubscribe: this many times as many, for kernels so lean that a device holds more groups
+  /// than of others.
   static Range strided(std::size_t max_count, std::size_t group_size, const Device &device,
                        std::size_t oversubscribe = 1);
 };
@@ -61,10 +64,11 @@ class RawKernel {
       : device_(&device), stem_(stem), name_(kernel_name), defines_(defines) {}
 
  protected:
-  /// Makes the kernel, unless that has been done; its program, too. Throws Error when there is none of that name,
-  /// std::invalid_argument when it has another number of parameters.
+  /// Makes the kernel, unless that has been done; its program, too. Throws Error when there is none
+  /// of that name, std::invalid_argument when it has another number of parameters.
   void make(std::size_t num_params);
-  /// Enqueues; waits at the first launch, and while a Device::Compiling lives. Throws Error naming kernel and OpenCL error.
+  /// Enqueues; waits at the first launch, and while a Device::Compiling lives. Throws Error naming
+  /// kernel and OpenCL error.
   void launch(const Range &range);
   template <class T>
   void set(cl_uint index, const In<T> &arg) {
@@ -98,10 +102,12 @@ class RawKernel {
 template <class... Params>
 class Kernel : public RawKernel {
  public:
-  Kernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines = {})
+  Kernel(Device &device, std::string_view stem, const char *kernel_name,
+         const Defines &defines = {})
       : RawKernel(device, stem, kernel_name, defines) {}
 
-  /// Enqueues one launch in queue order; does not wait but at the first one, which counts as compiling. A range of 0 groups does nothing.
+  /// Enqueues one launch in queue order; does not wait but at the first one, which counts as
+  /// compiling. A range of 0 groups does nothing.
   void operator()(const Range &range, const std::type_identity_t<Params> &...args) {
     if (range.num_groups == 0) return;
     make(sizeof...(Params));

@@ -55,7 +55,8 @@ std::optional<fs::path> folder_of(const DeviceInfo &device) {
   return {};
 }
 
-/// Others are written whenever a kernel is looked up: PoCL's last_accessed and tempfile_*, NVIDIA's index, Mesa's index and *.idx.
+/// Others are written whenever a kernel is looked up: PoCL's last_accessed and tempfile_*, NVIDIA's
+/// index, Mesa's index and *.idx.
 bool holds_kernels(const fs::path &file) {
   const std::string name = file.filename().string();
   return name != "index" && name != "last_accessed" && !name.starts_with("tempfile_") &&
@@ -66,7 +67,8 @@ bool holds_kernels(const fs::path &file) {
 
 KernelCache::KernelCache(const DeviceInfo &device)
     // A file's time is that of the kernel's last tick, up to 10 ms ago.
-    : folder_(folder_of(device)), begin_(fs::file_time_type::clock::now() - std::chrono::milliseconds(10)) {}
+    : folder_(folder_of(device)),
+      begin_(fs::file_time_type::clock::now() - std::chrono::milliseconds(10)) {}
 
 bool KernelCache::has_new_kernels() const {
   if (!folder_) return false;
@@ -75,7 +77,8 @@ bool KernelCache::has_new_kernels() const {
        file.increment(failure)) {
     std::error_code gone;  // drivers make temporary files there
     const auto time = file->last_write_time(gone);
-    if (!gone && time >= begin_ && file->is_regular_file(gone) && holds_kernels(file->path())) return true;
+    if (!gone && time >= begin_ && file->is_regular_file(gone) && holds_kernels(file->path()))
+      return true;
   }
   return false;
 }

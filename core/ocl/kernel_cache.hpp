@@ -1,5 +1,6 @@
 #pragma once
-// Where drivers keep the kernels that they have compiled, for the next program that asks for them. isowave keeps none itself.
+// Where drivers keep the kernels that they have compiled, for the next program that asks for them.
+// isowave keeps none itself.
 
 #include <filesystem>
 #include <optional>

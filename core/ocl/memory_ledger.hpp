@@ -17,7 +17,7 @@ class MemoryLedger {
   void remove(const std::string &name, std::uint64_t bytes) noexcept;
 
   std::uint64_t current() const { return total_.current; }  ///< bytes
-  std::uint64_t peak() const { return total_.peak; }        ///< bytes: the largest current() ever was
+  std::uint64_t peak() const { return total_.peak; }  ///< bytes: the largest current() ever was
   const std::map<std::string, Entry> &by_name() const { return by_name_; }
 
  private:

@@ -11,12 +11,13 @@ PinnedBuffer::PinnedBuffer(Device &device, std::string name, std::size_t count)
   const std::size_t bytes = count * sizeof(std::uint32_t);
   try {
     mem_ = cl::Buffer(device.context(), CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, bytes);
-    void *mapped = device.queue().enqueueMapBuffer(mem_, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE, 0, bytes);
+    void *mapped =
+        device.queue().enqueueMapBuffer(mem_, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE, 0, bytes);
     words_ = {static_cast<std::uint32_t *>(mapped), count};
     device.ledger().add(name_, bytes);
   } catch (const cl::Error &error) {
-    throw Error("device '{}' cannot allocate {} bytes for '{}': {}: {}", device.info().name, bytes, name_,
-                error.what(), error_name(error.err()));
+    throw Error("device '{}' cannot allocate {} bytes for '{}': {}: {}", device.info().name, bytes,
+                name_, error.what(), error_name(error.err()));
   }
   std::ranges::fill(words_, 0u);  // drivers allocate lazily
 }

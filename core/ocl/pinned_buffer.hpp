@@ -1,5 +1,6 @@
 #pragma once
-// Host memory that a device can copy from without help of the processor, so that transfers overlap with work.
+// Host memory that a device can copy from without help of the processor, so that transfers overlap
+// with work.
 
 #include <CL/opencl.hpp>
 #include <cstddef>
@@ -11,8 +12,8 @@
 
 namespace isowave::ocl {
 
-/// 32-bit words. Booked in the device's ledger all the same: a driver may keep a copy on the device, and some devices share
-/// the host's memory.
+/// 32-bit words. Booked in the device's ledger all the same: a driver may keep a copy on the
+/// device, and some devices share the host's memory.
 class PinnedBuffer {
  public:
   /// `count` is not 0. Throws Error when there is no such memory.

@@ -1,14 +1,16 @@
 #pragma once
-// What PoCL needs of the environment. Without a folder for compiled kernels that it can write to, PoCL 3.1 offers no device, fails to
-// build, or ends the process.
+// What PoCL needs of the environment. Without a folder for compiled kernels that it can write to,
+// PoCL 3.1 offers no device, fails to build, or ends the process.
 
 #include <string>
 
 namespace isowave::ocl {
 
-/// Sees to it that PoCL has such a folder: if the one it would take (POCL_CACHE_DIR, XDG_CACHE_HOME, HOME or /tmp) cannot be
-/// written to and POCL_CACHE_DIR is not set, sets POCL_CACHE_DIR to a folder of this user's alone below TMPDIR or /tmp. Adds the
-/// usual folders to a PATH without a linker, which PoCL runs. To be called before the first OpenCL call; does its work once.
+/// Sees to it that PoCL has such a folder: if the one it would take (POCL_CACHE_DIR,
+/// XDG_CACHE_HOME, HOME or /tmp) cannot be written to and POCL_CACHE_DIR is not set, sets
+/// POCL_CACHE_DIR to a folder of this user's alone below TMPDIR or /tmp. Adds the usual folders to
+/// a PATH without a linker, which PoCL runs. To be called before the first OpenCL call; does its
+/// work once.
 void prepare_for_pocl();
 
 /// To be called when PoCL is there, for cache_notice().

@@ -35,7 +35,8 @@ void StageTimer::finish_segment() {
   const auto now = std::chrono::steady_clock::now();
   // Outside every stage the clock would measure the host, so only launches inside one are booked.
   if (depth_ > 0) {
-    milliseconds_[current_] += std::chrono::duration<double, std::milli>(now - segment_start_).count();
+    milliseconds_[current_] +=
+        std::chrono::duration<double, std::milli>(now - segment_start_).count();
   }
   segment_start_ = now;
 }

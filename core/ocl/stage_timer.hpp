@@ -1,6 +1,6 @@
 #pragma once
-// Milliseconds per pipeline stage, from OpenCL events; where a driver reports event times of 0 (Mesa
-// rusticl 22.3), from the wall clock around a finish. Costs nothing when off.
+// Milliseconds per pipeline stage, from OpenCL events; where a driver reports event times of 0
+// (Mesa rusticl 22.3), from the wall clock around a finish. Costs nothing when off.
 //
 //   { const auto stage = device.timer().stage("traverse");  traverse_kernel_(...); ... }
 //   device.timer().collect()   // waits; name -> ms since the last collect()
@@ -33,17 +33,18 @@ class StageTimer {
     std::string outer_;
   };
 
-  /// Launches made while the returned object lives are booked under `name`. Nests: the innermost name counts.
-  /// With kWallClock both ends wait for the queue, and what is launched outside every stage is not booked;
-  /// with kEvents that is booked under "other".
+  /// Launches made while the returned object lives are booked under `name`. Nests: the innermost
+  /// name counts. With kWallClock both ends wait for the queue, and what is launched outside every
+  /// stage is not booked; with kEvents that is booked under "other".
   [[nodiscard]] Stage stage(std::string_view name) { return Stage(*this, name); }
 
   TimerSource source() const { return source_; }
-  /// Waits for the queue; milliseconds per stage since the last call. Empty when off. Call it now and then:
-  /// every launch keeps an event until then. Throws Error when the device failed.
+  /// Waits for the queue; milliseconds per stage since the last call. Empty when off. Call it now
+  /// and then: every launch keeps an event until then. Throws Error when the device failed.
   std::map<std::string, double> collect();
 
-  /// For Kernel and Buffer: the event a launch must fill, or nullptr when none is wanted. Counts the launch.
+  /// For Kernel and Buffer: the event a launch must fill, or nullptr when none is wanted. Counts
+  /// the launch.
   cl::Event *next_event();
   /// Launches, fills and transfers enqueued so far, timed or not.
   std::uint64_t num_commands() const { return num_commands_; }
@@ -51,7 +52,8 @@ class StageTimer {
  private:
   friend class Device;
   void start(TimerSource source, cl::CommandQueue queue);
-  /// kWallClock: waits for the queue and books the time since the last segment under the innermost stage.
+  /// kWallClock: waits for the queue and books the time since the last segment under the innermost
+  /// stage.
   void finish_segment();
 
   TimerSource source_ = TimerSource::kOff;

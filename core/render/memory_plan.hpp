@@ -1,5 +1,6 @@
 #pragma once
-// Every device buffer of a renderer, computed before any of them is made: what a memory budget is held to.
+// Every device buffer of a renderer, computed before any of them is made: what a memory budget is
+// held to.
 
 #include <cstdint>
 #include <string>
@@ -29,11 +30,12 @@ struct MemoryRequest {
   Grouping grouping = kDefaultGrouping;
   std::uint32_t group_size = 64;
   StreamPlace stream = StreamPlace::kAuto;
-  std::uint64_t largest_stream_part = 0;  ///< bytes of one buffer of the compressed volume; 0: no limit
-  std::uint32_t window_blocks = 0;        ///< see StreamWindow; 0: by the size of cache and blocks
-  bool with_levels = false;               ///< the volume's coarser levels are on the device, too
-  bool with_bounds = false;               ///< and the bounds of their blocks' errors
-  std::uint64_t kept_rays = 0;            ///< of KeptPicture
+  std::uint64_t largest_stream_part =
+      0;                            ///< bytes of one buffer of the compressed volume; 0: no limit
+  std::uint32_t window_blocks = 0;  ///< see StreamWindow; 0: by the size of cache and blocks
+  bool with_levels = false;         ///< the volume's coarser levels are on the device, too
+  bool with_bounds = false;         ///< and the bounds of their blocks' errors
+  std::uint64_t kept_rays = 0;      ///< of KeptPicture
 };
 
 struct MemoryPlan {
@@ -41,31 +43,34 @@ struct MemoryPlan {
     std::string name;  ///< as in the device's MemoryLedger
     std::uint64_t bytes = 0;
   };
-  std::vector<Buffer> buffers;    ///< that live as long as the renderer
-  std::uint64_t setup_bytes = 0;  ///< all that exists while the value ranges are built, scratch included
+  std::vector<Buffer> buffers;  ///< that live as long as the renderer
+  std::uint64_t setup_bytes =
+      0;  ///< all that exists while the value ranges are built, scratch included
   std::uint32_t cache_slots = 0;
   StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
   std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
   std::uint64_t stream_bytes = 0;             ///< of the buffers for the compressed volume
-  std::string reason;                         ///< for the place: "the compressed volume of 10 bytes ..."
+  std::string reason;  ///< for the place: "the compressed volume of 10 bytes ..."
 
   std::uint64_t total() const;  ///< bytes of buffers
   std::uint64_t peak() const;   ///< bytes: the most that ever exists
 };
 
-/// The plan with so many cache slots and the stream where request.stream says, on the device for kAuto. The one place that knows
-/// all sizes; tests compare it with what is booked. Throws Error where the stream does not fit four buffers on the device.
+/// The plan with so many cache slots and the stream where request.stream says, on the device for
+/// kAuto. The one place that knows all sizes; tests compare it with what is booked. Throws Error
+/// where the stream does not fit four buffers on the device.
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots);
 
-/// As plan_memory(), but kAuto leaves the stream on the host where the plan would otherwise exceed `budget` bytes, and that
-/// takes less.
-MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request, std::uint64_t budget,
-                           std::uint32_t cache_slots);
+/// As plan_memory(), but kAuto leaves the stream on the host where the plan would otherwise exceed
+/// `budget` bytes, and that takes less.
+MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request,
+                           std::uint64_t budget, std::uint32_t cache_slots);
 
-/// The plan with the most cache slots, up to `max_slots`, whose peak is within `budget` bytes and whose buffers the device can
-/// allocate. kAuto leaves the stream on the host where that gives more slots and those that the device would have beside it
-/// are not enough to be useful. Throws Error, with the smallest budget that would do, when 8 slots are too many.
+/// The plan with the most cache slots, up to `max_slots`, whose peak is within `budget` bytes and
+/// whose buffers the device can allocate. kAuto leaves the stream on the host where that gives more
+/// slots and those that the device would have beside it are not enough to be useful. Throws Error,
+/// with the smallest budget that would do, when 8 slots are too many.
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 

@@ -11,8 +11,9 @@
 
 namespace isowave {
 
-/// A queue of at most two read-backs in flight. Their memory is pinned: to any other, NVIDIA's driver copies by a detour that
-/// costs a cold 512^3 frame a fifth of its time (H100, README "Results").
+/// A queue of at most two read-backs in flight. Their memory is pinned: to any other, NVIDIA's
+/// driver copies by a detour that costs a cold 512^3 frame a fifth of its time (H100, README
+/// "Results").
 class PassReadback {
  public:
   static constexpr std::size_t kMaxInFlight = 2;
@@ -30,7 +31,8 @@ class PassReadback {
 
   std::size_t in_flight() const { return in_flight_; }
 
-  /// Enqueues a read of the counts as they are when the device gets here. At most two may be in flight.
+  /// Enqueues a read of the counts as they are when the device gets here. At most two may be in
+  /// flight.
   void push(const CountsBuffer &counts) {
     const std::size_t slot = next_++ % kMaxInFlight;
     auto *into = reinterpret_cast<PassCounts *>(memory_.words().subspan(slot * kWords).data());

@@ -21,7 +21,8 @@ class BlocksPipeline : public Pipeline {
         initial_rays_(state.device, state.rays.num_rays),
         speculation_(state.device),
         traverse_(state.device, state.rays.num_rays, group_size),
-        group_(state.device, state.rays.num_rays, state.cache.num_slots, group_size, grouping, closest),
+        group_(state.device, state.rays.num_rays, state.cache.num_slots, group_size, grouping,
+               closest),
         intersect_(state.device, state.rays.num_rays, group_size, solver, closest),
         composite_(state.device, state.rays.num_rays, closest) {}
 
@@ -123,7 +124,8 @@ void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
       Level &level = levels[i];
       // Two in one launch: it takes as long as one block, mostly.
       if (i + 1 < of.end && level.decode.can_join(levels[i + 1].stream)) ++i;
-      level.decode({level.stream, level.frame}, {levels[i].stream, levels[i].frame}, rays.counts, cache);
+      level.decode({level.stream, level.frame}, {levels[i].stream, levels[i].frame}, rays.counts,
+                   cache);
     }
   } catch (...) {  // blocks have slots, but no values
     cache.clear();
@@ -131,8 +133,9 @@ void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
   }
 }
 
-std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
-                                        Solver solver, Grouping grouping, ClosestHit closest) {
+std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
+                                        std::uint32_t group_size, Solver solver, Grouping grouping,
+                                        ClosestHit closest) {
   if (kind == PipelineKind::kBlocks)
     return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping, closest);
   return std::make_unique<RaysPipeline>(state, group_size, solver);

@@ -1,7 +1,9 @@
 #pragma once
-// The passes of a frame: two ways to arrange the same stages, with the same finished picture bit for bit.
+// The passes of a frame: two ways to arrange the same stages, with the same finished picture bit
+// for bit.
 //
-//   blocks  [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]*   the paper's (Sec. 3.3 to 4.4)
+//   blocks  [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]*
+//           the paper's (Sec. 3.3 to 4.4)
 //   rays    start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
 //           each ray intersects what it meets, as far as it is cached
 
@@ -54,8 +56,9 @@ struct FrameState {
   LevelRange drawing{};          ///< the frame at work
   bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
 
-  /// Cache and decode: the blocks asked for, asked.requested_count, of those levels, get slots and values. Asynchronous but where the stream
-  /// stays on the host: see ZfpDecode. Where that throws, the cache is empty.
+  /// Cache and decode: the blocks asked for, asked.requested_count, of those levels, get slots and
+  /// values. Asynchronous but where the stream stays on the host: see ZfpDecode. Where that throws,
+  /// the cache is empty.
   void provide_blocks(const CountsBuffer &asked, LevelRange of);
 };
 
@@ -66,12 +69,14 @@ class Pipeline {
   virtual void begin_frame() = 0;
   /// Enqueues one pass: a chain of launches whose sizes live on the device. Asynchronous.
   virtual void enqueue_pass() = 0;
-  /// Says that no ray is left in the frame. Without it, the next frame knows that passes of this one were not followed up.
+  /// Says that no ray is left in the frame. Without it, the next frame knows that passes of this
+  /// one were not followed up.
   virtual void end_frame() {}
 };
 
 /// `state` must outlive the pipeline.
-std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state, std::uint32_t group_size,
-                                        Solver solver, Grouping grouping, ClosestHit closest);
+std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
+                                        std::uint32_t group_size, Solver solver, Grouping grouping,
+                                        ClosestHit closest);
 
 }  // namespace isowave

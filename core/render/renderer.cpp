@@ -20,22 +20,26 @@ namespace {
 constexpr std::uint32_t kSmallCache = 1u << 16;
 
 double ms_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+      .count();
 }
 
-RendererOptions checked(RendererOptions options, const CompressedVolume &volume, const ocl::Device &device) {
+RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
+                        const ocl::Device &device) {
   check_volume_info(volume.info, "the volume");
   check_image_size(options.size);
   check_levels(volume, options.max_pixel_error);
   const bool with_levels = options.max_pixel_error > 0;
   if (with_levels && options.pipeline == PipelineKind::kBlocks)
-    throw Error("pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
+    throw Error(
+        "pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
   const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
   std::uint64_t num_ids = 0;  // see make_id_grid()
   for (const CompressedVolume *level : levels_of(volume, with_levels))
     num_ids += layer_ids * level->num_blocks().z;
   if (num_ids >= ISO_MAX_BLOCK_IDS) {
-    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids, ISO_MAX_BLOCK_IDS);
+    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids,
+                ISO_MAX_BLOCK_IDS);
   }
   if (options.max_speculation < 1 || options.max_speculation > ISO_MAX_SPECULATION) {
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
@@ -43,7 +47,8 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   }
   if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
   const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
-  if (!std::has_single_bit(options.group_size) || options.group_size < 8 || options.group_size > largest) {
+  if (!std::has_single_bit(options.group_size) || options.group_size < 8 ||
+      options.group_size > largest) {
     throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
                 options.group_size, device.info().name, largest);
   }
@@ -66,8 +71,9 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
       options.stream,          options.largest_stream_part,
       options.window_blocks,   options.max_pixel_error > 0,
       options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0};
-  const std::uint64_t budget =
-      options.memory_budget != 0 ? options.memory_budget : device.capabilities().global_memory / 4 * 3;
+  const std::uint64_t budget = options.memory_budget != 0
+                                   ? options.memory_budget
+                                   : device.capabilities().global_memory / 4 * 3;
   std::uint64_t num_blocks = 0;
   for (const CompressedVolume *level : levels_of(volume, request.with_levels))
     num_blocks += level->block_count();
@@ -75,7 +81,8 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
     MemoryPlan plan = plan_with_slots(volume, request, budget, options.cache_slots);
     if (options.memory_budget != 0 && plan.peak() > budget) {
       throw Error(
-          "{} cache slots need {} bytes of device memory, more than the budget of {}: give one of the two "
+          "{} cache slots need {} bytes of device memory, more than the budget of {}: give one of "
+          "the two "
           "alone",
           options.cache_slots, plan.peak(), budget);
     }
@@ -83,27 +90,32 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
   }
   const std::uint64_t most =
       options.memory_budget != 0 ? std::uint64_t{ISO_MAX_CACHE_SLOTS} : kAmpleCacheSlots;
-  return plan_within(device, volume, request, budget,
-                     static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most)));
+  return plan_within(
+      device, volume, request, budget,
+      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most)));
 }
 
-FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
-                      const MemoryPlan &plan) {
-  const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.max_pixel_error > 0);
-  const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.max_pixel_error > 0));
+FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
+                      const RendererOptions &options, const MemoryPlan &plan) {
+  const std::vector<const CompressedVolume *> volumes =
+      levels_of(volume, options.max_pixel_error > 0);
+  const std::vector<FrameParams> grids =
+      make_level_grids(level_infos(volume, options.max_pixel_error > 0));
   const FrameParams ids = make_id_grid(grids), &last = grids.back();
   const bool has_levels = volumes.size() > 1;
-  const auto buffers = std::make_shared<MacrocellBuffers>(device, last.ranges_begin + block_count(last),
-                                                          last.masks_begin / 2 + num_macrocells(last),
-                                                          options.with_bounds ? kNumFieldBounds : 1);
+  const auto buffers = std::make_shared<MacrocellBuffers>(
+      device, last.ranges_begin + block_count(last), last.masks_begin / 2 + num_macrocells(last),
+      options.with_bounds ? kNumFieldBounds : 1);
   const std::uint64_t num_rays = options.size.num_rays();
-  const std::uint32_t most_requests = BlockCache::capacity_for(plan.cache_slots, block_count(ids), num_rays);
+  const std::uint32_t most_requests =
+      BlockCache::capacity_for(plan.cache_slots, block_count(ids), num_rays);
   std::vector<Level> levels;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const CompressedVolume &level = *volumes[i];
-    DeviceStream stream = plan.stream == StreamPlace::kHost
-                              ? DeviceStream(device, level, OnHost{plan.window_blocks}, options.with_bounds)
-                              : DeviceStream(device, level, options.largest_stream_part, options.with_bounds);
+    DeviceStream stream =
+        plan.stream == StreamPlace::kHost
+            ? DeviceStream(device, level, OnHost{plan.window_blocks}, options.with_bounds)
+            : DeviceStream(device, level, options.largest_stream_part, options.with_bounds);
     Macrocells macrocells(device, grids[i], stream, buffers);
     ZfpDecode decode(device, most_requests, stream.defines(), has_levels);
     levels.push_back({level.info, level.error_bound, LevelError(level, i == 0), std::move(stream),
@@ -114,11 +126,12 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume, const
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
-/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use to the next. What
-/// is left of a ray's blocks makes it wait once for each that is gone. To a GPU such passes cost more than decoding
-/// all anew: H100, 512^3, frames that come again take 1.2 ms with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000
-/// where blocks are kept, cold ones 1.3. Where blocks take longer, since a CPU decodes them or they must be uploaded
-/// first, more are worth keeping: PoCL, 80,000 and 65,536 slots, 123 and 138 ms, cold 154 and 146.
+/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use
+/// to the next. What is left of a ray's blocks makes it wait once for each that is gone. To a GPU
+/// such passes cost more than decoding all anew: H100, 512^3, frames that come again take 1.2 ms
+/// with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones 1.3.
+/// Where blocks take longer, since a CPU decodes them or they must be uploaded first, more are
+/// worth keeping: PoCL, 80,000 and 65,536 slots, 123 and 138 ms, cold 154 and 146.
 std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, StreamPlace stream) {
   return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
 }
@@ -131,7 +144,8 @@ bool turned_over(const std::vector<PassStats> &passes, std::uint32_t most) {
 
 }  // namespace
 
-Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options)
+Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
+                   const RendererOptions &options)
     : device_(device),
       setup_begin_(std::chrono::steady_clock::now()),
       compile_ms_before_(device.compile_ms()),
@@ -153,11 +167,11 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume, const Re
   setup_ms_ = ms_since(setup_begin_) - (device.compile_ms() - compile_ms_before_);
 }
 
-/// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first, PoCL for each
-/// work-group size, and anew for more than 65,535 work-items. So the passes themselves run, of a frame of one pixel
-/// that meets nothing: what is launched here cannot differ from what frames launch, and all kernels leave by the
-/// exits they have for empty lists. Costs no time that grows with the volume; all that it leaves is one hit, which
-/// every frame clears.
+/// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first,
+/// PoCL for each work-group size, and anew for more than 65,535 work-items. So the passes
+/// themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ
+/// from what frames launch, and all kernels leave by the exits they have for empty lists. Costs no
+/// time that grows with the volume; all that it leaves is one hit, which every frame clears.
 void Renderer::compile_kernels() {
   const auto compiling = device_.compiling();
   Wavefront &rays = state_.rays;
@@ -169,7 +183,8 @@ void Renderer::compile_kernels() {
        ++num_levels) {
     rays.num_level_frames = num_levels;
     pipeline_->begin_frame();
-    for (int pass = 0; pass < 2; ++pass) pipeline_->enqueue_pass();  // the first has nothing to decode
+    for (int pass = 0; pass < 2; ++pass)
+      pipeline_->enqueue_pass();  // the first has nothing to decode
     pipeline_->end_frame();
   }
   state_.cache.classify(rays);
@@ -200,7 +215,8 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
     stats.cancelled = on_pass && !on_pass(pass) && !finished;
     guard.check(pass.counts);
   }
-  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits for it.
+  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
+  // for it.
   if (!stats.cancelled) {
     pipeline_->end_frame();
     if (turned_over(stats.passes,
@@ -276,12 +292,13 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
       std::min(counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
   if (rays_looking != 0) stats.n_spec = static_cast<double>(counts.ahead_count) / rays_looking;
   if (is_blocks) stats.visible_blocks = counts.visible_count;
-  // A launch that is not needed costs more than a pass that finds slots missing now and then. The counts are a pass
-  // old: its requests have taken slots since, and the pass after it may have asked for as many.
+  // A launch that is not needed costs more than a pass that finds slots missing now and then. The
+  // counts are a pass old: its requests have taken slots since, and the pass after it may have
+  // asked for as many.
   const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
   const std::uint32_t num_slots = state_.cache.num_slots;
-  state_.slots_are_scarce =
-      num_slots < kSmallCache || counts.free_count < std::max<std::uint64_t>(num_slots / 4, spoken_for);
+  state_.slots_are_scarce = num_slots < kSmallCache ||
+                            counts.free_count < std::max<std::uint64_t>(num_slots / 4, spoken_for);
   stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
   stats.utilization_percent = 100.0 * counts.granted_count / rays;
   stats.stage_ms = device_.timer().collect();
@@ -297,7 +314,8 @@ void Renderer::set_value_error(double value_error) {
 void Renderer::draw_bound(FieldBound bound) {
   if (bound != FieldBound::kNone) {
     if (!options_.with_bounds) throw std::logic_error("the renderer was made without bounds");
-    for (const Level &level : state_.levels) value_offset(level.error, bound, 0, value_range_);  // or throws
+    for (const Level &level : state_.levels)
+      value_offset(level.error, bound, 0, value_range_);  // or throws
   }
   bound_ = bound;
   if (options_.with_bounds) state_.levels[0].macrocells.use(static_cast<std::size_t>(bound));
@@ -338,8 +356,8 @@ void Renderer::set_max_pixel_error(double max_pixel_error) {
 void Renderer::set_size(ImageSize size) {
   check_image_size(size);
   if (size.num_rays() > state_.rays.num_rays) {
-    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for", size.width,
-                size.height, state_.rays.num_rays);
+    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
+                size.width, size.height, state_.rays.num_rays);
   }
   options_.size = size;
 }
@@ -362,7 +380,8 @@ void Renderer::clear_cache() {
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {
-  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, options_.size.samples);
+  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays,
+                options_.size.samples);
 }
 
 }  // namespace isowave

@@ -10,9 +10,10 @@
 
 namespace isowave {
 
-/// Watches the counts of a frame's passes. A pass that ends no ray and brings no block still takes the first of its rays on by
-/// a cell; so such passes in a row cannot be more than a ray has cells. If they are, a kernel is at fault: there has been an
-/// OpenCL compiler whose code waited for blocks that it never asked for.
+/// Watches the counts of a frame's passes. A pass that ends no ray and brings no block still takes
+/// the first of its rays on by a cell; so such passes in a row cannot be more than a ray has cells.
+/// If they are, a kernel is at fault: there has been an OpenCL compiler whose code waited for
+/// blocks that it never asked for.
 class StallGuard {
  public:
   /// dims: of the volume [voxels].
@@ -20,12 +21,13 @@ class StallGuard {
 
   /// counts: of the next pass. Throws Error when there is no progress.
   void check(const PassCounts &counts) {
-    const bool stalled = counts.next_active_count >= counts.active_count && counts.requested_count == 0 &&
-                         counts.decoded_count == 0;
+    const bool stalled = counts.next_active_count >= counts.active_count &&
+                         counts.requested_count == 0 && counts.decoded_count == 0;
     num_stalled_ = stalled ? num_stalled_ + 1 : 0;
     if (num_stalled_ > limit_)
       throw Error(
-          "{} rays wait for blocks that nobody asks for, for {} passes now: a fault of isowave or of this "
+          "{} rays wait for blocks that nobody asks for, for {} passes now: a fault of isowave or "
+          "of this "
           "OpenCL driver; please report it",
           counts.next_active_count, num_stalled_);
   }

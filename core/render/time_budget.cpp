@@ -29,12 +29,15 @@ void check_time_budget(double budget_ms) {
 }
 
 double TimedFrames::steady_clock_ms() {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch())
+  return std::chrono::duration<double, std::milli>(
+             std::chrono::steady_clock::now().time_since_epoch())
       .count();
 }
 
-TimedFrames::TimedFrames(Renderer &renderer, Clock now) : renderer_(renderer), now_(std::move(now)) {
-  if (!renderer.options().with_kept_picture) throw std::logic_error("the renderer keeps no picture");
+TimedFrames::TimedFrames(Renderer &renderer, Clock now)
+    : renderer_(renderer), now_(std::move(now)) {
+  if (!renderer.options().with_kept_picture)
+    throw std::logic_error("the renderer keeps no picture");
 }
 
 TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budget_ms) {
@@ -90,7 +93,8 @@ TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budg
   return frame;
 }
 
-/// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms, or `step` where there is no time.
+/// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms,
+/// or `step` where there is no time.
 std::size_t TimedFrames::next_step(std::size_t step, double step_ms, double first_pass_ms,
                                    double left_ms) const {
   std::size_t next = step;

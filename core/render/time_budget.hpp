@@ -1,6 +1,7 @@
 #pragma once
-// Frames within a time: first a small picture with coarse levels of detail, then larger and finer ones, as long as there is time. What is
-// drawn depends on timings, unlike everything else in isowave; a whole picture is there however short the time.
+// Frames within a time: first a small picture with coarse levels of detail, then larger and finer
+// ones, as long as there is time. What is drawn depends on timings, unlike everything else in
+// isowave; a whole picture is there however short the time.
 
 #include <array>
 #include <functional>
@@ -10,7 +11,8 @@
 
 namespace isowave {
 
-/// A picture that was drawn on the way. Where it was cancelled, since time was over, and has no hit yet, the one before shows through.
+/// A picture that was drawn on the way. Where it was cancelled, since time was over, and has no hit
+/// yet, the one before shows through.
 struct TimedStep {
   ImageSize size;
   double max_pixel_error = 0;    ///< of its own pixels
@@ -25,9 +27,10 @@ struct TimedFrame {
   bool complete = false;         ///< the hit buffer holds what Renderer::render() draws
 };
 
-/// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the rays along each axis, then all of them as the
-/// renderer was set. Pictures of fewer rays have one for each pixel. Where the renderer has levels of detail, smaller pictures use those
-/// whose voxels are at most one of their pixels apart.
+/// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the rays along
+/// each axis, then all of them as the renderer was set. Pictures of fewer rays have one for each
+/// pixel. Where the renderer has levels of detail, smaller pictures use those whose voxels are at
+/// most one of their pixels apart.
 class TimedFrames {
  public:
   using Clock = std::function<double()>;  ///< [ms]
@@ -35,9 +38,10 @@ class TimedFrames {
   /// now: for tests. `renderer` must outlive this.
   explicit TimedFrames(Renderer &renderer, Clock now = steady_clock_ms);
 
-  /// Draws the smallest picture, however long it takes, then the largest that is expected to be whole in time, by what steps took in
-  /// the frame before, and so on. A picture that is not whole in time is filled from the one before. The hit buffer holds a picture of the full
-  /// size. Throws Error unless budget_ms is finite and above 0, and as Renderer::render() does.
+  /// Draws the smallest picture, however long it takes, then the largest that is expected to be
+  /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
+  /// in time is filled from the one before. The hit buffer holds a picture of the full size. Throws
+  /// Error unless budget_ms is finite and above 0, and as Renderer::render() does.
   TimedFrame render(const Camera &camera, float isovalue, double budget_ms);
 
   static double steady_clock_ms();
@@ -45,11 +49,13 @@ class TimedFrames {
  private:
   static constexpr std::size_t kNumSteps = 4;  ///< 1/8 to 1/1; steps count down to 0, all rays
 
-  std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms, double left_ms) const;
+  std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms,
+                        double left_ms) const;
 
   Renderer &renderer_;
   Clock now_;
-  std::array<double, kNumSteps> last_ms_{};  ///< what each step took when it was drawn last; 0: unknown
+  std::array<double, kNumSteps>
+      last_ms_{};  ///< what each step took when it was drawn last; 0: unknown
 };
 
 /// Throws Error unless it is finite and above 0.

@@ -22,9 +22,9 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
 
 }  // namespace
 
-/// Twice as many entries as slots, an eighth of them with evicted blocks' keys at most before the table is rebuilt
-/// (H100, 512^3, 65,536 slots: frames take 1.26 ms; with a quarter, 1.45); not a multiple of 3, so that
-/// ISO_TABLE_STEP reaches every entry.
+/// Twice as many entries as slots, an eighth of them with evicted blocks' keys at most before the
+/// table is rebuilt (H100, 512^3, 65,536 slots: frames take 1.26 ms; with a quarter, 1.45); not a
+/// multiple of 3, so that ISO_TABLE_STEP reaches every entry.
 std::uint32_t BlockCache::table_groups_for(std::uint32_t num_slots) {
   const std::uint32_t groups = num_slots / 4 + 1;
   return groups % 3 == 0 ? groups + 1 : groups;
@@ -59,19 +59,25 @@ BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32
       slot_ranks_(device, "slot ranks", slots),
       slot_changing_(device, "cells of cached blocks", slots),
       rank_histogram_(device, "eviction ranks", ISO_EVICTION_RANKS),
-      request_(device, "block_cache", "cache_request", with_levels(group_defines(group_size), levels)),
+      request_(device, "block_cache", "cache_request",
+               with_levels(group_defines(group_size), levels)),
       rank_(device, "block_cache", "cache_rank", with_levels(group_defines(group_size), levels)),
-      select_(device, "block_cache", "cache_select", with_levels(group_defines(group_size), levels)),
+      select_(device, "block_cache", "cache_select",
+              with_levels(group_defines(group_size), levels)),
       evict_(device, "block_cache", "cache_evict", with_levels(group_defines(group_size), levels)),
-      rebuild_(device, "block_cache", "cache_rebuild", with_levels(group_defines(group_size), levels)),
-      classify_(device, "block_cache", "cache_classify", with_levels(group_defines(group_size), levels)),
-      assign_(device, "block_cache", "cache_assign", with_levels(group_defines(group_size), levels)),
+      rebuild_(device, "block_cache", "cache_rebuild",
+               with_levels(group_defines(group_size), levels)),
+      classify_(device, "block_cache", "cache_classify",
+                with_levels(group_defines(group_size), levels)),
+      assign_(device, "block_cache", "cache_assign",
+              with_levels(group_defines(group_size), levels)),
       clear_(device, "block_cache", "cache_clear", with_levels(group_defines(group_size), levels)) {
   clear();
 }
 
 void BlockCache::clear() {
-  clear_(slots_range_, num_slots, 8 * table_groups, table, slot_block_ids, slot_stamps, free_slots_, state);
+  clear_(slots_range_, num_slots, 8 * table_groups, table, slot_block_ids, slot_stamps, free_slots_,
+         state);
 }
 
 void BlockCache::classify(Wavefront &rays) {
@@ -79,23 +85,24 @@ void BlockCache::classify(Wavefront &rays) {
 }
 
 void BlockCache::request(Wavefront &rays) {
-  request_(pairs_range_, rays.frame, rays.counts, rays.pair_block_ids, table, slot_stamps, requested_bits,
-           request_block_ids, capacity, state);
+  request_(pairs_range_, rays.frame, rays.counts, rays.pair_block_ids, table, slot_stamps,
+           requested_bits, request_block_ids, capacity, state);
 }
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
-  rank_(slots_range_, rays.frame, asked, num_slots, capacity, state, table, slot_block_ids, slot_stamps,
-        slot_ranks_, slot_changing_, rank_histogram_);
+  rank_(slots_range_, rays.frame, asked, num_slots, capacity, state, table, slot_block_ids,
+        slot_stamps, slot_ranks_, slot_changing_, rank_histogram_);
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, rank_histogram_, state);
-  evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, slot_ranks_, table, state,
-         free_slots_);
-  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_changing_, state, table);
+  evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, slot_ranks_,
+         table, state, free_slots_);
+  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_changing_, state,
+           table);
 }
 
 void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {
-  assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots_, table,
-          slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
+  assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots_,
+          table, slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
 }
 
 }  // namespace isowave

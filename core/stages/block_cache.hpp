@@ -13,21 +13,21 @@ inline constexpr std::uint32_t kMinCacheSlots = 8;
 
 /// What the stages of one pass read of the cache, and add to its requests.
 struct BlockCache {
-  /// num_slots is at least kMinCacheSlots; num_rays bounds a pass's pairs. `grid`: its blocks are used, those of the
-  /// finest level where frames may have several levels of detail. Throws Error when there are too few slots, or more
-  /// than ISO_MAX_CACHE_SLOTS.
-  BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots, std::uint64_t num_rays,
-             std::uint32_t group_size, bool levels = false);
+  /// num_slots is at least kMinCacheSlots; num_rays bounds a pass's pairs. `grid`: its blocks are
+  /// used, those of the finest level where frames may have several levels of detail. Throws Error
+  /// when there are too few slots, or more than ISO_MAX_CACHE_SLOTS.
+  BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots,
+             std::uint64_t num_rays, std::uint32_t group_size, bool levels = false);
 
-  /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones. Out:
-  /// counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request_ahead.)
+  /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones.
+  /// Out: counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request_ahead.)
   void request(Wavefront &rays);
-  /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the free ones, but none
-  /// that the pass uses; the block served first gets what it takes. asked: the counts that hold requested_count.
-  /// Asynchronous.
+  /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the
+  /// free ones, but none that the pass uses; the block served first gets what it takes. asked: the
+  /// counts that hold requested_count. Asynchronous.
   void evict(const CountsBuffer &asked, Wavefront &rays);
-  /// Gives the free slots to requests. Out: counts.decoded_count; request_block_ids and decode_slots hold that many.
-  /// Asynchronous.
+  /// Gives the free slots to requests. Out: counts.decoded_count; request_block_ids and
+  /// decode_slots hold that many. Asynchronous.
   void assign(const CountsBuffer &asked, Wavefront &rays);
 
   /// Brings inside and the table up to date with another isovalue of rays.frame. Asynchronous.
@@ -43,14 +43,16 @@ struct BlockCache {
                                     std::uint64_t num_rays);
 
   std::uint32_t num_slots;
-  std::uint32_t table_groups;        ///< FrameParams::table_groups
-  std::uint32_t capacity;            ///< of the request list: requests beyond it are dropped
-  ocl::Buffer<BlockEntry> table;     ///< [8 * table_groups] see kernels_cl/portable/block_table.h
-  ocl::Buffer<float> values;         ///< [num_slots * 64] decoded values, x + 4y + 16z within a slot
-  ocl::Buffer<ulong> inside;         ///< [num_slots] bit x + 4y + 16z: is value >= isovalue?
+  std::uint32_t table_groups;     ///< FrameParams::table_groups
+  std::uint32_t capacity;         ///< of the request list: requests beyond it are dropped
+  ocl::Buffer<BlockEntry> table;  ///< [8 * table_groups] see kernels_cl/portable/block_table.h
+  ocl::Buffer<float> values;      ///< [num_slots * 64] decoded values, x + 4y + 16z within a slot
+  ocl::Buffer<ulong> inside;      ///< [num_slots] bit x + 4y + 16z: is value >= isovalue?
   ocl::Buffer<uint> slot_block_ids;  ///< [num_slots] block in each slot or ISO_INVALID_ID
-  ocl::Buffer<uint> slot_stamps;     ///< [num_slots] when it was used last: kernels_cl/device/slot_stamps.h
-  ocl::Buffer<uint> requested_bits;  ///< [2 * coarse macrocells] one bit per block; 0 between passes
+  ocl::Buffer<uint>
+      slot_stamps;  ///< [num_slots] when it was used last: kernels_cl/device/slot_stamps.h
+  ocl::Buffer<uint>
+      requested_bits;  ///< [2 * coarse macrocells] one bit per block; 0 between passes
   ocl::Buffer<uint> request_block_ids;  ///< [capacity]
   ocl::Buffer<uint> decode_slots;       ///< [capacity] slot of each request granted
   ocl::Buffer<CacheState> state;        ///< [1]
@@ -59,29 +61,32 @@ struct BlockCache {
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
   ocl::Buffer<uint> free_slots_;
-  ocl::Buffer<uchar> slot_ranks_;     ///< [num_slots] orders of eviction
-  ocl::Buffer<ulong> slot_changing_;  ///< [num_slots] BlockEntry::changing while the table is rebuilt
+  ocl::Buffer<uchar> slot_ranks_;  ///< [num_slots] orders of eviction
+  ocl::Buffer<ulong>
+      slot_changing_;  ///< [num_slots] BlockEntry::changing while the table is rebuilt
   ocl::Buffer<uint> rank_histogram_;
   ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       request_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>, ocl::In<BlockEntry>,
-              ocl::In<uint>, ocl::In<uint>, ocl::Out<uchar>, ocl::Out<ulong>, ocl::Out<uint>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>,
+              ocl::In<BlockEntry>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uchar>, ocl::Out<ulong>,
+              ocl::Out<uint>>
       rank_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
       select_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>, ocl::In<uchar>,
               ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>
       evict_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<ulong>, ocl::In<CacheState>,
-              ocl::Out<BlockEntry>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<ulong>,
+              ocl::In<CacheState>, ocl::Out<BlockEntry>>
       rebuild_;
-  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<float>, ocl::Out<ulong>, ocl::Out<BlockEntry>>
+  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<float>, ocl::Out<ulong>,
+              ocl::Out<BlockEntry>>
       classify_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint, ocl::In<uint>,
-              ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<CacheState>>
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint,
+              ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<CacheState>>
       assign_;
   ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<CacheState>>

@@ -1,6 +1,6 @@
 #pragma once
-// Counts that live on the device (PassCounts), named by field, and the macro every work-group kernel is built
-// with.
+// Counts that live on the device (PassCounts), named by field, and the macro every work-group
+// kernel is built with.
 
 #include <cstddef>
 #include <cstdint>

@@ -45,15 +45,16 @@ Grouping grouping_from_string(std::string_view name) {
   throw Error("no grouping is called '{}'; there are: radix, counting", name);
 }
 
-Group::Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
-             Grouping grouping, ClosestHit closest)
+Group::Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
+             std::uint32_t group_size, Grouping grouping, ClosestHit closest)
     : groups_{{device, "grouped pair ids", num_rays},
               {device, "block rays", max_visible(num_rays, num_slots)}},
       pair_slots_(device, "cache slots of pairs", num_rays),
-      gather_(grouping == Grouping::kRadix ? decltype(gather_)(std::in_place_type<ByRadix>, device, num_rays,
-                                                               num_slots, group_size, closest)
-                                           : decltype(gather_)(std::in_place_type<ByCounting>, device,
-                                                               num_rays, num_slots, group_size, closest)) {}
+      gather_(grouping == Grouping::kRadix
+                  ? decltype(gather_)(std::in_place_type<ByRadix>, device, num_rays, num_slots,
+                                      group_size, closest)
+                  : decltype(gather_)(std::in_place_type<ByCounting>, device, num_rays, num_slots,
+                                      group_size, closest)) {}
 
 void Group::operator()(const BlockCache &cache, Wavefront &rays) {
   std::visit([&](auto &gather) { gather(cache, rays, pair_slots_, groups_); }, gather_);
@@ -72,8 +73,8 @@ Group::ByRadix::ByRadix(ocl::Device &device, std::uint64_t num_rays, std::uint32
 
 void Group::ByRadix::operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &keys,
                                 BlockGroups &groups) {
-  select(pair_tiles_range, rays.frame, rays.counts, rays.pair_block_ids, cache.table, rays.pair_hits,
-         rays.closest_pairs, groups.pair_ids, keys);
+  select(pair_tiles_range, rays.frame, rays.counts, rays.pair_block_ids, cache.table,
+         rays.pair_hits, rays.closest_pairs, groups.pair_ids, keys);
   sort(keys, groups.pair_ids, rays.counts, ISO_COUNT_FIELD(granted_count), key_bits);
   head_sums(key_tiles_range, rays.counts, keys, tile_sums);
   heads(key_tiles_range, rays.counts, keys, tile_sums, groups.block_rays);
@@ -91,15 +92,15 @@ Group::ByCounting::ByCounting(ocl::Device &device, std::uint64_t num_rays, std::
       blocks(device, "group", "group_blocks", group_stage_defines(group_size, closest)),
       scatter(device, "group", "group_scatter", group_stage_defines(group_size, closest)) {}
 
-void Group::ByCounting::operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &pair_slots,
-                                   BlockGroups &groups) {
+void Group::ByCounting::operator()(const BlockCache &cache, Wavefront &rays,
+                                   ocl::Buffer<uint> &pair_slots, BlockGroups &groups) {
   ocl::Buffer<uint> &pair_ranks = rays.mask, &candidate_slots = groups.pair_ids;  // not in use yet
-  count(pair_tiles_range, rays.frame, rays.counts, rays.pair_block_ids, cache.table, pair_slots, pair_ranks,
-        slot_counts, candidate_slots, candidate_count);
-  blocks(candidates_range, rays.frame, rays.counts, candidate_slots, candidate_count, cache.slot_block_ids,
-         cache.table, slot_counts, slot_offsets, groups.block_rays);
-  scatter(pairs_range, rays.counts, rays.pair_block_ids, pair_slots, pair_ranks, slot_offsets, rays.pair_hits,
-          rays.closest_pairs, groups.pair_ids, candidate_count);
+  count(pair_tiles_range, rays.frame, rays.counts, rays.pair_block_ids, cache.table, pair_slots,
+        pair_ranks, slot_counts, candidate_slots, candidate_count);
+  blocks(candidates_range, rays.frame, rays.counts, candidate_slots, candidate_count,
+         cache.slot_block_ids, cache.table, slot_counts, slot_offsets, groups.block_rays);
+  scatter(pairs_range, rays.counts, rays.pair_block_ids, pair_slots, pair_ranks, slot_offsets,
+          rays.pair_hits, rays.closest_pairs, groups.pair_ids, candidate_count);
 }
 
 }  // namespace isowave

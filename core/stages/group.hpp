@@ -14,7 +14,8 @@ namespace isowave {
 /// How pairs are gathered. The picture has the same bits either way.
 enum class Grouping {
   kRadix,    ///< stable radix sort by cache slot (Sec. 3.6): scratch of 8 bytes a pixel
-  kCounting  ///< counts per slot, places for the visible ones, scatter: scratch of 8 bytes a cache slot
+  kCounting  ///< counts per slot, places for the visible ones, scatter: scratch of 8 bytes a cache
+             ///< slot
 };
 inline constexpr Grouping kDefaultGrouping = Grouping::kCounting;
 
@@ -23,16 +24,19 @@ std::string_view to_string(Grouping grouping);
 /// Throws Error naming both.
 Grouping grouping_from_string(std::string_view name);
 
-/// The pass's work for intersection. Pairs of one block lie together; which block comes first is left open.
+/// The pass's work for intersection. Pairs of one block lie together; which block comes first is
+/// left open.
 struct BlockGroups {
-  ocl::Buffer<uint> pair_ids;         ///< [granted_count] entries of pair_block_ids, by block (I_RAct)
-  ocl::Buffer<BlockRays> block_rays;  ///< [visible_count] each block's part of pair_ids (O_BRays, N_BRays)
+  ocl::Buffer<uint> pair_ids;  ///< [granted_count] entries of pair_block_ids, by block (I_RAct)
+  ocl::Buffer<BlockRays>
+      block_rays;  ///< [visible_count] each block's part of pair_ids (O_BRays, N_BRays)
 };
 
 class Group {
  public:
-  Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
-        Grouping grouping = kDefaultGrouping, ClosestHit closest = kDefaultClosestHit);
+  Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
+        std::uint32_t group_size, Grouping grouping = kDefaultGrouping,
+        ClosestHit closest = kDefaultClosestHit);
 
   /// In: counts.granted_count and counts.visible_count are 0, as begin_pass leaves them.
   /// Out: groups(), both counts; the other pairs are marked "not tested"; rays.mask is overwritten.
@@ -43,24 +47,25 @@ class Group {
 
  private:
   struct ByRadix {
-    ByRadix(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
-            ClosestHit closest);
-    void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &keys, BlockGroups &groups);
+    ByRadix(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
+            std::uint32_t group_size, ClosestHit closest);
+    void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &keys,
+                    BlockGroups &groups);
 
     ocl::Range pair_tiles_range, key_tiles_range;
     std::uint32_t key_bits;
     RadixSort sort;
     ocl::Buffer<uint> tile_sums;
-    ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<PairHit>,
-                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+    ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
+                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
         select;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> head_sums;
     ocl::Kernel<ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<BlockRays>> heads;
   };
 
   struct ByCounting {
-    ByCounting(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots, std::uint32_t group_size,
-               ClosestHit closest);
+    ByCounting(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
+               std::uint32_t group_size, ClosestHit closest);
     void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &pair_slots,
                     BlockGroups &groups);
 
@@ -68,8 +73,8 @@ class Group {
     ocl::Buffer<uint> slot_counts;      ///< [slots] 0 between passes
     ocl::Buffer<uint> slot_offsets;     ///< [slots] of blocks that the pass's pairs ask for
     ocl::Buffer<uint> candidate_count;  ///< [1] 0 between passes
-    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
-                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
+                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
         count;
     ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
                 ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<BlockRays>>
@@ -80,7 +85,8 @@ class Group {
   };
 
   BlockGroups groups_;
-  ocl::Buffer<uint> pair_slots_;  ///< [R] by radix the keys of the sort, else slots of pairs' blocks, by pair
+  ocl::Buffer<uint>
+      pair_slots_;  ///< [R] by radix the keys of the sort, else slots of pairs' blocks, by pair
   std::variant<ByRadix, ByCounting> gather_;
 };
 

@@ -11,8 +11,8 @@ class InitialRays {
  public:
   explicit InitialRays(ocl::Device &device, std::uint64_t num_rays);
 
-  /// In: rays.frame. Out: hits (none), ray_block_ids, next_active_ray_ids and counts.next_active_count.
-  /// Asynchronous.
+  /// In: rays.frame. Out: hits (none), ray_block_ids, next_active_ray_ids and
+  /// counts.next_active_count. Asynchronous.
   void operator()(Wavefront &rays, Compaction &compaction);
 
  private:

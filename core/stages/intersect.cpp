@@ -13,8 +13,8 @@ ocl::Defines intersect_defines(std::uint32_t group_size, Solver solver, ClosestH
 
 }  // namespace
 
-Intersect::Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size, Solver solver,
-                     ClosestHit closest)
+Intersect::Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size,
+                     Solver solver, ClosestHit closest)
     : range_(ocl::Range::strided(num_rays, group_size, device)),
       kernel_(device, "intersect", "intersect", intersect_defines(group_size, solver, closest)) {
   if (solver.kind == ISO_SOLVER_BERNSTEIN) {
@@ -27,8 +27,9 @@ void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, W
   kernel_(range_, rays.frame, rays.counts, groups.pair_ids, groups.block_rays, rays.pair_block_ids,
           cache.table, cache.values, rays.active_ray_ids, rays.pair_hits, rays.closest_pairs);
   if (settle_doubts_) {
-    (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, rays.pair_block_ids, cache.table,
-                      cache.values, rays.active_ray_ids, rays.pair_hits, rays.closest_pairs);
+    (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, rays.pair_block_ids,
+                      cache.table, cache.values, rays.active_ray_ids, rays.pair_hits,
+                      rays.closest_pairs);
   }
 }
 

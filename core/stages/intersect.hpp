@@ -24,9 +24,9 @@ class Intersect {
               ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>, ocl::Out<uint>>
       kernel_;
   /// Only a solver that can be in doubt has it.
-  std::optional<
-      ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<BlockEntry>,
-                  ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>, ocl::Out<uint>>>
+  std::optional<ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
+                            ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::Out<PairHit>,
+                            ocl::Out<uint>>>
       settle_doubts_;
 };
 

@@ -8,8 +8,10 @@ KeptPicture::KeptPicture(ocl::Device &device, ImageSize largest)
       show_(device, "kept_picture", "show_kept") {}
 
 void KeptPicture::compile(Wavefront &rays) {
-  for (const std::uint64_t num_rays : {std::uint64_t{1}, rays.num_rays})  // PoCL compiles large ones anew
-    show_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_), FrameParams{}, 1, 1, hits_, 0u, rays.hits);
+  for (const std::uint64_t num_rays :
+       {std::uint64_t{1}, rays.num_rays})  // PoCL compiles large ones anew
+    show_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_), FrameParams{}, 1, 1, hits_, 0u,
+          rays.hits);
 }
 
 void KeptPicture::keep(const Wavefront &rays, ImageSize size) {

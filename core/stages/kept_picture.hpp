@@ -1,6 +1,6 @@
 #pragma once
-// A picture put aside while the same frame is drawn again with more pixels, whose place it takes until they are there. See
-// kernels_cl/kept_picture.cl.
+// A picture put aside while the same frame is drawn again with more pixels, whose place it takes
+// until they are there. See kernels_cl/kept_picture.cl.
 
 #include <cstdint>
 
@@ -10,7 +10,8 @@
 
 namespace isowave {
 
-/// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel. 0 times: the picture itself.
+/// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel. 0
+/// times: the picture itself.
 inline ImageSize halved(ImageSize size, unsigned times) {
   if (times == 0) return size;
   const auto half = [times](std::uint32_t rays) { return ((rays - 1) >> times) + 1; };
@@ -24,9 +25,11 @@ class KeptPicture {
 
   /// Launches the kernel without a pixel to show, see Device::Compiling.
   void compile(Wavefront &rays);
-  /// Copies the hit buffer, a picture of that size. Asynchronous. Throws std::invalid_argument: a larger picture.
+  /// Copies the hit buffer, a picture of that size. Asynchronous. Throws std::invalid_argument: a
+  /// larger picture.
   void keep(const Wavefront &rays, ImageSize size);
-  /// The hit buffer, a picture as large as rays.frame says, takes the kept hits: where it has none, or everywhere. Asynchronous.
+  /// The hit buffer, a picture as large as rays.frame says, takes the kept hits: where it has none,
+  /// or everywhere. Asynchronous.
   void show(Wavefront &rays, bool everywhere);
 
  private:

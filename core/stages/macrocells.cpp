@@ -31,8 +31,9 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
                        std::shared_ptr<MacrocellBuffers> buffers)
     : num_coarse_(static_cast<std::uint32_t>(num_macrocells(frame))),
       coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
-      buffers_(buffers ? std::move(buffers)
-                       : std::make_shared<MacrocellBuffers>(device, block_count(frame), num_coarse_)),
+      buffers_(buffers
+                   ? std::move(buffers)
+                   : std::make_shared<MacrocellBuffers>(device, block_count(frame), num_coarse_)),
       coarse_ranges_(device, "macrocell ranges", num_coarse_),
       limits_(device, "active limits", ISO_BOUND_CODES),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
@@ -50,12 +51,12 @@ void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildK
   ocl::Buffer<ValueRange> partials(device, "range samples", 8);
   const ocl::Buffer<float> thresholds(device, "range thresholds", kNumThresholds);
   // limits_ stands in for words that are not read.
-  kernels.partials(range, no_blocks, limits_, limits_, limits_, limits_, limits_, stream.layout, 0, 0, 0, 0,
-                   partials);
+  kernels.partials(range, no_blocks, limits_, limits_, limits_, limits_, limits_, stream.layout, 0,
+                   0, 0, 0, partials);
   kernels.ranges(range, no_blocks, 0, partials, partials, thresholds, buffers_->ranges);
   kernels.coarse_ranges(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_);
-  masks_kernel_(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_, limits_, 0, limits_, 0,
-                buffers_->masks[0], selections_[0].box);
+  masks_kernel_(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_, limits_, 0, limits_,
+                0, buffers_->masks[0], selections_[0].box);
 }
 
 void Macrocells::build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream) {
@@ -67,10 +68,13 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
   Partials decode{device, frame, stream, kernels.partials};
   thresholds_ = sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame)), decode);
 
-  const ocl::Buffer<float> thresholds(device, "range thresholds", std::span<const float>(thresholds_));
+  const ocl::Buffer<float> thresholds(device, "range thresholds",
+                                      std::span<const float>(thresholds_));
   const std::uint32_t layer_blocks = frame.blocks_x * frame.blocks_y;
-  ocl::Buffer<ValueRange> below(device, "range partials, layer below", 8 * std::size_t{layer_blocks});
-  ocl::Buffer<ValueRange> above(device, "range partials, layer above", 8 * std::size_t{layer_blocks});
+  ocl::Buffer<ValueRange> below(device, "range partials, layer below",
+                                8 * std::size_t{layer_blocks});
+  ocl::Buffer<ValueRange> above(device, "range partials, layer above",
+                                8 * std::size_t{layer_blocks});
   const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
 
   decode(0, 1, layer_blocks, below);
@@ -91,25 +95,28 @@ std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
                   2 * 8 * sizeof(ValueRange) * layer_blocks + kNumThresholds * sizeof(float));
 }
 
-void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
-                                      ocl::Buffer<ValueRange> &partials) {
+void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
+                                      std::uint32_t count, ocl::Buffer<ValueRange> &partials) {
   if (!stream.window) {
-    kernel(ocl::Range::strided(count, ocl::kGroupSize, device), frame, stream.part(0), stream.part(1),
-           stream.part(2), stream.part(3), stream.index(), stream.layout, first, stride, count, 0, partials);
+    kernel(ocl::Range::strided(count, ocl::kGroupSize, device), frame, stream.part(0),
+           stream.part(1), stream.part(2), stream.part(3), stream.index(), stream.layout, first,
+           stride, count, 0, partials);
     return;
   }
   std::vector<uint> block_ids(count);
-  for (std::uint32_t i = 0; i < count; ++i) block_ids[i] = sampled_block(first + i * stride, stride);
-  stream.window->bring(block_ids,
-                       [&](const ocl::Buffer<uint> &words, std::uint32_t run_first, std::uint32_t run_count) {
-                         kernel(ocl::Range::strided(run_count, ocl::kGroupSize, device), frame, words, words,
-                                words, words, stream.index(words), stream.layout, first + run_first * stride,
-                                stride, run_count, run_first, partials);
-                       });
+  for (std::uint32_t i = 0; i < count; ++i)
+    block_ids[i] = sampled_block(first + i * stride, stride);
+  stream.window->bring(block_ids, [&](const ocl::Buffer<uint> &words, std::uint32_t run_first,
+                                      std::uint32_t run_count) {
+    kernel(ocl::Range::strided(run_count, ocl::kGroupSize, device), frame, words, words, words,
+           words, stream.index(words), stream.layout, first + run_first * stride, stride, run_count,
+           run_first, partials);
+  });
 }
 
-/// From the block minima and maxima of an even sample of blocks: half of them quantiles, so that one outlier does not coarsen
-/// the rest; half at even distances, so that the noise of a plateau, which has most of the values, does not either.
+/// From the block minima and maxima of an even sample of blocks: half of them quantiles, so that
+/// one outlier does not coarsen the rest; half at even distances, so that the noise of a plateau,
+/// which has most of the values, does not either.
 std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint32_t num_blocks,
                                                  Partials &decode) {
   const auto stride = static_cast<std::uint32_t>(sample_stride(num_blocks));
@@ -132,8 +139,10 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
     std::ranges::copy(values, thresholds.begin() + 1);
     return thresholds;
   }
-  constexpr std::size_t kNumQuantiles = kNumThresholds / 2, kNumEven = kNumThresholds - 2 - kNumQuantiles;
-  for (std::size_t i = 0; i < kNumQuantiles; ++i) {  // the smallest and the largest are always among them
+  constexpr std::size_t kNumQuantiles = kNumThresholds / 2,
+                        kNumEven = kNumThresholds - 2 - kNumQuantiles;
+  for (std::size_t i = 0; i < kNumQuantiles;
+       ++i) {  // the smallest and the largest are always among them
     thresholds[1 + i] = values[i * (values.size() - 1) / (kNumQuantiles - 1)];
   }
   const std::size_t outliers = values.size() / 100;
@@ -148,11 +157,13 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
 
 void Macrocells::select(const FrameParams &frame, double value_error, const DeviceStream *moved) {
   const auto index_of = [&](double value) {
-    return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) - thresholds_.begin());
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) -
+                                      thresholds_.begin());
   };
   const double isovalue = double{frame.isovalue};
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
-  const std::array of = {isovalue, value_error, double{layout.value_offset}, double{layout.bound_unit}};
+  const std::array of = {isovalue, value_error, double{layout.value_offset},
+                         double{layout.bound_unit}};
   Selection &selected = selection();
   if (selected.of == of) return;
   selected.of.reset();  // until the masks are there
@@ -160,7 +171,8 @@ void Macrocells::select(const FrameParams &frame, double value_error, const Devi
   selected.active_box.reset();
   std::array<uint, ISO_BOUND_CODES> limits{};
   for (std::uint32_t code = 0; code < ISO_BOUND_CODES; ++code) {
-    const double offset = double{layout.value_offset} + double{layout.bound_unit} * double{block_bound(code)};
+    const double offset =
+        double{layout.value_offset} + double{layout.bound_unit} * double{block_bound(code)};
     const double error = value_error + std::abs(offset);
     const double rounded = error == 0 ? 0.0 : value_error + 0x1p-20 * (std::abs(isovalue) + error);
     const std::uint32_t below = index_of(isovalue + rounded + std::max(-offset, 0.0)),
@@ -181,8 +193,9 @@ void Macrocells::select(const FrameParams &frame, double value_error, const Devi
 void Macrocells::set_active_box(FrameParams &frame) {
   Selection &selected = selection();
   if (!selected.active_box) selected.box.read(selected.active_box.emplace());
-  const std::array<int *, 6> fields = {&frame.active_begin_x, &frame.active_begin_y, &frame.active_begin_z,
-                                       &frame.active_end_x,   &frame.active_end_y,   &frame.active_end_z};
+  const std::array<int *, 6> fields = {&frame.active_begin_x, &frame.active_begin_y,
+                                       &frame.active_begin_z, &frame.active_end_x,
+                                       &frame.active_end_y,   &frame.active_end_z};
   const std::array<std::uint32_t, 3> dims = {frame.dims_x, frame.dims_y, frame.dims_z};
   for (std::size_t i = 0; i < 3; ++i) {
     const int num_blocks = static_cast<int>(num_owning_blocks(dims[i]));

@@ -32,22 +32,24 @@ March::Kernels &March::kernels_for(const Wavefront &rays) {
 
 void March::start_rays(const Macrocells &macrocells, Wavefront &rays) {
   kernels_for(rays).start_rays(start_range_, rays.frame, rays.level_frames, rays.num_level_frames,
-                               macrocells.masks(), macrocells.ranges(), rays.counts, rays.next_counts,
-                               rays.next_active_ray_ids, rays.ray_block_ids, rays.hits);
+                               macrocells.masks(), macrocells.ranges(), rays.counts,
+                               rays.next_counts, rays.next_active_ray_ids, rays.ray_block_ids,
+                               rays.hits);
 }
 
 void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  kernels_for(rays).march(range_, rays.frame, rays.level_frames, rays.num_level_frames, macrocells.masks(),
-                          macrocells.ranges(), cache.table, cache.inside, cache.values, rays.previous_counts,
-                          rays.counts, rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids,
-                          rays.ray_block_ids, rays.hits, cache.slot_stamps, cache.state);
+  kernels_for(rays).march(range_, rays.frame, rays.level_frames, rays.num_level_frames,
+                          macrocells.masks(), macrocells.ranges(), cache.table, cache.inside,
+                          cache.values, rays.previous_counts, rays.counts, rays.next_counts,
+                          rays.active_ray_ids, rays.next_active_ray_ids, rays.ray_block_ids,
+                          rays.hits, cache.slot_stamps, cache.state);
 }
 
 void March::request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  kernels_for(rays).request_ahead(range_, rays.frame, rays.level_frames, rays.num_level_frames,
-                                  macrocells.masks(), cache.table, rays.counts, rays.next_active_ray_ids,
-                                  rays.ray_block_ids, cache.slot_stamps, cache.requested_bits,
-                                  cache.request_block_ids, cache.capacity, cache.state);
+  kernels_for(rays).request_ahead(
+      range_, rays.frame, rays.level_frames, rays.num_level_frames, macrocells.masks(), cache.table,
+      rays.counts, rays.next_active_ray_ids, rays.ray_block_ids, cache.slot_stamps,
+      cache.requested_bits, cache.request_block_ids, cache.capacity, cache.state);
 }
 
 }  // namespace isowave

@@ -1,6 +1,6 @@
 #pragma once
-// Pipeline `rays`: each ray walks through the blocks that are cached until it hits, leaves, or waits for one that is not
-// (Sec. 3.3, 3.7, 4.4 in one stage; kernels_cl/march.cl).
+// Pipeline `rays`: each ray walks through the blocks that are cached until it hits, leaves, or
+// waits for one that is not (Sec. 3.3, 3.7, 4.4 in one stage; kernels_cl/march.cl).
 
 #include <optional>
 
@@ -19,16 +19,18 @@ class March {
         bool levels = false);
 
   /// macrocells: of any level of detail, since levels share what is used of them.
-  /// Begins a frame: rays.hits are none, rays.next_active_ray_ids those that meet an active block; their count goes to
-  /// counts.next_active_count, the frame before having left 0 there. Asynchronous.
+  /// Begins a frame: rays.hits are none, rays.next_active_ray_ids those that meet an active block;
+  /// their count goes to counts.next_active_count, the frame before having left 0 there.
+  /// Asynchronous.
   void start_rays(const Macrocells &macrocells, Wavefront &rays);
 
-  /// Takes rays further, as far as what was requested in the pass before has been provided. Out: rays.hits,
-  /// next_active_ray_ids, ray_block_ids; counts.hit_count, granted_count (blocks intersected), next_active_count.
-  /// Asynchronous.
+  /// Takes rays further, as far as what was requested in the pass before has been provided. Out:
+  /// rays.hits, next_active_ray_ids, ray_block_ids; counts.hit_count, granted_count (blocks
+  /// intersected), next_active_count. Asynchronous.
   void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
-  /// The rays that wait ask for blocks. Out: the cache's requests, counts.requested_count. Asynchronous.
+  /// The rays that wait ask for blocks. Out: the cache's requests, counts.requested_count.
+  /// Asynchronous.
   void request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:
@@ -40,8 +42,8 @@ class March {
         start_rays;
     ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
                 ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>, ocl::In<PassCounts>,
-                ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-                ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<CacheState>>
+                ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
+                ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<CacheState>>
         march;
     ocl::Kernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>,
                 ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,

@@ -18,7 +18,8 @@ ocl::Defines radix_defines(std::uint32_t group_size, RadixRanking ranking) {
 }
 
 RadixRanking ranking_for(const ocl::Device &device) {
-  return device.info().type == ocl::DeviceType::kCpu ? RadixRanking::kSerial : RadixRanking::kTogether;
+  return device.info().type == ocl::DeviceType::kCpu ? RadixRanking::kSerial
+                                                     : RadixRanking::kTogether;
 }
 
 }  // namespace
@@ -27,8 +28,8 @@ RadixSort::RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t g
                      RadixRanking ranking)
     : max_count_(max_count),
       group_size_(group_size),
-      tiles_range_(
-          ocl::Range::strided((max_count + ISO_RADIX_ITEMS - 1) / ISO_RADIX_ITEMS, group_size, device)),
+      tiles_range_(ocl::Range::strided((max_count + ISO_RADIX_ITEMS - 1) / ISO_RADIX_ITEMS,
+                                       group_size, device)),
       other_keys_(device, "sort keys, other half", max_count),
       other_values_(device, "sort values, other half", max_count),
       table_(device, "sort digit table", table_size(max_count, group_size)),
@@ -47,12 +48,13 @@ std::uint64_t RadixSort::table_size(std::uint64_t max_count, std::uint32_t group
 void RadixSort::operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, CountsBuffer &counts,
                            uint count_field, uint key_bits) {
   if (key_bits < 1 || key_bits > 32) {
-    throw std::invalid_argument(fmt::format("RadixSort: {} key bits; 1 to 32 can be sorted", key_bits));
+    throw std::invalid_argument(
+        fmt::format("RadixSort: {} key bits; 1 to 32 can be sorted", key_bits));
   }
   for (const ocl::Buffer<uint> *buffer : {&keys, &values}) {
     if (buffer->size() < max_count_) {
-      throw std::invalid_argument(fmt::format("RadixSort: {} pairs do not fit '{}' of {} entries", max_count_,
-                                              buffer->name(), buffer->size()));
+      throw std::invalid_argument(fmt::format("RadixSort: {} pairs do not fit '{}' of {} entries",
+                                              max_count_, buffer->name(), buffer->size()));
     }
   }
   // As few passes as there can be, and the bits dealt out among them: fewer digits are cheaper.

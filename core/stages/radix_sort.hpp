@@ -15,19 +15,22 @@ enum class RadixRanking {
 class RadixSort {
  public:
   /// max_count: the largest number of pairs any call may sort; scratch is O(max_count).
-  RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size, RadixRanking ranking);
+  RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size,
+            RadixRanking ranking);
   /// Ranks as suits the device.
   RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size);
 
-  /// Sorts pairs [0, n) by key, ascending; equal keys keep their order; n is the count in `count_field`.
+  /// Sorts pairs [0, n) by key, ascending; equal keys keep their order; n is the count in
+  /// `count_field`.
   ///
-  /// keys, values  at least max_count entries. Entries past n are undefined afterwards: the buffers trade
+  /// keys, values  at least max_count entries. Entries past n are undefined afterwards: the buffers
+  /// trade
   ///               places with scratch ones.
   /// key_bits      1..32; every key must be < 2^key_bits. O(n * key_bits).
-  /// Throws std::invalid_argument when buffers are smaller than max_count or key_bits is out of range.
-  /// Asynchronous: enqueues and does not wait.
-  void operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field,
-                  uint key_bits);
+  /// Throws std::invalid_argument when buffers are smaller than max_count or key_bits is out of
+  /// range. Asynchronous: enqueues and does not wait.
+  void operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, CountsBuffer &counts,
+                  uint count_field, uint key_bits);
 
   /// Entries of the table of digits.
   static std::uint64_t table_size(std::uint64_t max_count, std::uint32_t group_size);

@@ -9,8 +9,9 @@ namespace isowave {
 
 namespace {
 
-constexpr std::uint32_t kTilePixels = 32;             ///< of tiled_pixel(): 8 x 4
-constexpr std::uint32_t kBlocksPerLaunch = 1u << 22;  ///< some milliseconds: watchdogs end long launches
+constexpr std::uint32_t kTilePixels = 32;  ///< of tiled_pixel(): 8 x 4
+constexpr std::uint32_t kBlocksPerLaunch =
+    1u << 22;  ///< some milliseconds: watchdogs end long launches
 
 ocl::Defines resident_defines(Solver solver) {
   ocl::Defines defines = group_defines(ocl::kGroupSize);
@@ -20,11 +21,12 @@ ocl::Defines resident_defines(Solver solver) {
 
 }  // namespace
 
-Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size, Solver solver)
+Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
+                   Solver solver)
     : Resident(device, volume, size, solver, DeviceStream(device, volume)) {}
 
-Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size, Solver solver,
-                   const DeviceStream &stream)
+Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
+                   Solver solver, const DeviceStream &stream)
     : device_(device),
       info_(volume.info),
       size_(size),
@@ -39,8 +41,8 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       kernel_(device, "resident", "resident", resident_defines(solver)) {
   ocl::Defines decode_defines = resident_defines(solver);
   decode_defines.merge(stream.defines());
-  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, StreamLayout, uint,
-              uint, ocl::Out<float>>
+  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              StreamLayout, uint, uint, ocl::Out<float>>
       decode(device, "resident", "resident_decode", decode_defines);
   for (std::uint32_t first = 0; first < num_blocks_; first += kBlocksPerLaunch) {
     const std::uint32_t count = std::min(kBlocksPerLaunch, num_blocks_ - first);
@@ -50,8 +52,8 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
   device.finish();
 }
 
-std::optional<std::string> Resident::obstacle(const ocl::Device &device, const CompressedVolume &volume,
-                                              ImageSize size) {
+std::optional<std::string> Resident::obstacle(const ocl::Device &device,
+                                              const CompressedVolume &volume, ImageSize size) {
   const std::uint64_t blocks = volume.block_count();
   const std::uint64_t values = blocks * ISO_BLOCK_VOXELS * sizeof(float);
   const glm::uvec3 cells = (volume.num_blocks() + 3u) / 4u;
@@ -65,8 +67,8 @@ std::optional<std::string> Resident::obstacle(const ocl::Device &device, const C
                        can.largest_allocation);
   }
   if (all > can.global_memory) {
-    return fmt::format("the decoded volume and what belongs to it are {} bytes, the device has {}", all,
-                       can.global_memory);
+    return fmt::format("the decoded volume and what belongs to it are {} bytes, the device has {}",
+                       all, can.global_memory);
   }
   return std::nullopt;
 }
@@ -84,11 +86,13 @@ double Resident::render(const Camera &camera, float isovalue) {
   set_screen_box(frame);
   selected_isovalue_ = isovalue;
   const std::size_t tiles = std::size_t{(frame.width + 7) / 8} * ((frame.height + 3) / 4);
-  // One work-item per pixel: rays differ too much in length for strides over them to keep a device busy.
-  kernel_(ocl::Range::covering(tiles * kTilePixels, ocl::kGroupSize), frame, macrocells_.masks(), values_,
-          changing_, hits_);
+  // One work-item per pixel: rays differ too much in length for strides over them to keep a device
+  // busy.
+  kernel_(ocl::Range::covering(tiles * kTilePixels, ocl::kGroupSize), frame, macrocells_.masks(),
+          values_, changing_, hits_);
   device_.finish();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+      .count();
 }
 
 }  // namespace isowave

@@ -1,6 +1,6 @@
 #pragma once
-// The floor that benchmarks compare with: the whole volume decoded in device memory, a frame in one launch. The picture is the
-// pipelines', bit for bit; see kernels_cl/resident.cl.
+// The floor that benchmarks compare with: the whole volume decoded in device memory, a frame in one
+// launch. The picture is the pipelines', bit for bit; see kernels_cl/resident.cl.
 
 #include <optional>
 #include <string>
@@ -16,17 +16,17 @@ namespace isowave {
 
 class Resident {
  public:
-  /// Decodes the whole volume and waits. Throws Error when memory does not suffice. `device` must outlive this; `volume`
-  /// need not.
+  /// Decodes the whole volume and waits. Throws Error when memory does not suffice. `device` must
+  /// outlive this; `volume` need not.
   Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
            Solver solver = kDefaultSolver);
 
   /// Why the device cannot hold the decoded volume, in one line; nothing if it can.
-  static std::optional<std::string> obstacle(const ocl::Device &device, const CompressedVolume &volume,
-                                             ImageSize size);
+  static std::optional<std::string> obstacle(const ocl::Device &device,
+                                             const CompressedVolume &volume, ImageSize size);
 
-  /// Draws one frame and waits. Returns ms of wall clock, from the camera to the finished hit buffer on the device. The first
-  /// frame of an isovalue also finds its blocks.
+  /// Draws one frame and waits. Returns ms of wall clock, from the camera to the finished hit
+  /// buffer on the device. The first frame of an isovalue also finds its blocks.
   double render(const Camera &camera, float isovalue);
 
   /// The hit buffer [height * width], row 0 at the top. Waits.
@@ -49,7 +49,8 @@ class Resident {
   ocl::Buffer<HitRecord> hits_;  ///< [pixels]
   ocl::Kernel<FrameParams, uint, ocl::In<float>, ocl::Out<ulong>> inside_kernel_;
   ocl::Kernel<FrameParams, uint, ocl::In<ulong>, ocl::Out<ulong>> changing_kernel_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<float>, ocl::In<ulong>, ocl::Out<HitRecord>> kernel_;
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<float>, ocl::In<ulong>, ocl::Out<HitRecord>>
+      kernel_;
 };
 
 }  // namespace isowave

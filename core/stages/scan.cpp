@@ -6,10 +6,12 @@ namespace isowave {
 
 namespace {
 
-/// One work-group does the whole scan: on a GPU a large one, or most of the device's width stays idle.
+/// One work-group does the whole scan: on a GPU a large one, or most of the device's width stays
+/// idle.
 std::uint32_t scan_group_size(const ocl::Device &device, std::uint32_t group_size) {
   const bool gpu = device.info().type == ocl::DeviceType::kGpu;
-  return gpu ? std::max(group_size, std::min(256u, device.capabilities().max_work_group_size)) : group_size;
+  return gpu ? std::max(group_size, std::min(256u, device.capabilities().max_work_group_size))
+             : group_size;
 }
 
 }  // namespace
@@ -29,7 +31,8 @@ Compaction::Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t
       scan_(device, group_size),
       count_(device, "scan", "compact_count", group_defines(group_size)),
       values_(device, "scan", "compact_values", group_defines(group_size)) {
-  range_ = ocl::Range::strided((max_count + ISO_SCAN_ITEMS - 1) / ISO_SCAN_ITEMS, group_size, device);
+  range_ =
+      ocl::Range::strided((max_count + ISO_SCAN_ITEMS - 1) / ISO_SCAN_ITEMS, group_size, device);
 }
 
 void Compaction::operator()(const ocl::Buffer<uint> &mask, const ocl::Buffer<uint> &values,

@@ -1,21 +1,23 @@
 #pragma once
 // Exclusive prefix sum and stream compaction with counts that live on the device (Sec. 3.6, 4.2).
-// In: a table or a mask; out: sums or the kept entries in order. Asynchronous: enqueues and does not wait.
+// In: a table or a mask; out: sums or the kept entries in order. Asynchronous: enqueues and does
+// not wait.
 
 #include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
 
 namespace isowave {
 
-/// values[i] becomes values[0] + ... + values[i-1], in one work-group: for tables of tiles, which are short.
+/// values[i] becomes values[0] + ... + values[i-1], in one work-group: for tables of tiles, which
+/// are short.
 class ExclusiveScan {
  public:
   ExclusiveScan(ocl::Device &device, std::uint32_t group_size);
 
   /// Scans ceil(n / divisor) entries, n being the count in `count_field`. The sum of all goes to
   /// `total_field` unless that is ISO_INVALID_ID. Sums wrap at 2^32.
-  void operator()(ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field, uint divisor = 1,
-                  uint total_field = ISO_INVALID_ID);
+  void operator()(ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field,
+                  uint divisor = 1, uint total_field = ISO_INVALID_ID);
 
  private:
   std::uint32_t group_size_;
@@ -28,10 +30,10 @@ class Compaction {
   /// max_count: the largest count any call may have.
   Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t group_size);
 
-  /// out = values[i] of every i < n with mask[i] != 0, n in `count_field`; how many goes to `total_field`.
-  /// `out` must not be `values`.
-  void operator()(const ocl::Buffer<uint> &mask, const ocl::Buffer<uint> &values, CountsBuffer &counts,
-                  uint count_field, ocl::Buffer<uint> &out, uint total_field);
+  /// out = values[i] of every i < n with mask[i] != 0, n in `count_field`; how many goes to
+  /// `total_field`. `out` must not be `values`.
+  void operator()(const ocl::Buffer<uint> &mask, const ocl::Buffer<uint> &values,
+                  CountsBuffer &counts, uint count_field, ocl::Buffer<uint> &out, uint total_field);
 
  private:
   ocl::Range range_;
@@ -39,7 +41,9 @@ class Compaction {
   ocl::Buffer<uint> tile_offsets_;
   ExclusiveScan scan_;
   ocl::Kernel<ocl::In<uint>, ocl::In<PassCounts>, uint, ocl::Out<uint>> count_;
-  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::Out<uint>> values_;
+  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<PassCounts>, uint, ocl::In<uint>,
+              ocl::Out<uint>>
+      values_;
 };
 
 }  // namespace isowave

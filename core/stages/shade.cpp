@@ -48,12 +48,13 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
   return params;
 }
 
-Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits,
-                    std::uint32_t samples) {
+Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
+                    const std::vector<HitRecord> &hits, std::uint32_t samples) {
   const std::uint32_t columns = frame.width / samples, rows = frame.height / samples;
   std::vector<uint> packed(std::size_t{columns} * rows);
   for (uint pixel = 0; pixel < packed.size(); ++pixel)
-    packed[pixel] = shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns, hits.data());
+    packed[pixel] =
+        shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns, hits.data());
   return rgb_image(columns, rows, packed);
 }
 
@@ -64,9 +65,10 @@ Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
       kernel_(device, "shade", "shade") {}
 
 void Shade::compile(Wavefront &rays) {
-  for (const std::size_t num_pixels : {std::size_t{1}, image_.size()}) {  // PoCL compiles large ones anew
-    kernel_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device_), FrameParams{}, params_, 1, rays.hits,
-            image_);
+  for (const std::size_t num_pixels :
+       {std::size_t{1}, image_.size()}) {  // PoCL compiles large ones anew
+    kernel_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device_), FrameParams{}, params_, 1,
+            rays.hits, image_);
   }
 }
 
@@ -74,8 +76,8 @@ Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32
   const std::uint32_t columns = rays.frame.width / samples, rows = rays.frame.height / samples;
   std::vector<uint> packed(std::size_t{columns} * rows);
   params_.write({&params, 1});
-  kernel_(ocl::Range::strided(packed.size(), ocl::kGroupSize, device_), rays.frame, params_, samples,
-          rays.hits, image_);
+  kernel_(ocl::Range::strided(packed.size(), ocl::kGroupSize, device_), rays.frame, params_,
+          samples, rays.hits, image_);
   image_.read(packed);
   return rgb_image(columns, rows, packed);
 }

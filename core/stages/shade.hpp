@@ -20,9 +20,10 @@ struct Appearance {
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
 
-/// The picture of a frame's hit buffer on the host, of so many rays a pixel along each axis: the twin's. Same bits as Shade.
-Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params, const std::vector<HitRecord> &hits,
-                    std::uint32_t samples = 1);
+/// The picture of a frame's hit buffer on the host, of so many rays a pixel along each axis: the
+/// twin's. Same bits as Shade.
+Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
+                    const std::vector<HitRecord> &hits, std::uint32_t samples = 1);
 
 class Shade {
  public:

@@ -1,5 +1,6 @@
 #pragma once
-// A solver by itself on many ray-cell segments, for benchmarks and tests; intersection uses the same headers.
+// A solver by itself on many ray-cell segments, for benchmarks and tests; intersection uses the
+// same headers.
 
 #include "core/ocl/kernel.hpp"
 #include "core/stages/solvers.hpp"
@@ -10,8 +11,8 @@ class SolveCells {
  public:
   SolveCells(ocl::Device &device, Solver solver);
 
-  /// roots [n]: the first s in [0,1] at which inside changes along each of cubics [n], or -1. Asynchronous. Throws
-  /// std::invalid_argument when the sizes differ.
+  /// roots [n]: the first s in [0,1] at which inside changes along each of cubics [n], or -1.
+  /// Asynchronous. Throws std::invalid_argument when the sizes differ.
   void operator()(const ocl::Buffer<Cubic> &cubics, ocl::Buffer<float> &roots);
 
  private:

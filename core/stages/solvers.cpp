@@ -20,7 +20,8 @@ Solver solver_from_string(std::string_view name) {
 }
 
 ocl::Defines solver_defines(Solver solver) {
-  return {{"ISO_SOLVER", std::to_string(solver.kind)}, {"ISO_ROOT_STEPS", std::to_string(solver.max_steps)}};
+  return {{"ISO_SOLVER", std::to_string(solver.kind)},
+          {"ISO_ROOT_STEPS", std::to_string(solver.max_steps)}};
 }
 
 }  // namespace isowave

@@ -1,5 +1,6 @@
 #pragma once
-// The family of root finders by name (kernels_cl/portable/solver.h says what each guarantees and where it fails).
+// The family of root finders by name (kernels_cl/portable/solver.h says what each guarantees and
+// where it fails).
 
 #include <array>
 #include <string_view>
@@ -12,12 +13,13 @@ namespace isowave {
 /// The cheapest that passes the whole stability suite (README "Solvers").
 inline constexpr Solver kDefaultSolver{ISO_SOLVER_BERNSTEIN, 32};
 
-inline constexpr std::array<std::string_view, 4> kSolverNames{"linear", "marmitt", "analytic", "bernstein"};
+inline constexpr std::array<std::string_view, 4> kSolverNames{"linear", "marmitt", "analytic",
+                                                              "bernstein"};
 
 /// "linear", "marmitt", "analytic", "bernstein".
 std::string_view to_string(Solver solver);
-/// The solver of that name with the steps its authors use: linear and marmitt 4, bernstein 32 (it stops by
-/// itself after 3 to 5). Throws Error naming the solvers.
+/// The solver of that name with the steps its authors use: linear and marmitt 4, bernstein 32 (it
+/// stops by itself after 3 to 5). Throws Error naming the solvers.
 Solver solver_from_string(std::string_view name);
 
 /// Whether it misses no crossing, and converges.
@@ -25,7 +27,8 @@ inline bool finds_all(Solver solver) {
   return solver.kind == kDefaultSolver.kind && solver.max_steps >= kDefaultSolver.max_steps;
 }
 
-/// What a kernel that includes solver.h is built with: it is built for one solver, so that the others cost it nothing.
+/// What a kernel that includes solver.h is built with: it is built for one solver, so that the
+/// others cost it nothing.
 ocl::Defines solver_defines(Solver solver);
 
 }  // namespace isowave

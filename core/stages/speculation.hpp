@@ -1,6 +1,6 @@
 #pragma once
-// How many blocks each ray looks ahead in a pass (Sec. 4): N_Spec = min(max, floor(W H / N_Act)), computed on
-// the device.
+// How many blocks each ray looks ahead in a pass (Sec. 4): N_Spec = min(max, floor(W H / N_Act)),
+// computed on the device.
 
 #include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
@@ -11,8 +11,8 @@ class Speculation {
  public:
   explicit Speculation(ocl::Device &device) : begin_pass_(device, "speculation", "begin_pass") {}
 
-  /// Opens a pass: the rays left by the last one become active, N_Spec is set, the other counts are zeroed.
-  /// Asynchronous.
+  /// Opens a pass: the rays left by the last one become active, N_Spec is set, the other counts are
+  /// zeroed. Asynchronous.
   void begin_pass(Wavefront &rays) {
     std::swap(rays.active_ray_ids, rays.next_active_ray_ids);
     begin_pass_({1, 1}, rays.frame, rays.counts);

@@ -11,14 +11,15 @@ class Traverse {
  public:
   Traverse(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size);
 
-  /// In: active_ray_ids, ray_block_ids (where each ray goes on from), counts.spec_count. Out: pair_block_ids,
-  /// ray_block_ids (the first block not looked at), counts.pair_count. Asynchronous.
+  /// In: active_ray_ids, ray_block_ids (where each ray goes on from), counts.spec_count. Out:
+  /// pair_block_ids, ray_block_ids (the first block not looked at), counts.pair_count.
+  /// Asynchronous.
   void operator()(const Macrocells &macrocells, Wavefront &rays);
 
  private:
   ocl::Range range_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>>
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<uint>>
       kernel_;
 };
 

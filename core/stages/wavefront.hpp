@@ -1,6 +1,6 @@
 #pragma once
-// The rays of a frame on the device and the arrays of one pass. R = rays; nothing here grows with the
-// volume.
+// The rays of a frame on the device and the arrays of one pass. R = rays; nothing here grows with
+// the volume.
 
 #include <string_view>
 #include <utility>
@@ -10,7 +10,8 @@
 
 namespace isowave {
 
-/// How the closest of a ray's results is found (pipeline `blocks`). The picture has the same bits either way.
+/// How the closest of a ray's results is found (pipeline `blocks`). The picture has the same bits
+/// either way.
 enum class ClosestHit {
   kScan,      ///< composite looks at each of them
   kAtomicMin  ///< whoever has a result offers its index: one word a ray to look at
@@ -28,8 +29,10 @@ inline ocl::Defines closest_defines(ClosestHit closest) {
 }
 
 struct Wavefront {
-  /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not. levels: of detail.
-  explicit Wavefront(ocl::Device &device, std::uint64_t rays, bool with_pairs = true, std::size_t levels = 1)
+  /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not. levels: of
+  /// detail.
+  explicit Wavefront(ocl::Device &device, std::uint64_t rays, bool with_pairs = true,
+                     std::size_t levels = 1)
       : num_rays(rays),
         level_frames(device, "level frames", levels),
         counts(device, "pass counts", 1),
@@ -72,21 +75,23 @@ struct Wavefront {
   }
 
   std::uint64_t num_rays;  ///< R
-  FrameParams frame{};     ///< of the frame at work; of several levels of detail, the finest that draws
+  FrameParams
+      frame{};  ///< of the frame at work; of several levels of detail, the finest that draws
   ocl::Buffer<FrameParams>
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;
-  CountsBuffer counts;                    ///< [1] of the pass at work
-  CountsBuffer previous_counts;           ///< [1] of the pass before (pipeline `rays`)
-  CountsBuffer next_counts;               ///< [1] of the next pass, opened by this one (pipeline `rays`)
-  ocl::Buffer<HitRecord> hits;            ///< [R] by pixel: the picture so far
-  ocl::Buffer<uint> ray_block_ids;        ///< [R] by pixel: the block a ray goes on from (R_BID)
-  ocl::Buffer<uint> active_ray_ids;       ///< [active_count] rays at work: ISO_RAY_PIXEL, flags (R_ID)
+  CountsBuffer counts;               ///< [1] of the pass at work
+  CountsBuffer previous_counts;      ///< [1] of the pass before (pipeline `rays`)
+  CountsBuffer next_counts;          ///< [1] of the next pass, opened by this one (pipeline `rays`)
+  ocl::Buffer<HitRecord> hits;       ///< [R] by pixel: the picture so far
+  ocl::Buffer<uint> ray_block_ids;   ///< [R] by pixel: the block a ray goes on from (R_BID)
+  ocl::Buffer<uint> active_ray_ids;  ///< [active_count] rays at work: ISO_RAY_PIXEL, flags (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
   ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
-  ocl::Buffer<uint> pair_block_ids;       ///< [window_count * spec_count] blocks asked for, in ray order
-  ocl::Buffer<PairHit> pair_hits;         ///< [window_count * spec_count] what intersection found
-  ocl::Buffer<uint> closest_pairs;  ///< [window_count] by active ray: its pair that decides (closest_pair.h)
+  ocl::Buffer<uint> pair_block_ids;  ///< [window_count * spec_count] blocks asked for, in ray order
+  ocl::Buffer<PairHit> pair_hits;    ///< [window_count * spec_count] what intersection found
+  ocl::Buffer<uint>
+      closest_pairs;  ///< [window_count] by active ray: its pair that decides (closest_pair.h)
 };
 
 }  // namespace isowave

@@ -16,21 +16,24 @@ ocl::Defines all_defines(ocl::Defines stream_defines, bool levels) {
 
 }  // namespace
 
-ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines,
-                     bool levels)
+ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks,
+                     const ocl::Defines &stream_defines, bool levels)
     : device_(device),
       stream_defines_(stream_defines),
       range_(ocl::Range::strided(max_blocks, ocl::kGroupSize, device)),
       kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines, levels)) {
-  if (levels && DeviceStream::is_window(stream_defines)) places_.emplace(device, "decode places", max_blocks);
+  if (levels && DeviceStream::is_window(stream_defines))
+    places_.emplace(device, "decode places", max_blocks);
 }
 
 void ZfpDecode::compile(const DeviceStream &stream, const CountsBuffer &counts, BlockCache &cache) {
   const ocl::Buffer<uint> &words = cache.request_block_ids;  // stands in for what is not read
   const FrameParams frame{};
-  for (const ocl::Range &range : {ocl::Range{1, ocl::kGroupSize}, range_}) {  // PoCL compiles large ones anew
+  for (const ocl::Range &range :
+       {ocl::Range{1, ocl::kGroupSize}, range_}) {  // PoCL compiles large ones anew
     kernel_(range, frame, words, words, words, words, words, stream.layout, frame, words, words,
-            stream.layout, 0, 0, counts, words, words, cache.decode_slots, cache.values, cache.inside);
+            stream.layout, 0, 0, counts, words, words, cache.decode_slots, cache.values,
+            cache.inside);
   }
 }
 
@@ -50,22 +53,23 @@ void ZfpDecode::decode(const Source &source, const Source &next, const CountsBuf
   if (!stream.window) {
     kernel_(range_, source.frame, stream.part(0), stream.part(1), stream.part(2), stream.part(3),
             stream.index(), stream.layout, next.frame, next.stream.part(0), next.stream.index(),
-            next.stream.layout, 0, std::numeric_limits<uint>::max(), counts, block_ids, block_ids, slots,
-            values, inside);
+            next.stream.layout, 0, std::numeric_limits<uint>::max(), counts, block_ids, block_ids,
+            slots, values, inside);
     return;
   }
   std::span<uint> granted = stream.window->read_granted(counts, block_ids);
   if (places_) granted = granted.first(take_own(granted, source.frame));
-  stream.window->bring(granted, [&](const ocl::Buffer<uint> &words, std::uint32_t first,
-                                    std::uint32_t count) {
-    kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), source.frame, words, words, words, words,
-            stream.index(words), stream.layout, source.frame, words, stream.index(words), stream.layout,
-            first, first + count, counts, places_ ? *places_ : block_ids, block_ids, slots, values, inside);
-  });
+  stream.window->bring(
+      granted, [&](const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count) {
+        kernel_(ocl::Range::strided(count, ocl::kGroupSize, device_), source.frame, words, words,
+                words, words, stream.index(words), stream.layout, source.frame, words,
+                stream.index(words), stream.layout, first, first + count, counts,
+                places_ ? *places_ : block_ids, block_ids, slots, values, inside);
+      });
 }
 
-/// Keeps the first of block_ids for those of this level, as places in it, and tells the device which they were. Returns
-/// how many.
+/// Keeps the first of block_ids for those of this level, as places in it, and tells the device
+/// which they were. Returns how many.
 std::size_t ZfpDecode::take_own(std::span<uint> block_ids, const FrameParams &frame) {
   std::vector<uint> places;
   for (std::size_t i = 0; i < block_ids.size(); ++i) {

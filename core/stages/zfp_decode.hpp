@@ -13,9 +13,9 @@ namespace isowave {
 
 class ZfpDecode {
  public:
-  /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams to come.
-  /// levels: block ids count on through several levels of detail (FrameParams), and only blocks of the levels at hand
-  /// are decoded.
+  /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams
+  /// to come. levels: block ids count on through several levels of detail (FrameParams), and only
+  /// blocks of the levels at hand are decoded.
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
             bool levels = false);
 
@@ -30,24 +30,28 @@ class ZfpDecode {
   /// Whether blocks of this level can be decoded together with those that a call is for.
   bool can_join(const DeviceStream &next) const;
 
-  /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes in inside
-  /// [slots] which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the stream stays on the host,
-  /// waits for all that is enqueued, and throws Error when the volume's file has become shorter.
+  /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes
+  /// in inside [slots] which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the
+  /// stream stays on the host, waits for all that is enqueued, and throws Error when the volume's
+  /// file has become shorter.
   void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                   const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
                   ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
     const Source source{stream, frame};
     decode(source, source, counts, block_ids, slots, values, inside);
   }
-  /// The same for what the cache has granted, of one level or two that can be joined (or the same twice).
-  void operator()(const Source &source, const Source &next, const CountsBuffer &counts, BlockCache &cache) {
-    decode(source, next, counts, cache.request_block_ids, cache.decode_slots, cache.values, cache.inside);
+  /// The same for what the cache has granted, of one level or two that can be joined (or the same
+  /// twice).
+  void operator()(const Source &source, const Source &next, const CountsBuffer &counts,
+                  BlockCache &cache) {
+    decode(source, next, counts, cache.request_block_ids, cache.decode_slots, cache.values,
+           cache.inside);
   }
 
  private:
   void decode(const Source &source, const Source &next, const CountsBuffer &counts,
-              const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots, ocl::Buffer<float> &values,
-              ocl::Buffer<ulong> &inside);
+              const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
+              ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside);
   std::size_t take_own(std::span<uint> block_ids, const FrameParams &frame);
 
   ocl::Device &device_;
@@ -55,10 +59,10 @@ class ZfpDecode {
   ocl::Range range_;
   std::optional<ocl::Buffer<uint>>
       places_;  ///< of this level's requests, where several levels' streams are in windows
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              StreamLayout, FrameParams, ocl::In<uint>, ocl::In<uint>, StreamLayout, uint, uint,
-              ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::Out<float>,
-              ocl::Out<ulong>>
+  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              ocl::In<uint>, StreamLayout, FrameParams, ocl::In<uint>, ocl::In<uint>, StreamLayout,
+              uint, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              ocl::Out<float>, ocl::Out<ulong>>
       kernel_;
 };
 

@@ -40,8 +40,8 @@ StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_p
   // A block may begin with the last bit of a part.
   const std::uint64_t beyond = (volume.max_block_bits() + 30) / 32 + kDecoderAhead;
   const std::uint64_t begins = all - kDecoderAhead;  // blocks begin in that many words
-  const std::uint64_t per_part = std::min<std::uint64_t>(largest_words - std::min(largest_words, beyond),
-                                                         std::numeric_limits<std::uint32_t>::max());
+  const std::uint64_t per_part = std::min<std::uint64_t>(
+      largest_words - std::min(largest_words, beyond), std::numeric_limits<std::uint32_t>::max());
   if (per_part == 0 || (begins + per_part - 1) / per_part > kMaxStreamParts) return {};
   StreamSplit split;
   split.words_per_part = static_cast<std::uint32_t>(per_part);
@@ -55,14 +55,16 @@ std::uint64_t bound_words(const CompressedVolume &volume) {
   return (volume.bounds.codes.size() + 3) / 4;
 }
 
-DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part,
-                           bool with_bounds)
+DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
+                           std::uint64_t largest_part, bool with_bounds)
     : indexed_(volume.is_indexed()) {
-  const std::uint64_t largest = largest_part != 0 ? largest_part : device.capabilities().largest_allocation;
+  const std::uint64_t largest =
+      largest_part != 0 ? largest_part : device.capabilities().largest_allocation;
   const StreamSplit split = split_stream(volume, largest);
   if (split.num_parts == 0) {
-    throw Error("the compressed volume of {} bytes does not fit {} buffers of {} bytes on device '{}'",
-                volume.word_count() * sizeof(uint), kMaxStreamParts, largest, device.info().name);
+    throw Error(
+        "the compressed volume of {} bytes does not fit {} buffers of {} bytes on device '{}'",
+        volume.word_count() * sizeof(uint), kMaxStreamParts, largest, device.info().name);
   }
   layout = layout_of(volume, split.words_per_part);
   std::uint64_t first = 0;
@@ -75,11 +77,13 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, 
             with_bounds ? volume.bounds.codes : std::span<const std::uint8_t>{});
 }
 
-DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host, bool with_bounds)
+DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host,
+                           bool with_bounds)
     : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks, host.max_copy)),
       layout(layout_of(volume, 0)),
       indexed_(volume.is_indexed()) {
-  if (with_bounds) add_index(device, {}, volume.bounds.codes);  // a window brings where its blocks begin
+  if (with_bounds)
+    add_index(device, {}, volume.bounds.codes);  // a window brings where its blocks begin
 }
 
 void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t> index,

@@ -1,6 +1,6 @@
 #pragma once
-// The compressed volume as decoding kernels see it (kernels_cl/device/block_stream.h): whole on the device, in as many buffers as
-// its largest allocation demands, or on the host, behind a window.
+// The compressed volume as decoding kernels see it (kernels_cl/device/block_stream.h): whole on the
+// device, in as many buffers as its largest allocation demands, or on the host, behind a window.
 
 #include <cstdint>
 #include <memory>
@@ -22,8 +22,8 @@ struct StreamSplit {
   std::uint32_t num_parts = 0;  ///< 1..4; 0: more would be needed
   std::uint32_t words_per_part =
       0;  ///< from the beginning of one part to that of the next; 0: there is only one
-  std::vector<std::uint64_t>
-      words{};  ///< of each part: the next part's first are at its end, so that a block which begins in it is whole
+  std::vector<std::uint64_t> words{};  ///< of each part: the next part's first are at its end, so
+                                       ///< that a block which begins in it is whole
 };
 /// largest_part: bytes.
 StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part);
@@ -39,12 +39,14 @@ struct OnHost {
 
 class DeviceStream {
  public:
-  /// Uploads the whole volume and waits. with_bounds: and those of its blocks, for layout.bound_unit. largest_part: bytes of a buffer at most; 0: what the device allows. Throws Error when
-  /// four such buffers do not hold it.
+  /// Uploads the whole volume and waits. with_bounds: and those of its blocks, for
+  /// layout.bound_unit. largest_part: bytes of a buffer at most; 0: what the device allows. Throws
+  /// Error when four such buffers do not hold it.
   DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part = 0,
                bool with_bounds = false);
   /// Leaves the volume on the host, where it must outlive the stream.
-  DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host, bool with_bounds = false);
+  DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host,
+               bool with_bounds = false);
 
   /// For kernels that include block_stream.h.
   ocl::Defines defines() const;
@@ -52,8 +54,8 @@ class DeviceStream {
   static bool is_window(const ocl::Defines &defines);
   /// Buffer i of 0..3 of a whole stream; where there are fewer, the first.
   const ocl::Buffer<uint> &part(std::size_t i) const { return parts[i < parts.size() ? i : 0]; }
-  /// Where the blocks of a whole stream begin (block_index.h), and the bounds of a level of detail; where there is nothing to look
-  /// up, any buffer. words: of the window, where there is one.
+  /// Where the blocks of a whole stream begin (block_index.h), and the bounds of a level of detail;
+  /// where there is nothing to look up, any buffer. words: of the window, where there is one.
   const ocl::Buffer<uint> &index() const { return block_index ? *block_index : parts[0]; }
   const ocl::Buffer<uint> &index(const ocl::Buffer<uint> &words) const {
     return block_index ? *block_index : words;
@@ -61,7 +63,7 @@ class DeviceStream {
 
   std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none where the volume stays on the host
   std::optional<ocl::Buffer<uint>>
-      block_index;                       ///< of a volume whose blocks have lengths of their own, or bounds
+      block_index;  ///< of a volume whose blocks have lengths of their own, or bounds
   std::unique_ptr<StreamWindow> window;  ///< where the volume stays on the host
   StreamLayout layout;
 

@@ -11,7 +11,8 @@ namespace isowave {
 
 namespace {
 
-/// Blocks that one thread gathers at a time: a random read of memory each, far more than what starting a thread costs.
+/// Blocks that one thread gathers at a time: a random read of memory each, far more than what
+/// starting a thread costs.
 constexpr std::size_t kGatherBlocks = 4096;
 /// Of the request list, so many are read together with its length: one round trip instead of two.
 constexpr std::size_t kIdsAtOnce = 4096;
@@ -22,7 +23,8 @@ void wait(const cl::Event &event) {
   try {
     if (event() != nullptr) event.wait();
   } catch (const cl::Error &error) {
-    throw Error("a transfer of compressed blocks failed: {}: {}", error.what(), ocl::error_name(error.err()));
+    throw Error("a transfer of compressed blocks failed: {}: {}", error.what(),
+                ocl::error_name(error.err()));
   }
 }
 
@@ -34,7 +36,8 @@ cl::Event mark(ocl::Device &device) {
     device.queue().flush();
     return event;
   } catch (const cl::Error &error) {
-    throw Error("device '{}' failed: {}: {}", device.info().name, error.what(), ocl::error_name(error.err()));
+    throw Error("device '{}' failed: {}: {}", device.info().name, error.what(),
+                ocl::error_name(error.err()));
   }
 }
 
@@ -44,14 +47,15 @@ void hold_back(ocl::Device &device, const cl::Event &event) {
     const std::vector<cl::Event> events{event};
     device.queue().enqueueBarrierWithWaitList(&events);
   } catch (const cl::Error &error) {
-    throw Error("device '{}' failed: {}: {}", device.info().name, error.what(), ocl::error_name(error.err()));
+    throw Error("device '{}' failed: {}: {}", device.info().name, error.what(),
+                ocl::error_name(error.err()));
   }
 }
 
 }  // namespace
 
-StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks,
-                           std::uint64_t max_copy)
+StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume,
+                           std::uint32_t window_blocks, std::uint64_t max_copy)
     : device_(device),
       volume_(volume),
       window_blocks_(window_blocks),
@@ -66,11 +70,13 @@ StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume, 
   const std::uint64_t num_words = volume.word_count();
   if (!volume.file || num_words * sizeof(std::uint32_t) > max_copy) return;
   copy_.resize(num_words);
-  parallel_for((num_words + kCopyWords - 1) / kCopyWords, 0, [&](std::uint64_t part, std::uint32_t) {
-    const std::uint64_t first = part * kCopyWords;
-    volume.read_words(
-        32 * first, std::span(copy_).subspan(first, std::min<std::uint64_t>(kCopyWords, num_words - first)));
-  });
+  parallel_for(
+      (num_words + kCopyWords - 1) / kCopyWords, 0, [&](std::uint64_t part, std::uint32_t) {
+        const std::uint64_t first = part * kCopyWords;
+        volume.read_words(32 * first,
+                          std::span(copy_).subspan(
+                              first, std::min<std::uint64_t>(kCopyWords, num_words - first)));
+      });
 }
 
 std::uint64_t StreamWindow::default_max_copy() {
@@ -90,11 +96,12 @@ std::uint64_t StreamWindow::words_per_block(const CompressedVolume &volume) {
   return volume.payload_bits() / 32 / volume.block_count() + 1;
 }
 
-std::uint64_t StreamWindow::half_words(const CompressedVolume &volume, std::uint64_t window_blocks) {
+std::uint64_t StreamWindow::half_words(const CompressedVolume &volume,
+                                       std::uint64_t window_blocks) {
   const std::uint64_t words = window_blocks * words_per_block(volume) + kDecoderAhead;
   if (!volume.is_indexed()) return words;
-  return std::max<std::uint64_t>(words, (volume.max_block_bits() + 31) / 32 + kDecoderAhead) + window_blocks +
-         1;
+  return std::max<std::uint64_t>(words, (volume.max_block_bits() + 31) / 32 + kDecoderAhead) +
+         window_blocks + 1;
 }
 
 std::size_t StreamWindow::run_length(std::span<const uint> block_ids) const {
@@ -129,14 +136,16 @@ std::span<uint> StreamWindow::gather(std::span<const uint> block_ids, Half &half
     }
     words[count] = window_entry(static_cast<uint>(end), 0);
   }
-  parallel_for((count + kGatherBlocks - 1) / kGatherBlocks, 0, [&](std::uint64_t part, std::uint32_t) {
-    const std::size_t first = part * kGatherBlocks;
-    for (std::size_t i = first; i < std::min(first + kGatherBlocks, count); ++i) {
-      const std::size_t begin = volume_.is_indexed() ? entry_bit(words[i]) / 32 : i * each;
-      const std::size_t num_words = volume_.is_indexed() ? entry_bit(words[i + 1]) / 32 - begin : each;
-      read_block(block_ids[i], words.subspan(begin, num_words));
-    }
-  });
+  parallel_for(
+      (count + kGatherBlocks - 1) / kGatherBlocks, 0, [&](std::uint64_t part, std::uint32_t) {
+        const std::size_t first = part * kGatherBlocks;
+        for (std::size_t i = first; i < std::min(first + kGatherBlocks, count); ++i) {
+          const std::size_t begin = volume_.is_indexed() ? entry_bit(words[i]) / 32 : i * each;
+          const std::size_t num_words =
+              volume_.is_indexed() ? entry_bit(words[i + 1]) / 32 - begin : each;
+          read_block(block_ids[i], words.subspan(begin, num_words));
+        }
+      });
   return words.first(end + kDecoderAhead);
 }
 
@@ -170,8 +179,8 @@ std::span<uint> StreamWindow::read_granted(const ocl::Buffer<PassCounts> &counts
   wait(counts_read);
   wait(ids_read);
   if (counts_.decoded_count > at_once) {
-    block_ids.download(std::span(granted_).subspan(at_once, counts_.decoded_count - at_once), at_once,
-                       reached, ids_read);
+    block_ids.download(std::span(granted_).subspan(at_once, counts_.decoded_count - at_once),
+                       at_once, reached, ids_read);
     wait(ids_read);
   }
   return std::span(granted_).first(counts_.decoded_count);

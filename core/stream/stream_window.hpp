@@ -1,6 +1,7 @@
 #pragma once
-// The way of blocks to the device when the compressed volume stays on the host: gathered into pinned memory, uploaded on a
-// second queue into one half of a window, and decoded from there while the other half is filled.
+// The way of blocks to the device when the compressed volume stays on the host: gathered into
+// pinned memory, uploaded on a second queue into one half of a window, and decoded from there while
+// the other half is filled.
 
 #include <array>
 #include <cstdint>
@@ -17,8 +18,9 @@ namespace isowave {
 
 class StreamWindow {
  public:
-  /// window_blocks: what one half holds, at least 1. `volume` must outlive the window. A payload in a file is copied to host memory if
-  /// it is at most max_copy bytes: else each block is read when it is asked for, which costs a system call.
+  /// window_blocks: what one half holds, at least 1. `volume` must outlive the window. A payload in
+  /// a file is copied to host memory if it is at most max_copy bytes: else each block is read when
+  /// it is asked for, which costs a system call.
   StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks,
                std::uint64_t max_copy = default_max_copy());
   /// A quarter of the host's memory.
@@ -28,21 +30,27 @@ class StreamWindow {
   StreamWindow(const StreamWindow &) = delete;
   StreamWindow &operator=(const StreamWindow &) = delete;
 
-  /// Words of one block in the window, where each begins with a whole word: of every block at a fixed rate, otherwise of most.
+  /// Words of one block in the window, where each begins with a whole word: of every block at a
+  /// fixed rate, otherwise of most.
   static std::uint64_t words_per_block(const CompressedVolume &volume);
-  /// Words of one half and of its staging memory: blocks, before them where each begins and ends unless all are alike (kernels_cl/device/block_stream.h), and behind them
-  /// two words that decoders read past their block.
+  /// Words of one half and of its staging memory: blocks, before them where each begins and ends
+  /// unless all are alike (kernels_cl/device/block_stream.h), and behind them two words that
+  /// decoders read past their block.
   static std::uint64_t half_words(const CompressedVolume &volume, std::uint64_t window_blocks);
 
-  /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in `words`.
-  using Use = std::function<void(const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count)>;
-  /// Brings blocks to the device, as many at a time as fit, and calls `use` for each of these runs, in order. Waits for the
-  /// uploads of all runs but the last two; the rest is asynchronous. Throws Error when a file that blocks are read from has become shorter.
+  /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in
+  /// `words`.
+  using Use =
+      std::function<void(const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count)>;
+  /// Brings blocks to the device, as many at a time as fit, and calls `use` for each of these runs,
+  /// in order. Waits for the uploads of all runs but the last two; the rest is asynchronous. Throws
+  /// Error when a file that blocks are read from has become shorter.
   void bring(std::span<const uint> block_ids, const Use &use);
 
-  /// The first counts.decoded_count of block_ids. Waits for all that is enqueued before. Valid until the next call, for the
-  /// caller to change.
-  std::span<uint> read_granted(const ocl::Buffer<PassCounts> &counts, const ocl::Buffer<uint> &block_ids);
+  /// The first counts.decoded_count of block_ids. Waits for all that is enqueued before. Valid
+  /// until the next call, for the caller to change.
+  std::span<uint> read_granted(const ocl::Buffer<PassCounts> &counts,
+                               const ocl::Buffer<uint> &block_ids);
 
   std::uint64_t uploaded_blocks() const { return uploaded_blocks_; }  ///< since it was made
   std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }    ///< since it was made

@@ -19,7 +19,8 @@ using nlohmann::json;
 
 /// sin of the smallest angle between view and up: below it the image's right is rounding noise.
 constexpr double kMinSinViewUp = 1e-6;
-/// Of eye to at, and of up: squares of longer vectors, and of those as much shorter than 1, leave double's range.
+/// Of eye to at, and of up: squares of longer vectors, and of those as much shorter than 1, leave
+/// double's range.
 constexpr double kLongest = 0x1p500;
 
 const json &member(const json &object, const char *key, const std::string &where) {
@@ -42,7 +43,8 @@ std::uint32_t positive_uint(const json &value, const char *key, const std::strin
 }
 
 const json &triple(const json &value, const char *key, const std::string &where) {
-  if (!value.is_array() || value.size() != 3) throw Error("{}: \"{}\" must be [x, y, z]", where, key);
+  if (!value.is_array() || value.size() != 3)
+    throw Error("{}: \"{}\" must be [x, y, z]", where, key);
   return value;
 }
 
@@ -53,18 +55,20 @@ glm::dvec3 vector3(const json &value, const char *key, const std::string &where)
 
 glm::uvec3 size3(const json &value, const char *key, const std::string &where) {
   const json &v = triple(value, key, where);
-  return {positive_uint(v[0], key, where), positive_uint(v[1], key, where), positive_uint(v[2], key, where)};
+  return {positive_uint(v[0], key, where), positive_uint(v[1], key, where),
+          positive_uint(v[2], key, where)};
 }
 
 json parse_file(const std::filesystem::path &path) {
-  constexpr std::uint64_t kMostBytes = 4u
-                                       << 20;  // 30,000 cameras. Parsed, it may take 80 times as much memory
+  constexpr std::uint64_t kMostBytes =
+      4u << 20;  // 30,000 cameras. Parsed, it may take 80 times as much memory
   const InputFile file(path);
   if (file.size() > kMostBytes)
     throw Error("{}: not a camera file: it has more than {} bytes", file.what(), kMostBytes);
   std::string text(file.size(), '\0');
   file.read(0, std::as_writable_bytes(std::span(text)));
-  if (const std::size_t zero = text.find('\0'); zero != text.npos)  // the parser would take it for the end
+  if (const std::size_t zero = text.find('\0');
+      zero != text.npos)  // the parser would take it for the end
     throw Error("{}: not a camera file: no JSON from byte {} on", file.what(), zero + 1);
   std::vector<std::set<std::string>> keys;  // of the objects that have begun, and not ended
   const auto refuse_twice = [&](int, json::parse_event_t event, const json &parsed) {
@@ -98,7 +102,8 @@ void check_camera(const Camera &camera, std::string_view what) {
   }
   const glm::dvec3 view = camera.at - camera.eye;
   const double view_length = glm::length(view), up_length = glm::length(camera.up);
-  if (view_length > kLongest || up_length > kLongest) throw Error("{}: eye, at and up are too large", what);
+  if (view_length > kLongest || up_length > kLongest)
+    throw Error("{}: eye, at and up are too large", what);
   if (view_length < 1 / kLongest) throw Error("{}: eye and at are the same point", what);
   if (up_length < 1 / kLongest) throw Error("{}: up is the zero vector", what);
   if (glm::length(glm::cross(view / view_length, camera.up / up_length)) < kMinSinViewUp) {
@@ -143,8 +148,8 @@ std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
   const glm::dmat3 index_to_world = info.index_to_world();
   const glm::dvec3 extent(info.dims - 1u);
   const glm::dvec3 centre = info.origin + index_to_world * (0.5 * extent);
-  // Of the four diagonals of a sheared box the one from its first to its last voxel counts; all are equal
-  // otherwise.
+  // Of the four diagonals of a sheared box the one from its first to its last voxel counts; all are
+  // equal otherwise.
   const double distance = 0.8 * glm::length(index_to_world * extent);
 
   std::vector<Camera> cameras;

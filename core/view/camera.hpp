@@ -26,15 +26,15 @@ struct CameraFile {
   std::vector<Camera> cameras;
 };
 
-/// Throws Error: unreadable, not JSON, a field missing or of a wrong type, eye == at, up parallel to the
-/// view, fovy outside (0,180), no cameras.
+/// Throws Error: unreadable, not JSON, a field missing or of a wrong type, eye == at, up parallel
+/// to the view, fovy outside (0,180), no cameras.
 CameraFile read_camera_file(const std::filesystem::path &path);
 /// Throws Error when the camera is degenerate (see read_camera_file); `what` names it.
 void check_camera(const Camera &camera, std::string_view what);
 
-/// n eyes about the world +y axis through the box centre: azimuth 2*pi*k/n + 0.3 (0 looks from +z; x grows
-/// with sin), elevation 20 degrees, distance 0.8 box diagonals from the box centre, fovy 60. The box spans
-/// index [0, dims-1] mapped to world.
+/// n eyes about the world +y axis through the box centre: azimuth 2*pi*k/n + 0.3 (0 looks from +z;
+/// x grows with sin), elevation 20 degrees, distance 0.8 box diagonals from the box centre,
+/// fovy 60. The box spans index [0, dims-1] mapped to world.
 std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n);
 
 }  // namespace isowave

@@ -13,8 +13,8 @@ namespace isowave {
 
 namespace {
 
-/// Distances from the eye: none to a point of the volume's domain is less than the first or more than the second, a little apart so that no
-/// rounding matters [world units].
+/// Distances from the eye: none to a point of the volume's domain is less than the first or more
+/// than the second, a little apart so that no rounding matters [world units].
 std::array<double, 2> reach(const VolumeInfo &info, const glm::dvec3 &eye) {
   const glm::dmat3 to_world = info.index_to_world(), to_index = glm::inverse(to_world);
   const glm::dvec3 last = glm::dvec3(info.dims) - 1.0, at = to_index * (eye - info.origin);
@@ -25,7 +25,7 @@ std::array<double, 2> reach(const VolumeInfo &info, const glm::dvec3 &eye) {
     radius = std::max(radius, glm::length(to_world * (last * (side - 0.5))));
   }
   double nearest = glm::length(to_world * (0.5 * last - at)) - radius;  // to a ball around it
-  for (int axis = 0; axis < 3; ++axis) {                                // and to the planes of its faces
+  for (int axis = 0; axis < 3; ++axis) {  // and to the planes of its faces
     const double beyond = std::max(-at[axis], at[axis] - last[axis]);
     nearest = std::max(nearest, beyond / glm::length(glm::row(to_index, axis)));
   }
@@ -49,7 +49,8 @@ void place_levels(std::span<FrameParams> frames) {
 
 std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels) {
   std::vector<const CompressedVolume *> levels = {&volume};
-  for (std::size_t i = 0; with_levels && i < volume.coarser.size(); ++i) levels.push_back(&volume.coarser[i]);
+  for (std::size_t i = 0; with_levels && i < volume.coarser.size(); ++i)
+    levels.push_back(&volume.coarser[i]);
   return levels;
 }
 
@@ -74,14 +75,16 @@ FrameParams make_id_grid(std::span<const FrameParams> level_grids) {
 
 void check_max_pixel_error(double max_pixel_error) {
   if (!(max_pixel_error >= 0) || !std::isfinite(max_pixel_error))
-    throw Error("a distance of {} pixels between voxels cannot be allowed: give 0 or more", max_pixel_error);
+    throw Error("a distance of {} pixels between voxels cannot be allowed: give 0 or more",
+                max_pixel_error);
 }
 
 void check_levels(const CompressedVolume &volume, double max_pixel_error) {
   check_max_pixel_error(max_pixel_error);
   if (max_pixel_error > 0 && volume.coarser.empty() && max_levels(volume.info.dims) > 1) {
     throw Error(
-        "the volume has no levels of detail, which {} pixels between voxels need: convert it with --levels",
+        "the volume has no levels of detail, which {} pixels between voxels need: convert it with "
+        "--levels",
         max_pixel_error);
   }
 }
@@ -90,7 +93,8 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
                                            ImageSize size, float isovalue, double max_pixel_error) {
   check_max_pixel_error(max_pixel_error);
   std::vector<FrameParams> frames;
-  for (const VolumeInfo &info : levels) frames.push_back(make_frame_params(info, camera, size, isovalue));
+  for (const VolumeInfo &info : levels)
+    frames.push_back(make_frame_params(info, camera, size, isovalue));
   place_levels(frames);
   for (std::size_t i = 1; i < frames.size(); ++i) frames[i].begin_t = frames[i].end_t = 0.0f;
   if (max_pixel_error == 0 || levels.size() == 1) return frames;
@@ -99,7 +103,8 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   const glm::dmat3 to_world = finest.index_to_world();
   const double voxel =
       std::max({glm::length(to_world[0]), glm::length(to_world[1]), glm::length(to_world[2])});
-  const double pixel = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / size.height;  // at distance 1
+  const double pixel =
+      2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / size.height;  // at distance 1
   const auto [nearest, farthest] = reach(levels.back(), camera.eye);
   // Levels' t differ by powers of two, so that their borders are the same in all bits.
   const auto border = [&](std::size_t level, const FrameParams &frame) {

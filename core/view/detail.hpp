@@ -1,10 +1,11 @@
 #pragma once
 // Level of detail: which of a volume's levels draws which part of the rays.
 //
-// A level is fine enough from where its voxels are at most so many pixels apart. That depends on the distance from the eye alone,
-// so a frame is drawn in bands, from spherical border to border: the finest level nearest. A ray that crosses a border goes on at
-// the next level; where the two levels have it on different sides of the isosurface, the border is its hit, so that no
-// ray slips between them.
+// A level is fine enough from where its voxels are at most so many pixels apart. That depends on
+// the distance from the eye alone, so a frame is drawn in bands, from spherical border to border:
+// the finest level nearest. A ray that crosses a border goes on at the next level; where the two
+// levels have it on different sides of the isosurface, the border is its hit, so that no ray slips
+// between them.
 
 #include <cmath>
 #include <span>
@@ -15,17 +16,19 @@
 
 namespace isowave {
 
-/// One frame for each level, the finest first: as make_frame_params() makes it, but with the level's band, begin_t to end_t,
-/// which is empty where it draws nothing, and block ids that count on through all levels. The first band begins at the
-/// eye, the last one has no end; a level whose band the volume does not reach into draws nothing. If there are several
-/// bands, the active box of each is its whole domain, and the first one's screen box is for all.
-/// max_pixel_error: distance between a level's voxels, in pixels, at most; 0: the finest level draws all. Throws Error: what
+/// One frame for each level, the finest first: as make_frame_params() makes it, but with the
+/// level's band, begin_t to end_t, which is empty where it draws nothing, and block ids that count
+/// on through all levels. The first band begins at the eye, the last one has no end; a level whose
+/// band the volume does not reach into draws nothing. If there are several bands, the active box of
+/// each is its whole domain, and the first one's screen box is for all. max_pixel_error: distance
+/// between a level's voxels, in pixels, at most; 0: the finest level draws all. Throws Error: what
 /// make_frame_params() throws.
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
                                            ImageSize size, float isovalue, double max_pixel_error);
 
-/// How far decoded voxels of a level may be off where those of the finest may be by value_error: twice as far as of the level before,
-/// since it is drawn from twice the distance on. So what planes leave out is as many pixels wide at each border.
+/// How far decoded voxels of a level may be off where those of the finest may be by value_error:
+/// twice as far as of the level before, since it is drawn from twice the distance on. So what
+/// planes leave out is as many pixels wide at each border.
 inline double value_error_of(double value_error, std::size_t level) {
   return std::ldexp(value_error, static_cast<int>(level));
 }
@@ -34,9 +37,11 @@ inline double value_error_of(double value_error, std::size_t level) {
 std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels);
 std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels);
 
-/// Grid parameters of each level, with the places of its blocks, ranges and masks among those of all levels.
+/// Grid parameters of each level, with the places of its blocks, ranges and masks among those of
+/// all levels.
 std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels);
-/// All levels' ids as those of one grid: its blocks are as many along x and y as the finest level's.
+/// All levels' ids as those of one grid: its blocks are as many along x and y as the finest
+/// level's.
 FrameParams make_id_grid(std::span<const FrameParams> level_grids);
 
 inline bool draws(const FrameParams &frame) {

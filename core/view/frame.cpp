@@ -13,7 +13,8 @@ namespace isowave {
 
 namespace {
 
-/// Denormals and near-denormals of an eye next to a voxel plane would make devices disagree; they are 0.
+/// Denormals and near-denormals of an eye next to a voxel plane would make devices disagree; they
+/// are 0.
 float flush_tiny(double x) {
   return std::abs(x) < 0x1p-60 ? 0.0f : static_cast<float>(x);
 }
@@ -32,13 +33,15 @@ std::string spacing_text(const VolumeInfo &info) {
   return fmt::format("{} {} {}", info.spacing.x, info.spacing.y, info.spacing.z);
 }
 
-/// Throws Error where float64 tells places beside `place`, a vector of the world, apart only by more than 2^-10 voxels.
+/// Throws Error where float64 tells places beside `place`, a vector of the world, apart only by
+/// more than 2^-10 voxels.
 void check_places(const VolumeInfo &info, const glm::dvec3 &place, std::string_view what) {
   const double farthest = largest_component(place);
   const double shortest = std::ranges::min(edges(info));
   if (farthest * 0x1p-52 <= shortest * 0x1p-10) return;
   throw Error(
-      "{}: {:.3g} world units from the world's origin, float64 cannot tell voxels apart that are {:.3g} wide",
+      "{}: {:.3g} world units from the world's origin, float64 cannot tell voxels apart that are "
+      "{:.3g} wide",
       what, farthest, shortest);
 }
 
@@ -67,8 +70,8 @@ void check_image_size(ImageSize size) {
   }
   const std::uint64_t most = kMaxRays / (size.samples * size.samples);
   if (size.num_pixels() == 0 || size.num_pixels() > most) {
-    throw Error("an image of {} x {} pixels cannot be drawn: 1 to {} pixels can", size.width, size.height,
-                most);
+    throw Error("an image of {} x {} pixels cannot be drawn: 1 to {} pixels can", size.width,
+                size.height, most);
   }
 }
 
@@ -77,30 +80,32 @@ void check_drawable(const VolumeInfo &info, std::string_view what) {
   if (const std::uint64_t count = blocks.x * blocks.y * blocks.z; count >= ISO_MAX_BLOCK_IDS)
     throw Error("{}: a volume of {} blocks cannot be drawn: block ids end at {}", what, count,
                 ISO_MAX_BLOCK_IDS);
-  // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied to become it
-  // (below). An eye is at most 1e7 voxels off and dims are at most 2^16, so t is at most 2^25 voxels' longest edges;
-  // and nothing that matters is nearer than 2^-24 of the shortest. Within 2^+-100, neither reaches float32's ends,
-  // nor do a level of detail's voxels.
+  // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied
+  // to become it (below). An eye is at most 1e7 voxels off and dims are at most 2^16, so t is at
+  // most 2^25 voxels' longest edges; and nothing that matters is nearer than 2^-24 of the shortest.
+  // Within 2^+-100, neither reaches float32's ends, nor do a level of detail's voxels.
   const std::array<double, 3> voxel = edges(info);
   const double shortest = std::ranges::min(voxel), longest = std::ranges::max(voxel);
   if (!(shortest >= 0x1p-100 && longest <= 0x1p100)) {
     throw Error("{}: spacing {}: distances in float32 allow 2^-100 (8e-31) to 2^100 (1e30)", what,
                 spacing_text(info));
   }
-  // Rays along the longest edge move that much slower in index space than along the shortest, and directions below
-  // 2^-60 are 0.
+  // Rays along the longest edge move that much slower in index space than along the shortest, and
+  // directions below 2^-60 are 0.
   if (longest > 0x1p36 * shortest) {
-    throw Error("{}: spacing {}: directions in float32 allow one to be 2^36 (7e10) times another", what,
-                spacing_text(info));
+    throw Error("{}: spacing {}: directions in float32 allow one to be 2^36 (7e10) times another",
+                what, spacing_text(info));
   }
   check_places(info, info.origin, what);
 }
 
-FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue) {
+FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
+                              float isovalue) {
   check_volume_info(info, "the volume");
   check_camera(camera, "the camera");
   check_image_size(size);
-  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number in the volume's value range");
+  if (std::isnan(isovalue))
+    throw Error("the isovalue is NaN: give a number in the volume's value range");
 
   check_drawable(info, "the volume");
 
@@ -114,14 +119,16 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   glm::dvec3 up = world_to_index * world_up;
   if (!std::isfinite(largest_component(eye)) || largest_component(eye) > 1e7) {
     throw Error(
-        "the camera's eye is {:.3g} voxels from the volume's origin: up to 1e7 can be drawn in float32",
+        "the camera's eye is {:.3g} voxels from the volume's origin: up to 1e7 can be drawn in "
+        "float32",
         largest_component(eye));
   }
   check_places(info, camera.eye, "the camera's eye");
 
-  // A power of two takes the voxel size out of t, so that neither tiny nor huge spacings reach float32's
-  // ends.
-  const double largest = std::max({largest_component(fwd), largest_component(right), largest_component(up)});
+  // A power of two takes the voxel size out of t, so that neither tiny nor huge spacings reach
+  // float32's ends.
+  const double largest =
+      std::max({largest_component(fwd), largest_component(right), largest_component(up)});
   const double t_scale = std::exp2(-std::floor(std::log2(largest)));
   fwd *= t_scale;
   right *= t_scale;
@@ -145,7 +152,8 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   frame.up_x = flush_tiny(up.x);
   frame.up_y = flush_tiny(up.y);
   frame.up_z = flush_tiny(up.z);
-  frame.pixel_scale = static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows());
+  frame.pixel_scale =
+      static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows());
   frame.t_scale = static_cast<float>(t_scale);
   frame.isovalue = isovalue;
   frame.max_spec_count = 1;
@@ -165,8 +173,8 @@ void set_screen_box(FrameParams &frame) {
   const double pixel = 2.0 * frame.pixel_scale;  // step of u and v
   const glm::dvec2 border = 0.5 * pixel * size;  // largest |u|, |v|
 
-  // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of that basis: by how
-  // much?
+  // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of
+  // that basis: by how much?
   const glm::dmat3 sizes(glm::abs(basis[0]), glm::abs(basis[1]), glm::abs(basis[2]));
   const glm::dmat3 to_sizes(glm::abs(to_view[0]), glm::abs(to_view[1]), glm::abs(to_view[2]));
   const double length = glm::length(glm::dvec3(1, border.x, border.y));
@@ -190,7 +198,8 @@ void set_screen_box(FrameParams &frame) {
       break;
     }
     // See make_ray(): u = (2 column + 1 - width) pixel_scale, v = (height - 1 - 2 row) pixel_scale.
-    const glm::dvec2 projected = 0.5 * (size - 1.0) + glm::dvec2(view.y, -view.z) / (view.x * pixel);
+    const glm::dvec2 projected =
+        0.5 * (size - 1.0) + glm::dvec2(view.y, -view.z) / (view.x * pixel);
     begin = glm::min(begin, projected - margin);
     end = glm::max(end, projected + margin + 1.0);
   }
@@ -205,7 +214,8 @@ void set_screen_box(FrameParams &frame) {
 
 std::vector<float> depth_of(const std::vector<HitRecord> &hits) {
   std::vector<float> depth(hits.size());
-  std::transform(hits.begin(), hits.end(), depth.begin(), [](const HitRecord &hit) { return hit.t; });
+  std::transform(hits.begin(), hits.end(), depth.begin(),
+                 [](const HitRecord &hit) { return hit.t; });
   return depth;
 }
 

@@ -10,8 +10,9 @@
 
 namespace isowave {
 
-/// A picture, and the grid of its rays: that of a picture with samples times as many pixels along both axes. Frames
-/// and hit buffers count rays; the picture has the mean colour of each pixel's (kernels_cl/shade.cl).
+/// A picture, and the grid of its rays: that of a picture with samples times as many pixels along
+/// both axes. Frames and hit buffers count rays; the picture has the mean colour of each pixel's
+/// (kernels_cl/shade.cl).
 struct ImageSize {
   std::uint32_t width = 1280, height = 720;  ///< pixels
   std::uint32_t samples = 1;                 ///< rays of a pixel along each axis, 1..kMaxSamples
@@ -26,7 +27,8 @@ struct ImageSize {
 /// Throws Error: an image of 0 pixels, more than 2^28 rays, samples out of range.
 void check_image_size(ImageSize size);
 
-/// Blocks along an axis of `dim` voxels that own dual cells: all but a last one of a single voxel layer.
+/// Blocks along an axis of `dim` voxels that own dual cells: all but a last one of a single voxel
+/// layer.
 inline std::uint32_t num_owning_blocks(std::uint32_t dim) {
   return (dim + 2) / 4;
 }
@@ -43,21 +45,23 @@ inline std::uint64_t num_macrocells(const FrameParams &grid) {
   return cells(grid.blocks_x) * cells(grid.blocks_y) * cells(grid.blocks_z);
 }
 
-/// Throws Error where distances within the volume, or directions, do not fit float32, or its origin is so far away
-/// that voxels are lost beside it. `what` names the volume.
+/// Throws Error where distances within the volume, or directions, do not fit float32, or its origin
+/// is so far away that voxels are lost beside it. `what` names the volume.
 void check_drawable(const VolumeInfo &info, std::string_view what);
 
 /// Of the grid only, for what is done before there is a camera.
 FrameParams make_grid_params(const VolumeInfo &info);
 
-/// Sets the frame's screen box: a rectangle of the pixels whose rays, as make_ray() rounds them, may meet its active
-/// box.
+/// Sets the frame's screen box: a rectangle of the pixels whose rays, as make_ray() rounds them,
+/// may meet its active box.
 void set_screen_box(FrameParams &frame);
 
-/// Computes the camera basis once, in double, and maps it to index space. The active box is the whole volume;
-/// isovalue_index, speculation and table_groups are left for the renderer. Throws Error: a degenerate camera, or one
-/// too far away, what check_drawable() or check_image_size() refuses, a NaN isovalue.
-FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size, float isovalue);
+/// Computes the camera basis once, in double, and maps it to index space. The active box is the
+/// whole volume; isovalue_index, speculation and table_groups are left for the renderer. Throws
+/// Error: a degenerate camera, or one too far away, what check_drawable() or check_image_size()
+/// refuses, a NaN isovalue.
+FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
+                              float isovalue);
 
 /// Depth of each hit, world units, INFINITY where nothing is hit.
 std::vector<float> depth_of(const std::vector<HitRecord> &hits);

@@ -18,11 +18,12 @@ namespace isowave {
 /// The smallest float32 that is not below.
 inline float rounded_up(double error) {
   const float nearest = static_cast<float>(error);
-  return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
+  return double{nearest} < error ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
+                                 : nearest;
 }
 
-/// error + lost, rounded up: decoded voxels are off by `error` from what was compressed, and that by `lost` from the
-/// source (Chunk::lost).
+/// error + lost, rounded up: decoded voxels are off by `error` from what was compressed, and that
+/// by `lost` from the source (Chunk::lost).
 inline double with_lost(double error, float lost) {
   const double least = std::min(error, double{lost}), largest = std::max(error, double{lost});
   const double sum = largest + least;
@@ -43,7 +44,8 @@ struct BlockError {
     for (double &largest : at_place) largest = with_lost(largest, lost);
   }
   double largest() const { return std::ranges::max(at_place); }
-  /// The smallest bound for the whole block such that every voxel stays within its share of it (bound_share()).
+  /// The smallest bound for the whole block such that every voxel stays within its share of it
+  /// (bound_share()).
   double bound_by_place() const {
     double bound = 0;
     for (std::uint32_t place = 0; place < at_place.size(); ++place)
@@ -58,9 +60,13 @@ class BlockErrors {
   /// keep: bound_by_place() of each block, in 4 bytes; else only the largest of all.
   explicit BlockErrors(bool keep) : keep_(keep) {}
 
-  /// What the next blocks had lost before they were compressed (Chunk::lost); to be called before their end().
-  void add_lost(std::span<const float> lost) { lost_.insert(lost_.end(), lost.begin(), lost.end()); }
-  /// Zeros for the next blocks, to be filled in with how far they are off from what was compressed before end().
+  /// What the next blocks had lost before they were compressed (Chunk::lost); to be called before
+  /// their end().
+  void add_lost(std::span<const float> lost) {
+    lost_.insert(lost_.end(), lost.begin(), lost.end());
+  }
+  /// Zeros for the next blocks, to be filled in with how far they are off from what was compressed
+  /// before end().
   std::span<BlockError> begin(std::size_t num_blocks) {
     some_.assign(num_blocks, {});
     return some_;

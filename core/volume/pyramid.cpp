@@ -14,7 +14,8 @@ constexpr std::uint32_t kShortestAxis = 8;  ///< that is halved once more
 
 constexpr std::uint32_t kNumTaps = 5;
 
-/// -1/16, 1/4, 5/8, 1/4, -1/16, but never beyond the values themselves, so that a step does not ring and no sum overflows.
+/// -1/16, 1/4, 5/8, 1/4, -1/16, but never beyond the values themselves, so that a step does not
+/// ring and no sum overflows.
 float low_pass(const std::array<float, kNumTaps> &v) {
   const auto [least, largest] = std::minmax({v[0], v[1], v[2], v[3], v[4]});
   const float inner = 0.625f * v[2] + (0.25f * v[1] + 0.25f * v[3]);
@@ -24,7 +25,8 @@ float low_pass(const std::array<float, kNumTaps> &v) {
 /// Where coarse voxel k of an axis of n fine ones takes its values.
 std::array<std::uint32_t, kNumTaps> taps(std::uint32_t k, std::uint32_t n) {
   std::array<std::uint32_t, kNumTaps> at{};
-  for (std::uint32_t i = 0; i < kNumTaps; ++i) at[i] = std::min(2 * k + i - std::min(2 * k + i, 2u), n - 1);
+  for (std::uint32_t i = 0; i < kNumTaps; ++i)
+    at[i] = std::min(2 * k + i - std::min(2 * k + i, 2u), n - 1);
   return at;
 }
 
@@ -40,18 +42,22 @@ VolumeInfo coarser_level(const VolumeInfo &fine) {
 
 std::uint32_t max_levels(const glm::uvec3 &dims) {
   std::uint32_t levels = 1;
-  for (std::uint32_t n = std::min({dims.x, dims.y, dims.z}); n >= kShortestAxis && levels < kMaxLevels;
-       n = n / 2 + 1) {
+  for (std::uint32_t n = std::min({dims.x, dims.y, dims.z});
+       n >= kShortestAxis && levels < kMaxLevels; n = n / 2 + 1) {
     ++levels;
   }
   return levels;
 }
 
 Downsampler::Downsampler(const glm::uvec3 &fine_dims, std::uint32_t num_threads, Sink sink)
-    : fine_(fine_dims), coarse_(fine_dims / 2u + 1u), num_threads_(num_threads), sink_(std::move(sink)) {}
+    : fine_(fine_dims),
+      coarse_(fine_dims / 2u + 1u),
+      num_threads_(num_threads),
+      sink_(std::move(sink)) {}
 
 void Downsampler::add(std::span<const float> layers) {
-  const std::size_t fine_layer = std::size_t{fine_.x} * fine_.y, plane = std::size_t{coarse_.x} * coarse_.y;
+  const std::size_t fine_layer = std::size_t{fine_.x} * fine_.y,
+                    plane = std::size_t{coarse_.x} * coarse_.y;
   const std::size_t num_layers = layers.size() / fine_layer;
   planes_.resize(plane * num_layers);
   parallel_for(num_layers * coarse_.y, num_threads_, [&](std::uint64_t row, std::uint32_t) {
@@ -69,7 +75,8 @@ void Downsampler::add(std::span<const float> layers) {
       out[k] = low_pass({rows[x[0]], rows[x[1]], rows[x[2]], rows[x[3]], rows[x[4]]});
     }
   });
-  for (std::size_t i = 0; i < num_layers; ++i) add_plane(z_++, std::span(planes_).subspan(i * plane, plane));
+  for (std::size_t i = 0; i < num_layers; ++i)
+    add_plane(z_++, std::span(planes_).subspan(i * plane, plane));
 }
 
 void Downsampler::add_plane(std::uint32_t z, std::span<const float> plane) {
@@ -82,8 +89,9 @@ void Downsampler::add_plane(std::uint32_t z, std::span<const float> plane) {
 /// last: the fine layer that recent_ ends with.
 void Downsampler::emit(std::uint32_t last) {
   std::array<const float *, kNumTaps> planes{};
-  std::ranges::transform(taps(num_emitted_, fine_.z), planes.begin(),
-                         [&](std::uint32_t z) { return recent_[recent_.size() - 1 - (last - z)].data(); });
+  std::ranges::transform(taps(num_emitted_, fine_.z), planes.begin(), [&](std::uint32_t z) {
+    return recent_[recent_.size() - 1 - (last - z)].data();
+  });
   const std::size_t begin = chunk_.size(), size = std::size_t{coarse_.x} * coarse_.y;
   chunk_.resize(begin + size);
   for (std::size_t i = 0; i < size; ++i) {

@@ -1,10 +1,13 @@
 #pragma once
-// Levels of detail: a pyramid of grids, each with half the voxels of the one before along each axis.
+// Levels of detail: a pyramid of grids, each with half the voxels of the one before along each
+// axis.
 //
-// Voxel k of a level lies where voxel 2k of the level before does, so planes of a coarse grid are planes of the fine one, and a
-// ray crosses both at the same t, bit for bit. Its value is a mean of five along each axis, by -1/16, 1/4, 5/8, 1/4, -1/16, held to the
-// least and the largest of them. So a field that bends evenly keeps its values there, and surfaces their place, where positive weights would
-// shrink them. Behind the last voxel lie copies of it, and a coarse grid may end up to a voxel of its own behind the fine one.
+// Voxel k of a level lies where voxel 2k of the level before does, so planes of a coarse grid are
+// planes of the fine one, and a ray crosses both at the same t, bit for bit. Its value is a mean of
+// five along each axis, by -1/16, 1/4, 5/8, 1/4, -1/16, held to the least and the largest of them.
+// So a field that bends evenly keeps its values there, and surfaces their place, where positive
+// weights would shrink them. Behind the last voxel lie copies of it, and a coarse grid may end up
+// to a voxel of its own behind the fine one.
 
 #include <cstdint>
 #include <deque>
@@ -19,9 +22,11 @@ namespace isowave {
 
 inline constexpr std::uint32_t kMaxLevels = 16;
 
-/// The grid of the next coarser level: n / 2 + 1 voxels along an axis of n, twice the spacing, float32.
+/// The grid of the next coarser level: n / 2 + 1 voxels along an axis of n, twice the spacing,
+/// float32.
 VolumeInfo coarser_level(const VolumeInfo &fine);
-/// How many levels a volume can have, itself among them: halved while the shortest axis keeps at least 8 voxels.
+/// How many levels a volume can have, itself among them: halved while the shortest axis keeps at
+/// least 8 voxels.
 std::uint32_t max_levels(const glm::uvec3 &dims);
 
 /// Makes the voxels of the next coarser level from those of a level, in memory O(nx * ny).

@@ -48,8 +48,9 @@ VoxelType voxel_type_from_string(std::string_view name) {
   for (const TypeEntry &candidate : kVoxelTypes) {
     if (candidate.name == name) return candidate.type;
   }
-  throw Error("unknown voxel type '{}': use uint8, int8, uint16, int16, uint32, int32, float32 or float64",
-              name);
+  throw Error(
+      "unknown voxel type '{}': use uint8, int8, uint16, int16, uint32, int32, float32 or float64",
+      name);
 }
 
 glm::dmat3 VolumeInfo::index_to_world() const {
@@ -62,13 +63,13 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
   };
   for (int axis = 0; axis < 3; ++axis) {
     if (info.dims[axis] < 2 || info.dims[axis] > kMaxDim) {
-      throw Error("{}: dims {}x{}x{}: each must be 2 to {}", what, info.dims.x, info.dims.y, info.dims.z,
-                  kMaxDim);
+      throw Error("{}: dims {}x{}x{}: each must be 2 to {}", what, info.dims.x, info.dims.y,
+                  info.dims.z, kMaxDim);
     }
   }
   if (!finite(info.spacing) || glm::any(glm::lessThanEqual(info.spacing, glm::dvec3(0.0)))) {
-    throw Error("{}: spacing {} {} {}: each must be finite and above 0", what, info.spacing.x, info.spacing.y,
-                info.spacing.z);
+    throw Error("{}: spacing {} {} {}: each must be finite and above 0", what, info.spacing.x,
+                info.spacing.y, info.spacing.z);
   }
   if (!finite(info.origin)) throw Error("{}: the origin is not finite", what);
   const double determinant = glm::determinant(info.direction);
@@ -77,7 +78,8 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
   }
 }
 
-void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) {
+void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                                     std::span<double> out) {
   if (!fits_float32(info_.type)) throw std::logic_error("this reader has voxels in float32 only");
   std::vector<float> voxels(out.size());
   read_layers(z_begin, num_layers, voxels);

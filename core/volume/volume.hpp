@@ -1,8 +1,8 @@
 #pragma once
 // Uncompressed volumes: what a file says of its grid, and its voxels as float32, layer by layer.
 //
-// Index space: voxel (i,j,k) at integer coordinates. World = origin + direction * (spacing * index).
-// Voxels are ordered x fastest, then y, then z.
+// Index space: voxel (i,j,k) at integer coordinates. World = origin + direction * (spacing *
+// index). Voxels are ordered x fastest, then y, then z.
 
 #include <array>
 #include <cstdint>
@@ -62,8 +62,9 @@ struct VolumeInfo {
   glm::dmat3 index_to_world() const;
 };
 
-/// Throws Error if any dimension is below 2 or above kMaxDim, spacing is not finite and positive, the
-/// origin is not finite, or the direction is not invertible. `what` names the file in the message.
+/// Throws Error if any dimension is below 2 or above kMaxDim, spacing is not finite and positive,
+/// the origin is not finite, or the direction is not invertible. `what` names the file in the
+/// message.
 void check_volume_info(const VolumeInfo &info, std::string_view what);
 inline constexpr std::uint32_t kMaxDim = 1u << 16;
 
@@ -77,11 +78,13 @@ class VolumeReader {
   /// Calls must ask for ascending, non-overlapping layers (gzip streams cannot go back).
   /// Integer types are converted exactly up to 2^24 and rounded beyond. NaN and Inf pass through.
   /// Throws Error on a short or unreadable file.
-  virtual void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) = 0;
+  virtual void read_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                           std::span<float> out) = 0;
 
-  /// As read_layers(), but every voxel exactly as the file has it. A reader of types that float32 does not hold
-  /// (fits_float32()) must override this one, which throws std::logic_error for them.
-  virtual void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out);
+  /// As read_layers(), but every voxel exactly as the file has it. A reader of types that float32
+  /// does not hold (fits_float32()) must override this one, which throws std::logic_error for them.
+  virtual void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                                 std::span<double> out);
 
  protected:
   VolumeInfo info_;

@@ -18,8 +18,8 @@ namespace {
 
 constexpr std::uint64_t kChunkVoxels = 1ull << 22;  // enough to keep threads busy, 16 MiB
 
-/// Memory that nobody touches before voxels are read into it: a packed file may claim a thousand times more of them than it
-/// has, and ends before they are missed.
+/// Memory that nobody touches before voxels are read into it: a packed file may claim a thousand
+/// times more of them than it has, and ends before they are missed.
 template <class Value>
 class Untouched {
  public:
@@ -74,8 +74,8 @@ void raise_lost(float &lost, double error) {
   if (error > double{lost}) lost = rounded_up(error);
 }
 
-/// Sets voxels to their source as float32, and notes what that loses; of tiny ones, which will become 0, all of it.
-/// Those that will be mapped or refused become NaN, or kMaxMagnitude.
+/// Sets voxels to their source as float32, and notes what that loses; of tiny ones, which will
+/// become 0, all of it. Those that will be mapped or refused become NaN, or kMaxMagnitude.
 void cast_line(const Line &line, Findings &found) {
   for (std::size_t x = 0; x < line.source.size(); ++x) {
     const double source = line.source[x];
@@ -93,8 +93,9 @@ void cast_line(const Line &line, Findings &found) {
   }
 }
 
-/// Adds the range of the line to `found` if each of its voxels is compressed as it is. Else returns false. Made for
-/// vector instructions: no branches, and the bits of floats as integers of the same order.
+/// Adds the range of the line to `found` if each of its voxels is compressed as it is. Else returns
+/// false. Made for vector instructions: no branches, and the bits of floats as integers of the same
+/// order.
 bool add_plain_values(const Line &line, Findings &found) {
   constexpr std::int32_t kMagnitudeBits = 0x7FFFFFFF;
   constexpr auto kLeast = std::bit_cast<std::int32_t>(kMinMagnitude);
@@ -102,7 +103,8 @@ bool add_plain_values(const Line &line, Findings &found) {
   const auto ordered = [](std::int32_t bits) {
     return bits ^ ((bits >> 31) & kMagnitudeBits);
   };  // its own inverse
-  std::int32_t min = std::numeric_limits<std::int32_t>::max(), max = std::numeric_limits<std::int32_t>::min();
+  std::int32_t min = std::numeric_limits<std::int32_t>::max(),
+               max = std::numeric_limits<std::int32_t>::min();
   std::uint32_t others = 0;
   for (const float value : line.voxels) {
     const auto bits = std::bit_cast<std::int32_t>(value);
@@ -113,7 +115,8 @@ bool add_plain_values(const Line &line, Findings &found) {
     max = std::max(max, order);
   }
   if (others != 0) return false;
-  const auto least = std::bit_cast<float>(ordered(min)), largest = std::bit_cast<float>(ordered(max));
+  const auto least = std::bit_cast<float>(ordered(min)),
+             largest = std::bit_cast<float>(ordered(max));
   found.min = std::min(found.min, least);
   found.max = std::max(found.max, largest);
   if (line.source.empty()) found.add_source(double{least}, double{largest});
@@ -155,18 +158,21 @@ void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
     return fmt::format("({},{},{})", voxel % x, voxel / x % y, voxel / (x * y));
   };
   if (found.bad_count > 0) {
-    throw Error("{} of {} voxels are NaN or infinite, the first at {}: give a value for them with --map-nan",
-                found.bad_count, info.num_voxels(), position(found.first_bad));
+    throw Error(
+        "{} of {} voxels are NaN or infinite, the first at {}: give a value for them with "
+        "--map-nan",
+        found.bad_count, info.num_voxels(), position(found.first_bad));
   }
   if (found.too_large_count > 0) {
     throw Error(
-        "{} of {} voxels are beyond +-{:.4g}, the first at {}: zfp cannot hold them, scale the volume down",
+        "{} of {} voxels are beyond +-{:.4g}, the first at {}: zfp cannot hold them, scale the "
+        "volume down",
         found.too_large_count, info.num_voxels(), kMaxMagnitude, position(found.first_too_large));
   }
 }
 
-/// Checks the rows of a chunk and has them coded, unless a voxel was refused: what follows is only counted then.
-/// source: of its voxels, where they are still to be cast.
+/// Checks the rows of a chunk and has them coded, unless a voxel was refused: what follows is only
+/// counted then. source: of its voxels, where they are still to be cast.
 Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm::uvec3 &dims,
                    const InputOptions &options, ChunkCoder &coder) {
   const std::uint64_t layer = std::uint64_t(dims.x) * dims.y, rows_per_slab = (dims.y + 3u) / 4u;
@@ -182,8 +188,8 @@ Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm
     Findings &found = findings[thread];
     for (std::uint64_t i = 0; i < std::uint64_t(row.ny) * row.nz; ++i) {
       const std::uint64_t at = begin + i / row.ny * layer + i % row.ny * dims.x;
-      check_line({chunk.voxels.subspan(at, dims.x), source.empty() ? source : source.subspan(at, dims.x),
-                  chunk.z * layer + at, lost},
+      check_line({chunk.voxels.subspan(at, dims.x),
+                  source.empty() ? source : source.subspan(at, dims.x), chunk.z * layer + at, lost},
                  options.map_nan, found);
     }
     if (!found.refused()) coder.code_row(row, thread);
@@ -206,7 +212,8 @@ Chunk make_chunk(const glm::uvec3 &dims, std::uint32_t z, std::span<float> voxel
   return {z, num_layers, voxels, std::uint64_t((dims.y + 3u) / 4u) * ((num_layers + 3u) / 4u)};
 }
 
-void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder) {
+void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options,
+                ChunkCoder &coder) {
   std::vector<float> lost(chunk.num_rows * ((dims.x + 3u) / 4u));
   chunk.lost = lost;
   coder.begin_chunk(chunk);
@@ -225,7 +232,8 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
   const auto layers_at = [&](std::uint64_t z) {
     return z < dims.z ? std::uint32_t(std::min<std::uint64_t>(chunk_layers, dims.z - z)) : 0;
   };
-  // Float64, and integers of 32 bits, are read as they are, and cast where what that loses can be noted.
+  // Float64, and integers of 32 bits, are read as they are, and cast where what that loses can be
+  // noted.
   struct Layers {
     Untouched<float> floats;
     Untouched<double> doubles;

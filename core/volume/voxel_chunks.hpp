@@ -1,5 +1,6 @@
 #pragma once
-// A volume on its way to a compressor: read chunk by chunk, one ahead of the one at work, every voxel checked.
+// A volume on its way to a compressor: read chunk by chunk, one ahead of the one at work, every
+// voxel checked.
 
 #include <cstdint>
 #include <functional>
@@ -14,9 +15,9 @@ namespace isowave {
 /// done and total in voxel layers; called from the calling thread.
 using Progress = std::function<void(std::uint32_t done, std::uint32_t total)>;
 
-/// zfp cannot hold every float32 (its block scale is a float32 itself, and decoding overshoots by up to 2x).
-/// Voxels of at least kMaxMagnitude are refused; those below kMinMagnitude become 0, so that no decoder
-/// ever meets an infinity or a denormal.
+/// zfp cannot hold every float32 (its block scale is a float32 itself, and decoding overshoots by
+/// up to 2x). Voxels of at least kMaxMagnitude are refused; those below kMinMagnitude become 0, so
+/// that no decoder ever meets an infinity or a denormal.
 inline constexpr float kMaxMagnitude = 0x1p126f;
 inline constexpr float kMinMagnitude = 0x1p-97f;
 
@@ -24,7 +25,8 @@ inline constexpr std::uint32_t kBlockEdge = 4;  ///< voxels
 
 /// How a volume is read for compression.
 struct InputOptions {
-  std::optional<float> map_nan{};  ///< replaces NaN and +-Inf; unset: refused with count and first position
+  std::optional<float>
+      map_nan{};  ///< replaces NaN and +-Inf; unset: refused with count and first position
   Progress progress{};
   std::uint32_t num_threads = 0;  ///< 0: one per processor; the result is the same for any number
 };
@@ -34,9 +36,9 @@ struct Chunk {
   std::uint32_t z = 0, num_layers = 0;
   std::span<float> voxels{};   ///< [num_layers][ny][nx]
   std::uint64_t num_rows = 0;  ///< of blocks along x
-  /// [num_rows][blocks along x]: how far a block's voxels are from the source's at most, since float32 cannot hold
-  /// those or they were tiny and became 0. The source of a mapped NaN is what it was mapped to. Complete at
-  /// end_chunk().
+  /// [num_rows][blocks along x]: how far a block's voxels are from the source's at most, since
+  /// float32 cannot hold those or they were tiny and became 0. The source of a mapped NaN is what
+  /// it was mapped to. Complete at end_chunk().
   std::span<float> lost{};
 };
 
@@ -47,10 +49,11 @@ Chunk make_chunk(const glm::uvec3 &dims, std::uint32_t z, std::span<float> voxel
 
 /// A row of blocks along x within a chunk.
 struct BlockRow {
-  std::uint64_t index = 0;        ///< in its chunk, in the order of blocks
-  const float *voxels = nullptr;  ///< its first; a voxel row is nx values, a layer nx * ny of the volume
-  std::uint32_t ny = 0, nz = 0;   ///< voxel rows and layers that it has, 1..4
-  const float *lost = nullptr;    ///< of its blocks: Chunk::lost
+  std::uint64_t index = 0;  ///< in its chunk, in the order of blocks
+  const float *voxels =
+      nullptr;  ///< its first; a voxel row is nx values, a layer nx * ny of the volume
+  std::uint32_t ny = 0, nz = 0;  ///< voxel rows and layers that it has, 1..4
+  const float *lost = nullptr;   ///< of its blocks: Chunk::lost
 };
 
 /// What becomes of the voxels.
@@ -58,22 +61,25 @@ class ChunkCoder {
  public:
   virtual ~ChunkCoder() = default;
   virtual void begin_chunk(const Chunk &) {}
-  /// Called for every row of the chunk, from several threads; thread: as parallel_for()'s. Its voxels are checked.
+  /// Called for every row of the chunk, from several threads; thread: as parallel_for()'s. Its
+  /// voxels are checked.
   virtual void code_row(const BlockRow &, std::uint32_t /*thread*/) {}
   /// Not called once a voxel was refused.
   virtual void end_chunk(const Chunk &) {}
 };
 
-/// Codes one chunk of voxels that were made here: checked as those of a file are, but none can be refused.
-void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options, ChunkCoder &coder);
+/// Codes one chunk of voxels that were made here: checked as those of a file are, but none can be
+/// refused.
+void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options,
+                ChunkCoder &coder);
 
 /// [min, max] of a volume's voxels, after map_nan.
 struct ValueRange {
   std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
   std::array<double, 2> source{};  ///< as the source has them
 };
-/// Reads the volume from front to back for `coder`. Throws Error: voxels that cannot be compressed, after all of them
-/// were looked at; a bad grid; an unfit map_nan.
+/// Reads the volume from front to back for `coder`. Throws Error: voxels that cannot be compressed,
+/// after all of them were looked at; a bad grid; an unfit map_nan.
 ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder);
 
 }  // namespace isowave

@@ -23,17 +23,21 @@ Reach reach_of(std::uint32_t block, std::uint32_t fine_dim) {
   return {first - std::min(first, 2u), std::min(first + 9, fine_dim)};
 }
 
-/// What float32 may lose between voxels and the field at a hit, in roundings: of values, when they are raised or
-/// lowered; of their differences from the isovalue, when these are taken (1), where lerps of three axes (6), positions
-/// on two (2), sums and thirds (4) make a cubic of them (segment_cubic()), and where three more (6) evaluate that. 19,
-/// and some for what is left out here.
+/// What float32 may lose between voxels and the field at a hit, in roundings: of values, when they
+/// are raised or lowered; of their differences from the isovalue, when these are taken (1), where
+/// lerps of three axes (6), positions on two (2), sums and thirds (4) make a cubic of them
+/// (segment_cubic()), and where three more (6) evaluate that. 19, and some for what is left out
+/// here.
 constexpr double kValueRounding = 2 * 0x1p-24, kDifferenceRounding = 24 * 0x1p-24;
 
 }  // namespace
 
 LevelBounds::LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims,
                          std::uint32_t num_threads)
-    : fine_(fine_dims), coarse_(coarse_dims), blocks_((coarse_dims + 3u) / 4u), num_threads_(num_threads) {
+    : fine_(fine_dims),
+      coarse_(coarse_dims),
+      blocks_((coarse_dims + 3u) / 4u),
+      num_threads_(num_threads) {
   off_.made.resize(std::size_t{blocks_.x} * blocks_.y * blocks_.z);
   off_.decoded.resize(off_.made.size());
 }
@@ -57,7 +61,8 @@ void LevelBounds::add_coarse(std::span<const float> layers, std::span<const floa
 
 void LevelBounds::compare_ready_layers() {
   while (!fine_layers_.empty()) {
-    for (; !coarse_layers_.empty() && coarse_z_ < fine_z_ / 2; ++coarse_z_) coarse_layers_.pop_front();
+    for (; !coarse_layers_.empty() && coarse_z_ < fine_z_ / 2; ++coarse_z_)
+      coarse_layers_.pop_front();
     if (coarse_layers_.size() < 1 + fine_z_ % 2) return;
     compare_layer(fine_z_, fine_layers_.front());
     fine_layers_.pop_front();
@@ -77,7 +82,8 @@ void LevelBounds::compare_rows(std::uint32_t z, std::uint64_t by, const std::vec
                                const std::vector<float> &below, const std::vector<float> &above,
                                std::vector<float> &off) {
   const Reach ys = reach_of(static_cast<std::uint32_t>(by), fine_.y);
-  // In double precision: where values are large and their differences are not, those would be lost in float32.
+  // In double precision: where values are large and their differences are not, those would be lost
+  // in float32.
   std::vector<double> coarse(coarse_.x), largest(fine_.x);
   for (std::uint32_t y = ys.begin; y < ys.end; ++y) {
     const std::size_t row = std::size_t{y / 2} * coarse_.x, next = row + (y % 2) * coarse_.x;
@@ -93,7 +99,8 @@ void LevelBounds::compare_rows(std::uint32_t z, std::uint64_t by, const std::vec
   }
   for (std::uint32_t bx = 0; bx < blocks_.x; ++bx) {
     const Reach xs = reach_of(bx, fine_.x);
-    const float most = rounded_up(*std::max_element(largest.begin() + xs.begin, largest.begin() + xs.end));
+    const float most =
+        rounded_up(*std::max_element(largest.begin() + xs.begin, largest.begin() + xs.end));
     for (std::uint32_t bz = 0; bz < blocks_.z; ++bz) {
       const Reach zs = reach_of(bz, fine_.z);
       if (z < zs.begin || z >= zs.end) continue;
@@ -117,7 +124,8 @@ LevelBounds::Off LevelBounds::finish(std::span<const float> finer) const {
         for (std::uint32_t fz = begin.z; fz < end.z; ++fz) {
           for (std::uint32_t fy = begin.y; fy < end.y; ++fy) {
             for (std::uint32_t fx = begin.x; fx < end.x; ++fx)
-              most = std::max(most, finer[fx + finer_blocks.x * (fy + std::size_t{finer_blocks.y} * fz)]);
+              most = std::max(most,
+                              finer[fx + finer_blocks.x * (fy + std::size_t{finer_blocks.y} * fz)]);
           }
         }
         const std::size_t block = x + blocks_.x * (y + std::size_t{blocks_.y} * z);
@@ -133,8 +141,8 @@ BlockBounds encode_bounds(std::span<const float> bounds) {
   BlockBounds result;
   const double largest = bounds.empty() ? 0.0 : double{std::ranges::max(bounds)};
   if (largest > 0) {
-    result.exponent =
-        std::clamp(std::ilogb(largest / double{ISO_BOUND_MAX}) + 1, kMinBoundExponent, kMaxBoundExponent);
+    result.exponent = std::clamp(std::ilogb(largest / double{ISO_BOUND_MAX}) + 1, kMinBoundExponent,
+                                 kMaxBoundExponent);
   }
   std::array<double, ISO_BOUND_CODES> values{};
   for (std::uint32_t code = 0; code < values.size(); ++code)
@@ -150,7 +158,8 @@ BlockBounds encode_bounds(std::span<const float> bounds) {
 std::optional<double> known_max_error(const CompressedVolume &volume) {
   if (volume.max_error) return volume.max_error;
   // zfp's promise is for the float32 that it was given.
-  if (volume.error_bound.min_exponent == ISO_ALL_PLANES || !fits_float32(volume.info.type)) return {};
+  if (volume.error_bound.min_exponent == ISO_ALL_PLANES || !fits_float32(volume.info.type))
+    return {};
   return std::ldexp(1.0, volume.error_bound.min_exponent);
 }
 
@@ -186,17 +195,20 @@ ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane
     throw Error("the volume's range of values is not known: convert it again");
   if (!error.uniform) {
     throw Error(
-        "the volume's error is not known, or not that of its levels of detail: convert it again, with "
+        "the volume's error is not known, or not that of its levels of detail: convert it again, "
+        "with "
         "--levels and without "
         "--no-verify");
   }
-  const double beyond = 2 * (error.largest + plane_error);  // the range, as decoded, raised and lowered
+  const double beyond =
+      2 * (error.largest + plane_error);  // the range, as decoded, raised and lowered
   const double magnitude = std::max(std::abs(lowest), std::abs(highest)) + beyond,
                difference = highest - lowest + 2 * beyond;
   const double rounding = kValueRounding * magnitude + kDifferenceRounding * difference;
   const float uniform = std::nextafter(static_cast<float>(*error.uniform + plane_error + rounding),
                                        std::numeric_limits<float>::infinity());
-  return bound == FieldBound::kUpper ? ValueOffset{uniform, error.unit} : ValueOffset{-uniform, -error.unit};
+  return bound == FieldBound::kUpper ? ValueOffset{uniform, error.unit}
+                                     : ValueOffset{-uniform, -error.unit};
 }
 
 float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,

@@ -1,6 +1,6 @@
 #pragma once
-// How far each level of detail is from the volume it stands for: measured block by block while the pyramid is built,
-// and what frames make of it.
+// How far each level of detail is from the volume it stands for: measured block by block while the
+// pyramid is built, and what frames make of it.
 
 #include <array>
 #include <cstddef>
@@ -15,17 +15,19 @@
 
 namespace isowave {
 
-/// Measures, block by block, how far the field of the next coarser level is from a level's own: as it was made, and as
-/// it is decoded. The decoded one is compared with the fine level itself: bounds of what making loses and of what
-/// compressing loses, added up, would be larger. Memory: a few layers, and 8 bytes per coarse block.
+/// Measures, block by block, how far the field of the next coarser level is from a level's own: as
+/// it was made, and as it is decoded. The decoded one is compared with the fine level itself:
+/// bounds of what making loses and of what compressing loses, added up, would be larger. Memory: a
+/// few layers, and 8 bytes per coarse block.
 ///
-/// Both fields are trilinear, and planes of the coarse grid are planes of the fine one. So in a fine cell their
-/// difference is trilinear, too, and largest at a voxel. The bound of a coarse block is the largest difference in all
-/// cells that touch a voxel of it. A field that has these bounds at the coarse voxels, and is trilinear between them,
-/// is nowhere below the difference.
+/// Both fields are trilinear, and planes of the coarse grid are planes of the fine one. So in a
+/// fine cell their difference is trilinear, too, and largest at a voxel. The bound of a coarse
+/// block is the largest difference in all cells that touch a voxel of it. A field that has these
+/// bounds at the coarse voxels, and is trilinear between them, is nowhere below the difference.
 class LevelBounds {
  public:
-  LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims, std::uint32_t num_threads);
+  LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims,
+              std::uint32_t num_threads);
   /// The next layers [n][ny][nx] of each.
   void add_fine(std::span<const float> layers);
   void add_coarse(std::span<const float> layers, std::span<const float> decoded);
@@ -34,8 +36,8 @@ class LevelBounds {
   struct Off {
     std::vector<float> made, decoded;
   };
-  /// After all layers. finer: how far the fine level's blocks are from the source, as they were made; of the finest,
-  /// what their voxels lost (Chunk::lost); none where that is nothing.
+  /// After all layers. finer: how far the fine level's blocks are from the source, as they were
+  /// made; of the finest, what their voxels lost (Chunk::lost); none where that is nothing.
   Off finish(std::span<const float> finer) const;
 
  private:
@@ -45,7 +47,8 @@ class LevelBounds {
 
   void compare_ready_layers();
   void compare_layer(std::uint32_t z, const std::vector<float> &layer);
-  /// Fine layer z with the coarse field that two coarse layers make there, for a row of coarse blocks.
+  /// Fine layer z with the coarse field that two coarse layers make there, for a row of coarse
+  /// blocks.
   void compare_rows(std::uint32_t z, std::uint64_t by, const std::vector<float> &layer,
                     const std::vector<float> &below, const std::vector<float> &above,
                     std::vector<float> &off);
@@ -67,8 +70,8 @@ inline constexpr std::int32_t kMinBoundExponent = -126, kMaxBoundExponent = 127;
 enum class FieldBound { kNone, kLower, kUpper };
 inline constexpr std::size_t kNumFieldBounds = 3;
 
-/// Largest error of a volume's voxels, measured or, at fixed accuracy, as zfp promises; nothing where that is not
-/// known.
+/// Largest error of a volume's voxels, measured or, at fixed accuracy, as zfp promises; nothing
+/// where that is not known.
 std::optional<double> known_max_error(const CompressedVolume &volume);
 
 /// How far a level's decoded values may be off.
@@ -82,23 +85,25 @@ struct LevelError {
 };
 float largest_bound(const BlockBounds &bounds);
 
-/// How far decoded values may be from those of all bit planes where coarser(bound, value_error) leaves planes out.
+/// How far decoded values may be from those of all bit planes where coarser(bound, value_error)
+/// leaves planes out.
 double plane_error(const ErrorBound &bound, double value_error);
 
-/// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound, or the voxel's
-/// share of it (StreamLayout).
+/// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound,
+/// or the voxel's share of it (StreamLayout).
 struct ValueOffset {
   float uniform = 0, unit = 0;
 };
 /// Throws Error where the level's error or the range of values is not known.
 ///
 /// plane_error  how far values of fewer bit planes are from those of all
-/// value_range  of the volume before compression: what sums of such values lose in float32 is part of the offset
+/// value_range  of the volume before compression: what sums of such values lose in float32 is part
+/// of the offset
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,
                          const std::array<float, 2> &value_range);
 
-/// What is added to the value of voxel x + 4 y + 16 z of a block, in the order in which decode_block() in
-/// kernels_cl/device/block_stream.h adds it up.
+/// What is added to the value of voxel x + 4 y + 16 z of a block, in the order in which
+/// decode_block() in kernels_cl/device/block_stream.h adds it up.
 float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
                       std::uint32_t voxel);
 

@@ -27,16 +27,19 @@ class BlockCodec {
     zfp_stream_set_bit_stream(stream_.get(), bits_.get());
   }
 
-  /// Block number bx of a row; nx, layer: voxels in a row and a layer of the volume. Returns its length in bits.
-  std::uint32_t encode(const BlockRow &row, std::uint32_t bx, std::ptrdiff_t nx, std::ptrdiff_t layer) {
+  /// Block number bx of a row; nx, layer: voxels in a row and a layer of the volume. Returns its
+  /// length in bits.
+  std::uint32_t encode(const BlockRow &row, std::uint32_t bx, std::ptrdiff_t nx,
+                       std::ptrdiff_t layer) {
     const float *voxels = row.voxels + std::size_t{bx} * kBlockEdge;
     const std::size_t num_x =
         std::min<std::size_t>(kBlockEdge, std::size_t(nx) - std::size_t{bx} * kBlockEdge);
     zfp_stream_rewind(stream_.get());
-    const std::size_t length = num_x == kBlockEdge && row.ny == kBlockEdge && row.nz == kBlockEdge
-                                   ? zfp_encode_block_strided_float_3(stream_.get(), voxels, 1, nx, layer)
-                                   : zfp_encode_partial_block_strided_float_3(stream_.get(), voxels, num_x,
-                                                                              row.ny, row.nz, 1, nx, layer);
+    const std::size_t length =
+        num_x == kBlockEdge && row.ny == kBlockEdge && row.nz == kBlockEdge
+            ? zfp_encode_block_strided_float_3(stream_.get(), voxels, 1, nx, layer)
+            : zfp_encode_partial_block_strided_float_3(stream_.get(), voxels, num_x, row.ny, row.nz,
+                                                       1, nx, layer);
     stream_flush(bits_.get());
     if (length > ISO_MAX_BLOCK_BITS) throw std::logic_error("zfp: a block is longer than can be");
     return static_cast<std::uint32_t>(length);
@@ -65,7 +68,8 @@ class BlockCodec {
 /// Of block bx of a row; with `rounded`, of the decoded values' nearest integers.
 BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, const BlockRow &row,
                           std::uint32_t bx, std::ptrdiff_t nx, std::ptrdiff_t layer, bool rounded) {
-  const std::uint32_t num_x = std::min(kBlockEdge, static_cast<std::uint32_t>(nx) - bx * kBlockEdge);
+  const std::uint32_t num_x =
+      std::min(kBlockEdge, static_cast<std::uint32_t>(nx) - bx * kBlockEdge);
   BlockError error;
   for (std::uint32_t z = 0; z < row.nz; ++z) {
     for (std::uint32_t y = 0; y < row.ny; ++y) {
@@ -83,10 +87,11 @@ BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, co
 /// Largest errors of the whole volume with several numbers of bit planes at once.
 class ErrorMeter : public ChunkCoder {
  public:
-  /// Candidate i ends at first + i, up to `last`, at most kMaxCandidates. Those that exceed `limit` are given up.
+  /// Candidate i ends at first + i, up to `last`, at most kMaxCandidates. Those that exceed `limit`
+  /// are given up.
   static constexpr std::int32_t kMaxCandidates = 8;
-  ErrorMeter(const glm::uvec3 &dims, std::int32_t first, std::int32_t last, double limit, bool rounded,
-             std::uint32_t num_threads)
+  ErrorMeter(const glm::uvec3 &dims, std::int32_t first, std::int32_t last, double limit,
+             bool rounded, std::uint32_t num_threads)
       : nx_(dims.x),
         layer_(std::ptrdiff_t{dims.x} * dims.y),
         blocks_x_((dims.x + 3) / 4),
@@ -104,7 +109,8 @@ class ErrorMeter : public ChunkCoder {
       for (std::size_t i = 0; i < num_candidates_; ++i) {
         if (given_up_[i].load(std::memory_order_relaxed)) continue;
         const double error = with_lost(
-            error_of_block(codec.decode(first_ + std::int32_t(i)), row, bx, nx_, layer_, rounded_).largest(),
+            error_of_block(codec.decode(first_ + std::int32_t(i)), row, bx, nx_, layer_, rounded_)
+                .largest(),
             row.lost[bx]);
         errors_[thread][i] = std::max(errors_[thread][i], error);
         if (i > 0 && !(error <= limit_)) given_up_[i].store(true, std::memory_order_relaxed);
@@ -148,18 +154,20 @@ std::array<std::int32_t, 2> exponents_to_try(VoxelType type, const ErrorGoal &go
   if (goal.exact) return {-2, -2 + kNumFewer};  // a quarter at most
   // Values that became 0 may have taken nearly all of it.
   if (goal.tolerance <= 4 * double{kMinMagnitude}) return {kAllPlanes, kAllPlanes};
-  // zfp's error is 2^promised at most. No voxel has planes beyond kLastPlane, and not all exponents fit a file's header.
+  // zfp's error is 2^promised at most. No voxel has planes beyond kLastPlane, and not all exponents
+  // fit a file's header.
   constexpr std::int32_t kLastPlane = 130;
   const std::int32_t promised = std::min(std::ilogb(goal.tolerance), kLastPlane);
-  // Where the cast to float32, or to 0, may have taken a part of the tolerance, half of the rest is enough: a block
-  // that does not have all its planes by then has lost a quarter at most.
+  // Where the cast to float32, or to 0, may have taken a part of the tolerance, half of the rest is
+  // enough: a block that does not have all its planes by then has lost a quarter at most.
   const bool may_lose = !fits_float32(type) || goal.tolerance < 0x1p-80;
   return {promised - (may_lose ? 1 : 0), promised + kNumFewer};
 }
 
 }  // namespace
 
-ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal, const InputOptions &options) {
+ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal,
+                              const InputOptions &options) {
   const VolumeInfo &info = reader.info();
   if (goal.exact && !is_integer(info.type)) {
     throw Error("exact compression is for integer volumes, and this one is {}: give a tolerance",
@@ -173,13 +181,15 @@ ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal, const
   ErrorMeter meter(info.dims, exponents[0], exponents[1], limit, goal.exact, options.num_threads);
   const std::array<float, 2> range = read_in_chunks(reader, options, meter).coded;
   if (goal.exact && std::max(-range[0], range[1]) >= kIntegerEnd) {
-    throw Error("values from {} to {}: exact compression is for integers below 2^24, which float32 holds",
-                range[0], range[1]);
+    throw Error(
+        "values from {} to {}: exact compression is for integers below 2^24, which float32 holds",
+        range[0], range[1]);
   }
   const std::optional<ErrorBound> best = meter.best();
   if (!best) {
     throw Error(
-        "a tolerance of {} cannot be kept: voxels are stored as float32, and with all bit planes off by up "
+        "a tolerance of {} cannot be kept: voxels are stored as float32, and with all bit planes "
+        "off by up "
         "to {}; "
         "give at least that",
         goal.tolerance, printed_bound(meter.error(0)));
@@ -263,7 +273,8 @@ void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
     const std::uint32_t num_x = std::min(kBlockEdge, dims_.x - bx * kBlockEdge);
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y)
-        std::copy_n(decoded.data() + 4 * y + 16 * z, num_x, out + z * layer + std::ptrdiff_t(y) * dims_.x);
+        std::copy_n(decoded.data() + 4 * y + 16 * z, num_x,
+                    out + z * layer + std::ptrdiff_t(y) * dims_.x);
     }
   }
   coded.bits.pad();
@@ -311,11 +322,13 @@ void find_block_lengths(const CompressedVolume &volume, const std::string &what,
   for (std::uint64_t begin = 0, block = 0; block < num_blocks;) {
     volume.read_words(begin, words);  // with zeros behind its end, which libzfp does not know of
     const ZfpStream stream = make_zfp_stream(0, volume.error_bound.min_exponent);
-    const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)), &stream_close);
+    const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)),
+                       &stream_close);
     zfp_stream_set_bit_stream(stream.get(), bits.get());
     std::uint64_t at = 0;
     while (at < kChunkBits && block < num_blocks) {
-      std::uint64_t count = std::min<std::uint64_t>(zeros_at(words, at), num_blocks - block), length = 1;
+      std::uint64_t count = std::min<std::uint64_t>(zeros_at(words, at), num_blocks - block),
+                    length = 1;
       if (count == 0) {  // not empty
         count = 1;
         stream_rseek(bits.get(), at);

@@ -1,5 +1,6 @@
 #pragma once
-// Volumes with a bound on the error: zfp's fixed-accuracy mode, where blocks are as long as the error demands.
+// Volumes with a bound on the error: zfp's fixed-accuracy mode, where blocks are as long as the
+// error demands.
 
 #include <optional>
 #include <span>
@@ -16,11 +17,13 @@ struct ErrorGoal {
   bool exact = false;    ///< none: decoded values are rounded, and are the source's
 };
 
-/// The fewest bit planes with which no voxel exceeds the goal. zfp's promise is for the worst of all volumes, so up to
-/// six planes fewer than it demands are tried on every voxel. What the cast to float32 loses counts (Chunk::lost).
-/// Reads the whole volume. Throws Error: what read_in_chunks() throws; a tolerance that is not positive, or that
-/// float32 and zfp cannot keep (names the smallest that they can); `exact` of other volumes than integers below 2^24.
-ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal, const InputOptions &options);
+/// The fewest bit planes with which no voxel exceeds the goal. zfp's promise is for the worst of
+/// all volumes, so up to six planes fewer than it demands are tried on every voxel. What the cast
+/// to float32 loses counts (Chunk::lost). Reads the whole volume. Throws Error: what
+/// read_in_chunks() throws; a tolerance that is not positive, or that float32 and zfp cannot keep
+/// (names the smallest that they can); `exact` of other volumes than integers below 2^24.
+ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal,
+                              const InputOptions &options);
 
 /// Builds CompressedVolume::index block by block.
 class BlockIndexBuilder {
@@ -90,9 +93,10 @@ class ErrorBoundCoder : public ChunkCoder {
   BlockIndexBuilder index_;
 };
 
-/// Finds the lengths of all blocks of a fixed-accuracy payload without an index by decoding it front to back. Calls
-/// take(bits, count) for each run of `count` blocks of the same length, in order. volume.indexed_bits must be at least
-/// the payload's length. Throws Error, which names `what`, where the payload ends too early.
+/// Finds the lengths of all blocks of a fixed-accuracy payload without an index by decoding it
+/// front to back. Calls take(bits, count) for each run of `count` blocks of the same length, in
+/// order. volume.indexed_bits must be at least the payload's length. Throws Error, which names
+/// `what`, where the payload ends too early.
 void find_block_lengths(const CompressedVolume &volume, const std::string &what,
                         const std::function<void(std::uint32_t bits, std::uint64_t count)> &take);
 

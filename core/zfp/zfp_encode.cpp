@@ -24,13 +24,13 @@ std::uint64_t voxel_count(const glm::uvec3 &dims) {
 void check_sizes(std::size_t voxels, const glm::uvec3 &dims, std::uint32_t bits_per_block,
                  std::uint64_t needed_words, std::size_t words) {
   if (bits_per_block == 0 || bits_per_block % 32 != 0 || bits_per_block > 2048) {
-    throw std::invalid_argument(
-        fmt::format("ZfpEncode: {} bits per block: give a multiple of 32 up to 2048", bits_per_block));
+    throw std::invalid_argument(fmt::format(
+        "ZfpEncode: {} bits per block: give a multiple of 32 up to 2048", bits_per_block));
   }
   if (block_count(dims) > UINT32_MAX || voxel_count(dims) > voxels || needed_words > words) {
-    throw std::invalid_argument(
-        fmt::format("ZfpEncode: {}x{}x{} voxels at {} bits per block do not fit {} voxels and {} words",
-                    dims.x, dims.y, dims.z, bits_per_block, voxels, words));
+    throw std::invalid_argument(fmt::format(
+        "ZfpEncode: {}x{}x{} voxels at {} bits per block do not fit {} voxels and {} words", dims.x,
+        dims.y, dims.z, bits_per_block, voxels, words));
   }
 }
 
@@ -44,7 +44,8 @@ glm::uvec3 largest_piece(const glm::uvec3 &dims) {
   if (layer * kBlock <= LayerEncoder::kPieceVoxels) {
     return {dims.x, dims.y, fitting(LayerEncoder::kPieceVoxels, layer, dims.z)};
   }
-  return {dims.x, fitting(LayerEncoder::kPieceVoxels / kBlock, dims.x, dims.y), std::min(dims.z, kBlock)};
+  return {dims.x, fitting(LayerEncoder::kPieceVoxels / kBlock, dims.x, dims.y),
+          std::min(dims.z, kBlock)};
 }
 
 }  // namespace
@@ -64,7 +65,8 @@ void ZfpEncode::compile(const ocl::Buffer<float> &voxels, ocl::Buffer<uint> &wor
 void ZfpEncode::operator()(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims,
                            std::uint32_t bits_per_block, ocl::Buffer<uint> &words) {
   const std::uint64_t num_blocks = block_count(dims);
-  check_sizes(voxels.size(), dims, bits_per_block, num_blocks * (bits_per_block / 32), words.size());
+  check_sizes(voxels.size(), dims, bits_per_block, num_blocks * (bits_per_block / 32),
+              words.size());
   encode_(ocl::Range::strided(num_blocks, ocl::kGroupSize, device_), voxels, dims.x, dims.y, dims.z,
           bits_per_block, words);
 }
@@ -73,16 +75,18 @@ void ZfpEncode::measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec
                                std::uint32_t bits_per_block, const ocl::Buffer<uint> &words,
                                ocl::Buffer<float> &errors) {
   const std::uint64_t num_blocks = block_count(dims);
-  check_sizes(voxels.size(), dims, bits_per_block, num_blocks * (bits_per_block / 32) + 1, words.size());
+  check_sizes(voxels.size(), dims, bits_per_block, num_blocks * (bits_per_block / 32) + 1,
+              words.size());
   if (errors.size() < kErrorsPerBlock * num_blocks)
-    throw std::invalid_argument(fmt::format("ZfpEncode: {} errors do not fit {} for each of {} blocks",
-                                            errors.size(), kErrorsPerBlock, num_blocks));
-  measure_(ocl::Range::strided(num_blocks, ocl::kGroupSize, device_), voxels, dims.x, dims.y, dims.z,
-           bits_per_block, words, errors);
+    throw std::invalid_argument(
+        fmt::format("ZfpEncode: {} errors do not fit {} for each of {} blocks", errors.size(),
+                    kErrorsPerBlock, num_blocks));
+  measure_(ocl::Range::strided(num_blocks, ocl::kGroupSize, device_), voxels, dims.x, dims.y,
+           dims.z, bits_per_block, words, errors);
 }
 
-LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block,
-                           bool measure_error, BlockErrors errors)
+LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims,
+                           std::uint32_t bits_per_block, bool measure_error, BlockErrors errors)
     : device_(device),
       dims_(dims),
       piece_dims_(largest_piece(dims)),
@@ -104,9 +108,11 @@ LayerEncoder::~LayerEncoder() {
   }
 }
 
-void LayerEncoder::encode(std::span<const float> voxels, std::uint32_t num_layers, const Sink &sink) {
+void LayerEncoder::encode(std::span<const float> voxels, std::uint32_t num_layers,
+                          const Sink &sink) {
   const std::uint64_t layer = std::uint64_t{dims_.x} * dims_.y;
-  if (voxels.size() != layer * num_layers) throw std::invalid_argument("LayerEncoder: not whole layers");
+  if (voxels.size() != layer * num_layers)
+    throw std::invalid_argument("LayerEncoder: not whole layers");
   for (std::uint32_t z = 0; z < num_layers; z += piece_dims_.z) {
     for (std::uint32_t y = 0; y < dims_.y; y += piece_dims_.y) {
       const glm::uvec3 dims(dims_.x, std::min(piece_dims_.y, dims_.y - y),
@@ -117,7 +123,8 @@ void LayerEncoder::encode(std::span<const float> voxels, std::uint32_t num_layer
         voxels_.write(voxels.subspan(z * layer, layer * dims.z));
       } else {
         for (std::uint32_t i = 0; i < dims.z; ++i) {
-          voxels_.write(voxels.subspan((z + i) * layer + std::uint64_t{y} * dims.x, rows), i * rows);
+          voxels_.write(voxels.subspan((z + i) * layer + std::uint64_t{y} * dims.x, rows),
+                        i * rows);
         }
       }
       const bool has_previous = std::exchange(in_flight_, true);

@@ -18,22 +18,25 @@ class ZfpEncode {
  public:
   explicit ZfpEncode(ocl::Device &device);
 
-  /// Launches the kernels without a block to work on, that which measures only with `errors`. Waits.
-  void compile(const ocl::Buffer<float> &voxels, ocl::Buffer<uint> &words, ocl::Buffer<float> *errors);
+  /// Launches the kernels without a block to work on, that which measures only with `errors`.
+  /// Waits.
+  void compile(const ocl::Buffer<float> &voxels, ocl::Buffer<uint> &words,
+               ocl::Buffer<float> *errors);
 
-  /// Encodes voxels [dims.z][dims.y][dims.x], block (bx,by,bz) to the bits_per_block / 32 words at index
-  /// bx + blocks_x * (by + blocks_y * bz) of them. Bit-exact with libzfp, partial blocks too. Every magnitude
-  /// is 0 or in [2^-97, 2^126). Throws std::invalid_argument unless bits_per_block is a multiple of 32 in
-  /// 32..2048 and both buffers are large enough. Asynchronous.
-  void operator()(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims, std::uint32_t bits_per_block,
-                  ocl::Buffer<uint> &words);
+  /// Encodes voxels [dims.z][dims.y][dims.x], block (bx,by,bz) to the bits_per_block / 32 words at
+  /// index bx + blocks_x * (by + blocks_y * bz) of them. Bit-exact with libzfp, partial blocks too.
+  /// Every magnitude is 0 or in [2^-97, 2^126). Throws std::invalid_argument unless bits_per_block
+  /// is a multiple of 32 in 32..2048 and both buffers are large enough. Asynchronous.
+  void operator()(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims,
+                  std::uint32_t bits_per_block, ocl::Buffer<uint> &words);
 
   static constexpr std::size_t kErrorsPerBlock = 2 * ISO_BOUND_PLACES;
-  /// The largest |decoded - voxel| at each place (bound_place()) of each block b of what operator() wrote, exactly:
-  /// errors[2 i] + errors[2 i + 1], i = ISO_BOUND_PLACES b + place. `words` has one word behind the last block. Else as
-  /// operator().
-  void measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims, std::uint32_t bits_per_block,
-                      const ocl::Buffer<uint> &words, ocl::Buffer<float> &errors);
+  /// The largest |decoded - voxel| at each place (bound_place()) of each block b of what operator()
+  /// wrote, exactly: errors[2 i] + errors[2 i + 1], i = ISO_BOUND_PLACES b + place. `words` has one
+  /// word behind the last block. Else as operator().
+  void measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims,
+                      std::uint32_t bits_per_block, const ocl::Buffer<uint> &words,
+                      ocl::Buffer<float> &errors);
 
  private:
   ocl::Device &device_;
@@ -41,8 +44,8 @@ class ZfpEncode {
   ocl::Kernel<ocl::In<float>, uint, uint, uint, uint, ocl::In<uint>, ocl::Out<float>> measure_;
 };
 
-/// Encodes a volume from its first layer to its last, in pieces of bounded size: while the device works on one,
-/// the caller prepares the next.
+/// Encodes a volume from its first layer to its last, in pieces of bounded size: while the device
+/// works on one, the caller prepares the next.
 class LayerEncoder {
  public:
   /// Voxels on the device at a time, or a row of blocks where that is more.
@@ -51,15 +54,15 @@ class LayerEncoder {
   using Sink = std::function<void(std::span<const std::byte>)>;
 
   /// dims: of the whole volume. bits_per_block: a multiple of 64.
-  LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block, bool measure_error,
-               BlockErrors errors = BlockErrors(false));
+  LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block,
+               bool measure_error, BlockErrors errors = BlockErrors(false));
   ~LayerEncoder();
   LayerEncoder(const LayerEncoder &) = delete;
   LayerEncoder &operator=(const LayerEncoder &) = delete;
 
-  /// Encodes the next voxels [num_layers][ny][nx]; num_layers is a multiple of 4 but at the volume's end. Done
-  /// with `voxels` when it returns. The pieces before the last one enqueued go to `sink`, called
-  /// from this thread.
+  /// Encodes the next voxels [num_layers][ny][nx]; num_layers is a multiple of 4 but at the
+  /// volume's end. Done with `voxels` when it returns. The pieces before the last one enqueued go
+  /// to `sink`, called from this thread.
   void encode(std::span<const float> voxels, std::uint32_t num_layers, const Sink &sink);
   /// Hands the last piece to `sink`.
   void finish(const Sink &sink);

@@ -36,7 +36,8 @@ std::uint32_t version_of(const CompressedVolume &volume, bool has_levels) {
 ZfpFileWriter::ZfpFileWriter(const fs::path &path, const CompressedVolume &volume) {
   for (std::size_t level = 0; level <= volume.coarser.size(); ++level) {
     const CompressedVolume &at = level == 0 ? volume : volume.coarser[level - 1];
-    const ZfpHeader header = make_zfp_header(at.info.dims, at.bits_per_block, at.error_bound.min_exponent);
+    const ZfpHeader header =
+        make_zfp_header(at.info.dims, at.bits_per_block, at.error_bound.min_exponent);
     parts_.emplace_back(path).write(std::as_bytes(std::span(header)));
   }
 }
@@ -56,7 +57,8 @@ void ZfpFileWriter::commit(const CompressedVolume &volume) {
     layout.level_bytes.push_back(part.size);
     part.file.read_back([&all](std::span<const std::byte> bytes) { all.write(bytes); });
   }
-  all.write_trailer(zfp_trailer_text(volume, layout), version_of(volume, !layout.level_bytes.empty()));
+  all.write_trailer(zfp_trailer_text(volume, layout),
+                    version_of(volume, !layout.level_bytes.empty()));
   all.file.commit();
 }
 

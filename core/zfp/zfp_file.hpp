@@ -1,6 +1,7 @@
 #pragma once
-// The `.zfp` file, which README describes byte by byte ("File format"): zfp's header and stream, and behind them index,
-// bounds, levels of detail and trailer (zfp_trailer.hpp). The functions that read it are declared in zfp_stream.hpp.
+// The `.zfp` file, which README describes byte by byte ("File format"): zfp's header and stream,
+// and behind them index, bounds, levels of detail and trailer (zfp_trailer.hpp). The functions that
+// read it are declared in zfp_stream.hpp.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,11 +16,12 @@
 
 namespace isowave {
 
-/// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left behind without commit().
+/// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left
+/// behind without commit().
 class ZfpFileWriter {
  public:
-  /// Writes the headers of volume and of its coarser levels, from their info.dims and bits_per_block (a multiple of
-  /// 64), or error_bound.
+  /// Writes the headers of volume and of its coarser levels, from their info.dims and
+  /// bits_per_block (a multiple of 64), or error_bound.
   ZfpFileWriter(const std::filesystem::path &path, const CompressedVolume &volume);
   /// Appends payload of the volume (level 0) or of coarser level `level`.
   void write(std::span<const std::byte> payload, std::size_t level = 0);

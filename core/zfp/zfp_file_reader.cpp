@@ -21,11 +21,12 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint64_t kMaxJsonBytes = 1u << 20;
-constexpr std::uint32_t kMinBlockBits = 9;  // "not empty" and the exponent; libzfp reads them at any rate
+constexpr std::uint32_t kMinBlockBits =
+    9;  // "not empty" and the exponent; libzfp reads them at any rate
 constexpr std::uint32_t kMaxBlockBits = 2048;
 
-/// Calls take(items) with `total` items of a deflated part of a file, a few at a time, until it returns false. Returns
-/// whether all of that worked, and the part has no more items.
+/// Calls take(items) with `total` items of a deflated part of a file, a few at a time, until it
+/// returns false. Returns whether all of that worked, and the part has no more items.
 template <typename T, typename Take>
 bool inflate_items(const FileSource &part, std::uint64_t total, const Take &take) {
   constexpr std::uint64_t kMostItems = 1u << 15;
@@ -43,13 +44,15 @@ bool inflate_items(const FileSource &part, std::uint64_t total, const Take &take
 /// Calls take(length) for so many blocks, whose lengths are deflated. Returns whether they are.
 template <typename Take>
 bool inflate_lengths(const FileSource &deflated, std::uint64_t num_blocks, const Take &take) {
-  return inflate_items<std::uint16_t>(deflated, num_blocks, [&](std::span<const std::uint16_t> lengths) {
-    for (const std::uint16_t length : lengths) {
-      if (length < 1 || length > ISO_MAX_BLOCK_BITS) return false;
-      take(length);
-    }
-    return true;
-  });
+  return inflate_items<std::uint16_t>(deflated, num_blocks,
+                                      [&](std::span<const std::uint16_t> lengths) {
+                                        for (const std::uint16_t length : lengths) {
+                                          if (length < 1 || length > ISO_MAX_BLOCK_BITS)
+                                            return false;
+                                          take(length);
+                                        }
+                                        return true;
+                                      });
 }
 
 /// A `.zfp` file being read: the checks in the order in which the file is trusted.
@@ -76,7 +79,8 @@ class ZfpFileReader {
   ZfpFileReader(const ZfpFileReader &finer, std::uint64_t begin, std::uint64_t size)
       : file_(finer.file_), begin_(begin), file_size_(size), is_level_(true) {
     read_head();
-    if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims) refuse_level();
+    if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims)
+      refuse_level();
     volume_.info = coarser_level(finer.volume_.info);
     layout_.counts_casts = finer.layout_.counts_casts;
   }
@@ -94,7 +98,8 @@ class ZfpFileReader {
     read_header();
     read_trailer();
     check_volume_info(volume_.info, what());
-    if (layout_.level_bytes.size() > (is_level_ ? 0 : max_levels(volume_.info.dims) - 1)) refuse_level();
+    if (layout_.level_bytes.size() > (is_level_ ? 0 : max_levels(volume_.info.dims) - 1))
+      refuse_level();
     std::uint64_t begin = begin_ + stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes;
     for (const std::uint64_t bytes : layout_.level_bytes) {
       levels_.push_back(ZfpFileReader(levels_.empty() ? *this : levels_.back(), begin, bytes));
@@ -168,7 +173,8 @@ class ZfpFileReader {
   void read_bounds(bool keep) {
     const std::uint64_t num_blocks = volume_.block_count();
     std::vector<std::uint8_t> &codes = volume_.bounds.codes;
-    const FileSource deflated(file_, begin_ + stream_bytes_ + layout_.index_bytes, layout_.bounds_bytes);
+    const FileSource deflated(file_, begin_ + stream_bytes_ + layout_.index_bytes,
+                              layout_.bounds_bytes);
     if (num_blocks / kMaxDeflateRatio > layout_.bounds_bytes) refuse_bounds();
     if (keep) codes.reserve(num_blocks);
     const bool whole =
@@ -204,11 +210,13 @@ class ZfpFileReader {
     const bool fixed_rate = zfp_stream_compression_mode(stream.get()) == zfp_mode_fixed_rate;
     volume_.bits_per_block = fixed_rate ? stream->maxbits : 0;
     if (!fixed_rate) volume_.error_bound.min_exponent = stream->minexp;
-    volume_.value_range = {-std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity()};
+    volume_.value_range = {-std::numeric_limits<float>::infinity(),
+                           std::numeric_limits<float>::infinity()};
 
     if (!fixed_rate) {  // how long the stream is, a trailer tells, or else the file
       if (volume_.block_count() >= std::numeric_limits<std::uint32_t>::max()) {
-        fail("{}x{}x{} voxels: too many for blocks of lengths of their own", field->nx, field->ny, field->nz);
+        fail("{}x{}x{} voxels: too many for blocks of lengths of their own", field->nx, field->ny,
+             field->nz);
       }
       stream_bytes_ = file_size_;
       volume_.indexed_bits = 8 * file_size_ - header_bits_;
@@ -219,8 +227,8 @@ class ZfpFileReader {
     // libzfp can be built with smaller words: its files may end before the 64-bit word does.
     const std::uint64_t least_bytes = (total_bits + 7) / 8;
     if (file_size_ < least_bytes) {
-      fail("truncated: {}x{}x{} voxels at {} bits per block need {} bytes, found {}", field->nx, field->ny,
-           field->nz, volume_.bits_per_block, least_bytes, file_size_);
+      fail("truncated: {}x{}x{} voxels at {} bits per block need {} bytes, found {}", field->nx,
+           field->ny, field->nz, volume_.bits_per_block, least_bytes, file_size_);
     }
     stream_bytes_ = std::min(stream_bytes_, file_size_);
   }
@@ -265,7 +273,8 @@ class ZfpFileReader {
     }
     const std::uint64_t json_end = file_size_ - sizeof(ZfpFooter);
     std::string text;
-    if (footer.json_bytes <= kMaxJsonBytes && footer.json_bytes + sizeof(ZfpFooter) <= trailer_bytes) {
+    if (footer.json_bytes <= kMaxJsonBytes &&
+        footer.json_bytes + sizeof(ZfpFooter) <= trailer_bytes) {
       text.resize(footer.json_bytes);
       read_at(json_end - footer.json_bytes, std::as_writable_bytes(std::span(text)));
     }
@@ -288,8 +297,8 @@ class ZfpFileReader {
       // Neither sum overflows: a block has at least a bit, and not too many.
       const std::uint64_t bits = volume_.indexed_bits, blocks = volume_.block_count();
       const bool possible = bits >= blocks && bits <= blocks * ISO_MAX_BLOCK_BITS;
-      stream_bytes_ =
-          possible ? (header_bits_ + bits + 63) / 64 * 8 : std::numeric_limits<std::uint64_t>::max();
+      stream_bytes_ = possible ? (header_bits_ + bits + 63) / 64 * 8
+                               : std::numeric_limits<std::uint64_t>::max();
     }
     std::uint64_t left = json_begin;
     const auto take = [&left](std::uint64_t bytes) {

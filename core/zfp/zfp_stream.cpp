@@ -1,7 +1,7 @@
-// Compression and decompression of whole volumes by libzfp, or compression by a device. With a whole number
-// of bits per voxel a block is a whole number of 64-bit words, so rows of blocks are compressed apart, in
-// parallel, and laid end to end: the same bytes as one call for the whole array. A device gets whole layers
-// (zfp_encode). Blocks of lengths of their own: zfp_accuracy.
+// Compression and decompression of whole volumes by libzfp, or compression by a device. With a
+// whole number of bits per voxel a block is a whole number of 64-bit words, so rows of blocks are
+// compressed apart, in parallel, and laid end to end: the same bytes as one call for the whole
+// array. A device gets whole layers (zfp_encode). Blocks of lengths of their own: zfp_accuracy.
 
 #include "core/zfp/zfp_stream.hpp"
 
@@ -34,8 +34,8 @@ using Sink = std::function<void(Payload)>;
 /// Compresses the voxels of a level.
 class LevelCoder : public ChunkCoder {
  public:
-  /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be kept of each block's
-  /// errors, where they were measured.
+  /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be
+  /// kept of each block's errors, where they were measured.
   virtual std::vector<float> finish(CompressedVolume &volume) = 0;
   /// The last chunk's voxels as they are decoded, where errors are measured.
   virtual std::span<const float> decoded() const = 0;
@@ -44,7 +44,8 @@ class LevelCoder : public ChunkCoder {
 /// Compresses rows of blocks by libzfp.
 class FixedRateCoder : public LevelCoder {
  public:
-  FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink, bool keep)
+  FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink,
+                 bool keep)
       : dims_(dims), options_(options), sink_(sink), errors_(keep) {}
 
   void begin_chunk(const Chunk &chunk) override {
@@ -56,7 +57,8 @@ class FixedRateCoder : public LevelCoder {
   }
 
   void code_row(const BlockRow &row, std::uint32_t) override {
-    const std::span<std::uint64_t> words = std::span(words_).subspan(row.index * row_words(), row_words());
+    const std::span<std::uint64_t> words =
+        std::span(words_).subspan(row.index * row_words(), row_words());
     const ZfpStream stream = make_zfp_stream(64 * options_.rate);
     const ZfpBits bits(stream_open(words.data(), words.size_bytes()), &stream_close);
     zfp_stream_set_bit_stream(stream.get(), bits.get());
@@ -70,7 +72,8 @@ class FixedRateCoder : public LevelCoder {
     if (!options_.measure_error) return;
 
     float *decoded = decoded_.data() + (row.voxels - chunk_.data());
-    const ZfpField copy(zfp_field_3d(decoded, zfp_type_float, dims_.x, row.ny, row.nz), &zfp_field_free);
+    const ZfpField copy(zfp_field_3d(decoded, zfp_type_float, dims_.x, row.ny, row.nz),
+                        &zfp_field_free);
     zfp_field_set_stride_3d(copy.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
     zfp_stream_rewind(stream.get());
     if (zfp_decompress(stream.get(), copy.get()) == 0)
@@ -118,7 +121,8 @@ class FixedRateCoder : public LevelCoder {
 class DeviceCoder : public LevelCoder {
  public:
   DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const Sink &sink, bool keep)
-      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
+      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error,
+                 BlockErrors(keep)),
         measure_error_(options.measure_error),
         sink_(sink) {}
 
@@ -148,7 +152,9 @@ class BoundedCoder : public LevelCoder {
       : coder_(dims, bound, sink,
                keep || !bound.max_error ? std::optional(BlockErrors(keep)) : std::nullopt) {}
   void begin_chunk(const Chunk &chunk) override { coder_.begin_chunk(chunk); }
-  void code_row(const BlockRow &row, std::uint32_t thread) override { coder_.code_row(row, thread); }
+  void code_row(const BlockRow &row, std::uint32_t thread) override {
+    coder_.code_row(row, thread);
+  }
   void end_chunk(const Chunk &chunk) override { coder_.end_chunk(chunk); }
   std::vector<float> finish(CompressedVolume &volume) override {
     volume.index = coder_.finish();
@@ -167,8 +173,8 @@ class BoundedCoder : public LevelCoder {
 /// Compresses a level, and makes the voxels of the next from its own.
 class PyramidCoder : public ChunkCoder {
  public:
-  /// volumes, sinks: of this level and all coarser ones. Those are compressed on the host, since they are needed as
-  /// they are decoded, and are a seventh.
+  /// volumes, sinks: of this level and all coarser ones. Those are compressed on the host, since
+  /// they are needed as they are decoded, and are a seventh.
   PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
                std::span<const Sink> sinks, bool is_finest = true)
       : volume_(*volumes[0]), is_finest_(is_finest) {
@@ -186,13 +192,16 @@ class PyramidCoder : public ChunkCoder {
     const glm::uvec3 coarse_dims = next_->volume_.info.dims;
     if (options.measure_error || volume_.is_indexed())
       bounds_.emplace(dims, coarse_dims, options.input.num_threads);
-    downsampler_.emplace(dims, options.input.num_threads, [this, &options, coarse_dims](const Chunk &chunk) {
-      code_chunk(chunk, coarse_dims, options.input, *next_);
-      if (bounds_) bounds_->add_coarse(chunk.voxels, next_->coder_->decoded());
-    });
+    downsampler_.emplace(dims, options.input.num_threads,
+                         [this, &options, coarse_dims](const Chunk &chunk) {
+                           code_chunk(chunk, coarse_dims, options.input, *next_);
+                           if (bounds_) bounds_->add_coarse(chunk.voxels, next_->coder_->decoded());
+                         });
   }
   void begin_chunk(const Chunk &chunk) override { coder_->begin_chunk(chunk); }
-  void code_row(const BlockRow &row, std::uint32_t thread) override { coder_->code_row(row, thread); }
+  void code_row(const BlockRow &row, std::uint32_t thread) override {
+    coder_->code_row(row, thread);
+  }
   void end_chunk(const Chunk &chunk) override {
     coder_->end_chunk(chunk);
     if (!next_) return;
@@ -228,8 +237,8 @@ class PyramidCoder : public ChunkCoder {
   std::unique_ptr<PyramidCoder> next_;
   std::optional<Downsampler> downsampler_;
   std::optional<LevelBounds> bounds_;  ///< of the next level
-  std::vector<float> lost_;            ///< of the finest level's blocks (Chunk::lost); empty: nothing
-  std::size_t num_blocks_ = 0;         ///< that lost_ is known of
+  std::vector<float> lost_;     ///< of the finest level's blocks (Chunk::lost); empty: nothing
+  std::size_t num_blocks_ = 0;  ///< that lost_ is known of
 };
 
 /// All but what the voxels decide.
@@ -242,8 +251,8 @@ CompressedVolume describe(const VolumeReader &reader, const CompressOptions &opt
   const glm::uvec3 dims = reader.info().dims;
   const std::uint32_t num_levels = options.levels != 0 ? options.levels : max_levels(dims);
   if (num_levels > max_levels(dims)) {
-    throw Error("{} levels of detail: a volume of {}x{}x{} voxels can have 1 to {}", num_levels, dims.x,
-                dims.y, dims.z, max_levels(dims));
+    throw Error("{} levels of detail: a volume of {}x{}x{} voxels can have 1 to {}", num_levels,
+                dims.x, dims.y, dims.z, max_levels(dims));
   }
   CompressedVolume volume;
   volume.info = reader.info();
@@ -304,7 +313,8 @@ void CompressedVolume::read_words(std::uint64_t bit, std::span<std::uint32_t> ou
   std::array<std::byte, ISO_MAX_BLOCK_BITS / 8 + 2> of_block{};
   std::vector<std::byte> of_many(num_bytes > of_block.size() ? num_bytes : 0);
   const std::span<std::byte> bytes =
-      std::span(of_many.empty() ? std::span<std::byte>(of_block) : std::span(of_many)).first(num_bytes);
+      std::span(of_many.empty() ? std::span<std::byte>(of_block) : std::span(of_many))
+          .first(num_bytes);
   file->read(first / 8, bytes);
   copy_bits(bytes, first % 8, count, out);
 }
@@ -388,23 +398,26 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double val
   const glm::uvec3 dims = volume.info.dims, blocks = volume.num_blocks();
   const ErrorBound bound = coarser(volume.error_bound, value_error);
   const ZfpStream stream = make_zfp_stream(volume.bits_per_block, bound.min_exponent);
-  const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)), &stream_close);
+  const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)),
+                     &stream_close);
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   std::vector<float> voxels(volume.info.num_voxels());
   float *voxel = voxels.data();
   for (std::uint32_t id = 0; id < volume.block_count(); ++id) {
-    const glm::uvec3 at = 4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
+    const glm::uvec3 at =
+        4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
     const glm::uvec3 size = glm::min(dims - at, glm::uvec3(4));
-    stream_rseek(bits.get(), volume.block_begin(id));  // a block may have more bits than are decoded
+    stream_rseek(bits.get(),
+                 volume.block_begin(id));  // a block may have more bits than are decoded
     const std::uint32_t length = volume.block_bits(id);
     if (length < kExponentEnd) continue;  // an empty block: zeros
     // A lying index may end a block before its bits do.
     if (volume.is_indexed())
       zfp_stream_set_params(stream.get(), ZFP_MIN_BITS, length, ZFP_MAX_PREC, bound.min_exponent);
     const auto layer = std::ptrdiff_t{dims.x} * dims.y;
-    zfp_decode_partial_block_strided_float_3(stream.get(),
-                                             voxel + at.x + std::ptrdiff_t{dims.x} * at.y + layer * at.z,
-                                             size.x, size.y, size.z, 1, dims.x, layer);
+    zfp_decode_partial_block_strided_float_3(
+        stream.get(), voxel + at.x + std::ptrdiff_t{dims.x} * at.y + layer * at.z, size.x, size.y,
+        size.z, 1, dims.x, layer);
   }
   if (bound.whole_numbers) {
     for (float &value : voxels) value = std::rint(value) + 0.0f;  // as the kernels do

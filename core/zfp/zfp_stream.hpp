@@ -1,6 +1,7 @@
 #pragma once
-// Compressed volumes: a standard zfp stream of 4^3 float32 blocks, at a fixed number of bits per block or with as many
-// as a bound of the error needs, and what zfp's header cannot say. Block (bx,by,bz) is number bx + nbx*(by + nby*bz).
+// Compressed volumes: a standard zfp stream of 4^3 float32 blocks, at a fixed number of bits per
+// block or with as many as a bound of the error needs, and what zfp's header cannot say. Block
+// (bx,by,bz) is number bx + nbx*(by + nby*bz).
 
 #include <array>
 #include <cstdint>
@@ -25,9 +26,10 @@ class Device;
 
 /// How much of its voxels a volume keeps whose blocks have lengths of their own.
 struct ErrorBound {
-  /// Bit planes of blocks end where zfp can promise an error of at most 2^min_exponent (its fixed-accuracy mode).
+  /// Bit planes of blocks end where zfp can promise an error of at most 2^min_exponent (its
+  /// fixed-accuracy mode).
   std::int32_t min_exponent = ISO_ALL_PLANES;
-  bool whole_numbers = false;         ///< decoded values are rounded: the source's, which are integers
+  bool whole_numbers = false;  ///< decoded values are rounded: the source's, which are integers
   std::optional<double> max_error{};  ///< largest |decoded - source|, measured
 };
 
@@ -35,36 +37,44 @@ struct ErrorBound {
 ErrorBound coarser(const ErrorBound &bound, double value_error);
 
 struct CompressOptions {
-  std::uint32_t rate = 8;                   ///< bits per voxel, 1..32; or
-  std::optional<ErrorBound> error_bound{};  ///< as many bits as each block needs: see choose_error_bound()
+  std::uint32_t rate = 8;  ///< bits per voxel, 1..32; or
+  std::optional<ErrorBound>
+      error_bound{};  ///< as many bits as each block needs: see choose_error_bound()
   /// At a fixed rate, encodes instead of libzfp: the same result, bit for bit.
   ocl::Device *device = nullptr;
-  bool measure_error = false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_error
-  std::uint32_t levels = 1;    ///< of detail, the volume itself among them, 1..max_levels(); 0: max_levels()
+  bool measure_error =
+      false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_error
+  std::uint32_t levels =
+      1;  ///< of detail, the volume itself among them, 1..max_levels(); 0: max_levels()
   InputOptions input{};
 };
 
-/// How far the field of a level of detail may be from that of the volume before compression, by block: codes of
-/// kernels_cl/portable/block_bound.h, in units of 2^exponent.
+/// How far the field of a level of detail may be from that of the volume before compression, by
+/// block: codes of kernels_cl/portable/block_bound.h, in units of 2^exponent.
 struct BlockBounds {
   std::vector<std::uint8_t> codes{};
   std::int32_t exponent = 0;
-  /// A voxel is off by its share (bound_share()) at most. Only where voxels are compared with the source's.
+  /// A voxel is off by its share (bound_share()) at most. Only where voxels are compared with the
+  /// source's.
   bool by_place = false;
 };
 
 /// Words past its last bit that a decoder reads at most.
 inline constexpr std::uint64_t kDecoderAhead = 2;
 
-/// A zfp volume in host memory or in a file, at a fixed rate or of blocks as long as the error allows.
+/// A zfp volume in host memory or in a file, at a fixed rate or of blocks as long as the error
+/// allows.
 struct CompressedVolume {
   VolumeInfo info;  ///< type is that of the source before compression
-  /// 64 * rate; from other writers 9..2048 (1 + 8 bits hold the exponent). 0: blocks have lengths of their own.
+  /// 64 * rate; from other writers 9..2048 (1 + 8 bits hold the exponent). 0: blocks have lengths
+  /// of their own.
   std::uint32_t bits_per_block = 0;
-  ErrorBound error_bound{};            ///< at a fixed rate, as it is from the start
-  std::vector<std::uint32_t> index{};  ///< where blocks begin that have lengths of their own: block_index.h
-  std::uint64_t indexed_bits = 0;      ///< length of all of them
-  /// Payload from bit 0, little endian; two zero words follow the last bit. Empty where file is set,
+  ErrorBound error_bound{};  ///< at a fixed rate, as it is from the start
+  std::vector<std::uint32_t>
+      index{};  ///< where blocks begin that have lengths of their own: block_index.h
+  std::uint64_t indexed_bits = 0;  ///< length of all of them
+  /// Payload from bit 0, little endian; two zero words follow the last bit. Empty where file is
+  /// set,
   std::vector<std::uint32_t> words;
   std::shared_ptr<const InputFile> file{};  ///< which holds the payload instead,
   std::uint64_t file_first_bit = 0;         ///< from this bit on.
@@ -82,48 +92,53 @@ struct CompressedVolume {
   }
   bool is_indexed() const { return bits_per_block == 0; }
   std::uint64_t payload_bits() const;
-  std::uint64_t block_begin(std::uint32_t block_id) const;  ///< bit of the payload; of block_count(): its end
-  std::uint32_t block_bits(std::uint32_t block_id) const;   ///< length of a block
-  std::uint32_t max_block_bits() const { return is_indexed() ? ISO_MAX_BLOCK_BITS : bits_per_block; }
+  std::uint64_t block_begin(
+      std::uint32_t block_id) const;  ///< bit of the payload; of block_count(): its end
+  std::uint32_t block_bits(std::uint32_t block_id) const;  ///< length of a block
+  std::uint32_t max_block_bits() const {
+    return is_indexed() ? ISO_MAX_BLOCK_BITS : bits_per_block;
+  }
   /// Bits per voxel, of partial blocks' padding too; the index not counted.
   double rate() const { return double(payload_bits()) / (64.0 * double(block_count())); }
   /// Size of words, or what it would be.
   std::uint64_t word_count() const;
-  /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its end. Throws Error
-  /// where a file is shorter than it was, or cannot be read.
+  /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its
+  /// end. Throws Error where a file is shorter than it was, or cannot be read.
   void read_words(std::uint64_t bit, std::span<std::uint32_t> out) const;
 };
 
-/// Copies bits [bit, bit + count) of `bytes`, little endian, to `out`, which they fit; the rest of it becomes 0.
+/// Copies bits [bit, bit + count) of `bytes`, little endian, to `out`, which they fit; the rest of
+/// it becomes 0.
 void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_t count,
                std::span<std::uint32_t> out);
 
 /// Gives a volume, and its coarser levels, another spacing.
 void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
 
-/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more levels than it can
-/// have).
+/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more
+/// levels than it can have).
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
-/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each block, 9 where
-/// float32 does not hold all voxels. Writes to a temporary name and renames; nothing is left behind on an error.
-/// Returns what was written, but for the words, which stay empty.
+/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each
+/// block, 9 where float32 does not hold all voxels. Writes to a temporary name and renames; nothing
+/// is left behind on an error. Returns what was written, but for the words, which stay empty.
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
 
-/// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full header (spacing 1
-/// then). Throws Error in one line on a broken header, other types or modes, truncation, checksum mismatch.
+/// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full
+/// header (spacing 1 then). Throws Error in one line on a broken header, other types or modes,
+/// truncation, checksum mismatch.
 CompressedVolume read_zfp_file(const std::filesystem::path &path);
-/// As read_zfp_file(), but leaves the payload in the file, to be read when it is needed: words stays empty. The
-/// checksum is checked once, here.
+/// As read_zfp_file(), but leaves the payload in the file, to be read when it is needed: words
+/// stays empty. The checksum is checked once, here.
 CompressedVolume open_zfp_file(const std::filesystem::path &path);
-/// As open_zfp_file(), with all its checks, but keeps nothing that grows with the number of blocks: words and index
-/// stay empty, and of a level's bounds only the largest is there.
+/// As open_zfp_file(), with all its checks, but keeps nothing that grows with the number of blocks:
+/// words and index stay empty, and of a level's bounds only the largest is there.
 CompressedVolume check_zfp_file(const std::filesystem::path &path);
 /// As check_zfp_file(), but neither reads nor checks the payload, index and bounds.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
-/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as value_error allows: see coarser(). The
-/// ground truth of every decoder here.
+/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as value_error
+/// allows: see coarser(). The ground truth of every decoder here.
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double value_error = 0);
 
 }  // namespace isowave

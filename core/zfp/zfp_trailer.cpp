@@ -64,7 +64,8 @@ ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
   }
   volume.info.type = type_from(trailer.at("type"));
   ZfpLayout layout;
-  layout.counts_casts = fits_float32(volume.info.type) || trailer.value("cast_counts", json(false)) == true;
+  layout.counts_casts =
+      fits_float32(volume.info.type) || trailer.value("cast_counts", json(false)) == true;
   apply_errors(trailer, layout.counts_casts, volume);
   if (trailer.contains("level_bytes")) {
     for (const json &bytes : trailer["level_bytes"])
@@ -92,7 +93,8 @@ std::uint32_t update_crc(std::uint32_t crc, std::span<const std::byte> bytes) {
 
 std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer) {
   const std::array<std::uint32_t, 3> numbers{footer.version, footer.json_bytes, footer.stream_crc};
-  return update_crc(update_crc(0, std::as_bytes(std::span(text))), std::as_bytes(std::span(numbers)));
+  return update_crc(update_crc(0, std::as_bytes(std::span(text))),
+                    std::as_bytes(std::span(numbers)));
 }
 
 std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &layout) {

@@ -33,14 +33,16 @@ std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer);
 struct ZfpLayout {
   std::uint64_t index_bytes = 0, bounds_bytes = 0;
   std::vector<std::uint64_t> level_bytes{};  ///< of the coarser levels' files
-  /// Whether the errors are those against the source. In older files they leave out the cast to float32.
+  /// Whether the errors are those against the source. In older files they leave out the cast to
+  /// float32.
   bool counts_casts = true;
 };
 
 std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &layout);
 
-/// Sets what the text says of the volume, whose kind and dims the stream's header has said. Throws Error, which does
-/// not name the file: no JSON, a field that is missing or of another kind, a number that no such volume has.
+/// Sets what the text says of the volume, whose kind and dims the stream's header has said. Throws
+/// Error, which does not name the file: no JSON, a field that is missing or of another kind, a
+/// number that no such volume has.
 ZfpLayout apply_zfp_trailer(const std::string &text, CompressedVolume &volume);
 
 }  // namespace isowave

@@ -1,4 +1,5 @@
-/// block_cells.h -- a ray among the cells of one block, and pixels in an order in which neighbours share blocks. OpenCL C 1.2.
+/// block_cells.h -- a ray among the cells of one block, and pixels in an order in which neighbours
+/// share blocks. OpenCL C 1.2.
 #ifndef ISOWAVE_BLOCK_CELLS_H
 #define ISOWAVE_BLOCK_CELLS_H
 
@@ -13,11 +14,14 @@ ISO_INLINE GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, L
                    locate(ray->z, 2, enter, 1, z0, min(z0 + 3, last.z - 1)), 1, last);
 }
 
-/// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which voxels of the blocks of
-/// its dual grid are inside; where one is not known, the cells that need it have any bit.
+/// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which
+/// voxels of the blocks of its dual grid are inside; where one is not known, the cells that need it
+/// have any bit.
 ISO_INLINE ulong changing_cells(const ulong *inside) {
-  /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The same for +y, +z. */
-  const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul, not_z3 = 0x0000FFFFFFFFFFFFul;
+  /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The
+   * same for +y, +z. */
+  const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul,
+              not_z3 = 0x0000FFFFFFFFFFFFul;
   ulong v[8], any = 0, all = ~0ul;
   for (int i = 0; i < 8; ++i) v[i] = inside[i];
   for (int i = 0; i < 8; i += 2) v[i + 1] = (v[i] >> 1 & not_x3) | (v[i + 1] << 3 & ~not_x3);

@@ -12,8 +12,8 @@ ISO_INLINE void open_requests(global CacheState *cache) {
   cache->granted = cache->recycled = 0;
 }
 
-/// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks, with several levels of detail
-/// as those of one whose blocks have their ids.
+/// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks,
+/// with several levels of detail as those of one whose blocks have their ids.
 ISO_INLINE uint request_word(const FrameParams *frame, uint x, uint y, uint z) {
   const uint coarse_x = ((ISO_LEVELS ? frame->id_blocks_x : frame->blocks_x) + 3) / 4,
              coarse_y = ((ISO_LEVELS ? frame->id_blocks_y : frame->blocks_y) + 3) / 4;
@@ -25,30 +25,34 @@ ISO_INLINE uint request_bit(const FrameParams *frame, uint x, uint y, uint z) {
 }
 
 /// Marks block (x,y,z). Returns 1 to the one who is first.
-ISO_INLINE int mark_request(const FrameParams *frame, volatile global uint *requested_bits, uint x, uint y,
-                            uint z) {
+ISO_INLINE int mark_request(const FrameParams *frame, volatile global uint *requested_bits, uint x,
+                            uint y, uint z) {
   const uint bit = request_bit(frame, x, y, z);
   return (atomic_or(&requested_bits[request_word(frame, x, y, z)], bit) & bit) == 0;
 }
 
-/// Stamps block (x,y,z) as needed if it is cached. Returns 1 if it is not, and this is the first to ask for it.
+/// Stamps block (x,y,z) as needed if it is cached. Returns 1 if it is not, and this is the first to
+/// ask for it.
 ISO_INLINE int request_block(const FrameParams *frame, global const BlockEntry *table,
-                             global uint *slot_stamps, uint pass, volatile global uint *requested_bits,
-                             uint x, uint y, uint z) {
+                             global uint *slot_stamps, uint pass,
+                             volatile global uint *requested_bits, uint x, uint y, uint z) {
   const uint slot = cached_slot(frame, table, x, y, z);
   if (slot == ISO_BLOCK_ABSENT) return mark_request(frame, requested_bits, x, y, z);
   slot_stamps[slot] = needed_stamp(pass);
   return 0;
 }
 
-/// Puts a marked block at `place` of the list [capacity]; where the list has ended, takes the mark back.
-ISO_INLINE void list_request(const FrameParams *frame, global uint *request_block_ids, uint capacity,
-                             volatile global uint *requested_bits, uint place, uint block_id) {
+/// Puts a marked block at `place` of the list [capacity]; where the list has ended, takes the mark
+/// back.
+ISO_INLINE void list_request(const FrameParams *frame, global uint *request_block_ids,
+                             uint capacity, volatile global uint *requested_bits, uint place,
+                             uint block_id) {
   if (place < capacity) {
     request_block_ids[place] = block_id;
   } else {
     const BlockCoords b = block_coords(frame, block_id);
-    atomic_and(&requested_bits[request_word(frame, b.x, b.y, b.z)], ~request_bit(frame, b.x, b.y, b.z));
+    atomic_and(&requested_bits[request_word(frame, b.x, b.y, b.z)],
+               ~request_bit(frame, b.x, b.y, b.z));
   }
 }
 

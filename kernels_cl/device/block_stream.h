@@ -1,11 +1,14 @@
-/// block_stream.h -- where the bits of a block are on the device (core/stream/device_stream.hpp). OpenCL C 1.2.
+/// block_stream.h -- where the bits of a block are on the device (core/stream/device_stream.hpp).
+/// OpenCL C 1.2.
 ///
-/// ISO_STREAM_PARTS, by -D: 1 the whole zfp stream is in part_0. 4: it is cut into up to four buffers of layout.words_per_part
-/// words, each going on so far behind its end that a block which begins in it is whole. 0: part_0 is a window that holds only the
-/// blocks of this launch, one after the other, each beginning with a whole word.
-/// ISO_STREAM_INDEXED: 0 all blocks are layout.bits_per_block long. 1: `index` says where they begin (block_index.h); a window
-/// begins with an entry (window_entry()) for each of its blocks, and for the end of the last.
-/// A block ends where its length says, also where that lies: what its bits say by then is decoded, as at a fixed rate.
+/// ISO_STREAM_PARTS, by -D: 1 the whole zfp stream is in part_0. 4: it is cut into up to four
+/// buffers of layout.words_per_part words, each going on so far behind its end that a block which
+/// begins in it is whole. 0: part_0 is a window that holds only the blocks of this launch, one
+/// after the other, each beginning with a whole word. ISO_STREAM_INDEXED: 0 all blocks are
+/// layout.bits_per_block long. 1: `index` says where they begin (block_index.h); a window begins
+/// with an entry (window_entry()) for each of its blocks, and for the end of the last. A block ends
+/// where its length says, also where that lies: what its bits say by then is decoded, as at a fixed
+/// rate.
 #ifndef ISOWAVE_BLOCK_STREAM_H
 #define ISOWAVE_BLOCK_STREAM_H
 
@@ -21,9 +24,10 @@
 #endif
 
 /// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z.
-ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_1, global const uint *part_2,
-                             global const uint *part_3, global const uint *index, StreamLayout layout,
-                             uint block_id, uint place, float *values) {
+ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_1,
+                             global const uint *part_2, global const uint *part_3,
+                             global const uint *index, StreamLayout layout, uint block_id,
+                             uint place, float *values) {
   global const uint *words = part_0;
   uint bits = layout.bits_per_block;
   ulong first_bit = (ulong)block_id * bits;
@@ -48,14 +52,15 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
     ISO_UNROLL
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
       const uint rounded = as_uint(rint(values[v]));
-      values[v] =
-          as_float(rounded == 0x80000000u ? 0u : rounded); /* no integer is -0; llvmpipe drops a + 0.0f */
+      values[v] = as_float(
+          rounded == 0x80000000u ? 0u : rounded); /* no integer is -0; llvmpipe drops a + 0.0f */
     }
   }
   if (layout.value_offset != 0.0f || layout.bound_unit != 0.0f) {
     float bound = 0.0f;
     if (layout.bound_unit != 0.0f)
-      bound = layout.bound_unit * block_bound(packed_bound_code(index + layout.bounds_begin, block_id));
+      bound =
+          layout.bound_unit * block_bound(packed_bound_code(index + layout.bounds_begin, block_id));
     ISO_UNROLL
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
       const float share = layout.bounds_by_place != 0u ? bound_share(bound_place(v)) : 1.0f;

@@ -1,6 +1,6 @@
-/// block_walk.h -- a ray's way through the blocks that the isovalue is in the range of (Sec. 3.3). OpenCL C 1.2.
-/// Two-level grid: a coarse macrocell is 4^3 blocks; its 64 bits say which of them are active (macrocells.cl). A coarse
-/// cell with no bit is left in one step.
+/// block_walk.h -- a ray's way through the blocks that the isovalue is in the range of (Sec. 3.3).
+/// OpenCL C 1.2. Two-level grid: a coarse macrocell is 4^3 blocks; its 64 bits say which of them
+/// are active (macrocells.cl). A coarse cell with no bit is left in one step.
 ///
 /// Define ISO_FOUND, the address space of the list, before including this.
 #ifndef ISOWAVE_BLOCK_WALK_H
@@ -9,8 +9,9 @@
 #include "portable/block_grid.h"
 #include "portable/grid_dda.h"
 
-/// That a ray looks for before it intersects them, or asks for them. Where many work-items take turns, a longer list is walked
-/// by more of them, and a last ray has up to as many; a CPU looks for more than it needs.
+/// That a ray looks for before it intersects them, or asks for them. Where many work-items take
+/// turns, a longer list is walked by more of them, and a last ray has up to as many; a CPU looks
+/// for more than it needs.
 #ifdef ISO_CPU
 #define ISO_BLOCKS_AT_ONCE 8u
 #else
@@ -21,15 +22,18 @@ ISO_INLINE uint masks_begin(const FrameParams *frame) {
   return ISO_LEVELS ? frame->masks_begin : 0u;
 }
 
-ISO_INLINE int is_active(const FrameParams *frame, global const uint *macrocell_masks, BlockCoords b) {
+ISO_INLINE int is_active(const FrameParams *frame, global const uint *macrocell_masks,
+                         BlockCoords b) {
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
   const uint cell = b.x / 4 + coarse_x * (b.y / 4 + coarse_y * (b.z / 4));
   const uint bit = (b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3);
   return (macrocell_masks[masks_begin(frame) + 2 * cell + bit / 32] >> (bit % 32) & 1u) != 0;
 }
 
-/// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it entered the cell.
-ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e, LastPlanes last) {
+/// The block of coarse macrocell (cx,cy,cz) that the ray is in just after event `e`, by which it
+/// entered the cell.
+ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayEvent e,
+                                    LastPlanes last) {
   const int bx = coarse->x * ISO_MACROCELL_BLOCKS, by = coarse->y * ISO_MACROCELL_BLOCKS,
             bz = coarse->z * ISO_MACROCELL_BLOCKS;
   const int x = locate(ray->x, 0, e, 4, bx, min(bx + ISO_MACROCELL_BLOCKS - 1, (last.x - 1) / 4));
@@ -43,20 +47,25 @@ ISO_INLINE int ends_band(const FrameParams *frame, RayEvent exit) {
   return ISO_LEVELS && !event_before(exit, border_event(frame->end_t));
 }
 
-/// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active blocks, into found [wanted],
-/// `stride` apart. Returns how many there are before the ray has left the box, or its band; *block_id becomes the first block not looked at,
-/// or ISO_INVALID_ID.
-ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
-                            uint *block_id, uint wanted, ISO_FOUND uint *found, uint stride) {
+/// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active
+/// blocks, into found [wanted], `stride` apart. Returns how many there are before the ray has left
+/// the box, or its band; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
+ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks,
+                            const Ray *ray, uint *block_id, uint wanted, ISO_FOUND uint *found,
+                            uint stride) {
   const LastPlanes last = last_planes(frame);
   const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
   const uint begin = masks_begin(frame);
   /* The coarse cells behind the box, in the ray's direction. */
-  const int behind_x = ray->x.d > 0.0f ? (frame->active_end_x + 3) / 4 : frame->active_begin_x / 4 - 1,
-            behind_y = ray->y.d > 0.0f ? (frame->active_end_y + 3) / 4 : frame->active_begin_y / 4 - 1,
-            behind_z = ray->z.d > 0.0f ? (frame->active_end_z + 3) / 4 : frame->active_begin_z / 4 - 1;
+  const int behind_x =
+                ray->x.d > 0.0f ? (frame->active_end_x + 3) / 4 : frame->active_begin_x / 4 - 1,
+            behind_y =
+                ray->y.d > 0.0f ? (frame->active_end_y + 3) / 4 : frame->active_begin_y / 4 - 1,
+            behind_z =
+                ray->z.d > 0.0f ? (frame->active_end_z + 3) / 4 : frame->active_begin_z / 4 - 1;
   const BlockCoords from = block_coords(frame, *block_id);
-  /* The outer walk steps from coarse cell to coarse cell; only in those with a bit is there an inner one. */
+  /* The outer walk steps from coarse cell to coarse cell; only in those with a bit is there an
+   * inner one. */
   GridWalk w = walk_from(ray, (int)from.x, (int)from.y, (int)from.z, 4, last);
   GridWalk coarse = walk_from(ray, w.x / ISO_MACROCELL_BLOCKS, w.y / ISO_MACROCELL_BLOCKS,
                               w.z / ISO_MACROCELL_BLOCKS, 4 * ISO_MACROCELL_BLOCKS, last);
@@ -65,7 +74,8 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
   uint k = 0;
   while (within && k < wanted) {
     const uint cell = (uint)coarse.x + coarse_x * ((uint)coarse.y + coarse_y * (uint)coarse.z);
-    const uint low = macrocell_masks[begin + 2 * cell], high = macrocell_masks[begin + 2 * cell + 1];
+    const uint low = macrocell_masks[begin + 2 * cell],
+               high = macrocell_masks[begin + 2 * cell + 1];
     int left = 0;
     if ((low | high) != 0) {
       if (!follows) w = enter_macrocell(ray, &coarse, exit, last);
@@ -94,8 +104,8 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
   return k;
 }
 
-/// The block in which a ray, or its band, enters the box of active blocks, or starts in it; ISO_INVALID_ID if it does not meet the
-/// box.
+/// The block in which a ray, or its band, enters the box of active blocks, or starts in it;
+/// ISO_INVALID_ID if it does not meet the box.
 ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
   const LastPlanes last = last_planes(frame);
   LastPlanes begin, end;
@@ -108,19 +118,22 @@ ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
   end.y = min(4 * frame->active_end_y, last.y);
   end.z = min(4 * frame->active_end_z, last.z);
   if (begin.x >= end.x || !clip_to_box(ray, begin, end, &enter, &exit)) return ISO_INVALID_ID;
-  return block_id_at(frame, (uint)locate(ray->x, 0, enter, 4, frame->active_begin_x, (end.x - 1) / 4),
+  return block_id_at(frame,
+                     (uint)locate(ray->x, 0, enter, 4, frame->active_begin_x, (end.x - 1) / 4),
                      (uint)locate(ray->y, 1, enter, 4, frame->active_begin_y, (end.y - 1) / 4),
                      (uint)locate(ray->z, 2, enter, 4, frame->active_begin_z, (end.z - 1) / 4));
 }
 
-/// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones, or the ray's band.
-ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b, LastPlanes last) {
+/// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones, or the ray's
+/// band.
+ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b,
+                             LastPlanes last) {
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const RayEvent exit = walk_exit(&w, ray);
   walk_step(&w, ray, exit, 4, last);
   return !ends_band(frame, exit) && w.x >= frame->active_begin_x && w.x < frame->active_end_x &&
-                 w.y >= frame->active_begin_y && w.y < frame->active_end_y && w.z >= frame->active_begin_z &&
-                 w.z < frame->active_end_z
+                 w.y >= frame->active_begin_y && w.y < frame->active_end_y &&
+                 w.z >= frame->active_begin_z && w.z < frame->active_end_z
              ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
              : ISO_INVALID_ID;
 }

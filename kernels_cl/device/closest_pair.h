@@ -1,9 +1,11 @@
-/// closest_pair.h -- which of a ray's pairs decides: the first that hits or was not tested (Sec. 4.4). OpenCL C 1.2.
-/// A ray's blocks come in ray order, so that is the one with the lowest index, and no distances are compared: a 32-bit
-/// atomic_min does what the paper wanted 64-bit atomics for.
+/// closest_pair.h -- which of a ray's pairs decides: the first that hits or was not tested
+/// (Sec. 4.4). OpenCL C 1.2. A ray's blocks come in ray order, so that is the one with the lowest
+/// index, and no distances are compared: a 32-bit atomic_min does what the paper wanted 64-bit
+/// atomics for.
 ///
-/// Two ways, by -D ISO_CLOSEST_BY_ATOMICS: 1, the stages that learn a pair's result offer its index to closest_pairs
-/// [active rays] (ISO_INVALID_ID before); 0, composite searches the results of all of a ray's pairs.
+/// Two ways, by -D ISO_CLOSEST_BY_ATOMICS: 1, the stages that learn a pair's result offer its index
+/// to closest_pairs [active rays] (ISO_INVALID_ID before); 0, composite searches the results of all
+/// of a ray's pairs.
 #ifndef ISOWAVE_CLOSEST_PAIR_H
 #define ISOWAVE_CLOSEST_PAIR_H
 
@@ -19,8 +21,8 @@ ISO_INLINE void offer_closest(volatile global uint *closest_pairs, uint pair, ui
 }
 
 /// Marks a pair that cannot be intersected in this pass, or lies behind the last of its ray.
-ISO_INLINE void mark_not_tested(global PairHit *pair_hits, volatile global uint *closest_pairs, uint pair,
-                                uint block_id, uint spec_count) {
+ISO_INLINE void mark_not_tested(global PairHit *pair_hits, volatile global uint *closest_pairs,
+                                uint pair, uint block_id, uint spec_count) {
   if (!ISO_CLOSEST_BY_ATOMICS || block_id != ISO_INVALID_ID) pair_hits[pair].cell = ISO_NOT_TESTED;
   if (block_id != ISO_INVALID_ID) offer_closest(closest_pairs, pair, spec_count);
 }
@@ -33,7 +35,8 @@ ISO_INLINE uint closest_pair(global const uint *closest_pairs, global const uint
   while (pair < (a + 1) * spec_count && pair_block_ids[pair] != ISO_INVALID_ID &&
          pair_hits[pair].cell == ISO_NO_HIT)
     ++pair;
-  return pair < (a + 1) * spec_count && pair_block_ids[pair] != ISO_INVALID_ID ? pair : ISO_INVALID_ID;
+  return pair < (a + 1) * spec_count && pair_block_ids[pair] != ISO_INVALID_ID ? pair
+                                                                               : ISO_INVALID_ID;
 }
 
 #endif

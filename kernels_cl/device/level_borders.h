@@ -1,4 +1,5 @@
-/// level_borders.h -- a ray from one level of detail to the next (core/view/detail.hpp). OpenCL C 1.2.
+/// level_borders.h -- a ray from one level of detail to the next (core/view/detail.hpp). OpenCL
+/// C 1.2.
 ///
 /// Define ISO_FOUND local before including this.
 #ifndef ISOWAVE_LEVEL_BORDERS_H
@@ -6,7 +7,8 @@
 
 #include "block_walk.h"
 
-/// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the block with this id.
+/// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the
+/// block with this id.
 ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint block_id) {
   const uint layer = block_id / (frames[0].id_blocks_x * frames[0].id_blocks_y);
   uint level = 0;
@@ -14,16 +16,19 @@ ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint
   return level;
 }
 
-/// The side on which a whole block is; unknown if it is active. See macrocells.cl: the range of one that is not is on its side, too.
+/// The side on which a whole block is; unknown if it is active. See macrocells.cl: the range of one
+/// that is not is on its side, too.
 ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
                               global const ushort *ranges, BlockCoords b) {
   if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
-  return ranges[frame->ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >= frame->isovalue_index
+  return ranges[frame->ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >=
+                 frame->isovalue_index
              ? ISO_SIDE_INSIDE
              : ISO_SIDE_OUTSIDE;
 }
 
-/// Does the ray reach the border at t within the domain? If so, *b is the block it is in just behind it.
+/// Does the ray reach the border at t within the domain? If so, *b is the block it is in just
+/// behind it.
 ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
   const LastPlanes last = last_planes(frame);
   LastPlanes zero;
@@ -36,13 +41,14 @@ ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t
   return 1;
 }
 
-/// Where a ray goes on that leaves the band of frames[level]: its next block, and its side if it stands there for that; or
-/// ISO_INVALID_ID. side: on which it left, or else the border is in a block that is as a whole on one. Where the block behind the border
-/// is not as a whole on that side, the ray stands there; else at the next active block, in this band or one behind. ranges: of all
-/// levels' blocks. found [1]: scratch.
+/// Where a ray goes on that leaves the band of frames[level]: its next block, and its side if it
+/// stands there for that; or ISO_INVALID_ID. side: on which it left, or else the border is in a
+/// block that is as a whole on one. Where the block behind the border is not as a whole on that
+/// side, the ray stands there; else at the next active block, in this band or one behind. ranges:
+/// of all levels' blocks. found [1]: scratch.
 ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
-                              global const uint *macrocell_masks, global const ushort *ranges, uint pixel,
-                              uint level, uint side, local uint *found) {
+                              global const uint *macrocell_masks, global const ushort *ranges,
+                              uint pixel, uint level, uint side, local uint *found) {
   uint state = ISO_INVALID_ID;
   for (; level + 1 < num_frames && state == ISO_INVALID_ID; ++level) {
     const FrameParams behind = frames[level + 1];
@@ -80,9 +86,11 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
   const FrameParams *frame = ((void)frames, (void)num_frames, &frame_params)
 #endif
 
-/// find_blocks() for a ray that stands at block *block_id, which it looks into though it may not be active where it has a side.
-ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks, const Ray *ray,
-                                 uint side, uint *block_id, uint wanted, local uint *found) {
+/// find_blocks() for a ray that stands at block *block_id, which it looks into though it may not be
+/// active where it has a side.
+ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks,
+                                 const Ray *ray, uint side, uint *block_id, uint wanted,
+                                 local uint *found) {
   uint first = 0;
   if (side != ISO_SIDE_UNKNOWN) {
     found[0] = *block_id;

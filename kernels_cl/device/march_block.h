@@ -1,5 +1,5 @@
-/// march_block.h -- a ray through the cells of a block whose dual grid is in the cache, as far as it is (march.cl).
-/// OpenCL C 1.2.
+/// march_block.h -- a ray through the cells of a block whose dual grid is in the cache, as far as
+/// it is (march.cl). OpenCL C 1.2.
 #ifndef ISOWAVE_MARCH_BLOCK_H
 #define ISOWAVE_MARCH_BLOCK_H
 
@@ -18,7 +18,8 @@
 #error "a result of isolate() must stand for itself"
 #endif
 
-/// The corners of the dual grid (bits 0..7, corner x + 2y + 4z) whose blocks the voxels of local cell (x,y,z) lie in.
+/// The corners of the dual grid (bits 0..7, corner x + 2y + 4z) whose blocks the voxels of local
+/// cell (x,y,z) lie in.
 ISO_INLINE uint cell_blocks(int x, int y, int z) {
   const int border = (x == 3 ? 1 : 0) + (y == 3 ? 2 : 0) + (z == 3 ? 4 : 0);
   return (uint)(0xFF5533110F050301ul >> (8 * border)) & 0xFFu;
@@ -30,7 +31,8 @@ typedef struct BlockChange {
   GridWalk cell;
   RayEvent enter;
   float w[8];
-  int at_border;  ///< it is where the cell is entered: a level of detail has another opinion than the one before
+  int at_border;  ///< it is where the cell is entered: a level of detail has another opinion than
+                  ///< the one before
 } BlockChange;
 
 /// The cells of a block that have voxels of any of those corners.
@@ -39,18 +41,19 @@ ISO_INLINE ulong cells_of_corners(uint corners) {
   ulong cells = 0;
   for (uint corner = 0; corner < 8; ++corner) {
     if ((corners >> corner & 1u) != 0)
-      cells |=
-          ((corner & 1) != 0 ? x3 : ~0ul) & ((corner & 2) != 0 ? y3 : ~0ul) & ((corner & 4) != 0 ? z3 : ~0ul);
+      cells |= ((corner & 1) != 0 ? x3 : ~0ul) & ((corner & 2) != 0 ? y3 : ~0ul) &
+               ((corner & 4) != 0 ? z3 : ~0ul);
   }
   return cells;
 }
 
-/// Which cells of block b a ray must look into: those in which inside changes, and those that need a block that is
-/// not cached. What is found out stays in the block's table entry for the next who asks. Out: slots [8] of the dual
-/// grid, ISO_GROUP_SIZE apart; *have: which of its corners are cached, or beyond the volume, where no cell of the
-/// domain reaches.
-ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
-                            BlockCoords b, local uint *slots, uint *have) {
+/// Which cells of block b a ray must look into: those in which inside changes, and those that need
+/// a block that is not cached. What is found out stays in the block's table entry for the next who
+/// asks. Out: slots [8] of the dual grid, ISO_GROUP_SIZE apart; *have: which of its corners are
+/// cached, or beyond the volume, where no cell of the domain reaches.
+ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
+                            global const ulong *inside, BlockCoords b, local uint *slots,
+                            uint *have) {
   BlockEntry entries[8];
   ulong cells;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
@@ -89,13 +92,15 @@ ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
   return ends_band(frame, exit) ? border_event(frame->end_t) : exit;
 }
 
-/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS where a
-/// block of the dual grid is not cached, or how ISO_RAY_ENDS. slots: this work-item's place for eight, ISO_GROUP_SIZE
-/// apart. If b is cached, its slot's stamp becomes `stamp`. precise: settle doubts on the spot. side: where the ray
-/// was before the border at which its band begins in this block. may_end: its band may end in this one.
-ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, global const ulong *inside,
-                           global const float *cache_values, const Ray *ray, BlockCoords b, LastPlanes last,
-                           local uint *slots, global uint *slot_stamps, uint stamp, int precise, uint side,
+/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT,
+/// ISO_RAY_WAITS where a block of the dual grid is not cached, or how ISO_RAY_ENDS. slots: this
+/// work-item's place for eight, ISO_GROUP_SIZE apart. If b is cached, its slot's stamp becomes
+/// `stamp`. precise: settle doubts on the spot. side: where the ray was before the border at which
+/// its band begins in this block. may_end: its band may end in this one.
+ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
+                           global const ulong *inside, global const float *cache_values,
+                           const Ray *ray, BlockCoords b, LastPlanes last, local uint *slots,
+                           global uint *slot_stamps, uint stamp, int precise, uint side,
                            int may_end, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   uint have; /* corners of the dual grid */
@@ -121,21 +126,22 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
         for (int corner = 0; corner < 8; ++corner) {
           const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
           const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
-          found->w[corner] =
-              cache_values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
-              frame->isovalue;
+          found->w[corner] = cache_values[slot * ISO_BLOCK_VOXELS +
+                                          (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
+                             frame->isovalue;
         }
         if (ISO_LEVELS && side != ISO_SIDE_UNKNOWN)
           found->at_border = inside_at(ray, found->w, found->enter, found->cell.x, found->cell.y,
                                        found->cell.z, 0) != (side == ISO_SIDE_INSIDE);
         result = found->at_border ? ISO_RAY_HIT
-                 : precise        ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
-                                                   found->cell.z, found->enter, exit, &found->change)
-                           : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
-                                                     found->cell.z, found->enter, exit, &found->change);
+                 : precise
+                     ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                      found->cell.z, found->enter, exit, &found->change)
+                     : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
+                                               found->cell.z, found->enter, exit, &found->change);
         if (result == ISO_RAY_LEFT && ends_here)
-          result =
-              ISO_RAY_ENDS + inside_at(ray, found->w, exit, found->cell.x, found->cell.y, found->cell.z, 1);
+          result = ISO_RAY_ENDS +
+                   inside_at(ray, found->w, exit, found->cell.x, found->cell.y, found->cell.z, 1);
       }
     }
     if (result == ISO_RAY_LEFT) {
@@ -150,8 +156,9 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table, g
 
 ISO_INLINE HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  const float s =
-      ISO_LEVELS && found->at_border ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);
+  const float s = ISO_LEVELS && found->at_border
+                      ? 0.0f
+                      : refine(solver, found->change.cubic, found->change.bracket);
   return make_hit(frame, ray, found->w, found->cell.x, found->cell.y, found->cell.z, found->enter,
                   band_exit(frame, walk_exit(&found->cell, ray)), s);
 }

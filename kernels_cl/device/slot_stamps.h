@@ -1,8 +1,8 @@
 /// slot_stamps.h -- when a cache slot was used last, and which slots are freed first. OpenCL C 1.2.
 ///
-/// A pass has two stamps, an even one for blocks that rays read in it, then an odd one for blocks that its waiting
-/// rays need. So a slot with an odd stamp holds a block that nobody has read since it was asked for: mostly a wrong
-/// guess of speculation.
+/// A pass has two stamps, an even one for blocks that rays read in it, then an odd one for blocks
+/// that its waiting rays need. So a slot with an odd stamp holds a block that nobody has read since
+/// it was asked for: mostly a wrong guess of speculation.
 #ifndef ISOWAVE_SLOT_STAMPS_H
 #define ISOWAVE_SLOT_STAMPS_H
 
@@ -23,16 +23,17 @@ ISO_INLINE uint as_read_stamp(uint stamp) {
 #define ISO_RANKS_OF_FRAME \
   (2 * ISO_CLASS_RANKS)  ///< those below are of slots that the frame at work has used
 
-/// Slots are freed from rank ISO_EVICTION_RANKS - 1 down. Rank 0: needed at the end of the pass that `counts` are of,
-/// or later. Not in the paper, whose cache is strictly LRU. There are five classes, freed in this order:
+/// Slots are freed from rank ISO_EVICTION_RANKS - 1 down. Rank 0: needed at the end of the pass
+/// that `counts` are of, or later. Not in the paper, whose cache is strictly LRU. There are five
+/// classes, freed in this order:
 ///   not used in this frame nor the last: the least recently used first
 ///   of the last frame, unread: the least recently used first
 ///   of the last frame, read: the least recently used first
 ///   of this frame, unread: the least recently used first
 ///   of this frame, read: the most recently used first
-/// So a view whose blocks fit is decoded once. Slots of this frame go only when it needs more blocks than there are
-/// slots. Of those that it has read, the least recently used would be freed shortly before the next frame reads them;
-/// so the first stay.
+/// So a view whose blocks fit is decoded once. Slots of this frame go only when it needs more
+/// blocks than there are slots. Of those that it has read, the least recently used would be freed
+/// shortly before the next frame reads them; so the first stay.
 ISO_INLINE uint eviction_rank(uint stamp, global const PassCounts *counts) {
   const uint now = needed_stamp(counts->pass), begin = read_stamp(counts->frame_pass),
              last_begin = read_stamp(counts->last_frame_pass);

@@ -4,8 +4,8 @@
 
 #include "portable/shared_types.h"
 
-/// Exclusive prefix sum of one value per work-item; *total gets the sum. sums [ISO_GROUP_SIZE]. All items
-/// must call it.
+/// Exclusive prefix sum of one value per work-item; *total gets the sum. sums [ISO_GROUP_SIZE]. All
+/// items must call it.
 ISO_INLINE uint group_scan(local uint *sums, uint value, uint *total) {
   const uint item = get_local_id(0);
   uint inclusive = value;

@@ -1,5 +1,6 @@
-/// block_bound.h -- how far the field of a level of detail may be from the volume that it stands for, block by block, in 8 bits
-/// (core/zfp/level_bounds.hpp), and voxel by voxel what follows from that. Portable: OpenCL C 1.2 and C++.
+/// block_bound.h -- how far the field of a level of detail may be from the volume that it stands
+/// for, block by block, in 8 bits (core/zfp/level_bounds.hpp), and voxel by voxel what follows from
+/// that. Portable: OpenCL C 1.2 and C++.
 #ifndef ISOWAVE_BLOCK_BOUND_H
 #define ISOWAVE_BLOCK_BOUND_H
 
@@ -21,10 +22,12 @@ ISO_INLINE uint packed_bound_code(ISO_GLOBAL const uint *codes, uint block) {
   return codes[block / 4u] >> (8u * (block & 3u)) & 0xFFu;
 }
 
-/// zfp is not as far off everywhere in a block. Bit planes left out of negabinary coefficients leave errors whose mean is not 0; at voxel
-/// (1,1,1), where all basis functions are positive, they add up, and on the lines through it along the axes, at voxel (2,2,2) and at
-/// corners a little. Of a block's bound, voxels of the finest level have these shares, and the bound is made so that no voxel exceeds its
-/// own: what they are decides how tight it is, never whether it holds. Files name the number of this rule.
+/// zfp is not as far off everywhere in a block. Bit planes left out of negabinary coefficients
+/// leave errors whose mean is not 0; at voxel (1,1,1), where all basis functions are positive, they
+/// add up, and on the lines through it along the axes, at voxel (2,2,2) and at corners a little. Of
+/// a block's bound, voxels of the finest level have these shares, and the bound is made so that no
+/// voxel exceeds its own: what they are decides how tight it is, never whether it holds. Files name
+/// the number of this rule.
 #define ISO_BOUND_PLACES 3u
 #define ISO_BOUND_PLACES_RULE 2u
 

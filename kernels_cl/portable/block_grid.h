@@ -8,20 +8,24 @@ ISO_NAMESPACE_BEGIN
 
 #define ISO_BLOCK_ABSENT 0xFFFFFFFFu  ///< instead of a cache slot: not in the cache
 #define ISO_MAX_BLOCK_IDS 0x40000000u
-#define ISO_MAX_CACHE_SLOTS 0x04000000u  ///< 16 GiB of values, whose numbers kernels count in 32 bits
+#define ISO_MAX_CACHE_SLOTS \
+  0x04000000u  ///< 16 GiB of values, whose numbers kernels count in 32 bits
 
 typedef struct BlockCoords {
   uint x, y, z;
 } BlockCoords;
 
-/// Place of block (x,y,z) among those of its level of detail, as its stream and its ranges are ordered.
+/// Place of block (x,y,z) among those of its level of detail, as its stream and its ranges are
+/// ordered.
 ISO_INLINE uint level_block_at(const FrameParams *frame, uint x, uint y, uint z) {
   return x + frame->blocks_x * (y + frame->blocks_y * z);
 }
 
-/// Place among those of this level of the block with this id, of a frame with several levels; ISO_INVALID_ID if it is another level's.
+/// Place among those of this level of the block with this id, of a frame with several levels;
+/// ISO_INVALID_ID if it is another level's.
 ISO_INLINE uint level_block_of(const FrameParams *frame, uint block_id) {
-  const uint x = block_id % frame->id_blocks_x, y = block_id / frame->id_blocks_x % frame->id_blocks_y,
+  const uint x = block_id % frame->id_blocks_x,
+             y = block_id / frame->id_blocks_x % frame->id_blocks_y,
              z = block_id / frame->id_blocks_x / frame->id_blocks_y - frame->id_begin_z;
   return z < frame->blocks_z ? level_block_at(frame, x, y, z)
                              : ISO_INVALID_ID; /* finer: z has wrapped around */
@@ -48,20 +52,23 @@ ISO_INLINE uint block_id_at(const FrameParams *frame, uint x, uint y, uint z) {
                     : level_block_at(frame, x, y, z);
 }
 
-/// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. Always the first would be blind where the
-/// stride is a multiple of the blocks along x: all on one face of the volume.
+/// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. Always the
+/// first would be blind where the stride is a multiple of the blocks along x: all on one face of
+/// the volume.
 ISO_INLINE uint sampled_block(uint begin, uint stride) {
   uint h = begin * 0x9E3779B1u;
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   return begin + (h ^ (h >> 13)) % stride;
 }
 
-/// The dual grid of block b needs b and its +x, +y, +z neighbours, as far as there are any: corner x + 2y +
-/// 4z of 0..7 is the block (b.x + x, b.y + y, b.z + z), or ISO_INVALID_ID outside the volume.
+/// The dual grid of block b needs b and its +x, +y, +z neighbours, as far as there are any: corner
+/// x + 2y + 4z of 0..7 is the block (b.x + x, b.y + y, b.z + z), or ISO_INVALID_ID outside the
+/// volume.
 ISO_INLINE uint dual_grid_block(const FrameParams *frame, BlockCoords b, uint corner) {
   const uint x = b.x + (corner & 1u), y = b.y + (corner >> 1 & 1u), z = b.z + (corner >> 2);
-  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z ? block_id_at(frame, x, y, z)
-                                                                           : ISO_INVALID_ID;
+  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z
+             ? block_id_at(frame, x, y, z)
+             : ISO_INVALID_ID;
 }
 
 ISO_NAMESPACE_END

@@ -2,16 +2,17 @@
 ///
 /// Portable: OpenCL C 1.2 and C++; kernels and the scalar twin run these very lines.
 ///
-/// inside := field >= isovalue, on w = voxel - isovalue: inside := w >= 0. A hit is the first change of
-/// inside along the ray. Between entry pa and exit pb (cell-local [0,1]^3) the field is a cubic in s; its
-/// Bernstein coefficients are values of the trilinear form at mixed coordinates of pa and pb [Ramshaw 1987,
-/// blossoms], hence convex combinations of corners:
+/// inside := field >= isovalue, on w = voxel - isovalue: inside := w >= 0. A hit is the first
+/// change of inside along the ray. Between entry pa and exit pb (cell-local [0,1]^3) the field is a
+/// cubic in s; its Bernstein coefficients are values of the trilinear form at mixed coordinates of
+/// pa and pb [Ramshaw 1987, blossoms], hence convex combinations of corners:
 ///   b0 = f(a,a,a)    b1 = (f(b,a,a) + f(a,b,a) + f(a,a,b)) / 3
 ///   b3 = f(b,b,b)    b2 = (f(b,b,a) + f(b,a,b) + f(a,b,b)) / 3
-/// b0 and b3 lie on cell faces. There one coordinate is exactly 0 or 1 and lerp() returns its end exactly, so
-/// the two cells of a face compute the same bits: a ray cannot slip between them. lerp() also keeps signs (two
-/// ends < 0 give < 0, two ends >= 0 give >= 0), which is what clamping the face's value to its corners' range
-/// would be for: cells and blocks whose corners agree in sign can be skipped without changing any hit.
+/// b0 and b3 lie on cell faces. There one coordinate is exactly 0 or 1 and lerp() returns its end
+/// exactly, so the two cells of a face compute the same bits: a ray cannot slip between them.
+/// lerp() also keeps signs (two ends < 0 give < 0, two ends >= 0 give >= 0), which is what clamping
+/// the face's value to its corners' range would be for: cells and blocks whose corners agree in
+/// sign can be skipped without changing any hit.
 #ifndef ISOWAVE_CELL_INTERSECT_H
 #define ISOWAVE_CELL_INTERSECT_H
 
@@ -25,8 +26,8 @@ typedef struct CellPoint {
   float x, y, z;
 } CellPoint;
 
-/// Position of the ray at `e` in cell (x,y,z). On the axis of the event it is exactly the face's 0 or 1.
-/// leaving: 0 when `e` enters the cell, 1 when it leaves it.
+/// Position of the ray at `e` in cell (x,y,z). On the axis of the event it is exactly the face's 0
+/// or 1. leaving: 0 when `e` enters the cell, 1 when it leaves it.
 ISO_INLINE CellPoint event_position(const Ray *r, RayEvent e, int x, int y, int z, int leaving) {
   CellPoint p;
   p.x = e.axis == 0 ? ((r->x.d > 0.0f) == leaving ? 1.0f : 0.0f) : local_position(r->x, e.t, x);
@@ -55,9 +56,10 @@ ISO_INLINE Cubic segment_cubic(const float *w, CellPoint a, CellPoint b) {
   return c;
 }
 
-/// Is the ray inside at `e`, by which it enters or leaves cell (x,y,z)? As the ends of segment_cubic() say. leaving: as in
-/// event_position.
-ISO_INLINE int inside_at(const Ray *r, const float *w, RayEvent e, int x, int y, int z, int leaving) {
+/// Is the ray inside at `e`, by which it enters or leaves cell (x,y,z)? As the ends of
+/// segment_cubic() say. leaving: as in event_position.
+ISO_INLINE int inside_at(const Ray *r, const float *w, RayEvent e, int x, int y, int z,
+                         int leaving) {
   const CellPoint p = event_position(r, e, x, y, z, leaving);
   return segment_cubic(w, p, p).b0 >= 0.0f;
 }
@@ -73,8 +75,8 @@ ISO_INLINE TwoFloat precise_trilinear(const float *w, float x, float y, float z)
   return v[0];
 }
 
-/// segment_cubic() in 48 bits. A loop, for one copy of the arithmetic: compilers that inline and unroll everything take
-/// half a minute over eight.
+/// segment_cubic() in 48 bits. A loop, for one copy of the arithmetic: compilers that inline and
+/// unroll everything take half a minute over eight.
 ISO_INLINE PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellPoint b) {
   PreciseCubic c;
   TwoFloat third;
@@ -82,8 +84,8 @@ ISO_INLINE PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellP
   for (i = 0; i < 4; ++i) c.b[i] = two_float(0.0f);
   for (i = 0; i < 8; ++i) {
     const int k = (i & 1) + (i >> 1 & 1) + (i >> 2); /* coordinates of b */
-    c.b[k] =
-        tf_add(c.b[k], precise_trilinear(w, i & 1 ? b.x : a.x, i >> 1 & 1 ? b.y : a.y, i >> 2 ? b.z : a.z));
+    c.b[k] = tf_add(c.b[k], precise_trilinear(w, i & 1 ? b.x : a.x, i >> 1 & 1 ? b.y : a.y,
+                                              i >> 2 ? b.z : a.z));
   }
   third.hi = 1.0f / 3.0f;
   third.lo = fma(-third.hi, 3.0f, 1.0f) / 3.0f;
@@ -95,8 +97,9 @@ ISO_INLINE PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellP
 /// 1 if the corners [8] are not all on one side: only then can `inside` change in the cell.
 ISO_INLINE int corners_differ(const float *w) {
   const int in = w[0] >= 0.0f;
-  return (w[1] >= 0.0f) != in || (w[2] >= 0.0f) != in || (w[3] >= 0.0f) != in || (w[4] >= 0.0f) != in ||
-         (w[5] >= 0.0f) != in || (w[6] >= 0.0f) != in || (w[7] >= 0.0f) != in;
+  return (w[1] >= 0.0f) != in || (w[2] >= 0.0f) != in || (w[3] >= 0.0f) != in ||
+         (w[4] >= 0.0f) != in || (w[5] >= 0.0f) != in || (w[6] >= 0.0f) != in ||
+         (w[7] >= 0.0f) != in;
 }
 
 /// A change of inside in a cell, not yet refined.
@@ -105,12 +108,13 @@ typedef struct CellChange {
   Bracket bracket;
 } CellChange;
 
-/// Finds the first change of inside between the events `enter` and `exit` of cell (x,y,z), in float. Returns 1, 0 or
-/// ISO_DOUBTFUL. w [8] as in segment_cubic.
-ISO_INLINE int change_or_doubt_in_cell(Solver solver, const Ray *r, const float *w, int x, int y, int z,
-                                       RayEvent enter, RayEvent exit, CellChange *change) {
+/// Finds the first change of inside between the events `enter` and `exit` of cell (x,y,z), in
+/// float. Returns 1, 0 or ISO_DOUBTFUL. w [8] as in segment_cubic.
+ISO_INLINE int change_or_doubt_in_cell(Solver solver, const Ray *r, const float *w, int x, int y,
+                                       int z, RayEvent enter, RayEvent exit, CellChange *change) {
   if (!corners_differ(w)) return 0;
-  change->cubic = segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1));
+  change->cubic =
+      segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1));
   return isolate(solver, change->cubic, &change->bracket);
 }
 
@@ -119,9 +123,9 @@ ISO_INLINE int change_in_cell(Solver solver, const Ray *r, const float *w, int x
                               RayEvent enter, RayEvent exit, CellChange *change) {
   const int found = change_or_doubt_in_cell(solver, r, w, x, y, z, enter, exit, change);
   if (found != ISO_DOUBTFUL) return found;
-  return isolate_precisely(
-      precise_segment_cubic(w, event_position(r, enter, x, y, z, 0), event_position(r, exit, x, y, z, 1)),
-      change->cubic, &change->bracket);
+  return isolate_precisely(precise_segment_cubic(w, event_position(r, enter, x, y, z, 0),
+                                                 event_position(r, exit, x, y, z, 1)),
+                           change->cubic, &change->bracket);
 }
 
 /// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).
@@ -129,22 +133,27 @@ ISO_INLINE float without_zero_sign(float x) {
   return x == 0.0f ? 0.0f : x;
 }
 
-/// The hit at parameter s of cell (x,y,z): t, position in the cell, gradient. w [8] as in segment_cubic.
-ISO_INLINE HitRecord make_hit(const FrameParams *frame, const Ray *r, const float *w, int x, int y, int z,
-                              RayEvent enter, RayEvent exit, float s) {
+/// The hit at parameter s of cell (x,y,z): t, position in the cell, gradient. w [8] as in
+/// segment_cubic.
+ISO_INLINE HitRecord make_hit(const FrameParams *frame, const Ray *r, const float *w, int x, int y,
+                              int z, RayEvent enter, RayEvent exit, float s) {
   const CellPoint a = event_position(r, enter, x, y, z, 0), b = event_position(r, exit, x, y, z, 1);
   HitRecord hit;
   /* Two-float differences first: t_exit - t_enter may be far below an ulp of t. */
   const float length = (exit.t.hi - enter.t.hi) + (exit.t.lo - enter.t.lo);
   hit.t = (enter.t.hi + fma(s, length, enter.t.lo)) * frame->t_scale;
-  hit.block_id = (uint)(x >> 2) + frame->blocks_x * ((uint)(y >> 2) + frame->blocks_y * (uint)(z >> 2));
+  hit.block_id =
+      (uint)(x >> 2) + frame->blocks_x * ((uint)(y >> 2) + frame->blocks_y * (uint)(z >> 2));
   hit.cell = (uint)((x & 3) + 4 * (y & 3) + 16 * (z & 3));
   hit.x = lerp(s, a.x, b.x);
   hit.y = lerp(s, a.y, b.y);
   hit.z = lerp(s, a.z, b.z);
-  hit.grad_x = lerp(hit.z, lerp(hit.y, w[1] - w[0], w[3] - w[2]), lerp(hit.y, w[5] - w[4], w[7] - w[6]));
-  hit.grad_y = lerp(hit.z, lerp(hit.x, w[2] - w[0], w[3] - w[1]), lerp(hit.x, w[6] - w[4], w[7] - w[5]));
-  hit.grad_z = lerp(hit.y, lerp(hit.x, w[4] - w[0], w[5] - w[1]), lerp(hit.x, w[6] - w[2], w[7] - w[3]));
+  hit.grad_x =
+      lerp(hit.z, lerp(hit.y, w[1] - w[0], w[3] - w[2]), lerp(hit.y, w[5] - w[4], w[7] - w[6]));
+  hit.grad_y =
+      lerp(hit.z, lerp(hit.x, w[2] - w[0], w[3] - w[1]), lerp(hit.x, w[6] - w[4], w[7] - w[5]));
+  hit.grad_z =
+      lerp(hit.y, lerp(hit.x, w[4] - w[0], w[5] - w[1]), lerp(hit.x, w[6] - w[2], w[7] - w[3]));
   hit.grad_x = without_zero_sign(hit.grad_x);
   hit.grad_y = without_zero_sign(hit.grad_y);
   hit.grad_z = without_zero_sign(hit.grad_z);

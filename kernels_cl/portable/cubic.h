@@ -58,8 +58,9 @@ ISO_INLINE int precise_cubic_inside(PreciseCubic cubic, float s) {
   return c.b[0].hi >= 0.0f; /* lo cannot change the sign */
 }
 
-/// The cubic as p3 s^3 + p2 s^2 + p1 s + p0: the form most of the literature works in. Its coefficients are
-/// differences of the Bernstein ones, so they carry the rounding of the largest of those.
+/// The cubic as p3 s^3 + p2 s^2 + p1 s + p0: the form most of the literature works in. Its
+/// coefficients are differences of the Bernstein ones, so they carry the rounding of the largest of
+/// those.
 typedef struct PowerCubic {
   float p3, p2, p1, p0;
 } PowerCubic;

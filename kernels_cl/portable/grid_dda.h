@@ -3,12 +3,12 @@
 ///
 /// Portable: OpenCL C 1.2 and C++; kernels and the scalar twin run these very lines.
 ///
-/// No walk here accumulates anything. The moment a ray crosses a grid plane is a pure function of (ray, axis,
-/// plane), in two-float arithmetic (about 45 bits). All crossings of a ray have one total order: by t, then
-/// axis x < y < z; the ray's start, t = 0, comes after planes at t = 0. "The cell after an event" is the
-/// number of planes of each axis that are not later than the event. So walking cell by cell, skipping by
-/// macrocells, and resuming at a block pass through the same cells with the same bits, and a ray's state
-/// between passes is just a block.
+/// No walk here accumulates anything. The moment a ray crosses a grid plane is a pure function of
+/// (ray, axis, plane), in two-float arithmetic (about 45 bits). All crossings of a ray have one
+/// total order: by t, then axis x < y < z; the ray's start, t = 0, comes after planes at t = 0.
+/// "The cell after an event" is the number of planes of each axis that are not later than the
+/// event. So walking cell by cell, skipping by macrocells, and resuming at a block pass through the
+/// same cells with the same bits, and a ray's state between passes is just a block.
 #ifndef ISOWAVE_GRID_DDA_H
 #define ISOWAVE_GRID_DDA_H
 
@@ -66,8 +66,9 @@ ISO_INLINE RayAxis make_ray_axis(float o, float d) {
   return a;
 }
 
-/// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) / sqrt(1 + u^2 +
-/// v^2), mapped to index space; t * frame->t_scale is the distance from the eye in world units.
+/// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) /
+/// sqrt(1 + u^2 + v^2), mapped to index space; t * frame->t_scale is the distance from the eye in
+/// world units.
 ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   const int column = (int)(pixel % frame->width);
   const int row = (int)(pixel / frame->width);
@@ -75,14 +76,18 @@ ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   const float v = (float)((int)frame->height - 1 - 2 * row) * frame->pixel_scale;
   const float length = sqrt(fma(u, u, fma(v, v, 1.0f)));
   Ray r;
-  r.x = make_ray_axis(frame->eye_x, fma(v, frame->up_x, fma(u, frame->right_x, frame->fwd_x)) / length);
-  r.y = make_ray_axis(frame->eye_y, fma(v, frame->up_y, fma(u, frame->right_y, frame->fwd_y)) / length);
-  r.z = make_ray_axis(frame->eye_z, fma(v, frame->up_z, fma(u, frame->right_z, frame->fwd_z)) / length);
+  r.x = make_ray_axis(frame->eye_x,
+                      fma(v, frame->up_x, fma(u, frame->right_x, frame->fwd_x)) / length);
+  r.y = make_ray_axis(frame->eye_y,
+                      fma(v, frame->up_y, fma(u, frame->right_y, frame->fwd_y)) / length);
+  r.z = make_ray_axis(frame->eye_z,
+                      fma(v, frame->up_z, fma(u, frame->right_z, frame->fwd_z)) / length);
   return r;
 }
 
-/// t at which the ray crosses the plane, a whole number (a pure function; the order of crossings rests on it). Needs d != 0.
-/// plane - o is exact as a pair (Knuth's two-sum); it is multiplied by the two-float 1 / d.
+/// t at which the ray crosses the plane, a whole number (a pure function; the order of crossings
+/// rests on it). Needs d != 0. plane - o is exact as a pair (Knuth's two-sum); it is multiplied by
+/// the two-float 1 / d.
 ISO_INLINE TwoFloat plane_t(RayAxis a, float plane) {
   const float s = plane - a.o;
   const float back = s - plane;
@@ -118,15 +123,17 @@ ISO_INLINE RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int size
   return event_before(e, near) ? near : e;
 }
 
-/// Is the ray, just after event `e`, on the far side of the plane as seen from -infinity? Needs d != 0.
+/// Is the ray, just after event `e`, on the far side of the plane as seen from -infinity? Needs d
+/// != 0.
 ISO_INLINE int is_above(RayAxis a, int axis, int plane, RayEvent e) {
   const int crossed =
       !event_before(e, make_event(plane_t(a, (float)plane), axis)); /* the event itself counts */
   return crossed == (a.d > 0.0f);
 }
 
-/// The region along one axis, within [first, last], that the ray is in just after event `e`. Where the position o + t d is
-/// further from a plane than its error, 2^-24 (|t d| + |o + t d|), it decides; else crossings are compared.
+/// The region along one axis, within [first, last], that the ray is in just after event `e`. Where
+/// the position o + t d is further from a plane than its error, 2^-24 (|t d| + |o + t d|), it
+/// decides; else crossings are compared.
 ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
   const float p = a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o);
   const float error = 0x1p-22f * (fabs(p) + fabs(a.o));
@@ -143,8 +150,8 @@ ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int 
   return c;
 }
 
-/// Position along one axis at t, relative to the integer plane c: (o - c) + t d with the cancellation done
-/// exactly, clamped to the cell [0,1].
+/// Position along one axis at t, relative to the integer plane c: (o - c) + t d with the
+/// cancellation done exactly, clamped to the cell [0,1].
 ISO_INLINE float local_position(RayAxis a, TwoFloat t, int c) {
   const float cf = (float)c;
   const float s = a.o - cf;
@@ -159,9 +166,9 @@ ISO_INLINE float local_position(RayAxis a, TwoFloat t, int c) {
   return x <= 0.0f ? 0.0f : (x >= 1.0f ? 1.0f : x);
 }
 
-/// A walk through regions of one size: where it is, and by which plane of each axis it would leave. A GPU computes the three
-/// times when it needs them, without a branch, faster than it chooses one of them to renew; a CPU keeps them
-/// (ISO_CPU). The same bits either way.
+/// A walk through regions of one size: where it is, and by which plane of each axis it would leave.
+/// A GPU computes the three times when it needs them, without a branch, faster than it chooses one
+/// of them to renew; a CPU keeps them (ISO_CPU). The same bits either way.
 typedef struct GridWalk {
   int x, y, z;                ///< the region
   float far_x, far_y, far_z;  ///< planes
@@ -200,7 +207,8 @@ ISO_INLINE GridWalk walk_from(const Ray *r, int x, int y, int z, int size, LastP
   return w;
 }
 
-/// The event by which the ray entered region (x,y,z): the last of its three near planes, or the start.
+/// The event by which the ray entered region (x,y,z): the last of its three near planes, or the
+/// start.
 ISO_INLINE RayEvent region_entry(const Ray *r, int x, int y, int z, int size, LastPlanes last) {
   RayEvent e = start_event();
   e = later_entry(e, r->x, 0, x, size, last.x);
@@ -208,8 +216,9 @@ ISO_INLINE RayEvent region_entry(const Ray *r, int x, int y, int z, int size, La
   return later_entry(e, r->z, 2, z, size, last.z);
 }
 
-/// The event by which the ray leaves the walk's region: the first of the three; ties in the order x, y, z. Numbers are chosen,
-/// not structs, which compilers would choose by address and so keep in memory.
+/// The event by which the ray leaves the walk's region: the first of the three; ties in the order
+/// x, y, z. Numbers are chosen, not structs, which compilers would choose by address and so keep in
+/// memory.
 ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
 #ifdef ISO_CPU
   const TwoFloat x = w->t_x, y = w->t_y, z = w->t_z;
@@ -267,12 +276,14 @@ ISO_INLINE void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, La
 
 /// Does the walk leave the larger region that it is in, too, by its exit?
 ISO_INLINE int leaves(const GridWalk *w, const GridWalk *larger, RayEvent exit) {
-  return (exit.axis == 0 && w->far_x == larger->far_x) || (exit.axis == 1 && w->far_y == larger->far_y) ||
+  return (exit.axis == 0 && w->far_x == larger->far_x) ||
+         (exit.axis == 1 && w->far_y == larger->far_y) ||
          (exit.axis == 2 && w->far_z == larger->far_z);
 }
 
 /// Shrinks [*enter, *exit] to one axis of a box. Returns 0 if the ray runs beside it.
-ISO_INLINE int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *enter, RayEvent *exit) {
+ISO_INLINE int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *enter,
+                            RayEvent *exit) {
   RayEvent near, far;
   if (a.d == 0.0f) return a.o >= (float)begin && a.o <= (float)end;
   near = make_event(plane_t(a, (float)(a.d > 0.0f ? begin : end)), axis);
@@ -282,8 +293,10 @@ ISO_INLINE int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *e
   return 1;
 }
 
-/// Shrinks [*enter, *exit] to the box from planes `begin` to planes `end`. Returns 0 if nothing is left.
-ISO_INLINE int clip_to_box(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter, RayEvent *exit) {
+/// Shrinks [*enter, *exit] to the box from planes `begin` to planes `end`. Returns 0 if nothing is
+/// left.
+ISO_INLINE int clip_to_box(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter,
+                           RayEvent *exit) {
   return clip_to_slab(r->x, 0, begin.x, end.x, enter, exit) &&
          clip_to_slab(r->y, 1, begin.y, end.y, enter, exit) &&
          clip_to_slab(r->z, 2, begin.z, end.z, enter, exit) && event_before(*enter, *exit);

@@ -4,8 +4,9 @@
 
 #include "shared_types.h"
 
-/// Most key bits per pass: 1 to 9. Local memory per work-group is 4 bytes for each pair of a tile and, for
-/// each of the 2^bits digits, 8 bytes and ISO_RADIX_ROUND / 8 more; 9 are too many for groups of 256.
+/// Most key bits per pass: 1 to 9. Local memory per work-group is 4 bytes for each pair of a tile
+/// and, for each of the 2^bits digits, 8 bytes and ISO_RADIX_ROUND / 8 more; 9 are too many for
+/// groups of 256.
 #define ISO_RADIX_BITS 6u
 #define ISO_RADIX_DIGITS (1u << ISO_RADIX_BITS)
 #define ISO_RADIX_ITEMS 16u   ///< pairs per work-item and tile: a power of two from 4

@@ -1,6 +1,6 @@
-/// shade.h -- a pixel's colour, the mean of its rays', each from its hit: a headlight at the eye, Blinn-Phong, both
-/// sides of the surface alike. Portable: OpenCL C 1.2 and C++, so that pictures of devices and of the twin are the same files. No
-/// pow.
+/// shade.h -- a pixel's colour, the mean of its rays', each from its hit: a headlight at the eye,
+/// Blinn-Phong, both sides of the surface alike. Portable: OpenCL C 1.2 and C++, so that pictures
+/// of devices and of the twin are the same files. No pow.
 #ifndef ISOWAVE_SHADE_H
 #define ISOWAVE_SHADE_H
 
@@ -10,8 +10,9 @@ ISO_NAMESPACE_BEGIN
 
 /// Colours are display values, [0,1].
 typedef struct ShadeParams {
-  float normal[9];  ///< row-major: gradient in index space -> normal in world space (up to a factor)
-  float view[9];    ///< row-major: ray direction in index space -> world space (up to a factor)
+  float
+      normal[9];  ///< row-major: gradient in index space -> normal in world space (up to a factor)
+  float view[9];  ///< row-major: ray direction in index space -> world space (up to a factor)
   float surface_r, surface_g, surface_b;
   float background_r, background_g, background_b;
   float ambient, diffuse, specular;  ///< weights; the highlight is white
@@ -39,15 +40,16 @@ ISO_INLINE uint to_byte(float c) {
 }
 
 /// Of the ray of that number.
-ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint ray_id, float t,
-                           float gx, float gy, float gz) {
+ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint ray_id,
+                           float t, float gx, float gy, float gz) {
   const Ray ray = make_ray(frame, ray_id);
   float nx, ny, nz, vx, vy, vz, lengths, cosine, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
   int i;
   if (t == INFINITY) return make_color(p->background_r, p->background_g, p->background_b);
   largest = fabs(gz) > largest ? fabs(gz) : largest;
-  if (largest > 0.0f) { /* only its direction counts: squares of huge or tiny values would not survive */
+  if (largest >
+      0.0f) { /* only its direction counts: squares of huge or tiny values would not survive */
     gx /= largest;
     gy /= largest;
     gz /= largest;
@@ -59,7 +61,8 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
   vy = fma(p->view[3], ray.x.d, fma(p->view[4], ray.y.d, p->view[5] * ray.z.d));
   vz = fma(p->view[6], ray.x.d, fma(p->view[7], ray.y.d, p->view[8] * ray.z.d));
   lengths = sqrt(fma(nx, nx, fma(ny, ny, nz * nz))) * sqrt(fma(vx, vx, fma(vy, vy, vz * vz)));
-  /* The light is at the eye, so the half vector is the view vector and one cosine does for both terms. */
+  /* The light is at the eye, so the half vector is the view vector and one cosine does for both
+   * terms. */
   cosine = lengths > 0.0f ? fabs(fma(nx, vx, fma(ny, vy, nz * vz))) / lengths : 1.0f;
   highlight = cosine;
   for (i = 0; i < 5; ++i) highlight *= highlight; /* cosine^32 */
@@ -69,17 +72,18 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
                     fma(p->surface_b, light, highlight));
 }
 
-/// RGBA, 8 bits each, red in bits 0..7: of the pixel at a column and row of the picture, which has samples times samples rays of
-/// the frame.
-ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint samples,
-                            uint column, uint row, ISO_GLOBAL const HitRecord *hits) {
+/// RGBA, 8 bits each, red in bits 0..7: of the pixel at a column and row of the picture, which has
+/// samples times samples rays of the frame.
+ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p,
+                            uint samples, uint column, uint row, ISO_GLOBAL const HitRecord *hits) {
   const float share = 1.0f / (float)(samples * samples);
   float r = 0.0f, g = 0.0f, b = 0.0f;
   uint i;
   for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
-    const uint ray_id = (row * samples + i / samples) * frame->width + column * samples + i % samples;
-    const Color color = shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x, hits[ray_id].grad_y,
-                                  hits[ray_id].grad_z);
+    const uint ray_id =
+        (row * samples + i / samples) * frame->width + column * samples + i % samples;
+    const Color color = shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x,
+                                  hits[ray_id].grad_y, hits[ray_id].grad_z);
     r += color.r;
     g += color.g;
     b += color.b;

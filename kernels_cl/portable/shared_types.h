@@ -11,7 +11,8 @@
 #define ISO_GLOBAL global      ///< address space of buffers
 #define ISO_CONSTANT constant  ///< address space of tables
 #define ISO_UNROLL _Pragma("unroll")
-#ifdef ISO_CPU /* the host says so, of PoCL and llvmpipe: PoCL calls long functions otherwise, which takes a fifth longer */
+#ifdef ISO_CPU /* the host says so, of PoCL and llvmpipe: PoCL calls long functions otherwise, \
+                  which takes a fifth longer */
 #define ISO_INLINE static inline __attribute__((always_inline))
 #else /* Oclgrind, too, which knows no scopes of inlined arguments */
 #define ISO_INLINE static inline
@@ -53,50 +54,57 @@ inline uint popcount(uint x) {
 #define ISO_DUAL_GRID_VERTICES 125u  ///< 5^3
 #define ISO_SCAN_ITEMS 8u            ///< entries per work-item and tile in scan.cl
 #define ISO_GROUP_ITEMS 4u           ///< pairs per work-item and tile in group.cl
-#define ISO_EVICTION_RANKS 256u      ///< orders of eviction that the cache tells apart (slot_stamps.h)
+#define ISO_EVICTION_RANKS 256u  ///< orders of eviction that the cache tells apart (slot_stamps.h)
 
 #ifndef ISO_CHECK_RACES /* by -D, from tests/run_under_oclgrind.sh */
-#define ISO_CHECK_RACES \
-  0 /* 1: what work-items share without order, since any outcome is right, is ordered or not shared */
+#define ISO_CHECK_RACES                                                                      \
+  0 /* 1: what work-items share without order, since any outcome is right, is ordered or not \
+       shared */
 #endif
 
-#ifndef ISO_LEVELS   /* by -D */
-#define ISO_LEVELS 0 /* 1: frames are drawn in bands of several levels of detail (core/view/detail.hpp) */
+#ifndef ISO_LEVELS /* by -D */
+#define ISO_LEVELS \
+  0 /* 1: frames are drawn in bands of several levels of detail (core/view/detail.hpp) */
 #endif
 
-/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's compiler reads a
-/// pointer to constant memory through the cache, again in every turn of a loop.
+/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's
+/// compiler reads a pointer to constant memory through the cache, again in every turn of a loop.
 typedef struct FrameParams {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
   uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted
-  uint width, height;         ///< rays: those of the image, or several for each of its pixels along both axes
+  uint width,
+      height;  ///< rays: those of the image, or several for each of its pixels along both axes
   float eye_x, eye_y, eye_z;  ///< camera position, index space
-  float fwd_x, fwd_y, fwd_z;  ///< camera basis mapped to index space, divided by t_scale (see make_ray)
+  float fwd_x, fwd_y,
+      fwd_z;  ///< camera basis mapped to index space, divided by t_scale (see make_ray)
   float right_x, right_y, right_z;
   float up_x, up_y, up_z;
   float pixel_scale;  ///< tan(fovy / 2) / height: half a ray's step of u and v
   float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
   float isovalue;
-  uint isovalue_index;                                 ///< the first threshold of macrocells.cl that is >= it
-  uint max_spec_count;                                 ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
-  int active_begin_x, active_begin_y, active_begin_z;  ///< box around the active blocks, whole macrocells:
-  int active_end_x, active_end_y, active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
+  uint isovalue_index;  ///< the first threshold of macrocells.cl that is >= it
+  uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
+  int active_begin_x, active_begin_y,
+      active_begin_z;  ///< box around the active blocks, whole macrocells:
+  int active_end_x, active_end_y,
+      active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
   /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
   uint screen_begin_x, screen_begin_y, screen_end_x, screen_end_y;
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
   uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
-  /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z) of this one is
-  /// number x + id_blocks_x (y + id_blocks_y (id_begin_z + z)).
+  /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z)
+  /// of this one is number x + id_blocks_x (y + id_blocks_y (id_begin_z + z)).
   uint id_blocks_x, id_blocks_y, id_begin_z;
-  uint ranges_begin, masks_begin;  ///< this level's among those of all levels (macrocells.cl) [entries]
-  float begin_t, end_t;            ///< the band of the rays that is drawn at this level [t of the kernels]
+  uint ranges_begin,
+      masks_begin;       ///< this level's among those of all levels (macrocells.cl) [entries]
+  float begin_t, end_t;  ///< the band of the rays that is drawn at this level [t of the kernels]
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 176);
 
-/// How many of the active rays take part in the next pass, after one in which `asked` rays asked for `requested`
-/// blocks and got `granted`. Not in the paper. Where blocks were missing, about as many as can be served: otherwise
-/// all would hold on to parts of their dual grids, none would get the rest, and only the ray that is served first
-/// would move. Else a quarter more.
+/// How many of the active rays take part in the next pass, after one in which `asked` rays asked
+/// for `requested` blocks and got `granted`. Not in the paper. Where blocks were missing, about as
+/// many as can be served: otherwise all would hold on to parts of their dual grids, none would get
+/// the rest, and only the ray that is served first would move. Else a quarter more.
 ISO_INLINE uint next_window(uint asked, uint requested, uint granted) {
   uint window = asked + asked / 4 + 1;
   if (requested > granted) {
@@ -108,37 +116,44 @@ ISO_INLINE uint next_window(uint asked, uint requested, uint granted) {
   return window;
 }
 
-/// Most blocks that a ray looks ahead while only num_rays take part: for all together as many as there are slots, but
-/// for each one. Not in the paper. What rays look at in vain costs slots whose blocks other rays would read.
+/// Most blocks that a ray looks ahead while only num_rays take part: for all together as many as
+/// there are slots, but for each one. Not in the paper. What rays look at in vain costs slots whose
+/// blocks other rays would read.
 ISO_INLINE uint scarce_speculation(const FrameParams *frame, uint num_rays) {
   const uint each = 4 * frame->table_groups / (num_rays + 1);
   return each < 1 ? 1 : each;
 }
 
-/// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31 (march.cl).
+/// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31
+/// (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu
 #define ISO_RAY_AHEAD_SHIFT 28u
 #define ISO_RAY_AHEAD_MAX 6u
-#define ISO_FIRST_LOG_AHEAD 2u   ///< of a new ray
-#define ISO_BORDER_LOG_AHEAD 3u  ///< of one that crosses a border of levels (README "Levels of detail")
+#define ISO_FIRST_LOG_AHEAD 2u  ///< of a new ray
+#define ISO_BORDER_LOG_AHEAD \
+  3u  ///< of one that crosses a border of levels (README "Levels of detail")
 #define ISO_RAY_IN_DOUBT 0x80000000u
 
-/// With levels of detail, above a ray's block id, when it stands behind a border: the side it was on there.
+/// With levels of detail, above a ray's block id, when it stands behind a border: the side it was
+/// on there.
 #define ISO_RAY_BLOCK 0x3FFFFFFFu
 #define ISO_RAY_SIDE_SHIFT 30u
 #define ISO_SIDE_UNKNOWN 0u
 #define ISO_SIDE_OUTSIDE 1u
 #define ISO_SIDE_INSIDE 2u
 
-#define ISO_NO_HIT 64u      ///< PairHit::cell of a pair that was tested and misses
-#define ISO_NOT_TESTED 65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass
-#define ISO_IN_DOUBT 128u   ///< added to PairHit::cell where the pair's walk stopped for settle_doubts()
+#define ISO_NO_HIT 64u  ///< PairHit::cell of a pair that was tested and misses
+#define ISO_NOT_TESTED \
+  65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass
+#define ISO_IN_DOUBT \
+  128u  ///< added to PairHit::cell where the pair's walk stopped for settle_doubts()
 
-/// The result of one ray-block pair: which of the block's 64 dual cells the ray hits first, and where.
+/// The result of one ray-block pair: which of the block's 64 dual cells the ray hits first, and
+/// where.
 typedef struct PairHit {
-  uint
-      cell;  ///< x + 4 y + 16 z in the block, ISO_NO_HIT or ISO_NOT_TESTED; between kernels also + ISO_IN_DOUBT
-  float s;  ///< position between the ray's entry (0) and exit (1) of that cell
+  uint cell;  ///< x + 4 y + 16 z in the block, ISO_NO_HIT or ISO_NOT_TESTED; between kernels also +
+              ///< ISO_IN_DOUBT
+  float s;    ///< position between the ray's entry (0) and exit (1) of that cell
 } PairHit;
 ISO_CHECK_SIZE(PairHit, 8);
 
@@ -150,11 +165,12 @@ ISO_CHECK_SIZE(BlockRays, 8);
 
 /// One pixel's hit (design: a hit is cell + local position; t is derived from it).
 typedef struct HitRecord {
-  float t;                       ///< distance from the eye [world units]; INFINITY: no hit
-  uint block_id;                 ///< bx + blocks_x * (by + blocks_y * bz)
-  uint cell;                     ///< x + 4 y + 16 z in the block
-  float x, y, z;                 ///< position in the dual cell, [0,1]^3
-  float grad_x, grad_y, grad_z;  ///< gradient of the trilinear field there [value per voxel], index space
+  float t;        ///< distance from the eye [world units]; INFINITY: no hit
+  uint block_id;  ///< bx + blocks_x * (by + blocks_y * bz)
+  uint cell;      ///< x + 4 y + 16 z in the block
+  float x, y, z;  ///< position in the dual cell, [0,1]^3
+  float grad_x, grad_y,
+      grad_z;  ///< gradient of the trilinear field there [value per voxel], index space
 } HitRecord;
 ISO_CHECK_SIZE(HitRecord, 36);
 
@@ -162,10 +178,12 @@ ISO_CHECK_SIZE(HitRecord, 36);
 typedef struct StreamLayout {
   uint bits_per_block;  ///< at a fixed rate; 0: blocks have lengths of their own, see block_index.h
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
-  int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES: with the block's bits
+  int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES:
+                     ///< with the block's bits
   uint whole_numbers;  ///< not 0: decoded values are rounded to integers
-  /// Added to a block's values, to draw a bound of the volume: value_offset + bound_unit * block_bound() of its code,
-  /// of codes that begin with word bounds_begin of the index. Both 0: nothing.
+  /// Added to a block's values, to draw a bound of the volume: value_offset + bound_unit *
+  /// block_bound() of its code, of codes that begin with word bounds_begin of the index. Both 0:
+  /// nothing.
   float value_offset, bound_unit;
   uint bounds_begin;
   uint bounds_by_place;  ///< not 0: of its block's bound, a voxel has bound_share() of its place
@@ -174,26 +192,27 @@ ISO_CHECK_SIZE(StreamLayout, 32);
 
 #define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
 
-/// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input is "the
-/// first n entries" take n from a field of this struct, so that no launch waits for the host.
+/// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input
+/// is "the first n entries" take n from a field of this struct, so that no launch waits for the
+/// host.
 typedef struct PassCounts {
-  uint ray_count;        ///< width * height of the frame
-  uint pass;             ///< number of the pass since the cache was made: the clock of its slots' stamps
-  uint frame_pass;       ///< number of the frame's first pass
+  uint ray_count;   ///< width * height of the frame
+  uint pass;        ///< number of the pass since the cache was made: the clock of its slots' stamps
+  uint frame_pass;  ///< number of the frame's first pass
   uint last_frame_pass;  ///< and of the first pass of the frame before
   uint active_count;     ///< N_Act: rays at work at the start of the pass
   uint spec_count;       ///< N_Spec of the pass; 0 when no ray is active
   uint window_count;     ///< of the active rays, the first so many take part in the pass
   uint pair_slot_count;  ///< window_count * spec_count: entries of the pair arrays in use
-  uint pair_count;       ///< ray-block pairs: blocks that rays looked ahead at, summed over the rays
-  uint ahead_count;      ///< blocks that rays were to look ahead at, summed over the rays of the window
+  uint pair_count;   ///< ray-block pairs: blocks that rays looked ahead at, summed over the rays
+  uint ahead_count;  ///< blocks that rays were to look ahead at, summed over the rays of the window
   uint granted_count;    ///< of those, pairs whose dual grid was in the cache and were intersected
   uint visible_count;    ///< distinct blocks those belong to
   uint requested_count;  ///< blocks asked for that were not cached
   uint decoded_count;    ///< of those, blocks that got a slot
-  uint
-      recycled_count;  ///< blocks freed for them that this frame had asked for, too: it needs more than there are slots
-  uint hit_count;          ///< rays that hit in this pass
+  uint recycled_count;  ///< blocks freed for them that this frame had asked for, too: it needs more
+                        ///< than there are slots
+  uint hit_count;       ///< rays that hit in this pass
   uint next_active_count;  ///< rays left for the next pass
   uint free_count;         ///< cache slots left without a block
 } PassCounts;

@@ -1,5 +1,6 @@
-/// shared_types_fields.h -- the fields of every struct of shared_types.h, in order, for what must visit them
-/// all. ISO_<STRUCT>_FIELDS(X) expands X(field) for each; shared_types_test fails when one is missing.
+/// shared_types_fields.h -- the fields of every struct of shared_types.h, in order, for what must
+/// visit them all. ISO_<STRUCT>_FIELDS(X) expands X(field) for each; shared_types_test fails when
+/// one is missing.
 #ifndef ISOWAVE_SHARED_TYPES_FIELDS_H
 #define ISOWAVE_SHARED_TYPES_FIELDS_H
 // Lists that read as lists:

@@ -1,11 +1,12 @@
 /// solve_analytic.h -- the closed form of the cubic [Parker et al. 1998; Schwarze 1990].
 ///
 /// Guarantees: none above what cancellation leaves.
-/// Fails: it divides by the leading coefficient, which is rounding noise wherever the field is nearly linear or quadratic
-/// along the ray - most cells of real data; switching to the quadratic there needs a threshold, and on either side
-/// of any threshold digits are lost. Roots near 0 and 1 fall out of [0,1] by rounding, so rays slip through cell faces.
-/// OpenCL leaves the bits of cbrt, acos and cos open; the ones here are made of add, multiply, divide and sqrt,
-/// so that devices and twin agree.
+/// Fails: it divides by the leading coefficient, which is rounding noise wherever the field is
+/// nearly linear or quadratic along the ray - most cells of real data; switching to the quadratic
+/// there needs a threshold, and on either side of any threshold digits are lost. Roots near 0 and 1
+/// fall out of [0,1] by rounding, so rays slip through cell faces. OpenCL leaves the bits of cbrt,
+/// acos and cos open; the ones here are made of add, multiply, divide and sqrt, so that devices and
+/// twin agree.
 #ifndef ISOWAVE_SOLVE_ANALYTIC_H
 #define ISOWAVE_SOLVE_ANALYTIC_H
 
@@ -16,7 +17,8 @@ ISO_NAMESPACE_BEGIN
 /// Below this share of the largest coefficient the leading one counts as 0.
 #define ISO_ANALYTIC_DEGENERATE 1e-5f
 
-/// Cube root: halves the exponent's third by a power of two, then Newton. Relative error about 1e-7.
+/// Cube root: halves the exponent's third by a power of two, then Newton. Relative error about
+/// 1e-7.
 ISO_INLINE float portable_cbrt(float x) {
   union {
     float f;
@@ -50,8 +52,8 @@ ISO_INLINE float portable_acos(float x) {
 /// Cosine on [-pi/3, pi] by Taylor series about 0 of a half angle: absolute error about 1e-7.
 ISO_INLINE float portable_cos(float x) {
   const float h = 0.25f * x, h2 = h * h;
-  const float c =
-      fma(h2, fma(h2, fma(h2, fma(h2, 1.0f / 40320.0f, -1.0f / 720.0f), 1.0f / 24.0f), -0.5f), 1.0f);
+  const float c = fma(
+      h2, fma(h2, fma(h2, fma(h2, 1.0f / 40320.0f, -1.0f / 720.0f), 1.0f / 24.0f), -0.5f), 1.0f);
   const float cos_half = fma(2.0f * c, c, -1.0f);
   return fma(2.0f * cos_half, cos_half, -1.0f);
 }

@@ -1,10 +1,12 @@
-/// solve_bernstein.h -- sign variations of Bernstein coefficients reject and isolate, bracketed Newton refines [Yuksel 2022];
-/// where float rounding would decide between crossing and passing by, 48-bit arithmetic decides.
+/// solve_bernstein.h -- sign variations of Bernstein coefficients reject and isolate, bracketed
+/// Newton refines [Yuksel 2022]; where float rounding would decide between crossing and passing by,
+/// 48-bit arithmetic decides.
 ///
-/// Guarantees: a change of inside between entry and exit is always found. A pair of crossings is found also where it is
-/// shallower than the rounding of the float coefficients. Nothing is divided by a leading coefficient. The result
-/// lies in a bracket whose ends differ in inside.
-/// Fails: crossings that only the rounding of the positions of entry and exit (2^-25 voxels) removes or adds.
+/// Guarantees: a change of inside between entry and exit is always found. A pair of crossings is
+/// found also where it is shallower than the rounding of the float coefficients. Nothing is divided
+/// by a leading coefficient. The result lies in a bracket whose ends differ in inside. Fails:
+/// crossings that only the rounding of the positions of entry and exit (2^-25 voxels) removes or
+/// adds.
 #ifndef ISOWAVE_SOLVE_BERNSTEIN_H
 #define ISOWAVE_SOLVE_BERNSTEIN_H
 
@@ -14,8 +16,8 @@ ISO_NAMESPACE_BEGIN
 
 /// The iteration ends when s moves less than this: 2^-23 of the way through the cell.
 #define ISO_ROOT_STEP 0x1p-23f
-/// Bound on the rounding of a float coefficient and of a value computed from it, in units of the largest
-/// coefficient: what is smaller has no certain sign.
+/// Bound on the rounding of a float coefficient and of a value computed from it, in units of the
+/// largest coefficient: what is smaller has no certain sign.
 #define ISO_CUBIC_NOISE 0x1p-20f
 
 /// An answer besides 0 and 1: the sign of something too small decides. See isolate_precisely().
@@ -32,11 +34,13 @@ typedef struct Extrema {
   float discriminant;  ///< of the derivative, whose largest coefficient is scaled to 1
 } Extrema;
 
-/// The derivative is d0 (1-s)^2 + 2 d1 s (1-s) + d2 s^2, up to a factor. With r = s / (1-s) > 0 that is d2 r^2 +
-/// 2 d1 r + d0 = 0, whose roots q / d2 and d0 / q (q = -(d1 +- sqrt(d1^2 - d0 d2)), larger magnitude) give s
-/// without cancellation and without dividing by a leading coefficient.
+/// The derivative is d0 (1-s)^2 + 2 d1 s (1-s) + d2 s^2, up to a factor. With r = s / (1-s) > 0
+/// that is d2 r^2 + 2 d1 r + d0 = 0, whose roots q / d2 and d0 / q (q = -(d1 +- sqrt(d1^2 - d0
+/// d2)), larger magnitude) give s without cancellation and without dividing by a leading
+/// coefficient.
 ISO_INLINE Extrema cubic_extrema(float e0, float e1, float e2) {
-  const float e01 = fabs(e0) > fabs(e1) ? fabs(e0) : fabs(e1), largest = fabs(e2) > e01 ? fabs(e2) : e01;
+  const float e01 = fabs(e0) > fabs(e1) ? fabs(e0) : fabs(e1),
+              largest = fabs(e2) > e01 ? fabs(e2) : e01;
   /* Squares of huge or tiny values would not survive; only the ratios of the three count. */
   const float d0 = e0 / largest, d1 = e1 / largest, d2 = e2 / largest;
   const float d02 = d0 * d2;
@@ -59,12 +63,13 @@ ISO_INLINE float largest_coefficient(Cubic c) {
   return b01 > b23 ? b01 : b23;
 }
 
-/// The first piece of [0,1] at whose ends inside differs. Returns 1, 0 if it never does, or ISO_DOUBTFUL.
+/// The first piece of [0,1] at whose ends inside differs. Returns 1, 0 if it never does, or
+/// ISO_DOUBTFUL.
 ///
-/// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly one root,
-/// bracketed by [0,1]. More: [0,1] is split at the extrema. An extremum's value depends on its place only to second
-/// order, so its sign is certain unless the value is noise; nor is it certain that there is an extremum where the
-/// derivative's discriminant is noise.
+/// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly
+/// one root, bracketed by [0,1]. More: [0,1] is split at the extrema. An extremum's value depends
+/// on its place only to second order, so its sign is certain unless the value is noise; nor is it
+/// certain that there is an extremum where the derivative's discriminant is noise.
 ISO_INLINE int isolate_bernstein(Cubic c, Bracket *bracket) {
   const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
   bracket->lo = 0.0f;
@@ -92,13 +97,13 @@ ISO_INLINE int isolate_bernstein(Cubic c, Bracket *bracket) {
   return 1;
 }
 
-/// The same in 48 bits, for the few segments on which isolate_bernstein() is in doubt, and the root itself (lo == hi) by
-/// bisection. rounded: the float coefficients, whose end signs neighbouring cells share and which therefore say what
-/// is inside at entry and exit.
+/// The same in 48 bits, for the few segments on which isolate_bernstein() is in doubt, and the root
+/// itself (lo == hi) by bisection. rounded: the float coefficients, whose end signs neighbouring
+/// cells share and which therefore say what is inside at entry and exit.
 ISO_INLINE int isolate_precisely(PreciseCubic c, Cubic rounded, Bracket *bracket) {
   const int in0 = rounded.b0 >= 0.0f, in3 = rounded.b3 >= 0.0f;
-  const Extrema at =
-      cubic_extrema(tf_sub(c.b[1], c.b[0]).hi, tf_sub(c.b[2], c.b[1]).hi, tf_sub(c.b[3], c.b[2]).hi);
+  const Extrema at = cubic_extrema(tf_sub(c.b[1], c.b[0]).hi, tf_sub(c.b[2], c.b[1]).hi,
+                                   tf_sub(c.b[3], c.b[2]).hi);
   float lo = 0.0f, hi = 1.0f;
   int changed = 0, i;
   for (i = 0; i < 2 + 24; ++i) { /* the extrema, then bisection */
@@ -122,7 +127,8 @@ ISO_INLINE float refine_by_newton(Cubic c, Bracket bracket, int max_steps) {
   float lo = bracket.lo, hi = bracket.hi;
   float s = 0.5f * (lo + hi);
   int step;
-  if (lo == 0.0f && hi == 1.0f) s = c.b0 / (c.b0 - c.b3); /* signs differ: the chord's root, in [0,1] */
+  if (lo == 0.0f && hi == 1.0f)
+    s = c.b0 / (c.b0 - c.b3); /* signs differ: the chord's root, in [0,1] */
   for (step = 0; step < max_steps; ++step) {
     float derivative, next;
     const float value = cubic_value(c, s, &derivative);
@@ -132,7 +138,8 @@ ISO_INLINE float refine_by_newton(Cubic c, Bracket bracket, int max_steps) {
       hi = s;
     }
     next = s - value / derivative;
-    /* Not a root of the other direction just outside; and before the bracket is asked, of which s is an end now. */
+    /* Not a root of the other direction just outside; and before the bracket is asked, of which s
+     * is an end now. */
     if ((derivative > 0.0f) != in_lo && fabs(next - s) < ISO_ROOT_STEP) return s;
     if (!(next > lo && next < hi)) next = 0.5f * (lo + hi); /* also when derivative = 0 */
     s = next;

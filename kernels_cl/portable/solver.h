@@ -1,19 +1,21 @@
-/// solver.h -- the family of root finders behind one contract, for the field along a ray's segment in one cell.
-/// Portable: OpenCL C 1.2 and C++; kernels and the scalar twin run these very lines.
+/// solver.h -- the family of root finders behind one contract, for the field along a ray's segment
+/// in one cell. Portable: OpenCL C 1.2 and C++; kernels and the scalar twin run these very lines.
 ///
-/// Contract: the cubic is the field minus the isovalue on s in [0,1], entry to exit. isolate() returns 1 and a bracket of
-/// the first s at which inside (value >= 0) differs from inside at s = 0; 0 if it never does. refine() places the
-/// root in the bracket with at most max_steps steps; 0 leaves the first guess. They are apart so that a work-group's
-/// rays refine together after their walks, not one by one in the midst of the others' walks. What each keeps of that
-/// contract stands above it:
+/// Contract: the cubic is the field minus the isovalue on s in [0,1], entry to exit. isolate()
+/// returns 1 and a bracket of the first s at which inside (value >= 0) differs from inside at s =
+/// 0; 0 if it never does. refine() places the root in the bracket with at most max_steps steps; 0
+/// leaves the first guess. They are apart so that a work-group's rays refine together after their
+/// walks, not one by one in the midst of the others' walks. What each keeps of that contract stands
+/// above it:
 ///
 ///   solver      misses                                  refinement          cost
 ///   linear      every even number of crossings          false position      least
 ///   marmitt     extrema lost to its naive quadratic     false position      low
-///   analytic    roots lost to cancellation              none (closed form)  most: cube root, arc cosine
+///   analytic    roots lost to cancellation              none (closed form)  most: cbrt, acos
 ///   bernstein   nothing above rounding of entry, exit   bracketed Newton    low
 ///
-/// A kernel is built for one solver (-D ISO_SOLVER, -D ISO_ROOT_STEPS); the twin takes it as a value.
+/// A kernel is built for one solver (-D ISO_SOLVER, -D ISO_ROOT_STEPS); the twin takes it as a
+/// value.
 #ifndef ISOWAVE_SOLVER_H
 #define ISOWAVE_SOLVER_H
 
@@ -58,8 +60,8 @@ ISO_INLINE float refine(Solver solver, Cubic c, Bracket bracket) {
   return s > 0.0f ? s : 0.0f; /* no -0, whose sign compilers may change */
 }
 
-/// Both, for a cubic of which no more than its float coefficients is known: the first s at which inside differs from
-/// inside at s = 0. Returns 0 if it never does.
+/// Both, for a cubic of which no more than its float coefficients is known: the first s at which
+/// inside differs from inside at s = 0. Returns 0 if it never does.
 ISO_INLINE int first_change(Solver solver, Cubic c, float *s) {
   Bracket bracket;
   int found = isolate(solver, c, &bracket);

@@ -1,8 +1,10 @@
-/// zfp_codec.h -- decodes one zfp block of 4^3 float32 values, bit-exact with libzfp 1.0 [Lindstrom 2014].
+/// zfp_codec.h -- decodes one zfp block of 4^3 float32 values, bit-exact with libzfp 1.0 [Lindstrom
+/// 2014].
 ///
-/// Portable: OpenCL C 1.2 and C++. Block layout, in bits: 1 "not all zero" | 8 exponent + 127 | bit planes
-/// 31, 30, ... of 64 negabinary coefficients, each plane: n bits verbatim, then group-tested runs; cut at
-/// max_bits (fixed rate), or after the plane that a bound of the error needs (fixed accuracy).
+/// Portable: OpenCL C 1.2 and C++. Block layout, in bits: 1 "not all zero" | 8 exponent + 127 | bit
+/// planes 31, 30, ... of 64 negabinary coefficients, each plane: n bits verbatim, then group-tested
+/// runs; cut at max_bits (fixed rate), or after the plane that a bound of the error needs (fixed
+/// accuracy).
 #ifndef ISOWAVE_ZFP_CODEC_H
 #define ISOWAVE_ZFP_CODEC_H
 
@@ -10,7 +12,8 @@
 
 ISO_NAMESPACE_BEGIN
 
-/// Coefficients travel in order of total sequency i + j + k, then i^2 + j^2 + k^2: stream position -> i + 4 j
+/// Coefficients travel in order of total sequency i + j + k, then i^2 + j^2 + k^2: stream position
+/// -> i + 4 j
 /// + 16 k.
 ISO_CONSTANT static const uchar iso_zfp_order[64] = {
     0,  1,  4,  16, 20, 17, 5,  2,  8,  32, 21, 6,  18, 24, 9,  33, 36, 3,  12, 48, 22, 25,
@@ -60,8 +63,8 @@ ISO_INLINE uint trailing_zeros_32(uint bits) {
   return popcount(~bits & (bits - 1u));
 }
 
-/// Inverse of zfp's lifted 4-point transform, in place on v[0], v[stride], ... Sums wrap, shifts right keep
-/// the sign:
+/// Inverse of zfp's lifted 4-point transform, in place on v[0], v[stride], ... Sums wrap, shifts
+/// right keep the sign:
 ///   1/4 *  ( 4  6 -4 -1)
 ///          ( 4  2  4  5)
 ///          ( 4 -2  4 -5)
@@ -98,7 +101,8 @@ ISO_INLINE float power_of_two(int e) {
   return bits.f;
 }
 
-/// Transposes the 8 x 8 bits of bytes 7..4 in *low and 3..0 in *high, lowest byte first: bit j of byte k to bit 7 - k of byte j.
+/// Transposes the 8 x 8 bits of bytes 7..4 in *low and 3..0 in *high, lowest byte first: bit j of
+/// byte k to bit 7 - k of byte j.
 ISO_INLINE void transpose_bits(uint *low, uint *high) {
   uint t = (*low ^ *low >> 7) & 0x00AA00AAu;
   *low ^= t ^ t << 7;
@@ -113,7 +117,8 @@ ISO_INLINE void transpose_bits(uint *low, uint *high) {
   *high ^= t >> 4;
 }
 
-/// Appends eight bit planes, the highest first, to 32 coefficients: bit i of each to coefficients[i].
+/// Appends eight bit planes, the highest first, to 32 coefficients: bit i of each to
+/// coefficients[i].
 ISO_INLINE void append_planes(const uint *planes, uint *coefficients) {
   uint byte, i;
   ISO_UNROLL
@@ -134,17 +139,19 @@ ISO_INLINE void append_planes(const uint *planes, uint *coefficients) {
   }
 }
 
-/// All loops over the 64 values are unrolled, so that they stay in registers: a GPU has no fast indexed ones.
+/// All loops over the 64 values are unrolled, so that they stay in registers: a GPU has no fast
+/// indexed ones.
 
-/// Bit planes of a block with this largest exponent that a bound of 2^min_exponent on the error needs: zfp's own rule, with
-/// 2 (3 + 1) for what the transform adds in three dimensions.
+/// Bit planes of a block with this largest exponent that a bound of 2^min_exponent on the error
+/// needs: zfp's own rule, with 2 (3 + 1) for what the transform adds in three dimensions.
 ISO_INLINE uint zfp_num_planes(int exponent, int min_exponent) {
   const int num_planes = exponent - min_exponent + 8;
   return num_planes < 0 ? 0u : (num_planes > 32 ? 32u : (uint)num_planes);
 }
 
-/// Decodes the block that starts at `first_bit` of `words` and has max_bits bits, down to the bit plane of min_exponent
-/// (ISO_ALL_PLANES: as far as its bits go). values [64]: x + 4 y + 16 z. Reads at most two words past the block's last bit.
+/// Decodes the block that starts at `first_bit` of `words` and has max_bits bits, down to the bit
+/// plane of min_exponent (ISO_ALL_PLANES: as far as its bits go). values [64]: x + 4 y + 16 z.
+/// Reads at most two words past the block's last bit.
 ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, uint max_bits,
                                  int min_exponent, float *values) {
   BitReader r = open_bits(words, first_bit);
@@ -201,11 +208,13 @@ ISO_INLINE void zfp_decode_block(ISO_GLOBAL const uint *words, ulong first_bit, 
   for (i = 0; i < 64u; ++i) sequence[i] = 0u;
   for (i = 0; i < num_planes; i += 8u) append_planes(low + i, sequence);
   for (i = 0; any_high != 0u && i < num_planes; i += 8u) append_planes(high + i, sequence + 32);
-  bits = (32u - num_planes) & 24u; /* of the planes that are missing, those of whole bytes, but no 32 */
+  bits = (32u - num_planes) &
+         24u; /* of the planes that are missing, those of whole bytes, but no 32 */
   ISO_UNROLL
   for (i = 0; i < 64u; ++i) coefficients[iso_zfp_order[i]] = sequence[i] << bits;
   ISO_UNROLL
-  for (i = 0; i < 64u; ++i) coefficients[i] = (coefficients[i] ^ 0xAAAAAAAAu) - 0xAAAAAAAAu; /* negabinary */
+  for (i = 0; i < 64u; ++i)
+    coefficients[i] = (coefficients[i] ^ 0xAAAAAAAAu) - 0xAAAAAAAAu; /* negabinary */
   ISO_UNROLL
   for (i = 0; i < 16u; ++i) inverse_lift(coefficients + i, 16);
   ISO_UNROLL

@@ -1,4 +1,5 @@
-/// zfp_encode.h -- encodes one zfp block of 4^3 float32 values, bit-exact with libzfp 1.0 [Lindstrom 2014].
+/// zfp_encode.h -- encodes one zfp block of 4^3 float32 values, bit-exact with libzfp 1.0
+/// [Lindstrom 2014].
 ///
 /// Portable: OpenCL C 1.2 and C++. The block's layout is described in zfp_codec.h.
 #ifndef ISOWAVE_ZFP_ENCODE_H
@@ -47,8 +48,8 @@ ISO_INLINE uint trailing_zeros_64(ulong x) {
   return (uint)popcount((x & ((ulong)0 - x)) - 1u);
 }
 
-/// Forward lifting, in place on v[0], v[stride], ...: inverse_lift() of zfp_codec.h backwards, but for the
-/// bits that its shifts drop.
+/// Forward lifting, in place on v[0], v[stride], ...: inverse_lift() of zfp_codec.h backwards, but
+/// for the bits that its shifts drop.
 ISO_INLINE void forward_lift(uint *v, int stride) {
   uint x = v[0], y = v[stride], z = v[2 * stride], w = v[3 * stride];
   x += w;
@@ -71,7 +72,8 @@ ISO_INLINE void forward_lift(uint *v, int stride) {
   v[3 * stride] = w;
 }
 
-/// Where coordinate i, 0..3, of a partial block with `count` voxels along an axis, 1..4, takes its value from.
+/// Where coordinate i, 0..3, of a partial block with `count` voxels along an axis, 1..4, takes its
+/// value from.
 ISO_INLINE uint padded_coordinate(uint i, uint count) {
   if (i < count) return i;
   return i == 3u ? 0u : count - 1u;
@@ -86,8 +88,8 @@ ISO_INLINE uint float_bits(float value) {
   return bits.u;
 }
 
-/// Writes the bit planes of `coefficients`, in stream order and negabinary, until `bits` bits are used or no
-/// plane is left.
+/// Writes the bit planes of `coefficients`, in stream order and negabinary, until `bits` bits are
+/// used or no plane is left.
 ISO_INLINE void write_bit_planes(BitWriter *w, const uint *coefficients, uint bits) {
   uint n = 0; /* coefficients known to be significant: their bits go verbatim */
   uint plane, i;
@@ -101,7 +103,8 @@ ISO_INLINE void write_bit_planes(BitWriter *w, const uint *coefficients, uint bi
     while (n < 64u && bits > 0u) {
       ulong run = 0; /* group test: no more ones in this plane */
       uint length = 1, zeros = 0;
-      if (x != 0u) { /* the test's one, zeros, and a one that goes without saying for the last coefficient */
+      if (x != 0u) { /* the test's one, zeros, and a one that goes without saying for the last
+                        coefficient */
         zeros = trailing_zeros_64(x);
         run = (ulong)2 << zeros | 1u;
         length = n + zeros < 63u ? zeros + 2u : zeros + 1u;
@@ -116,8 +119,8 @@ ISO_INLINE void write_bit_planes(BitWriter *w, const uint *coefficients, uint bi
   }
 }
 
-/// Encodes values [64], x + 4 y + 16 z, to words [max_bits / 32]; max_bits: 32..2048, a multiple of 32. Every
-/// magnitude is 0 or in [2^-97, 2^126).
+/// Encodes values [64], x + 4 y + 16 z, to words [max_bits / 32]; max_bits: 32..2048, a multiple
+/// of 32. Every magnitude is 0 or in [2^-97, 2^126).
 ISO_INLINE void zfp_encode_block(const float *values, uint max_bits, ISO_GLOBAL uint *words) {
   ISO_GLOBAL uint *const end = words + max_bits / 32u;
   BitWriter w;
@@ -137,7 +140,8 @@ ISO_INLINE void zfp_encode_block(const float *values, uint max_bits, ISO_GLOBAL 
     for (i = 0; i < 16u; ++i) forward_lift(coefficients + 4u * i, 1);
     for (i = 0; i < 16u; ++i) forward_lift(coefficients + (i & 3u) + 16u * (i >> 2), 4);
     for (i = 0; i < 16u; ++i) forward_lift(coefficients + i, 16);
-    for (i = 0; i < 64u; ++i) ordered[i] = (coefficients[iso_zfp_order[i]] + 0xAAAAAAAAu) ^ 0xAAAAAAAAu;
+    for (i = 0; i < 64u; ++i)
+      ordered[i] = (coefficients[iso_zfp_order[i]] + 0xAAAAAAAAu) ^ 0xAAAAAAAAu;
     write_bits(&w, ((ulong)(uint)(exponent + 127) << 1) | 1u, 9);
     write_bit_planes(&w, ordered, max_bits - 9u);
   }

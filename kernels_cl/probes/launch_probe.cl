@@ -10,8 +10,8 @@ kernel void scale_values(global const uint *input, uint count, uint factor, glob
   for (uint i = get_global_id(0); i < count; i += get_global_size(0)) output[i] = factor * input[i];
 }
 
-/// Reverses the values of each work-group through local memory. values: one per work-item; scratch: one per
-/// work-item of a group.
+/// Reverses the values of each work-group through local memory. values: one per work-item; scratch:
+/// one per work-item of a group.
 kernel void reverse_groups(global uint *values, local uint *scratch) {
   const uint lane = get_local_id(0), last = get_local_size(0) - 1;
   scratch[last - lane] = values[get_global_id(0)];

@@ -3,7 +3,8 @@
 #include "portable/shared_types.h"
 #include "portable/shared_types_fields.h"
 
-/// sizes[0..5]: sizeof FrameParams, PairHit, BlockRays, HitRecord, StreamLayout, PassCounts. One work-item.
+/// sizes[0..5]: sizeof FrameParams, PairHit, BlockRays, HitRecord, StreamLayout, PassCounts. One
+/// work-item.
 kernel void shared_type_sizes(global uint *sizes) {
   sizes[0] = sizeof(FrameParams);
   sizes[1] = sizeof(PairHit);
@@ -14,7 +15,8 @@ kernel void shared_type_sizes(global uint *sizes) {
 }
 
 // OpenCL C has no offsetof.
-#define ISO_WRITE_OFFSET(field) *offsets++ = (uint)((const uchar *)&object.field - (const uchar *)&object);
+#define ISO_WRITE_OFFSET(field) \
+  *offsets++ = (uint)((const uchar *)&object.field - (const uchar *)&object);
 
 /// offsets[0..]: the byte offset of every field, in the order of the structs above. One work-item.
 kernel void shared_type_offsets(global uint *offsets) {

@@ -1,4 +1,5 @@
-/// solve_cells.cl -- one solver on many segments by itself: what benchmarks time and tests compare. No pass uses it.
+/// solve_cells.cl -- one solver on many segments by itself: what benchmarks time and tests compare.
+/// No pass uses it.
 #include "portable/solver.h"
 
 /// roots [count]: the first change of inside of cubics [count], or -1 for none. Grid-stride.

@@ -1,5 +1,5 @@
-// Camera files. Input: the file. One that is accepted has cameras that can be drawn, and reads the same when written
-// again.
+// Camera files. Input: the file. One that is accepted has cameras that can be drawn, and reads the
+// same when written again.
 
 #include <fmt/format.h>
 
@@ -11,17 +11,20 @@ using namespace isowave;
 namespace {
 
 std::string json_of(const glm::dvec3 &v) {
-  return fmt::format("[{:.17e},{:.17e},{:.17e}]", v.x, v.y, v.z);  // JSON takes "-0" for the integer 0
+  return fmt::format("[{:.17e},{:.17e},{:.17e}]", v.x, v.y,
+                     v.z);  // JSON takes "-0" for the integer 0
 }
 
 std::string json_of(const CameraFile &file) {
   std::string text = fmt::format("{{\"fovy_deg\":{},\"cameras\":[", file.cameras.at(0).fovy_deg);
   for (const Camera &camera : file.cameras) {
-    text += fmt::format("{}{{\"eye\":{},\"at\":{},\"up\":{}}}", &camera == &file.cameras[0] ? "" : ",",
-                        json_of(camera.eye), json_of(camera.at), json_of(camera.up));
+    text +=
+        fmt::format("{}{{\"eye\":{},\"at\":{},\"up\":{}}}", &camera == &file.cameras[0] ? "" : ",",
+                    json_of(camera.eye), json_of(camera.at), json_of(camera.up));
   }
   text += ']';
-  if (file.dims) text += fmt::format(",\"dims\":[{},{},{}]", file.dims->x, file.dims->y, file.dims->z);
+  if (file.dims)
+    text += fmt::format(",\"dims\":[{},{},{}]", file.dims->x, file.dims->y, file.dims->z);
   if (file.spacing) text += ",\"spacing\":" + json_of(*file.spacing);
   if (file.width) text += fmt::format(",\"width\":{}", *file.width);
   if (file.height) text += fmt::format(",\"height\":{}", *file.height);

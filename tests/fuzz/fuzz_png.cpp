@@ -1,5 +1,5 @@
-// PNG pictures. Input: the file. One that is accepted reads the same when written again. Mutations change what is in a
-// chunk, also behind its compression, and make its checksum right.
+// PNG pictures. Input: the file. One that is accepted reads the same when written again. Mutations
+// change what is in a chunk, also behind its compression, and make its checksum right.
 
 #include <random>
 #include <vector>
@@ -38,8 +38,8 @@ std::vector<Chunk> chunks_of(std::string_view file) {
   while (file.size() >= kNumberBytes + kTypeBytes) {
     const std::size_t begin = kNumberBytes + kTypeBytes;
     const std::size_t length = std::min<std::size_t>(number_at(file, 0), file.size() - begin);
-    chunks.push_back(
-        {std::string(file.substr(kNumberBytes, kTypeBytes)), std::string(file.substr(begin, length))});
+    chunks.push_back({std::string(file.substr(kNumberBytes, kTypeBytes)),
+                      std::string(file.substr(begin, length))});
     file.remove_prefix(std::min(begin + length + kNumberBytes, file.size()));
   }
   return chunks;
@@ -49,7 +49,8 @@ std::string file_of(const std::vector<Chunk> &chunks) {
   std::string file = "\x89PNG\r\n\x1a\n";
   for (const Chunk &chunk : chunks) {
     const std::string body = chunk.type + chunk.data;
-    file += bytes_of_number(std::uint32_t(chunk.data.size())) + body + bytes_of_number(fuzz::crc_of(body));
+    file += bytes_of_number(std::uint32_t(chunk.data.size())) + body +
+            bytes_of_number(fuzz::crc_of(body));
   }
   return file;
 }

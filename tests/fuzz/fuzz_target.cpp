@@ -48,11 +48,13 @@ struct Folder {
 };
 
 /// As compression reads them: float32 where that holds them, else exactly.
-void read_some(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::span<float> voxels) {
+void read_some(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers,
+               std::span<float> voxels) {
   if (fits_float32(reader.info().type)) return reader.read_layers(z, num_layers, voxels);
   std::vector<double> exact(voxels.size());
   reader.read_exact_layers(z, num_layers, exact);
-  std::ranges::transform(exact, voxels.begin(), [](double value) { return static_cast<float>(value); });
+  std::ranges::transform(exact, voxels.begin(),
+                         [](double value) { return static_cast<float>(value); });
 }
 
 /// All voxels, at most so many layers in each call; empty if the volume is refused.
@@ -63,7 +65,8 @@ std::vector<float> read_voxels(const fs::path &path, std::uint64_t voxels_at_onc
     const VolumeInfo info = reader->info();
     check_volume_info(info, path.string());
     const std::uint64_t layer = std::uint64_t(info.dims.x) * info.dims.y;
-    const auto some = std::uint32_t(std::clamp<std::uint64_t>(voxels_at_once / layer, 1, info.dims.z));
+    const auto some =
+        std::uint32_t(std::clamp<std::uint64_t>(voxels_at_once / layer, 1, info.dims.z));
     for (std::uint32_t z = 0; z < info.dims.z; z += some) {
       const std::uint32_t layers = std::min(some, info.dims.z - z);
       voxels.resize(layer * (z + layers));
@@ -90,9 +93,9 @@ const fs::path &folder() {
 fs::path put(const std::string &name, std::string_view bytes) {
   fs::path path = folder() / name;
   const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  demand(
-      file >= 0 && ::write(file, bytes.data(), bytes.size()) == ssize_t(bytes.size()) && ::close(file) == 0,
-      "cannot write " + path.string());
+  demand(file >= 0 && ::write(file, bytes.data(), bytes.size()) == ssize_t(bytes.size()) &&
+             ::close(file) == 0,
+         "cannot write " + path.string());
   return path;
 }
 
@@ -117,18 +120,21 @@ bool accepts(const std::function<void()> &read) {
 }
 
 void read_volume(const fs::path &path) {
-  const std::vector<float> some_layers = read_voxels(path, 1u << 22), each_layer = read_voxels(path, 1);
+  const std::vector<float> some_layers = read_voxels(path, 1u << 22),
+                           each_layer = read_voxels(path, 1);
   demand(same_bits(some_layers, each_layer), "voxels depend on how many layers are read at once");
 }
 
 bool same_bits(std::span<const float> a, std::span<const float> b) {
-  return std::ranges::equal(std::as_bytes(a), std::as_bytes(b));  // NaN equals itself here, and 0 not -0
+  return std::ranges::equal(std::as_bytes(a),
+                            std::as_bytes(b));  // NaN equals itself here, and 0 not -0
 }
 
 std::string pack(std::string_view bytes, Packing packing) {
   z_stream stream{};
   constexpr int kMemoryLevel = 8;
-  demand(::deflateInit2(&stream, 1, Z_DEFLATED, int(packing), kMemoryLevel, Z_DEFAULT_STRATEGY) == Z_OK,
+  demand(::deflateInit2(&stream, 1, Z_DEFLATED, int(packing), kMemoryLevel, Z_DEFAULT_STRATEGY) ==
+             Z_OK,
          "no memory for zlib");
   std::string packed(::deflateBound(&stream, bytes.size()), '\0');
   stream.next_in = reinterpret_cast<Bytef *>(const_cast<char *>(bytes.data()));
@@ -173,7 +179,8 @@ void mutate(std::string &bytes, std::size_t max_size) {
   bytes.resize(LLVMFuzzerMutate(reinterpret_cast<std::uint8_t *>(bytes.data()), size, max_size));
 }
 
-std::size_t replace(std::string_view bytes, std::uint8_t *data, std::size_t size, std::size_t max_size) {
+std::size_t replace(std::string_view bytes, std::uint8_t *data, std::size_t size,
+                    std::size_t max_size) {
   if (bytes.empty() || bytes.size() > max_size) return LLVMFuzzerMutate(data, size, max_size);
   std::memcpy(data, bytes.data(), bytes.size());
   return bytes.size();

@@ -1,6 +1,6 @@
-// Compressed volumes. Input: the file. Of one that is accepted, our decoder and libzfp decode each block to the same
-// bits, and what is written again reads the same. Mutations change what checksums and compression guard
-// (zfp_parts.hpp).
+// Compressed volumes. Input: the file. Of one that is accepted, our decoder and libzfp decode each
+// block to the same bits, and what is written again reads the same. Mutations change what checksums
+// and compression guard (zfp_parts.hpp).
 
 #include <algorithm>
 #include <array>
@@ -57,12 +57,14 @@ void demand_libzfp_agrees(const CompressedVolume &volume) {
   const glm::uvec3 dims = volume.info.dims, blocks = volume.num_blocks();
   const std::vector<float> voxels = decode_with_libzfp(volume);
   for (std::uint32_t id = 0; id < volume.block_count(); ++id) {
-    const glm::uvec3 at = 4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
+    const glm::uvec3 at =
+        4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
     const glm::uvec3 size = glm::min(dims - at, glm::uvec3(4));
     const std::array<float, 64> values = decode(volume, id);
     for (std::uint32_t z = 0; z < size.z; ++z) {
       for (std::uint32_t y = 0; y < size.y; ++y) {
-        const std::size_t row = at.x + std::size_t(dims.x) * (at.y + y + std::size_t(dims.y) * (at.z + z));
+        const std::size_t row =
+            at.x + std::size_t(dims.x) * (at.y + y + std::size_t(dims.y) * (at.z + z));
         fuzz::demand(fuzz::same_bits(std::span(voxels).subspan(row, size.x),
                                      std::span(values).subspan(4 * y + 16 * z, size.x)),
                      "libzfp decodes a block to other values");
@@ -73,10 +75,11 @@ void demand_libzfp_agrees(const CompressedVolume &volume) {
 
 /// What a file says, but for its payload.
 bool same_head(const CompressedVolume &a, const CompressedVolume &b) {
-  return a.info.dims == b.info.dims && a.info.spacing == b.info.spacing && a.info.origin == b.info.origin &&
-         a.info.direction == b.info.direction && a.info.type == b.info.type &&
-         a.bits_per_block == b.bits_per_block && a.error_bound.min_exponent == b.error_bound.min_exponent &&
-         a.max_error == b.max_error && a.error_bound.whole_numbers == b.error_bound.whole_numbers &&
+  return a.info.dims == b.info.dims && a.info.spacing == b.info.spacing &&
+         a.info.origin == b.info.origin && a.info.direction == b.info.direction &&
+         a.info.type == b.info.type && a.bits_per_block == b.bits_per_block &&
+         a.error_bound.min_exponent == b.error_bound.min_exponent && a.max_error == b.max_error &&
+         a.error_bound.whole_numbers == b.error_bound.whole_numbers &&
          a.coarser.size() == b.coarser.size();
 }
 
@@ -97,7 +100,8 @@ void demand_written_again(const CompressedVolume &volume, const std::filesystem:
     writer.write(std::as_bytes(std::span(words)), level);
   };
   write(volume, 0);
-  for (std::size_t level = 0; level < volume.coarser.size(); ++level) write(volume.coarser[level], level + 1);
+  for (std::size_t level = 0; level < volume.coarser.size(); ++level)
+    write(volume.coarser[level], level + 1);
   writer.commit(volume);
   demand_same(read_zfp_file(path), volume);
 }

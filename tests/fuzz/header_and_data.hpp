@@ -1,5 +1,6 @@
 #pragma once
-// Inputs of volumes with a text header: how to pack the voxels, the header, and the voxels, in one file or in two.
+// Inputs of volumes with a text header: how to pack the voxels, the header, and the voxels, in one
+// file or in two.
 
 #include <string>
 #include <string_view>
@@ -8,14 +9,15 @@
 
 namespace isowave::fuzz {
 
-/// What stands between header and voxels that lie in a file of their own. Headers call that `data.raw`, or
-/// `data.raw.gz`.
+/// What stands between header and voxels that lie in a file of their own. Headers call that
+/// `data.raw`, or `data.raw.gz`.
 inline constexpr std::string_view kNewFile = "\n--data.raw--\n";
 /// In a header: the number of packed bytes.
 inline constexpr std::string_view kPackedBytes = "@@";
 
-/// Writes the file or files of an input and reads the volume. The input's first byte says how its voxels are packed
-/// (pack_by()). end_of_header(text) is where voxels begin that stand in the header's file.
+/// Writes the file or files of an input and reads the volume. The input's first byte says how its
+/// voxels are packed (pack_by()). end_of_header(text) is where voxels begin that stand in the
+/// header's file.
 template <class EndOfHeader>
 int read_header_and_data(std::string_view input, const std::string &attached_name,
                          const std::string &detached_name, const EndOfHeader &end_of_header) {

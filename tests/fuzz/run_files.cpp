@@ -1,5 +1,5 @@
-// Gives a target each file of the named folders once: the seeds, and what was found before (there may be none). For
-// compilers without libFuzzer.
+// Gives a target each file of the named folders once: the seeds, and what was found before (there
+// may be none). For compilers without libFuzzer.
 //   fuzz_NAME FOLDER|FILE...
 
 #include <cstdio>

@@ -43,7 +43,8 @@ bool take_levels(std::string_view &file, const json &trailer, ZfpParts &parts) {
   const auto lengths = trailer.find("level_bytes");
   if (lengths == trailer.end() || !lengths->is_array()) return true;
   for (auto at = lengths->rbegin(); at != lengths->rend(); ++at) {
-    const auto bytes = at->is_number_unsigned() ? cut_end(file, at->get<std::uint64_t>()) : std::nullopt;
+    const auto bytes =
+        at->is_number_unsigned() ? cut_end(file, at->get<std::uint64_t>()) : std::nullopt;
     std::optional<ZfpParts> level = bytes ? take_apart(*bytes) : std::nullopt;
     if (!level) return false;
     parts.levels.insert(parts.levels.begin(), std::move(*level));
@@ -95,7 +96,8 @@ std::string put_together(const ZfpParts &parts, bool fix_lengths) {
 
   const std::string text =
       fix_lengths ? trailer.dump(-1, ' ', false, json::error_handler_t::replace) : parts.text;
-  const std::string numbers = bytes_of_number(parts.version) + bytes_of_number(std::uint32_t(text.size())) +
+  const std::string numbers = bytes_of_number(parts.version) +
+                              bytes_of_number(std::uint32_t(text.size())) +
                               bytes_of_number(crc_of(file));
   file += text + numbers + bytes_of_number(crc_of(numbers, crc_of(text)));
   return file.append(kMagic);

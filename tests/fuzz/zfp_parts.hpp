@@ -1,6 +1,7 @@
 #pragma once
-// A .zfp file of ours taken apart, so that a mutation reaches what checksums and compression guard (README "File
-// format", core/zfp/zfp_file.hpp). Made from the description of the format, not from its reader.
+// A .zfp file of ours taken apart, so that a mutation reaches what checksums and compression guard
+// (README "File format", core/zfp/zfp_file.hpp). Made from the description of the format, not from
+// its reader.
 
 #include <cstdint>
 #include <optional>
@@ -21,7 +22,8 @@ struct ZfpParts {
 /// Nothing where the file has no trailer, or parts of other lengths than it says.
 std::optional<ZfpParts> take_apart(std::string_view file);
 
-/// The file with right checksums. fix_lengths: also with right lengths of its parts, if its text is JSON.
+/// The file with right checksums. fix_lengths: also with right lengths of its parts, if its text is
+/// JSON.
 std::string put_together(const ZfpParts &parts, bool fix_lengths);
 
 }  // namespace isowave::fuzz

@@ -9,17 +9,19 @@ nlohmann::ordered_json quantiles_json(const Quantiles &q) {
 }
 
 void print_accuracy_header(std::string_view what) {
-  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays", "hits",
-             "missed", "false", "cell", "place", "at faces", "unstable", "|dt| p50, p99, max [voxels]",
-             "|f-iso|/|grad f| p99, max");
+  fmt::print("{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:<26} {}\n", what, "rays",
+             "hits", "missed", "false", "cell", "place", "at faces", "unstable",
+             "|dt| p50, p99, max [voxels]", "|f-iso|/|grad f| p99, max");
 }
 
 void print_accuracy(std::string_view name, const Accuracy &tally) {
   const Quantiles distance = quantiles(tally.distance), residual = quantiles(tally.residual);
   fmt::print(
-      "{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:.1e}, {:.1e}, {:.1e}  {:.1e}, {:.1e}\n",
-      name, tally.rays, tally.hits, tally.missed, tally.false_hits, tally.wrong_cells, tally.wrong_places,
-      tally.at_faces, tally.unstable, distance.p50, distance.p99, distance.max, residual.p99, residual.max);
+      "{:<28} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}  {:.1e}, {:.1e}, {:.1e}  {:.1e}, "
+      "{:.1e}\n",
+      name, tally.rays, tally.hits, tally.missed, tally.false_hits, tally.wrong_cells,
+      tally.wrong_places, tally.at_faces, tally.unstable, distance.p50, distance.p99, distance.max,
+      residual.p99, residual.max);
 }
 
 nlohmann::ordered_json accuracy_json(const Accuracy &tally) {

@@ -1,4 +1,5 @@
-// isowave bench: measurements that put accuracy beside time. (Speed alone is what the programs of bench/ measure.)
+// isowave bench: measurements that put accuracy beside time. (Speed alone is what the programs of
+// bench/ measure.)
 
 #include "tools/isowave/bench_pareto.hpp"
 #include "tools/isowave/bench_solvers.hpp"
@@ -7,7 +8,8 @@
 namespace isowave::tools {
 
 void add_bench(CLI::App &app) {
-  CLI::App *bench = app.add_subcommand("bench", "Measure time beside accuracy, as JSON for tools/charts");
+  CLI::App *bench =
+      app.add_subcommand("bench", "Measure time beside accuracy, as JSON for tools/charts");
   bench->require_subcommand(1);
   add_bench_solvers(*bench);
   add_bench_pareto(*bench);

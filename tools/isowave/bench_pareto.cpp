@@ -55,7 +55,8 @@ CompressionOptions parse_storage(const std::string &text) {
     options.exact = true;
     return options;
   }
-  const std::string_view value = colon == std::string::npos ? "" : std::string_view(text).substr(colon + 1);
+  const std::string_view value =
+      colon == std::string::npos ? "" : std::string_view(text).substr(colon + 1);
   const std::optional<std::uint64_t> rate = parse_whole(value);
   const std::optional<double> number = parse_finite(value);
   if (kind == "rate" && rate && *rate >= 1 && *rate <= 32) {
@@ -189,8 +190,10 @@ Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const 
   return Renderer(device, volume, point.max_error ? with_choices(options, volume) : options);
 }
 
-/// Sets the renderer to one view of the point, and draws it once: the first frame of an isovalue, or of a precision, does more.
-void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point, std::size_t view) {
+/// Sets the renderer to one view of the point, and draws it once: the first frame of an isovalue,
+/// or of a precision, does more.
+void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point,
+             std::size_t view) {
   renderer.set_max_pixel_error(point.details[view].max_pixel_error);
   renderer.set_value_error(point.details[view].value_error);
   renderer.render(subject.cameras[view], subject.isovalue);
@@ -211,7 +214,8 @@ void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
     for (std::uint32_t round = 0; round < subject.rounds; ++round) {
       const FrameStats stats = draw_cold(renderer, subject, view);
       times.push_back(stats.total_ms);
-      for (const PassStats &pass : stats.passes) decoded += round == 0 ? pass.counts.decoded_count : 0;
+      for (const PassStats &pass : stats.passes)
+        decoded += round == 0 ? pass.counts.decoded_count : 0;
     }
     views.push_back(view_of(renderer));
   }
@@ -225,8 +229,10 @@ void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
 }
 
 /// How many times as long as the other one takes: the median of cold frames drawn in turn.
-double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point &point, const Point &other) {
-  Renderer renderer = make_renderer(device, subject, point), others = make_renderer(device, subject, other);
+double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point &point,
+                  const Point &other) {
+  Renderer renderer = make_renderer(device, subject, point),
+           others = make_renderer(device, subject, other);
   std::vector<double> ratios;
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
     warm_up(renderer, subject, point, view);
@@ -249,8 +255,10 @@ CompressionOptions finest_storage(VoxelType type) {
 
 /// What frames need of the volume.
 std::uint64_t stored_bytes(const CompressedVolume &volume, bool with_levels) {
-  std::uint64_t bytes = (volume.payload_bits() + 7) / 8 + volume.index.size() * sizeof(std::uint32_t);
-  for (const CompressedVolume &level : volume.coarser) bytes += with_levels ? stored_bytes(level, false) : 0;
+  std::uint64_t bytes =
+      (volume.payload_bits() + 7) / 8 + volume.index.size() * sizeof(std::uint32_t);
+  for (const CompressedVolume &level : volume.coarser)
+    bytes += with_levels ? stored_bytes(level, false) : 0;
   return bytes;
 }
 
@@ -261,8 +269,9 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   subject.rounds = options.rounds;
   check_image_size(subject.size);
   const RawOverrides overrides = to_overrides(options.volume);
-  const CompressedVolume finest = load_volume(
-      options.input, overrides, finest_storage(open_any_volume(options.input, overrides)->info().type));
+  const CompressedVolume finest =
+      load_volume(options.input, overrides,
+                  finest_storage(open_any_volume(options.input, overrides)->info().type));
   const VolumeInfo &info = finest.info;
   subject.cameras = orbit_cameras(info, options.views);
   subject.voxel = std::max({info.spacing.x, info.spacing.y, info.spacing.z});
@@ -283,8 +292,8 @@ constexpr const char *kRowFormat =
     "{:<26} {:<6} {:<9} {:>6} {:>6} {:>11} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>6}\n";
 
 void print_header() {
-  fmt::print(kRowFormat, "storage", "", "solver", "px", "value", "bytes", "ms cold", "decoded", "wrong",
-             "depth p99", "normal", "FLIP", "PSNR");
+  fmt::print(kRowFormat, "storage", "", "solver", "px", "value", "bytes", "ms cold", "decoded",
+             "wrong", "depth p99", "normal", "FLIP", "PSNR");
 }
 
 /// Of the range of values, which may be none.
@@ -300,10 +309,11 @@ void print(const Point &point, double value_range) {
   fmt::print(kRowFormat, point.stored->name, point.pipeline,
              point.max_error ? fmt::format("error {}", *point.max_error) : point.solver,
              text(point.details.front().max_pixel_error),
-             text(part_of(value_range, point.details.front().value_error)), with_commas(stored_bytes(point)),
-             fmt::format("{:.3f}", point.ms), with_commas(point.decoded_blocks),
-             fmt::format("{:.2e}", errors.wrong_pixels()), fmt::format("{:.2e}", errors.depth_p99),
-             fmt::format("{:.2f}", errors.normal_p99), fmt::format("{:.4f}", errors.flip),
+             text(part_of(value_range, point.details.front().value_error)),
+             with_commas(stored_bytes(point)), fmt::format("{:.3f}", point.ms),
+             with_commas(point.decoded_blocks), fmt::format("{:.2e}", errors.wrong_pixels()),
+             fmt::format("{:.2e}", errors.depth_p99), fmt::format("{:.2f}", errors.normal_p99),
+             fmt::format("{:.4f}", errors.flip),
              std::isfinite(errors.psnr_db) ? fmt::format("{:.1f}", errors.psnr_db) : "same");
 }
 
@@ -361,7 +371,8 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
         point.details.resize(subject.cameras.size(), Detail{.max_pixel_error = max_pixel_error});
         Renderer renderer = make_renderer(device, subject, point);
         for (const double value_error : options.value_errors) {
-          for (Detail &detail : point.details) detail.value_error = value_error * subject.value_range;
+          for (Detail &detail : point.details)
+            detail.value_error = value_error * subject.value_range;
           points.push_back(point);
           measure(renderer, subject, points.back());
           print(points.back(), subject.value_range);
@@ -383,7 +394,8 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
     Point point = any;
     point.max_error = max_error;
     for (const Camera &camera : subject.cameras) {
-      const DetailChoice choice = choose_detail(renderer, stored.volume, camera, subject.isovalue, max_error);
+      const DetailChoice choice =
+          choose_detail(renderer, stored.volume, camera, subject.isovalue, max_error);
       point.details.push_back(choice.detail);
       point.reachable.push_back(choice.reachable);
     }
@@ -393,10 +405,12 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
   }
 }
 
-/// Sets Point::over_front of the choices of --max-error: how many times as long they take as the fastest point of the sweep that is no
-/// worse in any error; none, where all are worse. The two are drawn in turn, once more: of many points that take as long, the one
-/// that seemed to be the fastest mostly was lucky.
-void compare_choices(ocl::Device &device, const ParetoSubject &subject, std::vector<Point> &points) {
+/// Sets Point::over_front of the choices of --max-error: how many times as long they take as the
+/// fastest point of the sweep that is no worse in any error; none, where all are worse. The two are
+/// drawn in turn, once more: of many points that take as long, the one that seemed to be the
+/// fastest mostly was lucky.
+void compare_choices(ocl::Device &device, const ParetoSubject &subject,
+                     std::vector<Point> &points) {
   for (Point &choice : points) {
     if (!choice.max_error) continue;
     const Point *fastest = nullptr;
@@ -418,7 +432,8 @@ void run_bench_pareto(BenchParetoArgs options) {
   outputs.write("--json", options.json);
   for (const std::string &solver : options.solvers) solver_from_string(solver);
   if (is_zfp_name(options.input))
-    throw Error("{}: is compressed already: give the volume that is to be compressed", options.input);
+    throw Error("{}: is compressed already: give the volume that is to be compressed",
+                options.input);
   for (const std::string &storage : options.storages) parse_storage(storage);
   std::erase(options.max_errors, 0.0);
   for (const double max_error : options.max_errors) check_max_error(max_error);
@@ -429,11 +444,13 @@ void run_bench_pareto(BenchParetoArgs options) {
   std::vector<Stored> stored;
   for (const std::string &storage : options.storages) {
     CompressionOptions compression = parse_storage(storage);
-    const bool with_levels = !options.max_errors.empty() ||
-                             std::ranges::any_of(options.max_pixel_errors, [](double e) { return e > 0; });
+    const bool with_levels =
+        !options.max_errors.empty() ||
+        std::ranges::any_of(options.max_pixel_errors, [](double e) { return e > 0; });
     compression.levels = with_levels ? 0 : 1;
     compression.measure_error = !options.max_errors.empty();
-    stored.push_back({storage, load_volume(options.input, to_overrides(options.volume), compression)});
+    stored.push_back(
+        {storage, load_volume(options.input, to_overrides(options.volume), compression)});
   }
   std::vector<Point> points;
   print_header();
@@ -461,16 +478,19 @@ void run_bench_pareto(BenchParetoArgs options) {
 }  // namespace
 
 void add_bench_pareto(CLI::App &bench) {
-  CLI::App *command = bench.add_subcommand(
-      "pareto",
-      "Bytes and ms of cold frames beside their errors, for storage, pipeline, solver, level and precision");
+  CLI::App *command = bench.add_subcommand("pareto",
+                                           "Bytes and ms of cold frames beside their errors, for "
+                                           "storage, pipeline, solver, level and precision");
   const auto options = std::make_shared<BenchParetoArgs>();
   command->add_option("VOLUME", options->input, kVolumeHelp)->required();
-  command->add_option("--isovalue,-i", options->isovalue, "isovalue")->check(fits_float32())->required();
+  command->add_option("--isovalue,-i", options->isovalue, "isovalue")
+      ->check(fits_float32())
+      ->required();
   add_volume_options(*command, options->volume);
   command
       ->add_option("--storage", options->storages,
-                   "how the volume is compressed: rate:R, tolerance:E, tolerance-relative:E or exact; a list")
+                   "how the volume is compressed: rate:R, tolerance:E, tolerance-relative:E or "
+                   "exact; a list")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--pipeline", options->pipelines, "rays, blocks; a list")
@@ -502,10 +522,13 @@ void add_bench_pareto(CLI::App &bench) {
   command->add_option("--views", options->views, "views around the volume")
       ->check(CLI::Range(1u, 1000u))
       ->capture_default_str();
-  command->add_option("--rounds", options->rounds, "times that each view is drawn; the median of all counts")
+  command
+      ->add_option("--rounds", options->rounds,
+                   "times that each view is drawn; the median of all counts")
       ->check(CLI::Range(1u, 10000u))
       ->capture_default_str();
-  command->add_option("--device", options->device, "device: index, cpu, gpu, or a part of its name");
+  command->add_option("--device", options->device,
+                      "device: index, cpu, gpu, or a part of its name");
   command->add_option("--json", options->json, "write the results for tools/charts");
   command->callback([options] { run_bench_pareto(*options); });
 }

@@ -1,5 +1,6 @@
 #pragma once
-// isowave bench pareto: what each choice costs, in bytes and milliseconds, and how wrong the picture is for it.
+// isowave bench pareto: what each choice costs, in bytes and milliseconds, and how wrong the
+// picture is for it.
 
 #include <CLI/CLI.hpp>
 

@@ -80,20 +80,24 @@ std::pair<std::string, float> parse_subject(const std::string &argument) {
 }
 
 /// Where the failures of a solver are drawn.
-std::filesystem::path picture_path(const BenchSolversArgs &options, const std::string &name, Solver solver) {
+std::filesystem::path picture_path(const BenchSolversArgs &options, const std::string &name,
+                                   Solver solver) {
   const auto stem = name.substr(0, name.find('_'));
-  return std::filesystem::path(options.pictures) / fmt::format("{}_{}.png", stem, to_string(solver));
+  return std::filesystem::path(options.pictures) /
+         fmt::format("{}_{}.png", stem, to_string(solver));
 }
 
 void check_outputs(const BenchSolversArgs &options) {
   Outputs outputs;
-  for (const std::string &argument : options.volumes) outputs.read_volume(parse_subject(argument).first);
+  for (const std::string &argument : options.volumes)
+    outputs.read_volume(parse_subject(argument).first);
   outputs.write("--json", options.json);
   if (options.pictures.empty()) return;
   if (!std::filesystem::is_directory(options.pictures))
     throw Error("cannot write pictures: {} is no folder", options.pictures);
   for (const std::string &argument : options.volumes) {
-    const std::string name = std::filesystem::path(parse_subject(argument).first).filename().string();
+    const std::string name =
+        std::filesystem::path(parse_subject(argument).first).filename().string();
     for (const std::string_view solver : kSolverNames)
       outputs.write("--pictures", picture_path(options, name, solver_from_string(solver)));
   }
@@ -107,12 +111,13 @@ Subject load_subject(const std::string &argument, const BenchSolversArgs &option
   subject.volume = load_volume(path, to_overrides(options.volume), options.compression);
   subject.voxels = decode_with_libzfp(subject.volume);
   subject.camera = orbit_cameras(subject.volume.info, 1).front();
-  subject.frame =
-      make_frame_params(subject.volume.info, subject.camera, parse_size(options.size), subject.isovalue);
+  subject.frame = make_frame_params(subject.volume.info, subject.camera, parse_size(options.size),
+                                    subject.isovalue);
   return subject;
 }
 
-/// The oracle's answers to the rays of one frame, found once for all solvers; other rays are asked anew.
+/// The oracle's answers to the rays of one frame, found once for all solvers; other rays are asked
+/// anew.
 class FrameOracle final : public HitOracle {
  public:
   explicit FrameOracle(const Subject &subject)
@@ -121,7 +126,8 @@ class FrameOracle final : public HitOracle {
     const std::size_t num_pixels = std::size_t{subject.frame.width} * subject.frame.height;
     std::vector<OracleHit> hits(num_pixels);
     parallel_for(num_pixels, 0, [&](std::uint64_t pixel, std::uint32_t) {
-      hits[pixel] = oracle_.first_hit(exact_ray(make_ray(&subject.frame, static_cast<std::uint32_t>(pixel))));
+      hits[pixel] =
+          oracle_.first_hit(exact_ray(make_ray(&subject.frame, static_cast<std::uint32_t>(pixel))));
     });
     for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
       known_.emplace(key(exact_ray(make_ray(&subject.frame, static_cast<std::uint32_t>(pixel)))),
@@ -182,10 +188,12 @@ ordered_json judge_roots(const std::vector<CellSegment> &segments, const std::ve
     }
   }
   const Quantiles q = quantiles(std::move(errors));
-  return {{"missed", missed}, {"false", false_hits}, {"p50", q.p50}, {"p99", q.p99}, {"max", q.max}};
+  return {
+      {"missed", missed}, {"false", false_hits}, {"p50", q.p50}, {"p99", q.p99}, {"max", q.max}};
 }
 
-ordered_json bench_cells(ocl::Device &device, const std::vector<Subject> &subjects, std::uint32_t rounds) {
+ordered_json bench_cells(ocl::Device &device, const std::vector<Subject> &subjects,
+                         std::uint32_t rounds) {
   const std::vector<CellSegment> segments = gather_segments(subjects);
   if (segments.empty()) throw Error("no ray meets a cell with the isovalue: nothing to measure");
   std::vector<double> truth(segments.size());
@@ -210,7 +218,8 @@ ordered_json bench_cells(ocl::Device &device, const std::vector<Subject> &subjec
   constexpr int kLaunches = 20;  // so that a launch's cost and the clock's do not count
   std::vector<std::vector<double>> ns(solvers.size());
   for (std::uint32_t round = 0; round < rounds; ++round) {
-    for (std::size_t i = 0; i < solvers.size(); ++i) {  // interleaved: what disturbs one disturbs all
+    for (std::size_t i = 0; i < solvers.size();
+         ++i) {  // interleaved: what disturbs one disturbs all
       device.finish();
       const auto begin = Clock::now();
       for (int launch = 0; launch < kLaunches; ++launch) kernels[i](on_device, roots);
@@ -232,8 +241,8 @@ Verdict verdict_of(const Accuracy &tally) {
   return tally.false_hits > 0 ? Verdict::kFalse : Verdict::kRight;
 }
 
-/// The shaded frame in grey, missed pixels red, false ones blue, unstable ones yellow; below, its busiest part of 64 x 36
-/// pixels ten times larger.
+/// The shaded frame in grey, missed pixels red, false ones blue, unstable ones yellow; below, its
+/// busiest part of 64 x 36 pixels ten times larger.
 Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdicts) {
   constexpr std::uint32_t kZoom = 10, kPartWidth = 64, kPartHeight = 36;
   const std::uint32_t width = shaded.width, height = shaded.height;
@@ -246,9 +255,10 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
       case Verdict::kUnstable:
         return {240, 200, 0};
       default: {
-        const auto grey = static_cast<std::uint8_t>(
-            160 +
-            (shaded.pixels[3 * pixel] + shaded.pixels[3 * pixel + 1] + shaded.pixels[3 * pixel + 2]) / 8);
+        const auto grey = static_cast<std::uint8_t>(160 + (shaded.pixels[3 * pixel] +
+                                                           shaded.pixels[3 * pixel + 1] +
+                                                           shaded.pixels[3 * pixel + 2]) /
+                                                              8);
         return {grey, grey, grey};
       }
     }
@@ -274,7 +284,8 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
   picture.height = height + kZoom * kPartHeight;
   picture.pixels.assign(std::size_t{3} * picture.width * picture.height, 255);
   const auto set = [&](std::uint32_t x, std::uint32_t y, std::array<std::uint8_t, 3> rgb) {
-    std::copy(rgb.begin(), rgb.end(), picture.pixels.begin() + std::ptrdiff_t{3} * (y * picture.width + x));
+    std::copy(rgb.begin(), rgb.end(),
+              picture.pixels.begin() + std::ptrdiff_t{3} * (y * picture.width + x));
   };
   for (std::uint32_t pixel = 0; pixel < width * height; ++pixel)
     set(pixel % width, pixel / width, color(pixel));
@@ -287,20 +298,22 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
   return picture;
 }
 
-void write_failure_picture(const BenchSolversArgs &options, const Subject &subject, const HitOracle &oracle,
-                           Solver solver, Renderer &renderer) {
+void write_failure_picture(const BenchSolversArgs &options, const Subject &subject,
+                           const HitOracle &oracle, Solver solver, Renderer &renderer) {
   const std::vector<HitRecord> hits = renderer.hits();
   std::vector<Verdict> verdicts(hits.size());
   parallel_for(hits.size(), 0, [&](std::uint64_t pixel, std::uint32_t) {
     Accuracy tally;
-    judge(oracle, subject.frame, make_ray(&subject.frame, static_cast<std::uint32_t>(pixel)), hits[pixel],
-          tally);
+    judge(oracle, subject.frame, make_ray(&subject.frame, static_cast<std::uint32_t>(pixel)),
+          hits[pixel], tally);
     verdicts[pixel] = verdict_of(tally);
   });
-  write_png(failure_picture(renderer.shade({}), verdicts), picture_path(options, subject.name, solver));
+  write_png(failure_picture(renderer.shade({}), verdicts),
+            picture_path(options, subject.name, solver));
 }
 
-ordered_json bench_frames(ocl::Device &device, const Subject &subject, const BenchSolversArgs &options) {
+ordered_json bench_frames(ocl::Device &device, const Subject &subject,
+                          const BenchSolversArgs &options) {
   const FrameOracle oracle(subject);
   struct Run {
     Solver solver;
@@ -310,7 +323,8 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject, const Ben
   };
   std::vector<Run> runs;
   for (const Solver solver : compared_solvers()) {
-    if (solver.max_steps != solver_from_string(to_string(solver)).max_steps && solver.max_steps != 1)
+    if (solver.max_steps != solver_from_string(to_string(solver)).max_steps &&
+        solver.max_steps != 1)
       continue;
     RendererOptions renderer_options;
     renderer_options.size = {subject.frame.width, subject.frame.height};
@@ -327,7 +341,8 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject, const Ben
     runs.push_back(std::move(run));
   }
   for (std::uint32_t round = 0; round < options.rounds; ++round) {
-    for (Run &run : runs) run.ms.push_back(run.renderer->render(subject.camera, subject.isovalue).total_ms);
+    for (Run &run : runs)
+      run.ms.push_back(run.renderer->render(subject.camera, subject.isovalue).total_ms);
   }
   ordered_json entries = ordered_json::array();
   for (Run &run : runs) {
@@ -343,34 +358,38 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject, const Ben
 void print_results(const ordered_json &document) {
   const ordered_json &cells = document["cells"];
   fmt::print("{} ray-cell tests, {} with a hit\n{:<11} {:>5} {:>9} {:>8} {:>8} {:>9} {:>9}\n",
-             cells["segments"].dump(), cells["hits"].dump(), "solver", "steps", "ns/test", "missed", "false",
-             "p99", "max");
+             cells["segments"].dump(), cells["hits"].dump(), "solver", "steps", "ns/test", "missed",
+             "false", "p99", "max");
   for (const ordered_json &e : cells["entries"]) {
-    fmt::print("{:<11} {:>5} {:>9.3f} {:>8} {:>8} {:>9.1e} {:>9.1e}\n", e["solver"].get<std::string>(),
-               e["steps"].get<int>(), e["ns"].get<double>(), e["missed"].dump(), e["false"].dump(),
-               e["p99"].get<double>(), e["max"].get<double>());
+    fmt::print("{:<11} {:>5} {:>9.3f} {:>8} {:>8} {:>9.1e} {:>9.1e}\n",
+               e["solver"].get<std::string>(), e["steps"].get<int>(), e["ns"].get<double>(),
+               e["missed"].dump(), e["false"].dump(), e["p99"].get<double>(),
+               e["max"].get<double>());
   }
   for (const ordered_json &frame : document["frames"]) {
-    fmt::print("{} at {}\n{:<11} {:>5} {:>9} {:>8} {:>8} {:>8}\n", frame["volume"].get<std::string>(),
-               frame["isovalue"].dump(), "solver", "steps", "ms", "missed", "false", "unstable");
+    fmt::print("{} at {}\n{:<11} {:>5} {:>9} {:>8} {:>8} {:>8}\n",
+               frame["volume"].get<std::string>(), frame["isovalue"].dump(), "solver", "steps",
+               "ms", "missed", "false", "unstable");
     for (const ordered_json &e : frame["entries"]) {
       fmt::print("{:<11} {:>5} {:>9.2f} {:>8} {:>8} {:>8}\n", e["solver"].get<std::string>(),
-                 e["steps"].get<int>(), e["ms"].get<double>(), e["missed"].dump(), e["false"].dump(),
-                 e["unstable"].dump());
+                 e["steps"].get<int>(), e["ms"].get<double>(), e["missed"].dump(),
+                 e["false"].dump(), e["unstable"].dump());
     }
   }
 }
 
 void run_bench_solvers(const CLI::App &command, const BenchSolversArgs &options) {
   check_image_size(parse_size(options.size));
-  if (std::ranges::all_of(options.volumes,
-                          [](const auto &volume) { return is_zfp_name(parse_subject(volume).first); }))
+  if (std::ranges::all_of(options.volumes, [](const auto &volume) {
+        return is_zfp_name(parse_subject(volume).first);
+      }))
     refuse_options(command, {"--rate"}, "all volumes are compressed already");
   check_outputs(options);
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   std::vector<Subject> subjects;
-  for (const std::string &argument : options.volumes) subjects.push_back(load_subject(argument, options));
+  for (const std::string &argument : options.volumes)
+    subjects.push_back(load_subject(argument, options));
   ocl::Device device(info);
   ordered_json document = {
       {"schema", kChartsSchema},
@@ -389,23 +408,29 @@ void run_bench_solvers(const CLI::App &command, const BenchSolversArgs &options)
 }  // namespace
 
 void add_bench_solvers(CLI::App &bench) {
-  CLI::App *command = bench.add_subcommand(
-      "solvers",
-      "Root finders: ns per ray-cell test and ms per frame beside their errors, by the exact oracle");
+  CLI::App *command = bench.add_subcommand("solvers",
+                                           "Root finders: ns per ray-cell test and ms per frame "
+                                           "beside their errors, by the exact oracle");
   const auto options = std::make_shared<BenchSolversArgs>();
-  command->add_option("VOLUME:ISOVALUE", options->volumes, "volumes and the isovalue of each")->required();
+  command->add_option("VOLUME:ISOVALUE", options->volumes, "volumes and the isovalue of each")
+      ->required();
   add_volume_options(*command, options->volume);
   command
-      ->add_option("--rate", options->compression.rate, "bits per voxel of volumes that are not compressed")
+      ->add_option("--rate", options->compression.rate,
+                   "bits per voxel of volumes that are not compressed")
       ->capture_default_str();
   command->add_option("--size", options->size, "picture size WxH")->capture_default_str();
-  command->add_option("--rounds", options->rounds, "times that everything is measured; the median counts")
+  command
+      ->add_option("--rounds", options->rounds,
+                   "times that everything is measured; the median counts")
       ->check(CLI::Range(1u, 10000u))
       ->capture_default_str();
-  command->add_option("--device", options->device, "device: index, cpu, gpu, or a part of its name");
+  command->add_option("--device", options->device,
+                      "device: index, cpu, gpu, or a part of its name");
   command->add_option("--json", options->json, "write the results for tools/charts");
-  command->add_option("--pictures", options->pictures,
-                      "folder for VOLUME_SOLVER.png: missed pixels red, false blue, unstable yellow");
+  command->add_option(
+      "--pictures", options->pictures,
+      "folder for VOLUME_SOLVER.png: missed pixels red, false blue, unstable yellow");
   command->callback([command, options] { run_bench_solvers(*command, *options); });
 }
 

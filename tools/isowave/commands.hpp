@@ -1,6 +1,7 @@
 #pragma once
-// One function per subcommand, each in the file of its name. It adds the subcommand and its options to `app`;
-// CLI11 calls the action when the command line names it. Actions throw isowave::Error; main prints it.
+// One function per subcommand, each in the file of its name. It adds the subcommand and its options
+// to `app`; CLI11 calls the action when the command line names it. Actions throw isowave::Error;
+// main prints it.
 
 #include <CLI/CLI.hpp>
 

@@ -43,8 +43,8 @@ void print(const DepthComparison &result) {
   fmt::print("hit in both: {}; only in A (false negatives): {}; only in B (false positives): {}\n",
              result.hit_both, result.false_negatives, result.false_positives);
   if (result.error) {
-    fmt::print("depth |A-B| where both hit: p50 {:.6g}, p99 {:.6g}, max {:.6g}\n", result.error->p50,
-               result.error->p99, result.error->max);
+    fmt::print("depth |A-B| where both hit: p50 {:.6g}, p99 {:.6g}, max {:.6g}\n",
+               result.error->p50, result.error->p99, result.error->max);
   }
 }
 
@@ -108,7 +108,8 @@ bool report(const Comparison &result, bool as_json) {
 void run_compare(const CompareArgs &args) {
   const ImageKind kind = image_kind(args.a);
   if (image_kind(args.b) != kind) {
-    throw Error("{} and {}: one is a depth image, the other a PNG", args.a.string(), args.b.string());
+    throw Error("{} and {}: one is a depth image, the other a PNG", args.a.string(),
+                args.b.string());
   }
   const bool equal = kind == ImageKind::kDepth
                          ? report(compare_depth(read_npy(args.a), read_npy(args.b)), args.json)

@@ -18,8 +18,8 @@ constexpr double kWorthSayingMs = 250;
 CompileReport::CompileReport(ocl::Device &device) : device_(device), cache_(device.info()) {
   if (::isatty(STDERR_FILENO) == 0) return;
   device_.on_new_kernel([this](std::string_view kernel) {
-    fmt::print(stderr, "\r\x1b[Kcompiling kernels for {}: {}, {}", device_.info().name, ++num_kernels_,
-               kernel);
+    fmt::print(stderr, "\r\x1b[Kcompiling kernels for {}: {}, {}", device_.info().name,
+               ++num_kernels_, kernel);
     std::fflush(stderr);
   });
 }
@@ -36,8 +36,9 @@ void CompileReport::finish() {
   if (!cache_.folder()) {
     fmt::print("compiling kernels for {}: {:.1f} s\n", device_.info().name, ms / 1000);
   } else if (cache_.has_new_kernels()) {
-    fmt::print("compiling kernels for {}: {:.1f} s; its driver keeps them for the next time in {}\n",
-               device_.info().name, ms / 1000, cache_.folder()->string());
+    fmt::print(
+        "compiling kernels for {}: {:.1f} s; its driver keeps them for the next time in {}\n",
+        device_.info().name, ms / 1000, cache_.folder()->string());
   }
   cache_ = ocl::KernelCache(device_.info());
 }

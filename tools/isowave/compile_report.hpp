@@ -14,7 +14,8 @@ class CompileReport {
   CompileReport(const CompileReport &) = delete;
   CompileReport &operator=(const CompileReport &) = delete;
 
-  /// All that is needed now is there. Prints a line of what was compiled since the last call; none where the driver had kept it.
+  /// All that is needed now is there. Prints a line of what was compiled since the last call; none
+  /// where the driver had kept it.
   void finish();
 
  private:

@@ -32,7 +32,8 @@ struct ConvertArgs {
 };
 
 void run_convert(const CLI::App &command, const ConvertArgs &options) {
-  if (!is_zfp_name(options.output)) throw Error("{}: end the output's name in .zfp", options.output);
+  if (!is_zfp_name(options.output))
+    throw Error("{}: end the output's name in .zfp", options.output);
   if (is_zfp_name(options.path)) throw Error("{}: is compressed already", options.path);
   if (options.device && options.compression.bounded())
     throw Error("--device compresses at a fixed rate only: leave it, or the bound on the error");
@@ -51,7 +52,8 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
-  compress.error_bound = find_error_bound(options.path, overrides, options.compression, options.input);
+  compress.error_bound =
+      find_error_bound(options.path, overrides, options.compression, options.input);
   compress.input.progress = make_progress_bar("compressing");
   const CompressedVolume volume = compress_to_file(*reader, compress, options.output);
   if (compiling) compiling->finish();
@@ -59,10 +61,11 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);
   const std::uint64_t bytes_out = std::filesystem::file_size(options.output);
-  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output), dims.x,
-             dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in), with_commas(bytes_out),
-             volume.rate(),
-             volume.max_error ? fmt::format(", max error {}", printed_bound(*volume.max_error)) : "");
+  fmt::print(
+      "{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output),
+      dims.x, dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in),
+      with_commas(bytes_out), volume.rate(),
+      volume.max_error ? fmt::format(", max error {}", printed_bound(*volume.max_error)) : "");
   for (const CompressedVolume &level : volume.coarser) {
     const glm::uvec3 coarse = level.info.dims;
     fmt::print("  level of detail {}x{}x{}: {} bytes\n", coarse.x, coarse.y, coarse.z,
@@ -78,14 +81,19 @@ void add_convert(CLI::App &app) {
   command->add_option("IN", options->path, kVolumeHelp)->required();
   command->add_option("-o,--output", options->output, "the .zfp file to write")->required();
   add_compression_options(*command, options->compression);
-  command->add_option("--map-nan", options->input.map_nan, "replace NaN and infinite voxels by this value")
+  command
+      ->add_option("--map-nan", options->input.map_nan,
+                   "replace NaN and infinite voxels by this value")
       ->check(fits_float32());
-  command->add_option("--device", options->device,
-                      "compress on this device, at a fixed rate: index, cpu, gpu, or a part of its name [the "
-                      "host's processors]; the "
-                      "file is the same");
-  command->add_option("--threads", options->input.num_threads, "0: one per processor")->capture_default_str();
-  command->add_flag("--no-verify", options->no_verify, "do not decode again to measure the largest error");
+  command->add_option(
+      "--device", options->device,
+      "compress on this device, at a fixed rate: index, cpu, gpu, or a part of its name [the "
+      "host's processors]; the "
+      "file is the same");
+  command->add_option("--threads", options->input.num_threads, "0: one per processor")
+      ->capture_default_str();
+  command->add_flag("--no-verify", options->no_verify,
+                    "do not decode again to measure the largest error");
   add_volume_options(*command, options->volume);
   command->callback([command, options] { run_convert(*command, *options); });
 }

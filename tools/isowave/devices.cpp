@@ -62,10 +62,12 @@ Row table_row(const ocl::DeviceInfo &info, bool is_default) {
           features(can)};
 }
 
-void print_table(const std::vector<ocl::DeviceInfo> &devices, std::optional<std::uint32_t> default_index) {
-  std::vector<Row> rows = {{"  #", "type", "name", "platform", "version", "units", "memory", "largest buffer",
-                            "local", "group", "features"}};
-  for (const ocl::DeviceInfo &info : devices) rows.push_back(table_row(info, info.index == default_index));
+void print_table(const std::vector<ocl::DeviceInfo> &devices,
+                 std::optional<std::uint32_t> default_index) {
+  std::vector<Row> rows = {{"  #", "type", "name", "platform", "version", "units", "memory",
+                            "largest buffer", "local", "group", "features"}};
+  for (const ocl::DeviceInfo &info : devices)
+    rows.push_back(table_row(info, info.index == default_index));
   std::array<std::size_t, kNumColumns> widths{};
   for (const Row &row : rows) {
     for (std::size_t i = 0; i < kNumColumns; ++i) widths[i] = std::max(widths[i], row[i].size());
@@ -78,7 +80,8 @@ void print_table(const std::vector<ocl::DeviceInfo> &devices, std::optional<std:
   }
 }
 
-void print_json(const std::vector<ocl::DeviceInfo> &devices, std::optional<std::uint32_t> default_index) {
+void print_json(const std::vector<ocl::DeviceInfo> &devices,
+                std::optional<std::uint32_t> default_index) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const ocl::DeviceInfo &info : devices) {
     nlohmann::ordered_json entry = device_json(info);

@@ -51,33 +51,36 @@ Scene load_scene(const std::string &path, const VolumeOptions &volume, const Fra
   scene.volume = load_volume(path, to_overrides(volume), options.compression, device);
   const VolumeInfo &info = scene.volume.info;
   if (file && file->dims && *file->dims != info.dims) {
-    throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims), path,
-                dims_text(info.dims));
+    throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims),
+                path, dims_text(info.dims));
   }
   if (file && file->spacing &&
       glm::any(glm::greaterThan(glm::abs(*file->spacing - info.spacing), 1e-3 * info.spacing))) {
-    throw Error("{} is for a spacing of {} {} {}, but {} has {} {} {}: give --spacing", options.cameras,
-                file->spacing->x, file->spacing->y, file->spacing->z, path, info.spacing.x, info.spacing.y,
-                info.spacing.z);
+    throw Error("{} is for a spacing of {} {} {}, but {} has {} {} {}: give --spacing",
+                options.cameras, file->spacing->x, file->spacing->y, file->spacing->z, path,
+                info.spacing.x, info.spacing.y, info.spacing.z);
   }
   scene.cameras = file ? file->cameras : orbit_cameras(info, views.count);
   return scene;
 }
 
 CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
-  CLI::Option *isovalue = command
-                              .add_option("--isovalue,-i", options.isovalues,
-                                          "isovalue; repeat it for more surfaces, each drawn from all views")
-                              ->check(fits_float32())
-                              ->allow_extra_args(false);  // one number each time: VOLUME may follow
+  CLI::Option *isovalue =
+      command
+          .add_option("--isovalue,-i", options.isovalues,
+                      "isovalue; repeat it for more surfaces, each drawn from all views")
+          ->check(fits_float32())
+          ->allow_extra_args(false);  // one number each time: VOLUME may follow
   add_compression_options(command, options.compression);
   command
       .add_option("--value-error", options.value_error,
-                  "how far decoded voxels may be from the compressed volume's: fewer bit planes are decoded")
+                  "how far decoded voxels may be from the compressed volume's: fewer bit planes "
+                  "are decoded")
       ->capture_default_str();
   command.add_option("--size", options.size, "picture size WxH [1280x720, or the camera file's]");
-  CLI::Option *orbit = command.add_option("--orbit", options.orbit, "draw N views around the volume [1]")
-                           ->check(CLI::Range(1u, 100000u));
+  CLI::Option *orbit =
+      command.add_option("--orbit", options.orbit, "draw N views around the volume [1]")
+          ->check(CLI::Range(1u, 100000u));
   command.add_option("--cameras", options.cameras, "camera file (JSON)")->excludes(orbit);
   return isovalue;
 }

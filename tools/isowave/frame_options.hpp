@@ -25,7 +25,8 @@ struct FrameOptions {
   std::string cameras;        ///< camera file
 };
 
-/// Adds --isovalue, --value-error, --size, --orbit, --cameras and add_compression_options(). Returns the option --isovalue.
+/// Adds --isovalue, --value-error, --size, --orbit, --cameras and add_compression_options().
+/// Returns the option --isovalue.
 /// (--samples is render's alone.)
 CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options);
 
@@ -49,8 +50,8 @@ struct Scene {
   ImageSize size;
 };
 
-/// Reads or compresses the volume and makes its cameras. Throws Error in one line, also when a camera file is for another
-/// volume. Where a device is given, it compresses the volume.
+/// Reads or compresses the volume and makes its cameras. Throws Error in one line, also when a
+/// camera file is for another volume. Where a device is given, it compresses the volume.
 Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
                  const Views &views, ocl::Device *device = nullptr);
 

@@ -40,13 +40,15 @@ ordered_json describe_grid(const VolumeInfo &info) {
   result["spacing"] = {info.spacing.x, info.spacing.y, info.spacing.z};
   result["origin"] = {info.origin.x, info.origin.y, info.origin.z};
   for (int axis = 0; axis < 3; ++axis) {
-    result["direction"].push_back({info.direction[axis].x, info.direction[axis].y, info.direction[axis].z});
+    result["direction"].push_back(
+        {info.direction[axis].x, info.direction[axis].y, info.direction[axis].z});
   }
   return result;
 }
 
 ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
-  if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
+  if (overrides.dims || overrides.type)
+    throw Error("{}: --dims and --type are for raw files", path);
   CompressedVolume volume = no_scan ? read_zfp_file_info(path) : check_zfp_file(path);
   if (overrides.spacing) {
     set_spacing(volume, *overrides.spacing);
@@ -87,8 +89,8 @@ void add_value_range(VolumeReader &reader, ordered_json &result) {
   const std::uint64_t layer_size = std::uint64_t(dims.x) * dims.y;
   const auto chunk = std::uint32_t(std::clamp<std::uint64_t>((1u << 22) / layer_size, 1, dims.z));
   const Progress progress = make_progress_bar("reading");
-  const auto memory =
-      std::make_unique_for_overwrite<Value[]>(layer_size * chunk);  // a file may have fewer than it claims
+  const auto memory = std::make_unique_for_overwrite<Value[]>(
+      layer_size * chunk);  // a file may have fewer than it claims
   std::uint64_t bad_count = 0;
   Value min = std::numeric_limits<Value>::infinity(), max = -min;
   for (std::uint32_t z = 0; z < dims.z; z += chunk) {
@@ -135,8 +137,10 @@ void run(const InfoArgs &options) {
     const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);
     result["format"] = "voxels";
     result.update(describe_grid(reader->info()));
-    if (!options.no_scan && fits_float32(reader->info().type)) add_value_range<float>(*reader, result);
-    if (!options.no_scan && !fits_float32(reader->info().type)) add_value_range<double>(*reader, result);
+    if (!options.no_scan && fits_float32(reader->info().type))
+      add_value_range<float>(*reader, result);
+    if (!options.no_scan && !fits_float32(reader->info().type))
+      add_value_range<double>(*reader, result);
   }
   if (options.json) {
     fmt::print("{}", json_text(result));

@@ -7,7 +7,8 @@
 
 int main(int argc, char **argv) {
   CLI::App app{
-      "Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on OpenCL "
+      "Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on "
+      "OpenCL "
       "devices."};
   app.name("isowave");
   app.set_version_flag("--version", "isowave 0.1.0");

@@ -22,11 +22,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The same for all names of a file that exists; for one that does not, its folder and name. Throws Error where it can be neither.
+/// The same for all names of a file that exists; for one that does not, its folder and name. Throws
+/// Error where it can be neither.
 std::string key_of(const fs::path &path) {
   const fs::path target = follow_links(path);
   struct stat status {};
-  if (::stat(target.c_str(), &status) == 0) return fmt::format("{}:{}", status.st_dev, status.st_ino);
+  if (::stat(target.c_str(), &status) == 0)
+    return fmt::format("{}:{}", status.st_dev, status.st_ino);
   const int reason = errno;
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   if (reason == ENOENT && ::stat(folder.c_str(), &status) == 0)
@@ -38,7 +40,8 @@ std::string key_of(const fs::path &path) {
 
 void Outputs::read(const fs::path &path) {
   std::error_code failure;
-  if (fs::exists(path, failure)) users_.emplace(key_of(path), fmt::format("the input {}", path.string()));
+  if (fs::exists(path, failure))
+    users_.emplace(key_of(path), fmt::format("the input {}", path.string()));
 }
 
 void Outputs::read_volume(const std::string &path) {
@@ -55,16 +58,21 @@ void Outputs::write(const std::string &option, const fs::path &path) {
   std::error_code failure;
   if (!folder.empty() && !fs::is_directory(folder, failure))
     throw Error("cannot write {}: {} is no folder", path.string(), folder.string());
-  const auto [user, is_new] = users_.emplace(key_of(path), fmt::format("{} {}", option, path.string()));
-  if (!is_new) throw Error("{} {}: it would take the place of {}", option, path.string(), user->second);
-  // Of many frames' files in a folder, the first shows whether there can be any; a file that is replaced, whether it may be.
+  const auto [user, is_new] =
+      users_.emplace(key_of(path), fmt::format("{} {}", option, path.string()));
+  if (!is_new)
+    throw Error("{} {}: it would take the place of {}", option, path.string(), user->second);
+  // Of many frames' files in a folder, the first shows whether there can be any; a file that is
+  // replaced, whether it may be.
   if (probed_.insert(folder).second || fs::exists(path, failure)) AtomicFile{path};
 }
 
-void Outputs::write_pictures(const std::string &option, const fs::path &folder, const std::string &prefix) {
+void Outputs::write_pictures(const std::string &option, const fs::path &folder,
+                             const std::string &prefix) {
   if (folder.empty()) return;
   std::error_code failure;
-  fs::path existing = folder, made;  // the deepest folder that is there, and the one that will be made in it
+  fs::path existing = folder,
+           made;  // the deepest folder that is there, and the one that will be made in it
   while (!fs::exists(existing, failure) && existing.has_relative_path()) {
     if (!existing.filename().empty()) made = existing;
     existing = existing.has_parent_path() ? existing.parent_path() : fs::path(".");
@@ -83,9 +91,11 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder, 
   if (::stat(folder.c_str(), &status) != 0) return;
   for (const auto &entry : fs::directory_iterator(folder, failure)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with(prefix) || !name.ends_with(".png") || !fs::exists(entry.path(), failure)) continue;
+    if (!name.starts_with(prefix) || !name.ends_with(".png") || !fs::exists(entry.path(), failure))
+      continue;
     if (const auto user = users_.find(key_of(entry.path())); user != users_.end())
-      throw Error("{} {}: {} could take the place of {}", option, folder.string(), name, user->second);
+      throw Error("{} {}: {} could take the place of {}", option, folder.string(), name,
+                  user->second);
   }
   const std::string in_folder = fmt::format("{}:{}/{}", status.st_dev, status.st_ino, prefix);
   for (const auto &[key, user] : users_) {
@@ -97,7 +107,8 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder, 
 void Outputs::make_folder() const {
   std::error_code failure;
   if (!new_folder_.empty()) fs::create_directories(new_folder_, failure);
-  if (failure) throw Error("cannot make the folder {}: {}", new_folder_.string(), failure.message());
+  if (failure)
+    throw Error("cannot make the folder {}: {}", new_folder_.string(), failure.message());
 }
 
 }  // namespace isowave::tools

@@ -1,6 +1,6 @@
 #pragma once
-// Files that a command reads and writes, looked at before any work: whether the outputs can be written, and that none takes the
-// place of an input or of another output.
+// Files that a command reads and writes, looked at before any work: whether the outputs can be
+// written, and that none takes the place of an input or of another output.
 
 #include <filesystem>
 #include <map>
@@ -16,20 +16,24 @@ class Outputs {
   /// The volume and, where its header names them, the files of its voxels. generate:... is no file.
   void read_volume(const std::string &path);
 
-  /// A file that will be written, as `option` says; empty: none. Throws Error where it cannot be written, or is a file that read() or
-  /// write() was called with: by any name, also through symbolic and hard links.
+  /// A file that will be written, as `option` says; empty: none. Throws Error where it cannot be
+  /// written, or is a file that read() or write() was called with: by any name, also through
+  /// symbolic and hard links.
   void write(const std::string &option, const std::filesystem::path &path);
-  /// A folder for files PREFIX*.png whose number nobody knows yet. It is made by make_folder() where it is missing. After all read()
-  /// and write(): throws Error also where one of those files has such a name.
+  /// A folder for files PREFIX*.png whose number nobody knows yet. It is made by make_folder()
+  /// where it is missing. After all read() and write(): throws Error also where one of those files
+  /// has such a name.
   void write_pictures(const std::string &option, const std::filesystem::path &folder,
                       const std::string &prefix);
   /// Throws Error.
   void make_folder() const;
 
  private:
-  std::map<std::string, std::string> users_;  ///< key of a file -> who uses it: "the input NAME", "--depth"
-  std::set<std::filesystem::path> probed_;    ///< folders that were written to, to see whether it works
-  std::filesystem::path new_folder_;          ///< to be made
+  std::map<std::string, std::string>
+      users_;  ///< key of a file -> who uses it: "the input NAME", "--depth"
+  std::set<std::filesystem::path>
+      probed_;                        ///< folders that were written to, to see whether it works
+  std::filesystem::path new_folder_;  ///< to be made
 };
 
 }  // namespace isowave::tools

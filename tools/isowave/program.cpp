@@ -28,8 +28,8 @@ namespace isowave::tools {
 
 namespace {
 
-/// Gives descriptors 0 to 2 that are closed to /dev/null, or the next file that is opened would be standard input or output. In the
-/// wrong direction, so that whoever uses one finds that it fails.
+/// Gives descriptors 0 to 2 that are closed to /dev/null, or the next file that is opened would be
+/// standard input or output. In the wrong direction, so that whoever uses one finds that it fails.
 void open_standard_streams() {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(fd, F_GETFD) == -1 && errno == EBADF)
@@ -37,10 +37,12 @@ void open_standard_streams() {
   }
 }
 
-/// To a file of its own in the folder for temporary files. Returns its name, or nothing where that fails.
+/// To a file of its own in the folder for temporary files. Returns its name, or nothing where that
+/// fails.
 std::string keep_log(const std::string &log) {
   std::error_code failure;
-  std::string name = (std::filesystem::temp_directory_path(failure) / "isowave_build_log_XXXXXX").string();
+  std::string name =
+      (std::filesystem::temp_directory_path(failure) / "isowave_build_log_XXXXXX").string();
   const int fd = failure ? -1 : ::mkstemp(name.data());
   if (fd < 0) return {};
   const bool written = ::write(fd, log.data(), log.size()) == static_cast<ssize_t>(log.size());
@@ -67,7 +69,8 @@ std::string text_of_current_exception(const std::string &command) {
     throw;
   } catch (const BuildError &error) {
     const std::string name = error.log().empty() ? "" : keep_log(error.log());
-    return error.what() + (name.empty() ? "" : fmt::format("; the compiler's whole log is {}", name));
+    return error.what() +
+           (name.empty() ? "" : fmt::format("; the compiler's whole log is {}", name));
   } catch (const Error &error) {
     return error.what();
   } catch (const std::filesystem::filesystem_error &error) {
@@ -79,7 +82,8 @@ std::string text_of_current_exception(const std::string &command) {
   } catch (const nlohmann::json::exception &error) {
     return fmt::format("{} failed: JSON: {}", command, text_of(error));
   } catch (const cl::Error &error) {
-    return fmt::format("{} failed in OpenCL: {}: {}", command, error.what(), ocl::error_name(error.err()));
+    return fmt::format("{} failed in OpenCL: {}: {}", command, error.what(),
+                       ocl::error_name(error.err()));
   } catch (const std::system_error &error) {
     return fmt::format("{} failed: {}", command, error.code().message());
   } catch (const std::exception &error) {
@@ -95,7 +99,8 @@ std::optional<std::string> finish_output() {
   std::cout.flush();
   const bool failed = std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || std::cout.fail();
   if (!failed) return {};
-  return "cannot write to standard output" + (errno != 0 ? fmt::format(": {}", std::strerror(errno)) : "");
+  return "cannot write to standard output" +
+         (errno != 0 ? fmt::format(": {}", std::strerror(errno)) : "");
 }
 
 /// Of a subcommand that is missing: CLI11 does not say that there is one of another name.
@@ -127,8 +132,8 @@ int run_program(CLI::App &app, int argc, char **argv) {
   open_standard_streams();
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow further is an error like any other
   // Standard output is for results.
-  spdlog::set_default_logger(
-      std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::stderr_color_sink_mt>()));
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "", std::make_shared<spdlog::sinks::stderr_color_sink_mt>()));
   std::optional<std::string> message;
   int status = 1;
   try {
@@ -152,7 +157,8 @@ int run_program(CLI::App &app, int argc, char **argv) {
     print_line(app, *message);
     return 1;
   }
-  if (const std::string notice = ocl::cache_notice(); status == 0 && !notice.empty()) print_line(app, notice);
+  if (const std::string notice = ocl::cache_notice(); status == 0 && !notice.empty())
+    print_line(app, notice);
   return status;
 }
 

@@ -1,4 +1,5 @@
-// isowave render: pictures, depth and statistics of isosurfaces, on an OpenCL device or by the scalar twin.
+// isowave render: pictures, depth and statistics of isosurfaces, on an OpenCL device or by the
+// scalar twin.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -55,19 +56,21 @@ glm::vec3 parse_color(const char *option, const std::string &text) {
   if (text.size() == 7 && text[0] == '#') {
     const auto parsed = std::from_chars(text.data() + 1, end, rgb, 16);
     if (parsed.ec == std::errc{} && parsed.ptr == end) {
-      return {float(rgb >> 16) / 255.0f, float(rgb >> 8 & 255u) / 255.0f, float(rgb & 255u) / 255.0f};
+      return {float(rgb >> 16) / 255.0f, float(rgb >> 8 & 255u) / 255.0f,
+              float(rgb & 255u) / 255.0f};
     }
   }
   throw Error("{} {}: give a colour as #RRGGBB", option, text);
 }
 
-/// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT. Empty for an empty name.
-fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArgs &options, float isovalue,
-                    std::size_t view) {
+/// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT. Empty
+/// for an empty name.
+fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArgs &options,
+                    float isovalue, std::size_t view) {
   if (path.empty() || num_views * options.frame.isovalues.size() == 1) return path;
   fs::path result = path;
-  result.replace_filename(
-      fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view, path.extension().string()));
+  result.replace_filename(fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view,
+                                      path.extension().string()));
   return result;
 }
 
@@ -77,18 +80,21 @@ class FrameSource {
   virtual ~FrameSource() = default;
   virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
   /// Draws the frame once more, however long it takes.
-  virtual FrameStats refine(const Camera &camera, float isovalue) { return render(camera, isovalue, {}); }
+  virtual FrameStats refine(const Camera &camera, float isovalue) {
+    return render(camera, isovalue, {});
+  }
   virtual std::vector<HitRecord> hits() = 0;
   virtual Image8 shade() = 0;
-  /// Prints what else is known of the frame drawn last, and adds it to its --stats: how far it may be off, the steps it was drawn in.
-  /// error_map: the .npy to write, or empty.
+  /// Prints what else is known of the frame drawn last, and adds it to its --stats: how far it may
+  /// be off, the steps it was drawn in. error_map: the .npy to write, or empty.
   virtual void report(const Camera &, float /*isovalue*/, const fs::path & /*error_map*/,
                       nlohmann::ordered_json & /*frame*/) {}
 };
 
 class DeviceFrames : public FrameSource {
  public:
-  DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance, const RenderArgs &args)
+  DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance,
+               const RenderArgs &args)
       : volume_(scene.volume),
         renderer_(device, scene.volume, args.renderer),
         appearance_(appearance),
@@ -118,7 +124,8 @@ class DeviceFrames : public FrameSource {
   const Renderer &renderer() const { return renderer_; }
 
  private:
-  nlohmann::ordered_json bound_error(const Camera &camera, float isovalue, const fs::path &error_map);
+  nlohmann::ordered_json bound_error(const Camera &camera, float isovalue,
+                                     const fs::path &error_map);
   nlohmann::ordered_json timed_steps() const;
 
   const CompressedVolume &volume_;
@@ -137,7 +144,8 @@ nlohmann::ordered_json DeviceFrames::timed_steps() const {
                step.max_pixel_error == 0
                    ? "finest level"
                    : fmt::format("voxels up to {} of its pixels apart", step.max_pixel_error),
-               step.ms, step.cancelled ? fmt::format("{:.1f} % of it", step.completed_percent) : "whole");
+               step.ms,
+               step.cancelled ? fmt::format("{:.1f} % of it", step.completed_percent) : "whole");
     steps.push_back({{"size", {step.size.width, step.size.height}},
                      {"max_pixel_error", step.max_pixel_error},
                      {"ms", step.ms},
@@ -155,23 +163,26 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
                                                  const fs::path &error_map) {
   const Certificate certificate = certify(renderer_, volume_, camera, isovalue, renderer_.hits());
   const CertificateSummary summary = summarize(certificate, *max_error_);
-  const double certified =
-      summary.num_pixels == 0 ? 100.0 : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
+  const double certified = summary.num_pixels == 0
+                               ? 100.0
+                               : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
   fmt::print(
-      "  within {} pixels of the true surface: {:.2f} % of {} rays (bound: median {:.3g}, p99 {:.3g}); {} "
+      "  within {} pixels of the true surface: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
+      "{:.3g}); {} "
       "uncertain\n"
-      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, bounded in "
+      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
+      "bounded in "
       "{:.0f} ms\n",
       *max_error_, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
-      with_commas(summary.num_uncertain), choice_.detail.max_pixel_error, choice_.detail.value_error,
-      choice_.total_ms, certificate.total_ms);
+      with_commas(summary.num_uncertain), choice_.detail.max_pixel_error,
+      choice_.detail.value_error, choice_.total_ms, certificate.total_ms);
   if (!choice_.reachable) {
     spdlog::warn("most pixels cannot be kept within {} pixels: {}", *max_error_, choice_.advice);
   }
   if (!error_map.empty())
-    write_npy(
-        {renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(), certificate.bounds},
-        error_map);
+    write_npy({renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(),
+               certificate.bounds},
+              error_map);
   nlohmann::ordered_json tries = nlohmann::ordered_json::array();
   for (const DetailChoice::Try &each : choice_.tries) {
     tries.push_back(detail_json(each.detail));
@@ -224,10 +235,11 @@ class TwinFrames : public FrameSource {
   std::vector<HitRecord> hits_;
 };
 
-void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &frames, float isovalue,
-                   std::size_t view) {
+void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &frames,
+                   float isovalue, std::size_t view) {
   if (!options.image.empty()) {
-    write_png(frames.shade(), frame_path(options.image, scene.cameras.size(), options, isovalue, view));
+    write_png(frames.shade(),
+              frame_path(options.image, scene.cameras.size(), options, isovalue, view));
   }
   if (!options.depth.empty()) {
     write_npy({scene.size.ray_columns(), scene.size.ray_rows(), depth_of(frames.hits())},
@@ -236,8 +248,8 @@ void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &f
 }
 
 /// Writes the picture after every pass to --progress-dir, if that was asked for.
-OnPass progress_writer(const RenderArgs &options, const Scene &scene, FrameSource &frames, float isovalue,
-                       std::size_t view) {
+OnPass progress_writer(const RenderArgs &options, const Scene &scene, FrameSource &frames,
+                       float isovalue, std::size_t view) {
   if (options.progress_dir.empty()) return {};
   return [&options, &scene, &frames, isovalue, view, pass = 0](const PassStats &) mutable {
     const fs::path name = fs::path(options.progress_dir) / fmt::format("pass{:04}.png", ++pass);
@@ -246,7 +258,8 @@ OnPass progress_writer(const RenderArgs &options, const Scene &scene, FrameSourc
   };
 }
 
-nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene, FrameSource &frames) {
+nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene,
+                                   FrameSource &frames) {
   nlohmann::ordered_json result = nlohmann::ordered_json::array();
   for (const float isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
@@ -262,7 +275,8 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
                     result.back());
       if (!options.refined.empty()) {
         const FrameStats refined = frames.refine(camera, isovalue);
-        write_png(frames.shade(), frame_path(options.refined, scene.cameras.size(), options, isovalue, view));
+        write_png(frames.shade(),
+                  frame_path(options.refined, scene.cameras.size(), options, isovalue, view));
         fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.rays_hit),
                    refined.total_ms);
       }
@@ -279,24 +293,26 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
                                  {"value_error", options.frame.value_error},
                                  {"reference", options.reference}};
   json.update(renderer_options_json(options.renderer));
-  json["max_pixel_error"] = options.max_pixel_error;  // where it is chosen, the renderer was made for others
+  json["max_pixel_error"] =
+      options.max_pixel_error;  // where it is chosen, the renderer was made for others
   return json;
 }
 
 nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVolume &volume) {
   const VolumeInfo &info = volume.info;
-  return {
-      {"file", options.input},
-      {"dims", {info.dims.x, info.dims.y, info.dims.z}},
-      {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
-      {"type", to_string(info.type)},
-      {"rate", volume.rate()},
-      {"max_error", volume.max_error ? nlohmann::ordered_json(*volume.max_error) : nlohmann::ordered_json()},
-      {"blocks", volume.block_count()},
-      {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
+  return {{"file", options.input},
+          {"dims", {info.dims.x, info.dims.y, info.dims.z}},
+          {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
+          {"type", to_string(info.type)},
+          {"rate", volume.rate()},
+          {"max_error",
+           volume.max_error ? nlohmann::ordered_json(*volume.max_error) : nlohmann::ordered_json()},
+          {"blocks", volume.block_count()},
+          {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
 }
 
-/// Outputs go to folders that exist, but for --progress-dir, which is made when frames are drawn. Throws Error before any work.
+/// Outputs go to folders that exist, but for --progress-dir, which is made when frames are drawn.
+/// Throws Error before any work.
 Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
   Outputs outputs;
   outputs.read_volume(options.input);
@@ -319,11 +335,12 @@ Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
 
 std::unique_ptr<ocl::Device> open_device(const RenderArgs &options) {
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
-  fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index, info.name,
-             info.platform);
+  fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
+             info.name, info.platform);
   if (!info.capabilities.correctly_rounded_divide) {
     spdlog::warn(
-        "{} does not promise correctly rounded division: pictures may differ from other devices' in last "
+        "{} does not promise correctly rounded division: pictures may differ from other devices' "
+        "in last "
         "bits",
         info.name);
   }
@@ -332,21 +349,26 @@ std::unique_ptr<ocl::Device> open_device(const RenderArgs &options) {
 
 void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
   fmt::print("the compressed volume of {} bytes stays on the {}: {}\n",
-             with_commas(volume.word_count() * sizeof(std::uint32_t)), to_string(plan.stream), plan.reason);
+             with_commas(volume.word_count() * sizeof(std::uint32_t)), to_string(plan.stream),
+             plan.reason);
   if (plan.stream == StreamPlace::kHost) {
-    fmt::print("its blocks are uploaded through a window, {} at a time\n", with_commas(plan.window_blocks));
+    fmt::print("its blocks are uploaded through a window, {} at a time\n",
+               with_commas(plan.window_blocks));
   }
   for (const MemoryPlan::Buffer &buffer : plan.buffers) {
     fmt::print("  {:>16} bytes  {}\n", with_commas(buffer.bytes), buffer.name);
   }
   fmt::print("  {:>16} bytes  in all, with {} cache slots; at most {} during setup\n",
-             with_commas(plan.total()), with_commas(plan.cache_slots), with_commas(plan.setup_bytes));
+             with_commas(plan.total()), with_commas(plan.cache_slots),
+             with_commas(plan.setup_bytes));
 }
 
 /// --max-error, --time-budget and what goes with them.
 void check_choice(const RenderArgs &options) {
-  if (!options.max_error && !options.error_map.empty()) throw Error("--error-map needs --max-error");
-  if (!options.time_budget && !options.refined.empty()) throw Error("--refined needs --time-budget");
+  if (!options.max_error && !options.error_map.empty())
+    throw Error("--error-map needs --max-error");
+  if (!options.time_budget && !options.refined.empty())
+    throw Error("--refined needs --time-budget");
   if (!options.max_error && !options.time_budget) return;
   const char *choice = options.max_error ? "--max-error" : "--time-budget";
   if (options.reference) throw Error("--reference cannot choose: leave out {}", choice);
@@ -355,7 +377,8 @@ void check_choice(const RenderArgs &options) {
     throw Error("--time-budget draws a frame in steps: leave out --progress-dir");
   if (!options.max_error) return;
   check_max_error(*options.max_error);
-  if (options.time_budget) throw Error("--max-error takes the time it takes: leave out --time-budget");
+  if (options.time_budget)
+    throw Error("--max-error takes the time it takes: leave out --time-budget");
   if (options.frame.value_error > 0 || options.max_pixel_error > 0)
     throw Error("--max-error chooses for itself: leave out --value-error and --max-pixel-error");
 }
@@ -389,7 +412,8 @@ void run_render(const CLI::App &command, RenderArgs options) {
   options.frame.compression.measure_error |= options.max_error.has_value();
   wanted.with_bounds = options.max_error.has_value();
   wanted.with_kept_picture = options.time_budget.has_value();
-  wanted.with_shading = !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
+  wanted.with_shading =
+      !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
   // Whoever chooses has levels of detail to choose from.
   const bool chooses_levels =
       options.max_error || (options.time_budget && options.renderer_flags.pipeline != "blocks");
@@ -397,7 +421,8 @@ void run_render(const CLI::App &command, RenderArgs options) {
   want_levels(options.renderer_flags, options.frame.compression);
   const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
   outputs.make_folder();
-  if (chooses_levels && scene.volume.coarser.empty()) wanted.max_pixel_error = options.max_pixel_error;
+  if (chooses_levels && scene.volume.coarser.empty())
+    wanted.max_pixel_error = options.max_pixel_error;
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
@@ -425,38 +450,41 @@ void run_render(const CLI::App &command, RenderArgs options) {
 }  // namespace
 
 void add_render(CLI::App &app) {
-  CLI::App *command = app.add_subcommand("render", "Draw isosurfaces: PNG pictures, depth and statistics");
+  CLI::App *command =
+      app.add_subcommand("render", "Draw isosurfaces: PNG pictures, depth and statistics");
   const auto options = std::make_shared<RenderArgs>();
-  command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))->required();
+  command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))
+      ->required();
   add_volume_options(*command, options->volume);
   add_frame_options(*command, options->frame)->required();
   command
-      ->add_option(
-          "--samples", options->frame.samples,
-          "N: a pixel is the mean of N x N rays; pixels elsewhere in this list are still the picture's")
+      ->add_option("--samples", options->frame.samples,
+                   "N: a pixel is the mean of N x N rays; pixels elsewhere in this list are still "
+                   "the picture's")
       ->check(CLI::Range(1u, ImageSize::kMaxSamples))
       ->capture_default_str();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
   add_renderer_options(*command, options->renderer_flags);
-  command->add_flag("--reference", options->reference,
-                    "use the scalar C++ reference instead of a device; options of how a device draws are "
-                    "then without effect");
+  command->add_flag(
+      "--reference", options->reference,
+      "use the scalar C++ reference instead of a device; options of how a device draws are "
+      "then without effect");
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
   command->add_option("--output,-o", options->image,
                       "PNG; NAME_isoV_viewK.png when there are several frames");
-  command->add_option(
-      "--depth", options->depth,
-      "float32 .npy [H,W]: distance from the eye, inf where nothing is hit; with --samples of each ray");
+  command->add_option("--depth", options->depth,
+                      "float32 .npy [H,W]: distance from the eye, inf where nothing is hit; with "
+                      "--samples of each ray");
   command->add_option(
       "--max-error", options->max_error,
       "choose levels of detail and bit planes for each frame, so that its surface is within so "
       "many pixels of the true one, and say for how many pixels that is certain");
-  command->add_option(
-      "--error-map", options->error_map,
-      "float32 .npy [H,W] of --max-error: the bound of each pixel, or ray, inf where there is none");
+  command->add_option("--error-map", options->error_map,
+                      "float32 .npy [H,W] of --max-error: the bound of each pixel, or ray, inf "
+                      "where there is none");
   command->add_option(
       "--time-budget", options->time_budget,
       "ms for each frame: draws small pictures by coarse levels of detail first, then larger ones, "
@@ -464,10 +492,12 @@ void add_render(CLI::App &app) {
   command->add_option("--refined", options->refined,
                       "PNG of --time-budget: the whole picture, drawn after the other");
   command->add_option("--stats", options->stats, "JSON statistics of every frame and pass");
-  command->add_flag("--no-stage-times", options->no_stage_times,
-                    "leave ms per stage out of --stats: measuring them makes the host wait after each pass");
+  command->add_flag(
+      "--no-stage-times", options->no_stage_times,
+      "leave ms per stage out of --stats: measuring them makes the host wait after each pass");
   command->add_flag("--verbose", options->verbose, "print the plan of the device's memory");
-  command->add_option("--progress-dir", options->progress_dir, "folder for the picture after every pass");
+  command->add_option("--progress-dir", options->progress_dir,
+                      "folder for the picture after every pass");
   command->callback([command, options] { run_render(*command, *options); });
 }
 

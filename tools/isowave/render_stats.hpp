@@ -9,7 +9,8 @@
 
 namespace isowave::tools {
 
-inline constexpr int kChartsSchema = 2;  ///< of the JSON of `isowave bench`; tools/charts refuses others
+inline constexpr int kChartsSchema =
+    2;  ///< of the JSON of `isowave bench`; tools/charts refuses others
 
 /// A device and what it can do.
 nlohmann::ordered_json device_json(const ocl::DeviceInfo &info);
@@ -21,7 +22,8 @@ nlohmann::ordered_json frame_json(float isovalue, std::size_t view, const Camera
 /// Bytes of device memory: current, peak, and by buffer name.
 nlohmann::ordered_json memory_json(const ocl::MemoryLedger &ledger);
 
-/// The document as text. Names of files and drivers' strings need not be UTF-8: what is none is replaced by U+FFFD.
+/// The document as text. Names of files and drivers' strings need not be UTF-8: what is none is
+/// replaced by U+FFFD.
 std::string json_text(const nlohmann::ordered_json &document);
 
 /// Writes the document whole or not at all. Throws Error.

@@ -7,7 +7,8 @@ namespace isowave::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option("--pipeline", flags.pipeline,
-                 "arrangement of the passes: blocks (the paper's), rays, or auto (rays, which was faster in "
+                 "arrangement of the passes: blocks (the paper's), rays, or auto (rays, which was "
+                 "faster in "
                  "nearly all "
                  "that was measured)")
       ->check(CLI::IsMember({"auto", "blocks", "rays"}))
@@ -16,33 +17,39 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
          "--speculation", flags.speculation,
          "blocks a ray looks ahead: off (1), global (W*H / active rays), per-ray (twice as many "
          "after every "
-         "miss; in pipeline blocks no more than global), or auto: per-ray in pipeline rays, global in blocks")
+         "miss; in pipeline blocks no more than global), or auto: per-ray in pipeline rays, global "
+         "in blocks")
       ->check(CLI::IsMember({"auto", "off", "global", "per-ray"}))
       ->capture_default_str();
-  app.add_option("--max-speculation", flags.values.max_speculation, "most blocks a ray looks ahead, 1..64")
+  app.add_option("--max-speculation", flags.values.max_speculation,
+                 "most blocks a ray looks ahead, 1..64")
       ->capture_default_str();
-  app.add_option("--memory-budget", flags.values.memory_budget,
-                 "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB (1024^3); "
-                 "what the driver takes for itself comes on top [3/4 of the device's memory]")
+  app.add_option(
+         "--memory-budget", flags.values.memory_budget,
+         "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB (1024^3); "
+         "what the driver takes for itself comes on top [3/4 of the device's memory]")
       ->transform(byte_count())
       ->type_name("BYTES");
-  app.add_option("--cache-slots", flags.values.cache_slots,
-                 "decoded blocks kept on the device, 8 to 2^26 [as many as the budget allows; without one "
-                 "2^20 or all]")
-      ->check(CLI::Range(8u, 1u << 26));
   app.add_option(
-         "--stream", flags.stream,
-         "where the compressed volume is: device, host (blocks are uploaded when they are asked for), or "
-         "auto (on the device if that leaves room for a useful cache)")
+         "--cache-slots", flags.values.cache_slots,
+         "decoded blocks kept on the device, 8 to 2^26 [as many as the budget allows; without one "
+         "2^20 or all]")
+      ->check(CLI::Range(8u, 1u << 26));
+  app.add_option("--stream", flags.stream,
+                 "where the compressed volume is: device, host (blocks are uploaded when they are "
+                 "asked for), or "
+                 "auto (on the device if that leaves room for a useful cache)")
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
   app.add_option("--max-pixel-error", flags.values.max_pixel_error,
-                 "draw far parts by coarser levels of detail, whose voxels are at most so many pixels apart; "
+                 "draw far parts by coarser levels of detail, whose voxels are at most so many "
+                 "pixels apart; "
                  "0: all by the finest")
       ->capture_default_str();
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
-  app.add_option("--grouping", flags.grouping, "how pipeline blocks gathers rays by block: radix or counting")
+  app.add_option("--grouping", flags.grouping,
+                 "how pipeline blocks gathers rays by block: radix or counting")
       ->capture_default_str();
   app.add_option("--closest", flags.closest,
                  "how pipeline blocks finds a ray's closest result: scan or atomic-min")
@@ -52,7 +59,8 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
 }
 
 void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
-  if (flags.speculation == "off") refuse_options(app, {"--max-speculation"}, "--speculation off is 1");
+  if (flags.speculation == "off")
+    refuse_options(app, {"--max-speculation"}, "--speculation off is 1");
   solver_from_string(flags.solver);
   grouping_from_string(flags.grouping);
   closest_hit_from_string(flags.closest);
@@ -67,9 +75,11 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
                      : flags.pipeline == "rays" ? PipelineKind::kRays
                                                 : PipelineKind::kAuto;
   if (flags.speculation == "off") options.max_speculation = 1;
-  // Measured: pipeline blocks needs twice the passes with it, and is no faster for decoding less (README "Results").
-  options.per_ray_speculation = flags.speculation == "per-ray" ||
-                                (flags.speculation == "auto" && options.pipeline != PipelineKind::kBlocks);
+  // Measured: pipeline blocks needs twice the passes with it, and is no faster for decoding less
+  // (README "Results").
+  options.per_ray_speculation =
+      flags.speculation == "per-ray" ||
+      (flags.speculation == "auto" && options.pipeline != PipelineKind::kBlocks);
   options.solver = solver_from_string(flags.solver);
   options.grouping = grouping_from_string(flags.grouping);
   options.stream = stream_place_from_string(flags.stream);
@@ -81,11 +91,12 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
   const char *speculation = options.max_speculation == 1  ? "off"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
-  return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
-          {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
-          {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
-          {"closest", to_string(options.closest)},      {"group_size", options.group_size},
-          {"stream", to_string(options.stream)},        {"max_pixel_error", options.max_pixel_error}};
+  return {
+      {"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
+      {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
+      {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
+      {"closest", to_string(options.closest)},      {"group_size", options.group_size},
+      {"stream", to_string(options.stream)},        {"max_pixel_error", options.max_pixel_error}};
 }
 
 }  // namespace isowave::tools

@@ -12,13 +12,15 @@ namespace isowave::tools {
 
 struct RendererFlags {
   std::string pipeline = "auto", speculation = "auto", solver{to_string(kDefaultSolver)};
-  std::string grouping{to_string(kDefaultGrouping)}, closest{to_string(kDefaultClosestHit)}, stream = "auto";
+  std::string grouping{to_string(kDefaultGrouping)}, closest{to_string(kDefaultClosestHit)},
+      stream = "auto";
   RendererOptions values;
 };
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags);
 
-/// Asks for levels of detail of a volume that is compressed now, if they are to be drawn and nobody said how many.
+/// Asks for levels of detail of a volume that is compressed now, if they are to be drawn and nobody
+/// said how many.
 inline void want_levels(const RendererFlags &flags, CompressionOptions &compression) {
   if (flags.values.max_pixel_error > 0 && !says_levels(compression)) compression.levels = 0;
 }
@@ -29,8 +31,8 @@ void check_renderer_options(const CLI::App &app, const RendererFlags &flags);
 /// Throws Error on a solver, grouping or way to the closest hit that there is not.
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
-/// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size, stream,
-/// max_pixel_error.
+/// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size,
+/// stream, max_pixel_error.
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options);
 
 }  // namespace isowave::tools

@@ -15,7 +15,8 @@ namespace isowave::tools {
 
 namespace {
 
-/// Returns what is wrong with the value, or nothing. Writes whole numbers anew: CLI11 reads 010 as 8.
+/// Returns what is wrong with the value, or nothing. Writes whole numbers anew: CLI11 reads 010
+/// as 8.
 std::string check_number(const std::string &type, std::string &value) {
   if (type.starts_with("UINT")) {
     const std::optional<std::uint64_t> number = parse_whole(value);
@@ -26,7 +27,8 @@ std::string check_number(const std::string &type, std::string &value) {
     if (!number) return fmt::format("'{}' is no whole number of at most 64 bits", value);
     value = std::to_string(*number);
   } else if (type.starts_with("FLOAT")) {
-    if (!parse_finite(value)) return fmt::format("'{}' is no finite number that float64 holds", value);
+    if (!parse_finite(value))
+      return fmt::format("'{}' is no finite number that float64 holds", value);
   }
   return {};
 }
@@ -35,7 +37,8 @@ std::string check_number(const std::string &type, std::string &value) {
 template <class Use>
 void for_options(CLI::App &app, const Use &use) {
   for (CLI::Option *option : app.get_options()) use(app, *option);
-  for (CLI::App *command : app.get_subcommands([](CLI::App *) { return true; })) for_options(*command, use);
+  for (CLI::App *command : app.get_subcommands([](CLI::App *) { return true; }))
+    for_options(*command, use);
 }
 
 bool has_empty_entry(std::string_view list, char delimiter) {
@@ -76,7 +79,8 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text) {
 void make_strict(CLI::App &app) {
   for_options(app, [](CLI::App &command, CLI::Option &option) {
     if (option.get_items_expected_max() == 0) return;  // a flag
-    const auto check = [&command, type = option.get_type_name()](std::string &value) -> std::string {
+    const auto check = [&command,
+                        type = option.get_type_name()](std::string &value) -> std::string {
       if (value.empty()) return "the value is empty";
       if (value.starts_with('-') && command.get_option_no_throw(value) != nullptr)
         return fmt::format("a value is missing before {}", value);
@@ -120,7 +124,8 @@ CLI::Validator byte_count() {
       [](std::string &value) -> std::string {
         const std::optional<std::uint64_t> bytes = parse_bytes(value);
         if (!bytes)
-          return fmt::format("'{}' is no number of bytes from 1 to 2^64 - 1, such as 600MB or 1GiB", value);
+          return fmt::format("'{}' is no number of bytes from 1 to 2^64 - 1, such as 600MB or 1GiB",
+                             value);
         value = std::to_string(*bytes);
         return {};
       },
@@ -132,7 +137,8 @@ CLI::Validator count_or_all() {
       [](std::string &value) -> std::string {
         const bool all = value == "all";
         const std::uint32_t number = all ? 0 : parse_all<std::uint32_t>(value).value_or(0);
-        if (number == 0 && !all) return fmt::format("'{}' is neither a whole number above 0 nor all", value);
+        if (number == 0 && !all)
+          return fmt::format("'{}' is neither a whole number above 0 nor all", value);
         value = std::to_string(number);
         return {};
       },

@@ -1,6 +1,6 @@
 #pragma once
-// Options that take what they say and nothing else. CLI11 by itself takes '' for 0, -1 for 2^64 - 1, 010 for 8, 1e400 for infinity
-// and the next option for a value.
+// Options that take what they say and nothing else. CLI11 by itself takes '' for 0, -1 for 2^64 -
+// 1, 010 for 8, 1e400 for infinity and the next option for a value.
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -11,16 +11,19 @@
 
 namespace isowave::tools {
 
-/// Makes every option of the program and its subcommands refuse, by name and in one line: an empty value; an option's name in the
-/// place of a value; for a number anything but a decimal one in its range, so also nan and inf.
+/// Makes every option of the program and its subcommands refuse, by name and in one line: an empty
+/// value; an option's name in the place of a value; for a number anything but a decimal one in its
+/// range, so also nan and inf.
 void make_strict(CLI::App &app);
-/// Throws Error on `--name=` with nothing behind it, for which CLI11 would take the next argument, and on `a,,b`.
+/// Throws Error on `--name=` with nothing behind it, for which CLI11 would take the next argument,
+/// and on `a,,b`.
 void refuse_empty_values(CLI::App &app, int argc, char **argv);
 
 /// All of the text as a decimal number; none where it is not, or out of range.
 std::optional<std::uint64_t> parse_whole(std::string_view text);
 std::optional<double> parse_finite(std::string_view text);
-/// "12kB" is 12000, "1KiB" is 1024, "12" is 12; none where it is not such a number above 0, or more than 64 bits hold.
+/// "12kB" is 12000, "1KiB" is 1024, "12" is 12; none where it is not such a number above 0, or more
+/// than 64 bits hold.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
 
 /// A validator: a number that float32 can hold without becoming infinite.
@@ -31,6 +34,7 @@ CLI::Validator byte_count();
 CLI::Validator count_or_all();
 
 /// Throws Error, "OPTION: WHY", where one of the options was given on the command line.
-void refuse_options(const CLI::App &command, std::initializer_list<const char *> names, std::string_view why);
+void refuse_options(const CLI::App &command, std::initializer_list<const char *> names,
+                    std::string_view why);
 
 }  // namespace isowave::tools

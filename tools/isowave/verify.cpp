@@ -1,5 +1,5 @@
-// isowave verify: the stability suite and the watertight test for each solver, judged by the root oracle; whole frames of
-// real volumes are in verify_frames.cpp.
+// isowave verify: the stability suite and the watertight test for each solver, judged by the root
+// oracle; whole frames of real volumes are in verify_frames.cpp.
 
 #include <fmt/format.h>
 
@@ -53,15 +53,17 @@ std::uint64_t verify_watertight(const VerifyArgs &options, Solver solver, ocl::D
                                 ordered_json &surfaces) {
   std::uint64_t leaks = 0;
   for (const RayBands bands : {RayBands::kOne, RayBands::kLevels}) {
-    leaks +=
-        report_watertight("twin", run_watertight(options.watertight, options.seed, solver, bands), surfaces);
+    leaks += report_watertight(
+        "twin", run_watertight(options.watertight, options.seed, solver, bands), surfaces);
     for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
-      if (device == nullptr || (bands == RayBands::kLevels && pipeline == PipelineKind::kBlocks)) continue;
+      if (device == nullptr || (bands == RayBands::kLevels && pipeline == PipelineKind::kBlocks))
+        continue;
       CompileReport compiling(*device);
       const auto results =
           run_watertight_on(*device, pipeline, options.watertight, options.seed, solver, bands);
       compiling.finish();
-      leaks += report_watertight(fmt::format("pipeline {}", to_string(pipeline)), results, surfaces);
+      leaks +=
+          report_watertight(fmt::format("pipeline {}", to_string(pipeline)), results, surfaces);
     }
   }
   return leaks;
@@ -79,7 +81,8 @@ std::unique_ptr<ocl::Device> open_device(const VerifyArgs &options) {
   return std::make_unique<ocl::Device>(info);
 }
 
-/// Returns the failures of the solver: rays missed, false, wrong or leaked. device: for the watertight test, or none.
+/// Returns the failures of the solver: rays missed, false, wrong or leaked. device: for the
+/// watertight test, or none.
 std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, ocl::Device *device,
                             ordered_json &document) {
   const Solver solver = solver_from_string(name);
@@ -111,17 +114,20 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, oc
 void check_options(const CLI::App &command, const VerifyArgs &options) {
   for (const std::string &name : options.solvers) solver_from_string(name);
   if (options.frames.input.empty()) {
-    refuse_options(command,
-                   {"--oracle", "--isovalue", "--value-error", "--size", "--orbit", "--cameras", "--dims",
-                    "--type", "--spacing", "--rate", "--tolerance", "--tolerance-relative", "--exact"},
-                   "is for frames: give a VOLUME");
+    refuse_options(
+        command,
+        {"--oracle", "--isovalue", "--value-error", "--size", "--orbit", "--cameras", "--dims",
+         "--type", "--spacing", "--rate", "--tolerance", "--tolerance-relative", "--exact"},
+        "is for frames: give a VOLUME");
   } else {
-    refuse_options(command, {"--rays", "--watertight", "--seed"}, "is for the suite: leave out VOLUME");
-    if (options.frames.frame.isovalues.empty()) throw Error("{}: give --isovalue", options.frames.input);
+    refuse_options(command, {"--rays", "--watertight", "--seed"},
+                   "is for the suite: leave out VOLUME");
+    if (options.frames.frame.isovalues.empty())
+      throw Error("{}: give --isovalue", options.frames.input);
   }
-  refuse_options(
-      command, {"--levels"},
-      options.frames.max_error ? "--max-error has all levels of detail" : "the finest level alone is judged");
+  refuse_options(command, {"--levels"},
+                 options.frames.max_error ? "--max-error has all levels of detail"
+                                          : "the finest level alone is judged");
   Outputs outputs;
   outputs.read_volume(options.frames.input);
   if (!options.frames.frame.cameras.empty()) outputs.read(options.frames.frame.cameras);
@@ -156,14 +162,16 @@ void run_verify(const CLI::App &command, VerifyArgs options) {
   if (!options.json.empty()) write_json(document, options.json);
   if (failures != 0 && options.frames.max_error)
     throw Error("{} pixels are farther off than their bounds", failures);
-  if (failures != 0) throw Error("{} rays were missed, false, in a wrong cell or place, or leaked", failures);
+  if (failures != 0)
+    throw Error("{} rays were missed, false, in a wrong cell or place, or leaked", failures);
 }
 
 }  // namespace
 
 void add_verify(CLI::App &app) {
   CLI::App *command = app.add_subcommand(
-      "verify", "Judge the intersection by independent oracles: the stability suite, or frames of a volume");
+      "verify",
+      "Judge the intersection by independent oracles: the stability suite, or frames of a volume");
   const auto options = std::make_shared<VerifyArgs>();
   add_verify_frames_options(*command, options->frames);
   command->add_option(
@@ -173,12 +181,13 @@ void add_verify(CLI::App &app) {
       ->check(CLI::Range(1u, 100'000'000u))
       ->capture_default_str();
   command
-      ->add_option(
-          "--watertight", options->watertight,
-          "rays per surface of the watertight test, for the twin and for each pipeline of the device")
+      ->add_option("--watertight", options->watertight,
+                   "rays per surface of the watertight test, for the twin and for each pipeline of "
+                   "the device")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000}))
       ->capture_default_str();
-  command->add_option("--seed", options->seed, "of the suite's fields and rays")->capture_default_str();
+  command->add_option("--seed", options->seed, "of the suite's fields and rays")
+      ->capture_default_str();
   command->add_option("--json", options->json, "write the results as JSON");
   command->callback([command, options] { run_verify(*command, *options); });
 }

@@ -20,7 +20,8 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
                 options.input);
   if (!options.oracles.empty() || options.frame.value_error > 0)
     throw Error(
-        "--max-error chooses for itself, and has an oracle of its own: leave out --oracle and --value-error");
+        "--max-error chooses for itself, and has an oracle of its own: leave out --oracle and "
+        "--value-error");
   FrameOptions frame_options = options.frame;
   frame_options.compression.levels = 0;
   frame_options.compression.measure_error = true;
@@ -28,32 +29,37 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   ocl::Device device(info);
   CompileReport compiling(device);
-  const Scene scene = load_scene(options.input, options.volume, frame_options, read_views(frame_options));
+  const Scene scene =
+      load_scene(options.input, options.volume, frame_options, read_views(frame_options));
   const glm::uvec3 dims = scene.volume.info.dims;
   std::vector<double> source(scene.volume.info.num_voxels());
-  open_any_volume(options.input, to_overrides(options.volume))->read_exact_layers(0, dims.z, source);
+  open_any_volume(options.input, to_overrides(options.volume))
+      ->read_exact_layers(0, dims.z, source);
   Renderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
   compiling.finish();
-  fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view", "px chosen",
-             "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");
+  fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view",
+             "px chosen", "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");
   std::uint64_t exceeded = 0;
   for (const float isovalue : options.frame.isovalues) {
     const CellOracle truth(source, {dims.x, dims.y, dims.z}, isovalue);
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
-      const DetailChoice choice = choose_detail(renderer, scene.volume, camera, isovalue, max_error);
+      const DetailChoice choice =
+          choose_detail(renderer, scene.volume, camera, isovalue, max_error);
       renderer.render(camera, isovalue);
       const std::vector<HitRecord> drawn = renderer.hits();
       const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
       const CertificateSummary summary = summarize(certificate, max_error);
       const BoundTally tally =
-          judge_bounds(truth, make_frame_params(scene.volume.info, camera, scene.size, isovalue), drawn,
-                       certificate.bounds);
+          judge_bounds(truth, make_frame_params(scene.volume.info, camera, scene.size, isovalue),
+                       drawn, certificate.bounds);
       const Quantiles slack = quantiles(tally.slack);
-      fmt::print("{:>9} {:>5} {:>9.3g} {:>10} {:>10} {:>9.2f} {:>10} {:>9} {:>10.2f}\n", isovalue, view,
-                 choice.detail.max_pixel_error, choice.detail.value_error, with_commas(summary.num_pixels),
-                 summary.num_pixels == 0 ? 100.0
-                                         : 100.0 * double(summary.num_certified) / double(summary.num_pixels),
+      fmt::print("{:>9} {:>5} {:>9.3g} {:>10} {:>10} {:>9.2f} {:>10} {:>9} {:>10.2f}\n", isovalue,
+                 view, choice.detail.max_pixel_error, choice.detail.value_error,
+                 with_commas(summary.num_pixels),
+                 summary.num_pixels == 0
+                     ? 100.0
+                     : 100.0 * double(summary.num_certified) / double(summary.num_pixels),
                  with_commas(summary.num_uncertain), tally.exceeded, slack.p50);
       document["frames"].push_back({{"volume", options.input},
                                     {"drawn_by", info.name},

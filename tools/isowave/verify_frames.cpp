@@ -39,7 +39,8 @@ struct FrameJudge {
 };
 
 template <class Oracle>
-FrameJudge judge_by(std::string name, const std::shared_ptr<const Oracle> &oracle, std::string contents) {
+FrameJudge judge_by(std::string name, const std::shared_ptr<const Oracle> &oracle,
+                    std::string contents) {
   return {std::move(name), std::move(contents), true,
           [oracle](const FrameParams &frame, std::span<const HitRecord> hits) {
             return judge_frame(*oracle, frame, hits);
@@ -58,8 +59,8 @@ FrameJudge make_judge(const std::string &name, std::span<const float> voxels, co
                     with_commas(oracle->num_triangles()) +
                         " triangles in Embree; unstable: finer ones agree with the frame");
   }
-  FrameJudge judge =
-      judge_by(name, std::make_shared<const RootOracle>(voxels, dims, isovalue), "every cell, certified");
+  FrameJudge judge = judge_by(name, std::make_shared<const RootOracle>(voxels, dims, isovalue),
+                              "every cell, certified");
   judge.uses_embree = false;
   return judge;
 }
@@ -67,8 +68,8 @@ FrameJudge make_judge(const std::string &name, std::span<const float> voxels, co
 /// Draws with the scalar reference, or with a device.
 class FrameDrawer {
  public:
-  FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device, Solver solver,
-              double value_error)
+  FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device,
+              Solver solver, double value_error)
       : scene_(scene), voxels_(voxels), solver_(solver) {
     if (device.empty()) return;
     const ocl::DeviceInfo info = ocl::choose_device(device);
@@ -111,7 +112,8 @@ void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, 
   const std::array<double, 3> eye{frame.eye_x, frame.eye_y, frame.eye_z};
   const Dims dims{frame.dims_x, frame.dims_y, frame.dims_z};
   for (const FrameJudge &judge : judges) {
-    const std::string row = fmt::format("{}, isovalue {}, view {}", judge.oracle, frame.isovalue, view);
+    const std::string row =
+        fmt::format("{}, isovalue {}, view {}", judge.oracle, frame.isovalue, view);
     ordered_json entry = {{"oracle", judge.oracle}};
     if (judge.uses_embree && !within_embree_reach(eye, dims)) {
       const std::string why = out_of_reach(eye, dims);
@@ -133,13 +135,15 @@ void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, 
 
 }  // namespace
 
-std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vector<std::string> &solvers,
-                            ordered_json &document) {
-  const Scene scene = load_scene(options.input, options.volume, options.frame, read_views(options.frame));
+std::uint64_t verify_frames(const VerifyFramesOptions &options,
+                            const std::vector<std::string> &solvers, ordered_json &document) {
+  const Scene scene =
+      load_scene(options.input, options.volume, options.frame, read_views(options.frame));
   const std::vector<float> voxels = decode_with_libzfp(scene.volume, options.frame.value_error);
   const glm::uvec3 dims = scene.volume.info.dims;
-  const std::vector<std::string> names =
-      options.oracles.empty() ? std::vector<std::string>{"roots", "cells", "mesh"} : options.oracles;
+  const std::vector<std::string> names = options.oracles.empty()
+                                             ? std::vector<std::string>{"roots", "cells", "mesh"}
+                                             : options.oracles;
   Totals totals;
   for (const float isovalue : options.frame.isovalues) {
     std::vector<FrameJudge> judges;
@@ -165,8 +169,10 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vecto
         judge_all(judges, frame, view, hits, labels, document, totals);
         const Quantiles rounding =
             quantiles(ray_rounding(scene.volume.info, scene.cameras[view], scene.size, hits));
-        fmt::print("{:<28} float32 rays are off the camera's by p50 {:.1e}, p99 {:.1e}, max {:.1e} voxels\n",
-                   "", rounding.p50, rounding.p99, rounding.max);
+        fmt::print(
+            "{:<28} float32 rays are off the camera's by p50 {:.1e}, p99 {:.1e}, max {:.1e} "
+            "voxels\n",
+            "", rounding.p50, rounding.p99, rounding.max);
         document["ray_rounding_voxels"].push_back(quantiles_json(rounding));
       }
     }
@@ -181,20 +187,22 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
   add_volume_options(command, options.volume);
   add_frame_options(command, options.frame);
   command
-      .add_option("--oracle", options.oracles,
-                  "who judges frames: roots (every root on the ray, certified), cells (Embree through the "
-                  "dual cells) "
-                  "or mesh (Embree and triangles); repeat it [all]")
+      .add_option(
+          "--oracle", options.oracles,
+          "who judges frames: roots (every root on the ray, certified), cells (Embree through the "
+          "dual cells) "
+          "or mesh (Embree and triangles); repeat it [all]")
       ->check(CLI::IsMember({"roots", "cells", "mesh"}))
       ->allow_extra_args(false);  // one name each time: VOLUME may follow
+  command.add_option("--max-error", options.max_error,
+                     "judge what render --max-error promises instead: each pixel's bound against "
+                     "the volume before "
+                     "compression");
   command.add_option(
-      "--max-error", options.max_error,
-      "judge what render --max-error promises instead: each pixel's bound against the volume before "
-      "compression");
-  command.add_option("--device", options.device,
-                     "who draws frames, or is tested for leaks beside the scalar reference: index, cpu, gpu, "
-                     "or a part of its name "
-                     "[frames: the scalar reference; leaks: as render]");
+      "--device", options.device,
+      "who draws frames, or is tested for leaks beside the scalar reference: index, cpu, gpu, "
+      "or a part of its name "
+      "[frames: the scalar reference; leaks: as render]");
 }
 
 }  // namespace isowave::tools

@@ -1,5 +1,6 @@
 #pragma once
-// `isowave verify VOLUME`: whole frames, drawn by the scalar reference or a device, judged by up to three oracles.
+// `isowave verify VOLUME`: whole frames, drawn by the scalar reference or a device, judged by up to
+// three oracles.
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -25,9 +26,11 @@ struct VerifyFramesOptions {
 /// Adds VOLUME, the options of volumes and frames, --oracle, --max-error and --device.
 void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options);
 
-/// Draws every view and isovalue with every solver, prints a row for each oracle and adds it to document["frames"].
-/// Returns the rays missed, false or in a wrong cell. Throws Error, also when every frame had to be left out.
-std::uint64_t verify_frames(const VerifyFramesOptions &options, const std::vector<std::string> &solvers,
+/// Draws every view and isovalue with every solver, prints a row for each oracle and adds it to
+/// document["frames"]. Returns the rays missed, false or in a wrong cell. Throws Error, also when
+/// every frame had to be left out.
+std::uint64_t verify_frames(const VerifyFramesOptions &options,
+                            const std::vector<std::string> &solvers,
                             nlohmann::ordered_json &document);
 
 }  // namespace isowave::tools

@@ -23,7 +23,8 @@ constexpr std::string_view kGenerate = "generate:";
 
 GenerateOptions parse_generator(std::string_view text) {
   const auto fail = [&] {
-    throw Error("'{}{}': write generate:FIELD_XxYxZ_TYPE or generate:FIELD_XxYxZ_TYPE:SEED", kGenerate, text);
+    throw Error("'{}{}': write generate:FIELD_XxYxZ_TYPE or generate:FIELD_XxYxZ_TYPE:SEED",
+                kGenerate, text);
   };
   const std::size_t colon = text.find(':');
   const std::optional<RawName> name = parse_raw_name(text.substr(0, colon));
@@ -53,7 +54,8 @@ class RespacedReader : public VolumeReader {
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
     source_->read_layers(z_begin, num_layers, out);
   }
-  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<double> out) override {
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                         std::span<double> out) override {
     source_->read_exact_layers(z_begin, num_layers, out);
   }
 
@@ -68,8 +70,10 @@ void add_volume_options(CLI::App &command, VolumeOptions &options) {
       .add_option("--dims", options.dims,
                   "voxels of a raw file whose name does not say: X Y Z, or N for a cube")
       ->expected(1, 3);
-  command.add_option("--type", options.type, "voxel type of a raw file: uint8, int8, ... float32, float64");
-  command.add_option("--spacing", options.spacing, "world units between voxels: X Y Z or one for all")
+  command.add_option("--type", options.type,
+                     "voxel type of a raw file: uint8, int8, ... float32, float64");
+  command
+      .add_option("--spacing", options.spacing, "world units between voxels: X Y Z or one for all")
       ->expected(1, 3);
 }
 
@@ -85,12 +89,14 @@ RawOverrides to_overrides(const VolumeOptions &options) {
   if (!options.type.empty()) overrides.type = voxel_type_from_string(options.type);
   const std::vector<double> &spacing = options.spacing;
   if (spacing.size() == 1) overrides.spacing = glm::dvec3(spacing[0]);
-  if (spacing.size() == 2) throw Error("--spacing: need X Y Z, or one number for all, got 2 numbers");
+  if (spacing.size() == 2)
+    throw Error("--spacing: need X Y Z, or one number for all, got 2 numbers");
   if (spacing.size() == 3) overrides.spacing = {spacing[0], spacing[1], spacing[2]};
   return overrides;
 }
 
-std::unique_ptr<VolumeReader> open_any_volume(const std::string &path, const RawOverrides &overrides) {
+std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
+                                              const RawOverrides &overrides) {
   if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
   if (overrides.dims || overrides.type)
     throw Error("{}: it says dims and type itself: leave --dims and --type", path);
@@ -105,26 +111,26 @@ bool is_zfp_name(const std::string &path) {
 }
 
 void add_compression_options(CLI::App &command, CompressionOptions &options) {
-  CLI::Option *rate =
-      command.add_option("--rate", options.rate, "bits per voxel of a volume that is compressed, 1 to 32")
-          ->capture_default_str();
-  CLI::Option *tolerance =
-      command.add_option("--tolerance", options.tolerance,
-                         "instead: as few bits as keep each voxel within this error of the input's");
+  CLI::Option *rate = command
+                          .add_option("--rate", options.rate,
+                                      "bits per voxel of a volume that is compressed, 1 to 32")
+                          ->capture_default_str();
+  CLI::Option *tolerance = command.add_option(
+      "--tolerance", options.tolerance,
+      "instead: as few bits as keep each voxel within this error of the input's");
   CLI::Option *relative = command.add_option("--tolerance-relative", options.relative_tolerance,
                                              "the same, as a part of the range of values");
-  CLI::Option *exact =
-      command.add_flag("--exact", options.exact,
-                       "the same, with no error: decoded values are the input's (integers below 2^24 only)");
-  CLI::Option *levels =
-      command
-          .add_option(
-              "--levels", options.levels,
-              "levels of detail of a volume that is compressed, each of half the voxels along each axis, "
-              "itself among them: a number, or all")
-          ->transform(count_or_all())
-          ->type_name("N|all")
-          ->capture_default_str();
+  CLI::Option *exact = command.add_flag(
+      "--exact", options.exact,
+      "the same, with no error: decoded values are the input's (integers below 2^24 only)");
+  CLI::Option *levels = command
+                            .add_option("--levels", options.levels,
+                                        "levels of detail of a volume that is compressed, each of "
+                                        "half the voxels along each axis, "
+                                        "itself among them: a number, or all")
+                            ->transform(count_or_all())
+                            ->type_name("N|all")
+                            ->capture_default_str();
   tolerance->excludes(rate, relative, exact);
   relative->excludes(rate, exact);
   exact->excludes(rate);
@@ -158,11 +164,13 @@ std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOve
     const std::array<double, 2> range =
         read_in_chunks(*open_any_volume(path, overrides), input, nothing).source;
     if (range[0] == range[1])
-      throw Error("{}: all voxels are {}: there is no range that an error is relative to", path, range[0]);
+      throw Error("{}: all voxels are {}: there is no range that an error is relative to", path,
+                  range[0]);
     goal.tolerance = *options.relative_tolerance * (range[1] - range[0]);
     if (!(goal.tolerance > 0 && std::isfinite(goal.tolerance)))
-      throw Error("--tolerance-relative {}: of values from {} to {}, that is {}: need above 0 and finite",
-                  *options.relative_tolerance, range[0], range[1], goal.tolerance);
+      throw Error(
+          "--tolerance-relative {}: of values from {} to {}, that is {}: need above 0 and finite",
+          *options.relative_tolerance, range[0], range[1], goal.tolerance);
   }
   input.progress = make_progress_bar("measuring errors");
   return choose_error_bound(*open_any_volume(path, overrides), goal, input);
@@ -171,7 +179,8 @@ std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOve
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device) {
   if (is_zfp_name(path)) {
-    if (overrides.dims || overrides.type) throw Error("{}: --dims and --type are for raw files", path);
+    if (overrides.dims || overrides.type)
+      throw Error("{}: --dims and --type are for raw files", path);
     refuse_compression(compression, path);
     VolumeInfo info = read_zfp_file_info(path).info;
     if (overrides.spacing) info.spacing = *overrides.spacing;
@@ -199,7 +208,8 @@ Progress make_progress_bar(std::string_view label) {
   if (::isatty(STDERR_FILENO) == 0) return {};
   // The line is erased when the last copy goes, be it after the work or after an error.
   const std::shared_ptr<void> eraser(nullptr, [](void *) { fmt::print(stderr, "\r\x1b[K"); });
-  return [eraser, text = std::string(label), shown = -1](std::uint32_t done, std::uint32_t total) mutable {
+  return [eraser, text = std::string(label), shown = -1](std::uint32_t done,
+                                                         std::uint32_t total) mutable {
     constexpr int kWidth = 40;
     if (done == total) {
       fmt::print(stderr, "\r\x1b[K");

@@ -1,6 +1,6 @@
 #pragma once
-// What the subcommands share about volumes: options that say what a raw file's name does not, opening any
-// kind of volume, and the progress bar.
+// What the subcommands share about volumes: options that say what a raw file's name does not,
+// opening any kind of volume, and the progress bar.
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -42,31 +42,38 @@ struct CompressionOptions {
   bool bounded() const { return tolerance || relative_tolerance || exact; }
 };
 
-/// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given, and --levels.
+/// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given, and
+/// --levels.
 void add_compression_options(CLI::App &command, CompressionOptions &options);
-/// Throws Error where an option of how to compress was given for volumes that are compressed already.
+/// Throws Error where an option of how to compress was given for volumes that are compressed
+/// already.
 void refuse_compression(const CompressionOptions &options, const std::string &path);
 /// Whether the command line says how many levels there are to be.
 bool says_levels(const CompressionOptions &options);
-/// The bound that was asked for, or none: the rate. Reads all of the volume, for a relative tolerance twice. Throws Error: see
-/// choose_error_bound().
+/// The bound that was asked for, or none: the rate. Reads all of the volume, for a relative
+/// tolerance twice. Throws Error: see choose_error_bound().
 std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
-                                           const CompressionOptions &options, InputOptions input = {});
+                                           const CompressionOptions &options,
+                                           InputOptions input = {});
 
 /// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
-std::unique_ptr<VolumeReader> open_any_volume(const std::string &path, const RawOverrides &overrides);
+std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
+                                              const RawOverrides &overrides);
 /// The help text of such an argument.
 inline constexpr const char *kVolumeHelp =
-    "a volume: .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, or generate:FIELD_XxYxZ_TYPE[:SEED]";
+    "a volume: .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, or "
+    "generate:FIELD_XxYxZ_TYPE[:SEED]";
 
 /// Whether the name ends in .zfp.
 bool is_zfp_name(const std::string &path);
-/// Opens a .zfp file (its spacing may be overridden; options of how to compress are refused), or compresses any other
-/// volume, at a rate on `device` where one is given. Clears that device's stage times. Throws Error also on what cannot be drawn.
+/// Opens a .zfp file (its spacing may be overridden; options of how to compress are refused), or
+/// compresses any other volume, at a rate on `device` where one is given. Clears that device's
+/// stage times. Throws Error also on what cannot be drawn.
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device = nullptr);
 
-/// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with the last.
+/// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with
+/// the last.
 Progress make_progress_bar(std::string_view label);
 
 /// 1,234,567
