@@ -9,6 +9,7 @@
 #include "core/render/pass_readback.hpp"
 #include "core/stages/shade.hpp"
 #include "core/view/detail.hpp"
+#include "kernels_cl/portable/block_bound.h"
 
 namespace isowave {
 
