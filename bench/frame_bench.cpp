@@ -162,7 +162,7 @@ void check_options(const CLI::App &app, const Options &options) {
 void run(const CLI::App &app, Options options, const std::string &command) {
   check_options(app, options);
   tools::want_levels(options.renderer, options.compression);
-  if (options.renderer.values.max_pixel_error > 0)
+  if (options.renderer.values.voxel_pixels > 0)
     options.resident = false;  // it draws the finest level
   nlohmann::ordered_json json;
   if (options.budgets.empty()) {

@@ -23,18 +23,18 @@ void add_offset(const CompressedVolume &level, const ValueOffset &offset,
 
 }  // namespace
 
-Twin::Twin(const CompressedVolume &volume, double max_pixel_error, double value_error,
+Twin::Twin(const CompressedVolume &volume, double voxel_pixels, double voxel_error,
            FieldBound bound)
-    : max_pixel_error_(max_pixel_error) {
-  check_levels(volume, max_pixel_error);
-  for (const CompressedVolume *level : levels_of(volume, max_pixel_error > 0)) {
-    const double level_error = value_error_of(value_error, levels_.size());
+    : max_pixel_error_(voxel_pixels) {
+  check_levels(volume, voxel_pixels);
+  for (const CompressedVolume *level : levels_of(volume, voxel_pixels > 0)) {
+    const double level_error = voxel_error_of(voxel_error, levels_.size());
     levels_.push_back(level->info);
     voxels_.push_back(decode_with_libzfp(*level, level_error));
     if (bound == FieldBound::kNone) continue;
     const ValueOffset offset =
-        value_offset({*level, level == &volume}, bound,
-                     plane_error(level->error_bound, level_error), volume.value_range);
+        value_offset({*level, level == &volume}, bound, plane_error(level->precision, level_error),
+                     volume.value_range);
     add_offset(*level, offset, voxels_.back());
   }
 }

@@ -13,10 +13,10 @@ namespace isowave {
 
 class Twin {
  public:
-  /// Decodes the volume, and its coarser levels where max_pixel_error, as RendererOptions', is not
-  /// 0. value_error: as Renderer::set_value_error(). bound: as Renderer::draw_bound(). Throws
+  /// Decodes the volume, and its coarser levels where voxel_pixels, as RendererOptions', is not
+  /// 0. voxel_error: as Renderer::set_voxel_error(). bound: as Renderer::draw_bound(). Throws
   /// Error: what check_levels() throws.
-  explicit Twin(const CompressedVolume &volume, double max_pixel_error = 0, double value_error = 0,
+  explicit Twin(const CompressedVolume &volume, double voxel_pixels = 0, double voxel_error = 0,
                 FieldBound bound = FieldBound::kNone);
 
   /// The hits [height * width] that a renderer must find, bit for bit.

@@ -49,7 +49,7 @@ GridLevels decoded_levels(const CompressedVolume &volume, bool with_levels) {
 struct View {
   Camera camera;
   ImageSize size{kPicture, kPicture};
-  double max_pixel_error = 0;
+  double voxel_pixels = 0;
   bool from_inside = false;
 };
 
@@ -89,8 +89,7 @@ View random_view(const GridLevels &levels, Random &random) {
   const double pixel =
       2 * std::tan(view.camera.fovy_deg * 3.141592653589793 / 360) / view.size.height;
   const double eye_distance = glm::length(view.camera.eye - at);
-  view.max_pixel_error =
-      2 / (pixel * random.in(std::max(1.0, eye_distance - 20), eye_distance + 20));
+  view.voxel_pixels = 2 / (pixel * random.in(std::max(1.0, eye_distance - 20), eye_distance + 20));
   return view;
 }
 
@@ -161,14 +160,14 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
                        .pipeline = pipeline,
                        .cache_slots = kCacheSlots,
                        .solver = solver,
-                       .max_pixel_error = with_levels ? 1.0 : 0.0,
+                       .voxel_pixels = with_levels ? 1.0 : 0.0,
                        .with_shading = false});
     WatertightResult result{surface.name + std::string(with_levels ? ", levels" : "")};
     Random random(seed);
     for (std::uint64_t view_id = 0; result.rays < num_rays; ++view_id) {
       const View view = random_view(levels, random);
       renderer.set_size(view.size);
-      if (with_levels) renderer.set_max_pixel_error(view.max_pixel_error);
+      if (with_levels) renderer.set_voxel_pixels(view.voxel_pixels);
       renderer.render(view.camera, 0);
       judge_view(levels, view, renderer.hits(), (seed + view_id) * 0x9E3779B97F4A7C15u, result);
     }

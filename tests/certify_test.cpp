@@ -108,8 +108,9 @@ TEST(BlockBound, NoVoxelExceedsItsShare) {
     for (const CompressOptions &options :
          {CompressOptions{.rate = 4}, CompressOptions{.rate = 11},
           // The largest error not known, and known, as to convert.
-          CompressOptions{.error_bound = ErrorBound{.min_exponent = -5}},
-          CompressOptions{.error_bound = ErrorBound{.min_exponent = -5, .max_error = 0.03125}}}) {
+          CompressOptions{.precision = BlockPrecision{.min_exponent = -5}},
+          CompressOptions{.precision =
+                              BlockPrecision{.min_exponent = -5, .max_voxel_error = 0.03125}}}) {
       const Scene scene(dims, field, options);
       const BlockBounds &bounds = scene.volume.bounds;
       ASSERT_TRUE(bounds.by_place);
@@ -137,7 +138,7 @@ TEST(BlockBound, NoVoxelExceedsItsShare) {
 /// the volume: the least of many places at random. Below 1, a bound is exceeded.
 double least_slack(const Scene &scene, std::size_t level, int num_places) {
   const glm::uvec3 dims = scene.volume.info.dims;
-  const CompressedVolume &coarse = scene.volume.coarser[level];
+  const CompressedVolume &coarse = scene.volume.coarser_levels[level];
   const std::vector<float> voxels = decode_with_libzfp(coarse);
   const glm::uvec3 n = coarse.info.dims, blocks = coarse.num_blocks();
   std::vector<float> bounds(voxels.size());
@@ -173,7 +174,7 @@ TEST(LevelBounds, HoldBetweenVoxels) {
        {std::pair(glm::uvec3(33, 32, 40), 16u), std::pair(glm::uvec3(17, 41, 20), 16u),
         std::pair(glm::uvec3(33, 32, 40), 4u)}) {
     const Scene scene(dims, test::noise_field(3), {.rate = rate});
-    for (std::size_t level = 0; level < scene.volume.coarser.size(); ++level) {
+    for (std::size_t level = 0; level < scene.volume.coarser_levels.size(); ++level) {
       const double slack = least_slack(scene, level, 200000);
       EXPECT_GE(slack, 1) << "level " << level + 1;
       EXPECT_LT(slack, 2.5) << "a bound that is never needed, level " << level + 1;
@@ -192,7 +193,7 @@ TEST(LevelBounds, HoldFarFromZero) {
       return 3e6 + steps.at(std::size_t(std::rint(at.x)));
     };
     const Scene scene({33, 8, 8}, field, {.rate = 32});
-    for (std::size_t level = 0; level < scene.volume.coarser.size(); ++level)
+    for (std::size_t level = 0; level < scene.volume.coarser_levels.size(); ++level)
       EXPECT_GE(least_slack(scene, level, 5000), 1) << "seed " << seed << ", level " << level + 1;
   }
 }
@@ -217,14 +218,15 @@ std::vector<double> expect_kept(const Certificate &certificate, std::span<const 
 
 class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  /// Draws a frame, checks its bounds, and counts the pixels that keep max_error. Returns the hits.
+  /// Draws a frame, checks its bounds, and counts the pixels that keep max_surface_error. Returns
+  /// the hits.
   std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene, const Camera &camera,
-                                       float isovalue, double max_error) {
+                                       float isovalue, double max_surface_error) {
     renderer.render(camera, isovalue);
     std::vector<HitRecord> drawn = renderer.hits();
     const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
     expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
-    const CertificateSummary summary = summarize(certificate, max_error);
+    const CertificateSummary summary = summarize(certificate, max_surface_error);
     certified_ += summary.num_certified;
     all_ += summary.num_pixels;
     return drawn;
@@ -252,22 +254,21 @@ TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
 TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
   for (const CompressOptions &options :
        {CompressOptions{.rate = 8},
-        CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
+        CompressOptions{.precision = BlockPrecision{.min_exponent = -6}}}) {
     const Scene scene({40, 37, 44}, test::gyroid_field(11), options);
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
       ocl::Device device(GetParam());
-      Renderer renderer(
-          device, scene.volume,
-          {.size = kMedium, .stream = place, .max_pixel_error = 4, .with_bounds = true});
+      Renderer renderer(device, scene.volume,
+                        {.size = kMedium, .stream = place, .voxel_pixels = 4, .with_bounds = true});
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
-      for (const double value_error : {0.0, 0.1}) {
-        renderer.set_value_error(value_error);
+      for (const double voxel_error : {0.0, 0.1}) {
+        renderer.set_voxel_error(voxel_error);
         for (const FieldBound bound : {FieldBound::kUpper, FieldBound::kNone, FieldBound::kLower}) {
           renderer.draw_bound(bound);
           renderer.render(camera, 0.4f);
           expect_same_hits(renderer.hits(),
-                           Twin(scene.volume, 4, value_error, bound).render(camera, kMedium, 0.4f),
+                           Twin(scene.volume, 4, voxel_error, bound).render(camera, kMedium, 0.4f),
                            kMedium.width);
         }
         renderer.draw_bound(FieldBound::kNone);
@@ -284,17 +285,17 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
          {test::gyroid_field(24), test::sphere_field(dims), test::noise_field(7)}) {
       for (const CompressOptions &options :
            {CompressOptions{.rate = 8},
-            CompressOptions{.error_bound = ErrorBound{.min_exponent = -8}}}) {
+            CompressOptions{.precision = BlockPrecision{.min_exponent = -8}}}) {
         const Scene scene(dims, field, options);
         Renderer renderer(device_, scene.volume,
-                          {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
+                          {.size = kMedium, .voxel_pixels = 2, .with_bounds = true});
         std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
         cameras.push_back(camera_along({20, 18, 16}, {0.3, 0.2, 1}));  // from within
         for (const Camera &camera : cameras) {
           for (const Detail &detail :
                {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
-            renderer.set_max_pixel_error(detail.max_pixel_error);
-            renderer.set_value_error(detail.value_error);
+            renderer.set_voxel_pixels(detail.voxel_pixels);
+            renderer.set_voxel_error(detail.voxel_error);
             const std::vector<HitRecord> drawn = certify_frame(renderer, scene, camera, 0.3f, 10);
             renderer.render(camera, 0.3f);  // and the volume is drawn again
             expect_same_hits(renderer.hits(), drawn, kMedium.width);
@@ -310,11 +311,11 @@ TEST_P(CertifyOnDevice, RealVolumes) {
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .max_pixel_error = 2, .with_bounds = true});
+                      {.size = kMedium, .voxel_pixels = 2, .with_bounds = true});
     for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
       for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
-        for (const double max_pixel_error : {0.0, 2.0}) {
-          renderer.set_max_pixel_error(max_pixel_error);
+        for (const double voxel_pixels : {0.0, 2.0}) {
+          renderer.set_voxel_pixels(voxel_pixels);
           certify_frame(renderer, scene, camera, isovalue, 4);
         }
       }
@@ -326,7 +327,7 @@ TEST_P(CertifyOnDevice, RealVolumes) {
 /// From so far that most of an error is what t loses in float32.
 TEST_P(CertifyOnDevice, FarAway) {
   const Scene scene("nucleon_41x41x41_uint8.raw.gz",
-                    {.error_bound = ErrorBound{.min_exponent = -16, .max_error = 0x1p-16}});
+                    {.precision = BlockPrecision{.min_exponent = -16, .max_voxel_error = 0x1p-16}});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye = camera.at + 700.0 * (camera.eye - camera.at);
   camera.fovy_deg /= 700;
@@ -345,9 +346,9 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
   const auto noise = [field = test::noise_field(3)](const glm::dvec3 &at) mutable {
     return std::rint(127.5 + 127.5 * field(at));
   };
-  const Scene scene(
-      {40, 40, 40}, noise,
-      {.error_bound = ErrorBound{.min_exponent = -6, .whole_numbers = true, .max_error = 0}});
+  const Scene scene({40, 40, 40}, noise,
+                    {.precision = BlockPrecision{
+                         .min_exponent = -6, .whole_numbers = true, .max_voxel_error = 0}});
   Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   for (const double x : {12.0, 19.0, 26.0}) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
@@ -363,14 +364,14 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
 /// The goal is that half of the pixels have a bound of at most 8 times their error.
 TEST_P(CertifyOnDevice, BoundsAreTight) {
   for (const CompressOptions &options :
-       {CompressOptions{.rate = 4},
-        CompressOptions{.error_bound = ErrorBound{.min_exponent = -6, .max_error = 0.015625}}}) {
+       {CompressOptions{.rate = 4}, CompressOptions{.precision = BlockPrecision{.min_exponent = -6,
+                                                                 .max_voxel_error = 0.015625}}}) {
     const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+                      {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-    for (const double max_pixel_error : {0.0, 2.0}) {
-      renderer.set_max_pixel_error(max_pixel_error);
+    for (const double voxel_pixels : {0.0, 2.0}) {
+      renderer.set_voxel_pixels(voxel_pixels);
       renderer.render(camera, 0.3f);
       const std::vector<HitRecord> drawn = renderer.hits();
       const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
@@ -379,9 +380,9 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
       ASSERT_GT(slack.size(), 100u);
       // The error of a coarse level changes its sign between voxels: there, only the larger errors
       // say how tight a bound is.
-      EXPECT_LT(max_pixel_error == 0 ? slack[slack.size() / 2] : slack[slack.size() / 10], 8);
+      EXPECT_LT(voxel_pixels == 0 ? slack[slack.size() / 2] : slack[slack.size() / 10], 8);
       const CertificateSummary summary = summarize(certificate, 1e9);
-      EXPECT_GT(summary.num_certified, summary.num_pixels * 7 / 10) << max_pixel_error;
+      EXPECT_GT(summary.num_certified, summary.num_pixels * 7 / 10) << voxel_pixels;
     }
   }
 }
@@ -412,51 +413,52 @@ TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
 TEST_P(CertifyOnDevice, ChoosesLessForMore) {
   const glm::uvec3 dims(96, 96, 96);
   const Scene scene(dims, test::sphere_field(dims),
-                    {.error_bound = ErrorBound{.min_exponent = -10}});
+                    {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye += 0.35 * (camera.eye - camera.at);  // so far that levels spare most blocks
-  double pixel_error = -1, value_error = -1;
-  for (const double max_error : {0.00005, 0.05, 1.0, 4.0}) {
-    const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.5f, max_error);
-    EXPECT_GE(choice.detail.max_pixel_error, pixel_error);
-    if (choice.detail.max_pixel_error == pixel_error) {
-      EXPECT_GE(choice.detail.value_error, value_error);
+  double voxel_pixels = -1, voxel_error = -1;
+  for (const double max_surface_error : {0.00005, 0.05, 1.0, 4.0}) {
+    const DetailChoice choice =
+        choose_detail(renderer, scene.volume, camera, 0.5f, max_surface_error);
+    EXPECT_GE(choice.detail.voxel_pixels, voxel_pixels);
+    if (choice.detail.voxel_pixels == voxel_pixels) {
+      EXPECT_GE(choice.detail.voxel_error, voxel_error);
     }
-    pixel_error = choice.detail.max_pixel_error;
-    value_error = choice.detail.value_error;
-    EXPECT_EQ(renderer.options().max_pixel_error, pixel_error);
-    EXPECT_EQ(renderer.value_error(), value_error);
+    voxel_pixels = choice.detail.voxel_pixels;
+    voxel_error = choice.detail.voxel_error;
+    EXPECT_EQ(renderer.options().voxel_pixels, voxel_pixels);
+    EXPECT_EQ(renderer.voxel_error(), voxel_error);
     EXPECT_EQ(renderer.options().size.width, kMedium.width);
-    if (max_error == 0.00005) {
+    if (max_surface_error == 0.00005) {
       EXPECT_FALSE(choice.reachable);
       ASSERT_TRUE(choice.tolerance);
-      EXPECT_LT(*choice.tolerance, *scene.volume.max_error);
-      EXPECT_EQ(pixel_error, 0);
+      EXPECT_LT(*choice.tolerance, *scene.volume.max_voxel_error);
+      EXPECT_EQ(voxel_pixels, 0);
     } else {
       EXPECT_TRUE(choice.reachable);
       renderer.render(camera, 0.5f);
       const std::vector<HitRecord> drawn = renderer.hits();
       const CertificateSummary summary =
-          summarize(certify(renderer, scene.volume, camera, 0.5f, drawn), max_error);
+          summarize(certify(renderer, scene.volume, camera, 0.5f, drawn), max_surface_error);
       EXPECT_GE(double(summary.num_certified) / double(summary.num_pixels),
                 choice.tries[0].certified - kLostShare)
           << "a picture so small is tried as it is";
     }
   }
-  EXPECT_GT(pixel_error, 0);
+  EXPECT_GT(voxel_pixels, 0);
 }
 
 TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   for (const std::uint32_t rate : {8u, 16u, 24u}) {
     const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+                      {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 1);
     EXPECT_TRUE(choice.reachable);
-    EXPECT_EQ(choice.detail.value_error > 0, rate > 16) << "rate " << rate;
+    EXPECT_EQ(choice.detail.voxel_error > 0, rate > 16) << "rate " << rate;
   }
 }
 
@@ -464,16 +466,16 @@ TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
 /// levels cost.
 TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
   const Scene scene({96, 96, 96}, test::gyroid_field(48),
-                    {.error_bound = ErrorBound{.min_exponent = -10}});
+                    {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
+                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
-    return each.detail.max_pixel_error > 0.6 &&
+    return each.detail.voxel_pixels > 0.6 &&
            each.certified >= choice.tries[0].certified - kLostShare;
   })) << "the error would allow them";
-  EXPECT_EQ(choice.detail.max_pixel_error, 0);
+  EXPECT_EQ(choice.detail.voxel_pixels, 0);
   EXPECT_EQ(renderer.render(camera, 0.3f).last_level, 0u);
 }
 
@@ -482,13 +484,13 @@ TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
 TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
   const glm::uvec3 dims(96, 96, 96);
   const Scene scene(dims, test::sphere_field(dims),
-                    {.error_bound = ErrorBound{.min_exponent = -10}});
+                    {.precision = BlockPrecision{.min_exponent = -10}});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .max_pixel_error = 1, .with_bounds = true});
-  for (const double max_pixel_error :
+                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+  for (const double voxel_pixels :
        {1.0, 1.4}) {  // a border among the places where rays enter, or in the surface
-    renderer.set_max_pixel_error(max_pixel_error);
+    renderer.set_voxel_pixels(voxel_pixels);
     const auto hits_of = [&](FieldBound bound) {
       renderer.draw_bound(bound);
       renderer.render(camera, 0.5f);
@@ -531,9 +533,9 @@ TEST_P(CertifyOnDevice, SmallerPicturesAreTheTwins) {
 TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
   const Scene scene({30, 30, 30}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  const auto bounds = [&](ImageSize size, double max_pixel_error) {
+  const auto bounds = [&](ImageSize size, double voxel_pixels) {
     Renderer renderer(device_, scene.volume,
-                      {.size = size, .max_pixel_error = max_pixel_error, .with_bounds = true});
+                      {.size = size, .voxel_pixels = voxel_pixels, .with_bounds = true});
     renderer.render(camera, 0.3f);
     return certify(renderer, scene.volume, camera, 0.3f, renderer.hits()).bounds;
   };
@@ -556,17 +558,17 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
     certify(renderer, volume, camera, 0.3f, renderer.hits());
   };
   EXPECT_NO_THROW(
-      certify_with(scene.volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}));
+      certify_with(scene.volume, {.size = kSmall, .voxel_pixels = 1, .with_bounds = true}));
   CompressedVolume volume = scene.volume;
-  volume.max_error.reset();
+  volume.max_voxel_error.reset();
   volume.bounds = {};
   EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
               ThrowsMessage<Error>(HasSubstr("--no-verify")));
   volume = scene.volume;
-  volume.coarser[0].bounds = {};
+  volume.coarser_levels[0].bounds = {};
   EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));
   EXPECT_THAT(
-      [&] { certify_with(volume, {.size = kSmall, .max_pixel_error = 1, .with_bounds = true}); },
+      [&] { certify_with(volume, {.size = kSmall, .voxel_pixels = 1, .with_bounds = true}); },
       ThrowsMessage<Error>(HasSubstr("--levels")));
   volume = scene.volume;
   volume.value_range = {-INFINITY, INFINITY};
@@ -579,7 +581,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
       },
       ThrowsMessage<Error>(HasSubstr("bernstein")));
   Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true});
-  EXPECT_THROW(renderer.set_max_pixel_error(1), Error);
+  EXPECT_THROW(renderer.set_voxel_pixels(1), Error);
   EXPECT_THROW(renderer.set_size({13, 8}), Error);
   for (const double bad : {0.0, -1.0, double{INFINITY}, double{NAN}})
     EXPECT_THROW(choose_detail(renderer, scene.volume, camera, 0.3f, bad), Error);

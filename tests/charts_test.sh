@@ -40,8 +40,8 @@ for bad in "$work/none.raw:1" "$top/tests/data/fuel_64x33x32_uint8.raw.gz" "$wor
 done
 
 "$program" bench pareto generate:sphere_96x96x96_uint8 -i 128 --size 48x32 --views 1 --rounds 1 \
-  --storage rate:2,tolerance:2,exact --pipeline rays --solver bernstein --max-pixel-error 0,2 --value-error 0,0.1 \
-  --max-error 0.1,20 --json "$work/all.json" >"$work/out"
+  --storage rate:2,tolerance:2,exact --pipeline rays --solver bernstein --voxel-pixels 0,2 --voxel-error 0,0.1 \
+  --max-surface-error 0.1,20 --json "$work/all.json" >"$work/out"
 "$top/tools/charts" "$work/all.json" -o "$work"
 for file in all_pareto.png all_pareto.svg; do
   [ -s "$work/$file" ] || fail "$file is missing"
@@ -49,23 +49,23 @@ done
 /usr/bin/python3 - "$work/all.json" <<'EOF'
 import json, sys
 points = json.load(open(sys.argv[1]))["points"]
-chosen = [p for p in points if p["max_error"] is not None]
-points = [p for p in points if p["max_error"] is None]
+chosen = [p for p in points if p["max_surface_error"] is not None]
+points = [p for p in points if p["max_surface_error"] is None]
 assert len(points) == 12, len(points)
 assert len(chosen) == 6, "two errors of three ways to store it"
 assert all(p["over_front"] is None or p["over_front"] > 0 for p in chosen), chosen
 assert any(p["over_front"] for p in chosen if p["storage"] == "exact"), "the best point is among the swept"
-small, large = [sum(c["max_pixel_error"] for p in chosen if p["max_error"] == error for c in p["chosen"]) for error in (0.1, 20)]
+small, large = [sum(c["voxel_pixels"] for p in chosen if p["max_surface_error"] == error for c in p["chosen"]) for error in (0.1, 20)]
 assert small < large, "more may be left out where more error is allowed"
 exact = [p for p in points if p["storage"] == "exact"]
-best = [p for p in exact if p["max_pixel_error"] == p["value_error"] == 0]
+best = [p for p in exact if p["voxel_pixels"] == p["voxel_error"] == 0]
 assert len(best) == 1 and best[0]["wrong_pixels"] == best[0]["depth_p99"] == 0 and best[0]["psnr_db"] is None, best
 assert best[0]["flip"] == 0
 assert all(p["psnr_db"] is not None and p["flip"] > 0 for p in points if p not in best), "only the exact one is without error"
 assert len({p["bytes"] for p in points}) == 6, "three ways to store it, without and with levels"
-assert min(p["decoded_blocks"] for p in exact if p["max_pixel_error"]) < best[0]["decoded_blocks"]
+assert min(p["decoded_blocks"] for p in exact if p["voxel_pixels"]) < best[0]["decoded_blocks"]
 EOF
-for bad in "--storage rate" "--storage full:3" "--max-pixel-error -1" "--max-error -1"; do
+for bad in "--storage rate" "--storage full:3" "--voxel-pixels -1" "--max-surface-error -1"; do
   # shellcheck disable=SC2086
   if "$program" bench pareto "$top/tests/data/fuel_64x33x32_uint8.raw.gz" -i 40 $bad 2>"$work/error" >/dev/null; then
     fail "$bad was accepted"

@@ -40,7 +40,7 @@ TEST(CliOptions, EmptyValuesAreRefused) {
                              "--tolerance-relative",
                              "--rate",
                              "--levels",
-                             "--value-error",
+                             "--voxel-error",
                              "--size",
                              "--orbit",
                              "--cameras",
@@ -49,7 +49,7 @@ TEST(CliOptions, EmptyValuesAreRefused) {
                              "--depth",
                              "--stats",
                              "--device",
-                             "--max-error",
+                             "--max-surface-error",
                              "--progress-dir",
                              "--color",
                              "--dims",
@@ -76,8 +76,8 @@ TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
   for (const char *value : {"-1", "18446744073709551616", "1e3", "0x10", "+1", "1.0"})
     expect_one_line_error("generate mixing_layer --dims 8 --seed '" + std::string(value) + "'",
                           "--seed: ");
-  for (const char *option : {"--value-error", "--max-pixel-error", "--max-error", "--time-budget",
-                             "--tolerance", "--spacing"})
+  for (const char *option : {"--voxel-error", "--voxel-pixels", "--max-surface-error",
+                             "--time-budget", "--tolerance", "--spacing"})
     expect_one_line_error(kRender + option + " inf", option);
   for (const std::string option : {"--tolerance", "--tolerance-relative"}) {
     for (const char *value : {"0", "-1"})

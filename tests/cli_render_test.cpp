@@ -254,14 +254,14 @@ TEST(CliRender, ErrorsInsteadOfARate) {
   const std::string exact = depth(quoted(folder / "n.zfp"));
   EXPECT_EQ(depth(kNucleon + " --exact"), exact);
   EXPECT_EQ(depth(kNucleon + " --rate 32"), exact) << "as good as no compression";
-  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --value-error 0.1"), exact)
+  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --voxel-error 0.1"), exact)
       << "less than what was left out";
-  const std::string coarse = depth(quoted(folder / "n.zfp") + " --value-error 20");
+  const std::string coarse = depth(quoted(folder / "n.zfp") + " --voxel-error 20");
   EXPECT_NE(coarse, exact);
-  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --value-error 20 --reference"), coarse);
+  EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --voxel-error 20 --reference"), coarse);
   EXPECT_NE(depth(kNucleon + " --tolerance-relative 0.05"), exact);
   test::expect_one_line_error(
-      "render " + kNucleon + " -i 80 --value-error -1 --depth " + quoted(folder / "b.npy"),
+      "render " + kNucleon + " -i 80 --voxel-error -1 --depth " + quoted(folder / "b.npy"),
       "value error of -1");
   test::expect_one_line_error(
       "render " + kNucleon + " -i 80 --rate 4 --exact --depth " + quoted(folder / "b.npy"), "rate");
@@ -275,30 +275,30 @@ TEST(CliRender, LevelsOfDetail) {
   EXPECT_NE(converted.out.find("level of detail 21x21x21"), std::string::npos) << converted.out;
   const json info = json::parse(run_isowave("info --json " + file).out);
   EXPECT_EQ(info["coarser"], json({{21, 21, 21}, {11, 11, 11}, {6, 6, 6}}));
-  ASSERT_EQ(info["coarser_error"].size(), 3u);
-  EXPECT_GT(info["coarser_error"][0], info["max_error"])
+  ASSERT_EQ(info["level_errors"].size(), 3u);
+  EXPECT_GT(info["level_errors"][0], info["max_voxel_error"])
       << "against the finest level before compression";
   const auto depth = [&](const std::string &arguments) {
     render(arguments + " -i 80 --size 32x32 --no-stage-times --stats " + quoted(folder / "a.json") +
            " --depth " + quoted(folder / "a.npy"));
     return test::read_file(folder / "a.npy");
   };
-  const std::string finest = depth(file), coarse = depth(file + " --max-pixel-error 1.5");
+  const std::string finest = depth(file), coarse = depth(file + " --voxel-pixels 1.5");
   const json stats = json::parse(test::read_file(folder / "a.json"));
   const json levels = stats["frames"][0]["levels"];
   EXPECT_LT(levels.at(0).get<int>(), levels.at(1).get<int>()) << "one level drew all";
-  EXPECT_EQ(stats["options"]["max_pixel_error"], 1.5);
+  EXPECT_EQ(stats["options"]["voxel_pixels"], 1.5);
   EXPECT_NE(coarse, finest);
-  EXPECT_EQ(depth(file + " --max-pixel-error 1.5 --reference"), coarse);
-  EXPECT_EQ(depth(kNucleon + " --rate 16 --max-pixel-error 1.5"), coarse)
+  EXPECT_EQ(depth(file + " --voxel-pixels 1.5 --reference"), coarse);
+  EXPECT_EQ(depth(kNucleon + " --rate 16 --voxel-pixels 1.5"), coarse)
       << "levels are made when they are needed";
-  EXPECT_EQ(depth(file + " --max-pixel-error 0"), finest);
+  EXPECT_EQ(depth(file + " --voxel-pixels 0"), finest);
 
   ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 4 -o " + file).status, 0);
   const std::string refused =
       "render " + file + " -i 80 --reference --depth " + quoted(folder / "b.npy");
-  test::expect_one_line_error(refused + " --max-pixel-error 1", "no levels of detail");
-  test::expect_one_line_error(refused + " --max-pixel-error -1", "a distance of -1 pixels");
+  test::expect_one_line_error(refused + " --voxel-pixels 1", "no levels of detail");
+  test::expect_one_line_error(refused + " --voxel-pixels -1", "a distance of -1 pixels");
   test::expect_one_line_error("convert " + kNucleon + " --levels 9 -o " + file,
                               "9 levels of detail");
   test::expect_one_line_error("convert " + kNucleon + " --levels some -o " + file, "--levels");
@@ -314,7 +314,7 @@ TEST(CliRender, MaxError) {
     EXPECT_NE(run.out.find("pixels of the true surface"), std::string::npos) << run.out;
     return json::parse(test::read_file(folder / "a.json"))["frames"][0]["error"];
   };
-  const json error = error_of(file + " --max-error 0.5");
+  const json error = error_of(file + " --max-surface-error 0.5");
   EXPECT_TRUE(error["reachable"].get<bool>());
   EXPECT_GT(error["certified"], 0.9 * error["pixels"].get<double>());
   EXPECT_GT(error["tries"].size(), 3u);
@@ -324,18 +324,20 @@ TEST(CliRender, MaxError) {
   EXPECT_EQ(
       std::ranges::count_if(bounds.pixels, [](float bound) { return bound > 0 && bound <= 0.5f; }),
       error["certified"].get<int>());
-  EXPECT_EQ(error_of(kNucleon + " --rate 16 --max-error 0.5")["chosen"], error["chosen"])
+  EXPECT_EQ(error_of(kNucleon + " --rate 16 --max-surface-error 0.5")["chosen"], error["chosen"])
       << "a volume that is compressed now";
-  const json out_of_reach = error_of(kNucleon + " --rate 2 --max-error 0.001");
+  const json out_of_reach = error_of(kNucleon + " --rate 2 --max-surface-error 0.001");
   EXPECT_FALSE(out_of_reach["reachable"].get<bool>());
-  EXPECT_EQ(out_of_reach["chosen"], json({{"max_pixel_error", 0.0}, {"value_error", 0.0}}));
+  EXPECT_EQ(out_of_reach["chosen"], json({{"voxel_pixels", 0.0}, {"voxel_error", 0.0}}));
 
   const std::string command = "render " + file + " -i 80 --depth " + quoted(folder / "b.npy");
-  test::expect_one_line_error(command + " --max-error 1 --reference", "--reference cannot choose");
-  test::expect_one_line_error(command + " --max-error 0", "an error of 0 pixels");
-  test::expect_one_line_error(command + " --max-error 1 --value-error 1",
-                              "leave out --value-error");
-  test::expect_one_line_error(command + " --error-map " + map, "--error-map needs --max-error");
+  test::expect_one_line_error(command + " --max-surface-error 1 --reference",
+                              "--reference cannot choose");
+  test::expect_one_line_error(command + " --max-surface-error 0", "an error of 0 pixels");
+  test::expect_one_line_error(command + " --max-surface-error 1 --voxel-error 1",
+                              "leave out --voxel-error");
+  test::expect_one_line_error(command + " --error-map " + map,
+                              "--error-map needs --max-surface-error");
 }
 
 TEST(CliRender, TimeBudget) {
@@ -352,7 +354,7 @@ TEST(CliRender, TimeBudget) {
   EXPECT_FALSE(frame["complete"].get<bool>());
   ASSERT_EQ(frame["steps"].size(), 1u);
   EXPECT_EQ(frame["steps"][0]["size"], json({8, 6}));
-  EXPECT_EQ(frame["steps"][0]["max_pixel_error"], 1.0) << "levels of detail are made for it";
+  EXPECT_EQ(frame["steps"][0]["voxel_pixels"], 1.0) << "levels of detail are made for it";
   EXPECT_NE(run.out.find("8x6, voxels up to 1"), std::string::npos) << run.out;
   const Image8 quick = read_png(folder / "quick.png"), plain = read_png(folder / "plain.png");
   EXPECT_EQ(quick.width, 64u);
@@ -367,7 +369,7 @@ TEST(CliRender, TimeBudget) {
   test::expect_one_line_error(command + "0", "no picture can be drawn in 0 ms");
   test::expect_one_line_error(command + "nan", "--time-budget");
   test::expect_one_line_error(command + "9 --reference", "--reference cannot choose");
-  test::expect_one_line_error(command + "9 --max-error 1", "leave out --time-budget");
+  test::expect_one_line_error(command + "9 --max-surface-error 1", "leave out --time-budget");
   test::expect_one_line_error(command + "9 --progress-dir " + quoted(folder / "p"),
                               "leave out --progress-dir");
   test::expect_one_line_error("render " + scene + " --refined " + picture("a"),

@@ -65,10 +65,10 @@ TEST(CliVerify, NamesViewsOutOfEmbreesReach) {
 
 TEST(CliVerify, JudgesBoundsOfErrors) {
   const TemporaryFolder folder;
-  const auto run =
-      run_isowave("verify " + kNucleon +
-                  " -i 80 --orbit 2 --size 64x48 --rate 8 --max-error 2 --device cpu --json " +
-                  quoted(folder / "v.json"));
+  const auto run = run_isowave(
+      "verify " + kNucleon +
+      " -i 80 --orbit 2 --size 64x48 --rate 8 --max-surface-error 2 --device cpu --json " +
+      quoted(folder / "v.json"));
   EXPECT_EQ(run.status, 0) << run.err;
   const json frames = json::parse(test::read_file(folder / "v.json"))["frames"];
   ASSERT_EQ(frames.size(), 2u);
@@ -78,12 +78,12 @@ TEST(CliVerify, JudgesBoundsOfErrors) {
     EXPECT_GT(frame["misses"], 0);
     EXPECT_GE(frame["slack"]["p50"], 1.0);
   }
-  const std::string command = "verify " + kNucleon + " -i 80 --max-error ";
+  const std::string command = "verify " + kNucleon + " -i 80 --max-surface-error ";
   test::expect_one_line_error(command + "0", "an error of 0 pixels");
   test::expect_one_line_error(command + "1 --oracle cells", "leave out --oracle");
   test::expect_one_line_error(command + "1 --solver linear", "the default solver");
-  test::expect_one_line_error("verify --max-error 1", "give a VOLUME");
-  test::expect_one_line_error("verify none.zfp -i 80 --max-error 1",
+  test::expect_one_line_error("verify --max-surface-error 1", "give a VOLUME");
+  test::expect_one_line_error("verify none.zfp -i 80 --max-surface-error 1",
                               "the volume before compression is needed");
 }
 

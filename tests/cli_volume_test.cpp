@@ -39,7 +39,7 @@ TEST(Cli, ConvertAndInfo) {
   EXPECT_EQ(json["rate"], 4.0);
   EXPECT_EQ(json["block_count"], 11 * 11 * 11);
   EXPECT_EQ(json["value_range"], (std::array{0, 249}));
-  EXPECT_GT(json["max_error"], 0.0);
+  EXPECT_GT(json["max_voxel_error"], 0.0);
   EXPECT_EQ(json["file_bytes"], std::filesystem::file_size(folder / "n.zfp"));
 
   const auto text = run_isowave("info " + kNucleon);
@@ -60,12 +60,12 @@ TEST(Cli, ConvertWithinAnError) {
   };
   const auto absolute = info_of("--tolerance 2.49");
   EXPECT_EQ(absolute["format"], "zfp, fixed accuracy");
-  EXPECT_LE(absolute["max_error"], 2.49);
-  EXPECT_GT(absolute["max_error"], 0.0);
+  EXPECT_LE(absolute["max_voxel_error"], 2.49);
+  EXPECT_GT(absolute["max_voxel_error"], 0.0);
   EXPECT_EQ(absolute["exact"], false);
   EXPECT_EQ(info_of("--tolerance-relative 0.01"), absolute) << "of a range from 0 to 249";
   const auto exact = info_of("--exact");
-  EXPECT_EQ(exact["max_error"], 0.0);
+  EXPECT_EQ(exact["max_voxel_error"], 0.0);
   EXPECT_EQ(exact["exact"], true);
   EXPECT_GT(exact["rate"], absolute["rate"]);
   const auto render =

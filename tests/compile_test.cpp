@@ -56,8 +56,8 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const std::vector<std::string> programs = device_.built_programs();
     std::vector<std::string> late;
     device_.on_new_kernel([&](std::string_view kernel) { late.emplace_back(kernel); });
-    for (const double pixels : {options.max_pixel_error, 0.0}) {
-      renderer.set_max_pixel_error(pixels);
+    for (const double pixels : {options.voxel_pixels, 0.0}) {
+      renderer.set_voxel_pixels(pixels);
       for (const float isovalue :
            {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
         renderer.render(cameras_[0], isovalue);
@@ -86,8 +86,8 @@ TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
           {.size = {20, 15, 2}, .pipeline = pipeline, .cache_slots = 8, .stream = stream});
     }
   }
-  expect_all_compiled({.size = kSize, .max_pixel_error = 2});
-  expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .max_pixel_error = 2});
+  expect_all_compiled({.size = kSize, .voxel_pixels = 2});
+  expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .voxel_pixels = 2});
   expect_all_compiled({.size = kSize, .with_kept_picture = true});
 }
 
@@ -116,7 +116,7 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
   EXPECT_THAT(stems({.size = kSize, .with_kept_picture = true}),
               ElementsAre("block_cache", "kept_picture", "macrocells", "march", "zfp_decode"));
   // One for frames that the finest level draws alone, one for others.
-  EXPECT_THAT(stems({.size = kSize, .max_pixel_error = 2}),
+  EXPECT_THAT(stems({.size = kSize, .voxel_pixels = 2}),
               ElementsAre("block_cache", "macrocells", "march x2", "zfp_decode"));
   // Where one work-group scans alone, a GPU gives it more work-items.
   const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";

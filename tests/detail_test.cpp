@@ -94,8 +94,8 @@ TEST(LevelFrames, OneLevelDrawsAllWhereTheVolumeReachesNoBorder) {
   const std::vector<VolumeInfo> levels = levels_of(test::grid_info({64, 64, 64}));
   const Camera near_camera = orbit_cameras(levels[0], 1)[0];
   const Camera far_camera = camera_along({32, 32, -2000}, {0, 0, 1});
-  const auto drawn = [&](const Camera &camera, double max_pixel_error) {
-    const auto frames = make_level_frames(levels, camera, {128, 72}, 0.5f, max_pixel_error);
+  const auto drawn = [&](const Camera &camera, double voxel_pixels) {
+    const auto frames = make_level_frames(levels, camera, {128, 72}, 0.5f, voxel_pixels);
     EXPECT_EQ(std::ranges::count_if(frames, draws), 1);
     const auto found = std::ranges::find_if(frames, draws);
     EXPECT_EQ(found->begin_t, 0.0f);
@@ -202,8 +202,8 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Each camera twice by one renderer. Returns the hits at borders.
   std::size_t check(const CompressedVolume &volume, const std::vector<Camera> &cameras,
                     float isovalue, const RendererOptions &options) {
-    SCOPED_TRACE(fmt::format("{} pixels, {} slots", options.max_pixel_error, options.cache_slots));
-    const Twin twin(volume, options.max_pixel_error);
+    SCOPED_TRACE(fmt::format("{} pixels, {} slots", options.voxel_pixels, options.cache_slots));
+    const Twin twin(volume, options.voxel_pixels);
     const std::vector<VolumeInfo> infos = level_infos(volume, true);
     Renderer renderer(device_, volume, options);
     std::size_t at_border = 0;
@@ -215,7 +215,7 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
       }
       const auto frames =
-          make_level_frames(infos, camera, options.size, isovalue, options.max_pixel_error);
+          make_level_frames(infos, camera, options.size, isovalue, options.voxel_pixels);
       EXPECT_GT(std::ranges::count_if(frames, draws), 1) << "no border is tested";
       at_border += num_border_hits(expected, frames);
     }
@@ -231,7 +231,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, LevelsOnDevice, testing::ValuesIn(devices_unde
 TEST_P(LevelsOnDevice, SmallFrameIsTheTwins) {
   const CompressedVolume volume = pyramid_of({9, 10, 11}, test::noise_field(8));
   EXPECT_GT(check(volume, {orbit_cameras(volume.info, 1)[0]}, 0.1f,
-                  {.size = kSmall, .cache_slots = 20, .max_pixel_error = 1.4}),
+                  {.size = kSmall, .cache_slots = 20, .voxel_pixels = 1.4}),
             0u);
 }
 
@@ -248,19 +248,19 @@ TEST_P(LevelsOnDevice, EveryKindOfVolumeAndPlace) {
        {test::gyroid_field(11), test::noise_field(5), test::sphere_field(dims)}) {
     for (const CompressOptions &options :
          {CompressOptions{.rate = 8},
-          CompressOptions{.error_bound = ErrorBound{.min_exponent = -6}}}) {
+          CompressOptions{.precision = BlockPrecision{.min_exponent = -6}}}) {
       const CompressedVolume volume = pyramid_of(dims, field, options);
       const std::uint64_t third =
           volume.payload_bits() / 8 / 3;  // the finest level in four buffers, the next in one
       for (const auto &[place, largest_part] : {std::pair{StreamPlace::kDevice, std::uint64_t{0}},
                                                 std::pair{StreamPlace::kDevice, third},
                                                 std::pair{StreamPlace::kHost, std::uint64_t{0}}}) {
-        for (const double max_pixel_error : {2.5, 6.0}) {
+        for (const double voxel_pixels : {2.5, 6.0}) {
           at_border += check(volume, cameras(volume), 0.4f,
                              {.size = kMedium,
                               .stream = place,
                               .largest_stream_part = largest_part,
-                              .max_pixel_error = max_pixel_error});
+                              .voxel_pixels = voxel_pixels});
         }
       }
     }
@@ -278,19 +278,19 @@ TEST_P(LevelsOnDevice, ActiveBlocksFarFromBorders) {
   CompressedVolume volume = pyramid_of(dims, ball({75, 60, 45}, 1, 0));
   std::vector<Camera> cameras = orbit_cameras(volume.info, 3);
   cameras.push_back(camera_along({12, 11, 10}, {1, 0.8, 0.6}));  // from within
-  for (const double max_pixel_error : {1.2, 2.0, 3.0})
-    check(volume, cameras, 0.5f, {.size = kMedium, .max_pixel_error = max_pixel_error});
+  for (const double voxel_pixels : {1.2, 2.0, 3.0})
+    check(volume, cameras, 0.5f, {.size = kMedium, .voxel_pixels = voxel_pixels});
   // Coarser levels that are inside where this one is outside: every ray that comes to their border
   // hits there.
-  volume.coarser = pyramid_of(dims, ball({20, 20, 20}, 0, 1)).coarser;
-  EXPECT_GT(check(volume, cameras, 0.5f, {.size = kMedium, .max_pixel_error = 1.2}), 500u);
+  volume.coarser_levels = pyramid_of(dims, ball({20, 20, 20}, 0, 1)).coarser_levels;
+  EXPECT_GT(check(volume, cameras, 0.5f, {.size = kMedium, .voxel_pixels = 1.2}), 500u);
 }
 
 TEST_P(LevelsOnDevice, AnyCacheAndSpeculation) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const std::vector<Camera> cameras = orbit_cameras(volume.info, 2);
-  check(volume, cameras, 0.4f, {.size = kTiny, .cache_slots = 8, .max_pixel_error = 0.5});
-  check(volume, cameras, 0.4f, {.size = kSmall, .cache_slots = 13, .max_pixel_error = 1});
+  check(volume, cameras, 0.4f, {.size = kTiny, .cache_slots = 8, .voxel_pixels = 0.5});
+  check(volume, cameras, 0.4f, {.size = kSmall, .cache_slots = 13, .voxel_pixels = 1});
   for (const std::uint32_t slots : {64u, 300u}) {
     for (const std::uint32_t speculation : {1u, 7u, 64u}) {
       for (const bool per_ray : {false, true}) {
@@ -299,7 +299,7 @@ TEST_P(LevelsOnDevice, AnyCacheAndSpeculation) {
                .cache_slots = slots,
                .max_speculation = speculation,
                .per_ray_speculation = per_ray,
-               .max_pixel_error = 3});
+               .voxel_pixels = 3});
       }
     }
   }
@@ -309,19 +309,18 @@ TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const std::vector<Camera> cameras = orbit_cameras(volume.info, 3);
   std::map<double, Twin> twins;
-  for (const double max_pixel_error : {0.0, 3.0, 30.0})
-    twins.try_emplace(max_pixel_error, volume, max_pixel_error);
-  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .max_pixel_error = 3});
+  for (const double voxel_pixels : {0.0, 3.0, 30.0})
+    twins.try_emplace(voxel_pixels, volume, voxel_pixels);
+  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .voxel_pixels = 3});
   for (std::size_t last_pass = 1; last_pass < 12; ++last_pass) {
     std::size_t pass = 0;
     renderer.render(cameras[last_pass % 3], last_pass % 2 ? 0.4f : 0.2f,
                     [&](const PassStats &) { return ++pass < last_pass; });
-    for (const double max_pixel_error :
+    for (const double voxel_pixels :
          last_pass % 2 ? std::array{3.0, 0.0, 30.0} : std::array{0.0, 30.0, 3.0}) {
-      renderer.set_max_pixel_error(
-          max_pixel_error);  // several levels, the finest or a coarse one alone
+      renderer.set_voxel_pixels(voxel_pixels);  // several levels, the finest or a coarse one alone
       renderer.render(cameras[0], 0.4f);
-      expect_same_hits(renderer.hits(), twins.at(max_pixel_error).render(cameras[0], kMedium, 0.4f),
+      expect_same_hits(renderer.hits(), twins.at(voxel_pixels).render(cameras[0], kMedium, 0.4f),
                        kMedium.width);
     }
   }
@@ -330,11 +329,11 @@ TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
 TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const Camera camera = orbit_cameras(volume.info, 1)[0];
-  Renderer renderer(device_, volume, {.size = kMedium, .max_pixel_error = 3});
-  for (const double value_error : {0.0, 0.3, 0.01}) {
-    renderer.set_value_error(value_error);
+  Renderer renderer(device_, volume, {.size = kMedium, .voxel_pixels = 3});
+  for (const double voxel_error : {0.0, 0.3, 0.01}) {
+    renderer.set_voxel_error(voxel_error);
     renderer.render(camera, 0.4f);
-    expect_same_hits(renderer.hits(), Twin(volume, 3, value_error).render(camera, kMedium, 0.4f),
+    expect_same_hits(renderer.hits(), Twin(volume, 3, voxel_error).render(camera, kMedium, 0.4f),
                      kMedium.width);
   }
 }
@@ -343,16 +342,16 @@ TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
 TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const Camera camera = orbit_cameras(volume.info, 1)[0];
-  Renderer renderer(device_, volume, {.size = kMedium, .max_pixel_error = 30});
-  renderer.set_value_error(0.02);
+  Renderer renderer(device_, volume, {.size = kMedium, .voxel_pixels = 30});
+  renderer.set_voxel_error(0.02);
   const FrameStats stats = renderer.render(camera, 0.4f);
   const std::size_t level = stats.first_level;
   ASSERT_GT(level, 0u);
   ASSERT_EQ(stats.last_level, level);
-  const auto drawn_with = [&](double value_error) {
-    const CompressedVolume &alone = volume.coarser[level - 1];
+  const auto drawn_with = [&](double voxel_error) {
+    const CompressedVolume &alone = volume.coarser_levels[level - 1];
     return render_scalar(make_frame_params(alone.info, camera, kMedium, 0.4f),
-                         decode_with_libzfp(alone, value_error));
+                         decode_with_libzfp(alone, voxel_error));
   };
   const std::vector<float> depth = depth_of(renderer.hits());
   EXPECT_EQ(depth, depth_of(drawn_with(std::ldexp(0.02, static_cast<int>(level)))));
@@ -362,7 +361,7 @@ TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
 /// A band's end is not the rays'.
 TEST_P(LevelsOnDevice, FramesAreCompleteAfterTheLastBand) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
-  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .max_pixel_error = 3});
+  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .voxel_pixels = 3});
   const FrameStats stats = renderer.render(orbit_cameras(volume.info, 1)[0], 0.4f);
   ASSERT_LT(stats.first_level, stats.last_level);
   for (std::size_t i = 1; i < stats.passes.size(); ++i) {
@@ -375,8 +374,8 @@ TEST_P(LevelsOnDevice, FramesAreCompleteAfterTheLastBand) {
 TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
   const CompressedVolume volume = pyramid_of({64, 64, 64}, test::gyroid_field(16));
   const Camera camera = camera_along({32, 32, -200}, {0, 0, 1}, {0, 1, 0}, 30);
-  const auto num_decoded = [&](double max_pixel_error) {
-    Renderer renderer(device_, volume, {.size = kMedium, .max_pixel_error = max_pixel_error});
+  const auto num_decoded = [&](double voxel_pixels) {
+    Renderer renderer(device_, volume, {.size = kMedium, .voxel_pixels = voxel_pixels});
     const FrameStats stats = renderer.render(camera, 0.4f);
     return std::accumulate(
         stats.passes.begin(), stats.passes.end(), std::uint64_t{0},
@@ -396,8 +395,8 @@ TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
     Image8 image;
     std::uint64_t decoded = 0;
   };
-  const auto draw = [&](ImageSize size, double max_pixel_error) {
-    Renderer renderer(device_, volume, {.size = size, .max_pixel_error = max_pixel_error});
+  const auto draw = [&](ImageSize size, double voxel_pixels) {
+    Renderer renderer(device_, volume, {.size = size, .voxel_pixels = voxel_pixels});
     Picture picture;
     for (const PassStats &pass : renderer.render(camera, 80).passes)
       picture.decoded += pass.counts.decoded_count;
@@ -418,16 +417,16 @@ TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
 TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
   const CompressedVolume volume = pyramid_of({20, 20, 20}, test::gyroid_field(10));
   CompressedVolume flat = volume;
-  flat.coarser.clear();
-  EXPECT_THAT([&] { Renderer(device_, flat, {.size = kSmall, .max_pixel_error = 1}); },
+  flat.coarser_levels.clear();
+  EXPECT_THAT([&] { Renderer(device_, flat, {.size = kSmall, .voxel_pixels = 1}); },
               ThrowsMessage<Error>(AllOf(HasSubstr("no levels of detail"), HasSubstr("--levels"))));
   EXPECT_THAT(
       [&] {
         Renderer(device_, volume,
-                 {.size = kSmall, .pipeline = PipelineKind::kBlocks, .max_pixel_error = 1});
+                 {.size = kSmall, .pipeline = PipelineKind::kBlocks, .voxel_pixels = 1});
       },
       ThrowsMessage<Error>(HasSubstr("pipeline blocks")));
-  EXPECT_THROW(Renderer(device_, volume, {.size = kSmall, .max_pixel_error = -1}), Error);
+  EXPECT_THROW(Renderer(device_, volume, {.size = kSmall, .voxel_pixels = -1}), Error);
 }
 
 // ---- what it is for
@@ -444,10 +443,10 @@ TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
   const ImageSize size{48, 32}, fine_size{192, 128};
   const std::array<Twin, 2> twins{Twin(volume), Twin(volume, 0.5)};
   for (const Camera &camera : orbit_cameras(volume.info, 3)) {
-    const auto picture = [&](ImageSize image, double max_pixel_error) {
+    const auto picture = [&](ImageSize image, double voxel_pixels) {
       const FrameParams frame = make_frame_params(volume.info, camera, image, 0.0f);
       return shade_scalar(frame, make_shade_params(volume.info, {}),
-                          twins[max_pixel_error > 0].render(camera, image, 0.0f));
+                          twins[voxel_pixels > 0].render(camera, image, 0.0f));
     };
     const Image8 fine = picture(fine_size, 0);
     const double with = error_of(picture(size, 0.5), fine),

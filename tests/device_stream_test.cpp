@@ -212,7 +212,7 @@ TEST_P(DeviceStreamOnDevice, SmallPartsDecodeToTheSameBits) {
 
 TEST_P(DeviceStreamOnDevice, SmallWholeNumbersAreRounded) {
   CompressedVolume volume = indexed_volume(-1, {9, 10, 11});
-  volume.error_bound.whole_numbers = true;
+  volume.precision.whole_numbers = true;
   expect_decoded(volume, DeviceStream(device_, volume));
   expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
 }
@@ -263,7 +263,7 @@ TEST_P(DeviceStreamOnDevice, SmallLyingIndexDecodesToTheSameBits) {
     for (uint b = 0; b < num_blocks; ++b) {
       float values[64];
       zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
-                       volume.error_bound.min_exponent, values);
+                       volume.precision.min_exponent, values);
       ASSERT_EQ(std::memcmp(values, &expected[64 * std::size_t{b}], sizeof(values)), 0)
           << "block " << b;
     }
@@ -278,7 +278,7 @@ TEST_P(DeviceStreamOnDevice, SmallFilesThatBecomeShorterAreOneLine) {
   for (const bool indexed : {false, true}) {
     ArrayReader source(test::grid_info({9, 10, 11}), random_voxels({9, 10, 11}, -3, 3, 7));
     CompressOptions options{.rate = 5};
-    if (indexed) options.error_bound = ErrorBound{-4};
+    if (indexed) options.precision = BlockPrecision{-4};
     compress_to_file(source, options, path);
     const std::string bytes = test::read_file(path);
     for (const bool copied : {true, false}) {

@@ -54,8 +54,7 @@ struct TestVolume {
   /// Blocks as long as the goal demands. info.type: an integer type, where it is exact.
   TestVolume(const VolumeInfo &info, const std::vector<float> &source, const ErrorGoal &goal) {
     ArrayReader reader(info, source);
-    compressed =
-        compress(reader, CompressOptions{.error_bound = choose_error_bound(reader, goal, {})});
+    compressed = compress(reader, CompressOptions{.precision = choose_precision(reader, goal, {})});
     voxels = decode_with_libzfp(compressed);
   }
   TestVolume(const VolumeInfo &info, const std::vector<float> &source, std::uint32_t rate)

@@ -40,7 +40,7 @@ class HostileZfp : public testing::Test {
     ArrayReader source(test::grid_info({18, 17, 19}),
                        test::sample({18, 17, 19}, test::gyroid_field(9)));
     CompressOptions options{.rate = 6, .measure_error = true, .levels = 2};
-    if (indexed) options.error_bound = ErrorBound{-8};
+    if (indexed) options.precision = BlockPrecision{-8};
     compress_to_file(source, options, path_);
     return test::read_file(path_);
   }
@@ -134,7 +134,7 @@ TEST_F(HostileZfp, EmptyAndOtherBlocksAreFoundAlike) {
   for (std::size_t i = 0; i < voxels.size(); ++i)
     if (i % 64 / 4 % 5 < 3 || i / 64 % 36 < 13) voxels[i] = 0;
   ArrayReader source(test::grid_info({64, 36, 21}), voxels);
-  const CompressedVolume volume = compress(source, {.error_bound = ErrorBound{-6}});
+  const CompressedVolume volume = compress(source, {.precision = BlockPrecision{-6}});
   std::uint32_t block = 0;
   find_block_lengths(volume, "a test", [&](std::uint32_t bits, std::uint64_t count) {
     for (; count > 0; --count) EXPECT_EQ(bits, volume.block_bits(block++));
@@ -220,8 +220,8 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
         test::write_file(path_, with_trailer(parts.before, changed.dump(), parts.version));
         try {
           const CompressedVolume volume = open_zfp_file(path_);
-          EXPECT_TRUE(!volume.max_error ||
-                      (*volume.max_error >= 0 && std::isfinite(*volume.max_error)));
+          EXPECT_TRUE(!volume.max_voxel_error ||
+                      (*volume.max_voxel_error >= 0 && std::isfinite(*volume.max_voxel_error)));
           EXPECT_LE(volume.value_range[0], volume.value_range[1]);
           decode_with_libzfp(volume);
           ++num_read;
@@ -241,7 +241,7 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
 TEST_F(HostileZfp, DeflatedPartsEndWithTheirBlocks) {
   ArrayReader source(test::grid_info({18, 17, 19}),
                      test::sample({18, 17, 19}, test::gyroid_field(9)));
-  compress_to_file(source, {.error_bound = ErrorBound{-8}, .levels = 2}, path_);
+  compress_to_file(source, {.precision = BlockPrecision{-8}, .levels = 2}, path_);
   const TrailerFile parts(test::read_file(path_));
   const CompressedVolume volume = open_zfp_file(path_);
   const std::size_t stream_bytes = (96 + volume.payload_bits() + 63) / 64 * 8;
@@ -292,7 +292,7 @@ TEST_F(HostileZfp, ErrorsThatLeaveOutTheCastAreNotKnown) {
                                          " --levels 2 " + compression + " -o " + quoted(path_));
       ASSERT_EQ(run.status, 0) << run.err;
       const CompressedVolume right = open_zfp_file(path_);
-      EXPECT_TRUE(known_max_error(right));
+      EXPECT_TRUE(known_voxel_error(right));
       EXPECT_FALSE(right.bounds.codes.empty());
       const TrailerFile parts(test::read_file(path_));
       json trailer = json::parse(parts.text);
@@ -300,11 +300,11 @@ TEST_F(HostileZfp, ErrorsThatLeaveOutTheCastAreNotKnown) {
       EXPECT_EQ(had_casts, kind != "float32");
       test::write_file(path_, with_trailer(parts.before, trailer.dump(), parts.version));
       for (const CompressedVolume &read : {open_zfp_file(path_), read_zfp_file_info(path_)}) {
-        EXPECT_EQ(known_max_error(read), had_casts ? std::nullopt : right.max_error);
+        EXPECT_EQ(known_voxel_error(read), had_casts ? std::nullopt : right.max_voxel_error);
       }
       const CompressedVolume read = open_zfp_file(path_);
       EXPECT_EQ(read.bounds.codes.empty(), had_casts);
-      EXPECT_EQ(read.coarser[0].bounds.codes.empty(), had_casts);
+      EXPECT_EQ(read.coarser_levels[0].bounds.codes.empty(), had_casts);
     }
   }
 }
@@ -331,10 +331,10 @@ TEST_F(HostileZfp, AdviceCanBeFollowed) {
     for (const std::string compression : {"--rate 2", "--rate 8", "--rate 32", "--tolerance 0.7"}) {
       for (const std::string error : {"1e-9", "0.001", "1"}) {
         const auto run = test::run_isowave(
-            fmt::format("render {} {} -i {} --device cpu --size 32x24 --max-error {} -o {}",
+            fmt::format("render {} {} -i {} --device cpu --size 32x24 --max-surface-error {} -o {}",
                         quoted(voxels), compression, isovalue, error, quoted(folder_ / "p.png")));
-        const std::string what =
-            voxels.string() + " " + compression + " -i " + isovalue + " --max-error " + error;
+        const std::string what = voxels.string() + " " + compression + " -i " + isovalue +
+                                 " --max-surface-error " + error;
         if (run.status != 0) {
           EXPECT_THAT(run.err, HasSubstr("cannot be kept")) << what;
           continue;

@@ -334,11 +334,11 @@ TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
   const CompressedVolume volume = compress_with_libzfp(sphere_voxels(dims), dims, 2048);
   const DeviceStream stream(device_, volume);
   const auto select = [&](Macrocells &macrocells, std::size_t selection, float isovalue,
-                          double value_error) {
+                          double voxel_error) {
     FrameParams params = grid_frame(dims);
     params.isovalue = isovalue;
     macrocells.use(selection);
-    macrocells.select(params, value_error, &stream);
+    macrocells.select(params, voxel_error, &stream);
     macrocells.set_index(params);
     macrocells.set_active_box(params);
     return std::pair(macrocells.masks().read(),
@@ -346,9 +346,9 @@ TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
                                 params.active_begin_y, params.active_begin_z, params.active_end_x,
                                 params.active_end_y, params.active_end_z});
   };
-  const auto alone = [&](float isovalue, double value_error) {
+  const auto alone = [&](float isovalue, double voxel_error) {
     Macrocells macrocells(device_, grid_frame(dims), stream);
-    return select(macrocells, 0, isovalue, value_error);
+    return select(macrocells, 0, isovalue, voxel_error);
   };
   Macrocells macrocells(
       device_, grid_frame(dims), stream,

@@ -133,10 +133,10 @@ TEST(Pyramid, LevelsAreTheVolumesOfTheirVoxels) {
     const std::vector<float> voxels = exact_voxels(dims);
     ArrayReader reader(test::grid_info(dims, {1, 2, 3}), voxels);
     const CompressedVolume volume = compress(reader, {.rate = 11, .levels = 0});
-    ASSERT_EQ(volume.coarser.size() + 1, max_levels(dims));
+    ASSERT_EQ(volume.coarser_levels.size() + 1, max_levels(dims));
     std::vector<float> finer = voxels;
     glm::uvec3 finer_dims = dims;
-    for (const CompressedVolume &level : volume.coarser) {
+    for (const CompressedVolume &level : volume.coarser_levels) {
       finer = downsample(finer_dims, finer);
       finer_dims = level.info.dims;
       ArrayReader alone(level.info, finer);
@@ -144,7 +144,7 @@ TEST(Pyramid, LevelsAreTheVolumesOfTheirVoxels) {
       EXPECT_EQ(level.words, expected.words);
       EXPECT_EQ(level.info.dims, expected.info.dims);
       EXPECT_EQ(level.info.spacing,
-                glm::dvec3(1, 2, 3) * double(1 << (&level - volume.coarser.data() + 1)));
+                glm::dvec3(1, 2, 3) * double(1 << (&level - volume.coarser_levels.data() + 1)));
     }
   }
 }
@@ -154,11 +154,11 @@ TEST(Pyramid, LevelsOfAnExactVolumeAreNoIntegers) {
   VolumeInfo info = test::grid_info(dims);
   info.type = VoxelType::kUint8;
   ArrayReader reader(info, test::sample(dims, test::plateau_field()));
-  const ErrorBound bound = choose_error_bound(reader, {.tolerance = 0, .exact = true}, {});
-  const CompressedVolume volume = compress(reader, {.error_bound = bound, .levels = 0});
-  EXPECT_TRUE(volume.error_bound.whole_numbers);
+  const BlockPrecision bound = choose_precision(reader, {.tolerance = 0, .exact = true}, {});
+  const CompressedVolume volume = compress(reader, {.precision = bound, .levels = 0});
+  EXPECT_TRUE(volume.precision.whole_numbers);
   const std::vector<float> exact = downsample(dims, decode_with_libzfp(volume));
-  const std::vector<float> got = decode_with_libzfp(volume.coarser.at(0));
+  const std::vector<float> got = decode_with_libzfp(volume.coarser_levels.at(0));
   ASSERT_EQ(got.size(), exact.size());
   float largest = 0, farthest_from_whole = 0;
   for (std::size_t i = 0; i < got.size(); ++i) {
@@ -189,9 +189,9 @@ TEST_F(PyramidFile, EveryLevelComesBack) {
   for (const CompressOptions &options :
        {CompressOptions{.rate = 5, .levels = 3},
         CompressOptions{.rate = 7, .measure_error = true, .levels = 3},
-        CompressOptions{.error_bound = ErrorBound{.min_exponent = -8}, .levels = 0}}) {
+        CompressOptions{.precision = BlockPrecision{.min_exponent = -8}, .levels = 0}}) {
     const CompressedVolume expected = write(options);
-    const bool measured = options.measure_error || options.error_bound;
+    const bool measured = options.measure_error || options.precision;
     const auto check_bounds = [&](const CompressedVolume &got, const CompressedVolume &level) {
       EXPECT_EQ(level.bounds.codes.size(), measured ? level.block_count() : 0);
       EXPECT_EQ(got.bounds.codes, level.bounds.codes);
@@ -202,16 +202,16 @@ TEST_F(PyramidFile, EveryLevelComesBack) {
       }
     };
     const auto check = [&](const CompressedVolume &got, bool payload) {
-      ASSERT_EQ(got.coarser.size(), expected.coarser.size());
+      ASSERT_EQ(got.coarser_levels.size(), expected.coarser_levels.size());
       if (payload) check_bounds(got, expected);
-      for (std::size_t i = 0; i < got.coarser.size(); ++i) {
-        const CompressedVolume &level = got.coarser[i];
-        EXPECT_EQ(level.info.dims, expected.coarser[i].info.dims);
-        EXPECT_EQ(level.info.spacing, expected.coarser[i].info.spacing);
+      for (std::size_t i = 0; i < got.coarser_levels.size(); ++i) {
+        const CompressedVolume &level = got.coarser_levels[i];
+        EXPECT_EQ(level.info.dims, expected.coarser_levels[i].info.dims);
+        EXPECT_EQ(level.info.spacing, expected.coarser_levels[i].info.spacing);
         if (!payload) continue;
-        check_bounds(level, expected.coarser[i]);
-        EXPECT_EQ(level.index, expected.coarser[i].index);
-        EXPECT_EQ(decode_with_libzfp(level), decode_with_libzfp(expected.coarser[i]));
+        check_bounds(level, expected.coarser_levels[i]);
+        EXPECT_EQ(level.index, expected.coarser_levels[i].index);
+        EXPECT_EQ(decode_with_libzfp(level), decode_with_libzfp(expected.coarser_levels[i]));
       }
     };
     check(read_zfp_file(folder_ / "a.zfp"), true);
@@ -219,7 +219,7 @@ TEST_F(PyramidFile, EveryLevelComesBack) {
     check(read_zfp_file_info(folder_ / "a.zfp"), false);
     CompressedVolume respaced = read_zfp_file_info(folder_ / "a.zfp");
     set_spacing(respaced, {5, 6, 7});
-    EXPECT_EQ(respaced.coarser.at(1).info.spacing, glm::dvec3(20, 24, 28));
+    EXPECT_EQ(respaced.coarser_levels.at(1).info.spacing, glm::dvec3(20, 24, 28));
   }
 }
 

@@ -128,20 +128,20 @@ inline double depth_tolerance(const ExactField &field, const VolumeInfo &info, c
   const glm::dvec3 eye = (ray.eye - info.origin) / info.spacing,
                    direction = ray.direction / info.spacing;
   const glm::dvec3 position = eye + t * direction;
-  double value_error = 0.0, corner_sum = 0.0, longest = 0.0;
+  double voxel_error = 0.0, corner_sum = 0.0, longest = 0.0;
   for (int corner = 0; corner < 8;
        ++corner) {  // the gradient of a trilinear field is largest in a corner
     const glm::dvec3 at =
         glm::floor(position) + glm::dvec3{corner & 1, corner >> 1 & 1, corner >> 2};
     const glm::dvec3 gradient = glm::abs(field.gradient(at));
     const glm::dvec3 position_error = 16 * u * t / info.spacing + u * glm::abs(eye) + u;
-    value_error = std::max(value_error, glm::dot(gradient, position_error));
+    voxel_error = std::max(voxel_error, glm::dot(gradient, position_error));
     corner_sum = std::max(corner_sum, gradient.x + gradient.y + gradient.z);
   }
   for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, std::abs(direction[axis]));
   const double slope = std::abs(glm::dot(field.gradient(position), direction));
   const double cell_length = 1.0 / longest;  // t through a cell is at most this
-  return (value_error + 20 * u * corner_sum) / slope + 0x1p-22 * cell_length + 3 * u * t;
+  return (voxel_error + 20 * u * corner_sum) / slope + 0x1p-22 * cell_length + 3 * u * t;
 }
 
 /// Compares a frame with the first change of `field >= 0` along every ray. Pixels whose answer

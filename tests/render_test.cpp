@@ -128,20 +128,20 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
   for (const TestVolume &volume :
        {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
     Renderer renderer(device_, volume.compressed, {.size = kSmall});
-    for (const double value_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
+    for (const double voxel_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
       SCOPED_TRACE(fmt::format("{} bits per block, value error {}",
-                               volume.compressed.bits_per_block, value_error));
-      const std::vector<float> voxels = decode_with_libzfp(volume.compressed, value_error);
+                               volume.compressed.bits_per_block, voxel_error));
+      const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
       for (std::size_t i = 0; i < voxels.size(); ++i)
-        ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), value_error);
-      renderer.set_value_error(value_error);
+        ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), voxel_error);
+      renderer.set_voxel_error(voxel_error);
       renderer.render(camera, 0.1f);
       expect_same_hits(renderer.hits(),
                        render_scalar(make_frame_params(info, camera, kSmall, 0.1f), voxels),
                        kSmall.width);
     }
     for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
-      EXPECT_THROW(renderer.set_value_error(bad), Error);
+      EXPECT_THROW(renderer.set_voxel_error(bad), Error);
   }
 }
 
@@ -153,11 +153,11 @@ TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
   const TestVolume volume(open()->info(), source, ErrorGoal{0, true});
   Renderer renderer(device_, volume.compressed, {.size = kMedium});
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  for (const double value_error : {0.5, 4.0, 64.0}) {
-    renderer.set_value_error(value_error);
-    const std::vector<float> voxels = decode_with_libzfp(volume.compressed, value_error);
+  for (const double voxel_error : {0.5, 4.0, 64.0}) {
+    renderer.set_voxel_error(voxel_error);
+    const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
     for (const float isovalue : {0.7f, 70.0f, 255.5f}) {
-      SCOPED_TRACE(fmt::format("value error {}, isovalue {}", value_error, isovalue));
+      SCOPED_TRACE(fmt::format("value error {}, isovalue {}", voxel_error, isovalue));
       renderer.render(camera, isovalue);
       const FrameParams frame = make_frame_params(volume.info(), camera, kMedium, isovalue);
       expect_same_hits(renderer.hits(), render_scalar(frame, voxels), kMedium.width);

@@ -88,8 +88,8 @@ double true_error(const CompressedVolume &volume, const std::vector<double> &sou
 void expect_bounds_hold(const CompressedVolume &volume, const std::vector<double> &source) {
   std::uint32_t step = 1;
   const CompressedVolume *level = &volume;
-  for (std::size_t number = 0; number <= volume.coarser.size(); ++number, step *= 2) {
-    if (number > 0) level = &volume.coarser[number - 1];
+  for (std::size_t number = 0; number <= volume.coarser_levels.size(); ++number, step *= 2) {
+    if (number > 0) level = &volume.coarser_levels[number - 1];
     const std::vector<float> decoded = decode_with_libzfp(*level);
     const glm::uvec3 dims = level->info.dims, blocks = level->num_blocks();
     ASSERT_EQ(level->bounds.codes.size(), level->block_count()) << "level " << number;
@@ -116,11 +116,12 @@ TEST(SourceError, OfRatesAndTheirLevels) {
       const CompressedVolume volume =
           compress(reader, {.rate = rate, .measure_error = true, .levels = 0});
       const double error = true_error(volume, reader.voxels());
-      EXPECT_GE(*volume.max_error, error);
+      EXPECT_GE(*volume.max_voxel_error, error);
       // The sum of what the cast has lost and of what zfp has, which is at most error + lost. No
       // float32 is closer to a voxel than its cast is, so that lost is at most the error; it is
       // rounded up.
-      EXPECT_LE(*volume.max_error, 3 * error + double{std::numeric_limits<float>::denorm_min()});
+      EXPECT_LE(*volume.max_voxel_error,
+                3 * error + double{std::numeric_limits<float>::denorm_min()});
       expect_bounds_hold(volume, reader.voxels());
     }
   }
@@ -134,10 +135,10 @@ TEST(SourceError, OfTolerancesAndTheirLevels) {
       const double tolerance = part * std::max(largest - least, 1e-6 * std::abs(largest));
       SCOPED_TRACE(fmt::format("{}, tolerance {}", source.name, tolerance));
       try {
-        const ErrorBound bound = choose_error_bound(reader, {tolerance}, {});
-        const CompressedVolume volume = compress(reader, {.error_bound = bound, .levels = 0});
-        EXPECT_LE(*volume.max_error, tolerance);
-        EXPECT_LE(true_error(volume, reader.voxels()), *volume.max_error);
+        const BlockPrecision bound = choose_precision(reader, {tolerance}, {});
+        const CompressedVolume volume = compress(reader, {.precision = bound, .levels = 0});
+        EXPECT_LE(*volume.max_voxel_error, tolerance);
+        EXPECT_LE(true_error(volume, reader.voxels()), *volume.max_voxel_error);
         expect_bounds_hold(volume, reader.voxels());
       } catch (const Error &error) {
         EXPECT_THAT(error.what(), HasSubstr("cannot be kept"));
@@ -156,17 +157,17 @@ TEST(SourceError, RefusedTolerancesNameTheSmallest) {
     ArrayReader reader = source.reader();
     double smallest = 0;
     try {
-      choose_error_bound(reader, {1e-60}, {});
+      choose_precision(reader, {1e-60}, {});
       ADD_FAILURE() << "1e-60 was kept";
     } catch (const Error &error) {
       const std::string text = error.what(), before = "off by up to ";
       ASSERT_NE(text.find(before), std::string::npos) << text;
       smallest = std::stod(text.substr(text.find(before) + before.size()));
     }
-    const ErrorBound bound = choose_error_bound(reader, {smallest}, {});
-    const CompressedVolume volume = compress(reader, {.error_bound = bound});
+    const BlockPrecision bound = choose_precision(reader, {smallest}, {});
+    const CompressedVolume volume = compress(reader, {.precision = bound});
     EXPECT_LE(true_error(volume, reader.voxels()), smallest);
-    EXPECT_THROW(choose_error_bound(reader, {0.9 * smallest}, {}), Error);
+    EXPECT_THROW(choose_precision(reader, {0.9 * smallest}, {}), Error);
     double lost = 0;
     for (const double value : reader.voxels())
       lost = std::max(lost, std::abs(value - double(float(value))));
@@ -181,11 +182,11 @@ TEST(SourceError, IntegersThatFloat32HoldsAreExactTo2To24) {
     return ArrayReader(kDims, voxels, VoxelType::kInt32);
   };
   ArrayReader below = range(16777215), at = range(16777216), above = range(16777217);
-  EXPECT_EQ(choose_error_bound(below, {0, true}, {}).max_error, 0.0);
+  EXPECT_EQ(choose_precision(below, {0, true}, {}).max_voxel_error, 0.0);
   for (ArrayReader *reader : {&at, &above}) {
     EXPECT_THAT(
         [&] {
-          choose_error_bound(*reader, {0, true}, {});
+          choose_precision(*reader, {0, true}, {});
         },
         ThrowsMessage<Error>(HasSubstr("below 2^24")));
   }
@@ -203,8 +204,8 @@ TEST(SourceError, AMappedVoxelsSourceIsWhatItIsMappedTo) {
       const CompressedVolume volume =
           compress(reader, {.rate = 32, .measure_error = true, .input = {.map_nan = map_nan}});
       const double error = true_error(volume, expected);
-      EXPECT_GE(*volume.max_error, error);
-      EXPECT_LE(*volume.max_error, 3 * error);
+      EXPECT_GE(*volume.max_voxel_error, error);
+      EXPECT_LE(*volume.max_voxel_error, 3 * error);
     }
   }
 }
@@ -315,7 +316,7 @@ TEST(SourceErrorOfTheProgram, TolerancesMayBeAsLargeAsNumbersAre) {
     const auto run = test::run_isowave("convert generate:gyroid_21x18x17_float32 --levels 2 -o " +
                                        test::quoted(path) + " --tolerance " + tolerance);
     EXPECT_EQ(run.status, 0) << tolerance << run.err;
-    EXPECT_LE(*known_max_error(open_zfp_file(path)), std::stod(tolerance));
+    EXPECT_LE(*known_voxel_error(open_zfp_file(path)), std::stod(tolerance));
   }
 }
 
@@ -341,7 +342,7 @@ TEST(SourceErrorOfTheProgram, VerifyComparesWithTheSource) {
   test::write_file(path, voxels);
   const auto run = test::run_isowave(
       "verify " + test::quoted(path) +
-      " -i 10000012 --device cpu --size 48x32 --orbit 2 --tolerance 0.75 --max-error 4");
+      " -i 10000012 --device cpu --size 48x32 --orbit 2 --tolerance 0.75 --max-surface-error 4");
   EXPECT_EQ(run.status, 0) << run.out << run.err;
 }
 
@@ -361,10 +362,10 @@ TEST_P(SourceErrorOnDevice, SmallErrorsAreTheHosts) {
     options.device = &device;
     const CompressedVolume got = compress(reader, options);
     EXPECT_EQ(got.words, host.words);
-    EXPECT_EQ(got.max_error, host.max_error);
+    EXPECT_EQ(got.max_voxel_error, host.max_voxel_error);
     EXPECT_EQ(got.bounds.codes, host.bounds.codes);
-    for (std::size_t level = 0; level < host.coarser.size(); ++level)
-      EXPECT_EQ(got.coarser[level].bounds.codes, host.coarser[level].bounds.codes);
+    for (std::size_t level = 0; level < host.coarser_levels.size(); ++level)
+      EXPECT_EQ(got.coarser_levels[level].bounds.codes, host.coarser_levels[level].bounds.codes);
   }
 }
 

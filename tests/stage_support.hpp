@@ -92,7 +92,7 @@ inline CompressedVolume compress_with_libzfp(std::vector<float> voxels, const gl
   CompressedVolume volume;
   volume.info.dims = dims;
   volume.bits_per_block = bits_per_block;
-  volume.error_bound.min_exponent = min_exponent;
+  volume.precision.min_exponent = min_exponent;
   std::vector<std::uint64_t> words(volume.block_count() * volume.max_block_bits() / 64 + 2);
   const ZfpStream stream = make_zfp_stream(bits_per_block, min_exponent);
   const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint64_t)),

@@ -236,14 +236,14 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
   for (const ocl::DeviceInfo &info : devices_under_test()) {
     ocl::Device device(info);
     Renderer renderer(device, volume,
-                      {.size = kSize, .max_pixel_error = 1, .with_kept_picture = true});
-    renderer.set_max_pixel_error(0);
+                      {.size = kSize, .voxel_pixels = 1, .with_kept_picture = true});
+    renderer.set_voxel_pixels(0);
     TimedFrames frames(renderer);
     const TimedFrame coarse = frames.render(camera, 0.5f, 1e-6);
     ASSERT_EQ(coarse.steps.size(), 1u);
-    EXPECT_EQ(coarse.steps[0].max_pixel_error, 1.0);
+    EXPECT_EQ(coarse.steps[0].voxel_pixels, 1.0);
     EXPECT_GT(coarse.stats.first_level, 0u);
-    EXPECT_EQ(renderer.options().max_pixel_error, 0.0) << "as before";
+    EXPECT_EQ(renderer.options().voxel_pixels, 0.0) << "as before";
     const TimedFrame fine = frames.render(camera, 0.5f, 1e9);
     EXPECT_TRUE(fine.complete);
     EXPECT_EQ(fine.stats.last_level, 0u);

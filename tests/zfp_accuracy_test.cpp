@@ -32,7 +32,7 @@ constexpr std::int32_t kExponents[] = {-200, -30, -9, -1, 3, 200};
 CompressedVolume compress_to(std::int32_t min_exponent, const glm::uvec3 &dims,
                              const std::vector<float> &voxels) {
   ArrayReader reader(dims, voxels);
-  return compress(reader, CompressOptions{.error_bound = ErrorBound{min_exponent}});
+  return compress(reader, CompressOptions{.precision = BlockPrecision{min_exponent}});
 }
 
 double largest_error(const CompressedVolume &volume, const std::vector<float> &source) {
@@ -48,8 +48,8 @@ void expect_same(const CompressedVolume &got, const CompressedVolume &expected) 
   EXPECT_EQ(got.words, expected.words);
   EXPECT_EQ(got.index, expected.index);
   EXPECT_EQ(got.indexed_bits, expected.indexed_bits);
-  EXPECT_EQ(got.error_bound.min_exponent, expected.error_bound.min_exponent);
-  EXPECT_EQ(got.error_bound.whole_numbers, expected.error_bound.whole_numbers);
+  EXPECT_EQ(got.precision.min_exponent, expected.precision.min_exponent);
+  EXPECT_EQ(got.precision.whole_numbers, expected.precision.whole_numbers);
 }
 
 // ---- streams
@@ -74,7 +74,7 @@ TEST(ErrorBoundCoder, ManyChunksAndAnyThreadCount) {
   const glm::uvec3 dims(700, 701, 19);  // more than one chunk of layers
   const std::vector<float> voxels = random_voxels(dims, -1, 1, 2);
   ArrayReader reader(dims, voxels);
-  CompressOptions options{.error_bound = ErrorBound{-3}};
+  CompressOptions options{.precision = BlockPrecision{-3}};
   options.input.num_threads = 1;
   const CompressedVolume one = compress(reader, options);
   options.input.num_threads = 5;
@@ -136,7 +136,7 @@ TEST(ErrorBoundCoder, RandomBitsAreNoLongerThanABlockCanBe) {
   volume.words.resize(volume.block_count() * ISO_MAX_BLOCK_BITS / 32 + 100);
   std::generate(volume.words.begin(), volume.words.end(), std::ref(random));
   for (const std::int32_t exponent : kExponents) {
-    volume.error_bound.min_exponent = exponent;
+    volume.precision.min_exponent = exponent;
     volume.indexed_bits = 32 * volume.words.size();
     volume.index = index_by_decoding(volume);
     const std::vector<float> expected = decode_blocks_with_libzfp(volume);
@@ -161,10 +161,10 @@ TEST(ChooseErrorBound, TheFewestPlanesWithinTheTolerance) {
         SCOPED_TRACE(fmt::format("{}x{}x{}, values {}, tolerance {}", dims.x, dims.y, dims.z,
                                  static_cast<int>(kind), tolerance));
         ArrayReader reader(dims, voxels);
-        const ErrorBound chosen = choose_error_bound(reader, {tolerance}, {});
+        const BlockPrecision chosen = choose_precision(reader, {tolerance}, {});
         const double error = largest_error(compress_to(chosen.min_exponent, dims, voxels), voxels);
         EXPECT_LE(error, tolerance);
-        EXPECT_EQ(chosen.max_error, error);
+        EXPECT_EQ(chosen.max_voxel_error, error);
         EXPECT_FALSE(chosen.whole_numbers);
         // What was tried: from zfp's promise up to six planes fewer.
         const std::int32_t promise = std::ilogb(tolerance);
@@ -184,11 +184,11 @@ TEST(ChooseErrorBound, AnyThreadCount) {
   for (const double tolerance : {0.02, 0.0005}) {
     InputOptions options;
     options.num_threads = 1;
-    const ErrorBound one = choose_error_bound(reader, {tolerance}, options);
+    const BlockPrecision one = choose_precision(reader, {tolerance}, options);
     options.num_threads = 7;
-    const ErrorBound seven = choose_error_bound(reader, {tolerance}, options);
+    const BlockPrecision seven = choose_precision(reader, {tolerance}, options);
     EXPECT_EQ(seven.min_exponent, one.min_exponent);
-    EXPECT_EQ(seven.max_error, one.max_error);
+    EXPECT_EQ(seven.max_voxel_error, one.max_voxel_error);
   }
 }
 
@@ -208,14 +208,14 @@ TEST(ChooseErrorBound, ExactIsTheSourceBitForBit) {
     for (float &voxel : voxels) voxel = std::rint(voxel) + 0.0f;
     ArrayReader reader(dims, voxels);
     reader.mutable_info().type = c.type;
-    const ErrorBound chosen = choose_error_bound(reader, {0, true}, {});
-    EXPECT_EQ(chosen.max_error, 0.0);
-    const CompressedVolume volume = compress(reader, CompressOptions{.error_bound = chosen});
+    const BlockPrecision chosen = choose_precision(reader, {0, true}, {});
+    EXPECT_EQ(chosen.max_voxel_error, 0.0);
+    const CompressedVolume volume = compress(reader, CompressOptions{.precision = chosen});
     const std::vector<float> decoded = decode_with_libzfp(volume);
     EXPECT_EQ(std::memcmp(decoded.data(), voxels.data(), voxels.size() * sizeof(float)), 0);
     // One plane fewer is not enough, or zfp's promise of a quarter was beaten by all that is tried.
     CompressedVolume coarser = compress_to(chosen.min_exponent + 1, dims, voxels);
-    coarser.error_bound.whole_numbers = true;
+    coarser.precision.whole_numbers = true;
     if (chosen.min_exponent < 4) {
       EXPECT_GT(largest_error(coarser, voxels), 0.0);
     }
@@ -226,14 +226,14 @@ TEST(ChooseErrorBound, WhatCannotBeIsOneLine) {
   const glm::uvec3 dims(8, 8, 8);
   ArrayReader reader(dims, random_voxels(dims, -1, 1, 9));
   for (const double tolerance : {0.0, -1.0, double{NAN}, double{INFINITY}}) {
-    EXPECT_THAT([&] { choose_error_bound(reader, {tolerance}, {}); },
+    EXPECT_THAT([&] { choose_precision(reader, {tolerance}, {}); },
                 ThrowsMessage<Error>(HasSubstr("above 0")));
   }
-  EXPECT_THAT([&] { choose_error_bound(reader, {1e-30}, {}); },
+  EXPECT_THAT([&] { choose_precision(reader, {1e-30}, {}); },
               ThrowsMessage<Error>(HasSubstr("cannot be kept")));
   EXPECT_THAT(
       [&] {
-        choose_error_bound(reader, {0, true}, {});
+        choose_precision(reader, {0, true}, {});
       },
       ThrowsMessage<Error>(HasSubstr("this one is float32")));
   std::vector<float> large(512, 5.0f);
@@ -242,16 +242,16 @@ TEST(ChooseErrorBound, WhatCannotBeIsOneLine) {
   integers.mutable_info().type = VoxelType::kInt32;
   EXPECT_THAT(
       [&] {
-        choose_error_bound(integers, {0, true}, {});
+        choose_precision(integers, {0, true}, {});
       },
       ThrowsMessage<Error>(HasSubstr("below 2^24")));
   large[77] = NAN;
   ArrayReader with_nan(dims, large);
-  EXPECT_THAT([&] { choose_error_bound(with_nan, {0.1}, {}); },
+  EXPECT_THAT([&] { choose_precision(with_nan, {0.1}, {}); },
               ThrowsMessage<Error>(HasSubstr("1 of 512 voxels")));
   InputOptions mapped;
   mapped.map_nan = 4.0f;
-  EXPECT_NO_THROW(choose_error_bound(with_nan, {0.1}, mapped));
+  EXPECT_NO_THROW(choose_precision(with_nan, {0.1}, mapped));
 }
 
 // ---- files
@@ -263,13 +263,13 @@ TEST(ErrorBoundFile, KeepsAllAndZfpsOwnToolDecodesIt) {
       const TemporaryFolder folder;
       ArrayReader reader(dims, make_voxels(ValueKind::kMixed, dims, 11));
       reader.mutable_info().spacing = {1, 2, 3};
-      const CompressOptions options{.error_bound = ErrorBound{exponent, false, 0.125}};
+      const CompressOptions options{.precision = BlockPrecision{exponent, false, 0.125}};
       compress_to_file(reader, options, folder / "a.zfp");
       const CompressedVolume in_memory = compress(reader, options);
       for (const CompressedVolume &read :
            {read_zfp_file(folder / "a.zfp"), open_zfp_file(folder / "a.zfp")}) {
         EXPECT_EQ(read.info.spacing, glm::dvec3(1, 2, 3));
-        EXPECT_EQ(read.max_error, 0.125);
+        EXPECT_EQ(read.max_voxel_error, 0.125);
         EXPECT_EQ(read.value_range, in_memory.value_range);
         EXPECT_EQ(read.index, in_memory.index);
         std::vector<std::uint32_t> words(in_memory.words.size());
@@ -313,7 +313,7 @@ class DamagedErrorBoundFile : public testing::Test {
  protected:
   DamagedErrorBoundFile() {
     ArrayReader reader({14, 9, 6}, make_voxels(ValueKind::kMixed, {14, 9, 6}, 13));
-    volume_ = compress(reader, {.error_bound = ErrorBound{-4}});
+    volume_ = compress(reader, {.precision = BlockPrecision{-4}});
     write(volume_);
     right_ = read_file(folder_ / "a.zfp");
   }

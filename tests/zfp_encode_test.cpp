@@ -248,7 +248,7 @@ class CompressOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     EXPECT_EQ(device.bits_per_block, host.bits_per_block);
     EXPECT_EQ(first_difference(device.words, host.words), kNoDifference);
     EXPECT_EQ(device.value_range, host.value_range);
-    EXPECT_EQ(device.max_error, host.max_error);
+    EXPECT_EQ(device.max_voxel_error, host.max_voxel_error);
     EXPECT_EQ(device.bounds.codes, host.bounds.codes);
     EXPECT_TRUE(test::read_file(folder / "device.zfp") == test::read_file(folder / "host.zfp"));
     EXPECT_EQ(device_.ledger().current(), 0u);

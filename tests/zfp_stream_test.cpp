@@ -105,14 +105,14 @@ TEST(Compress, ManyChunksAndAnyThreadCount) {
   options.input.num_threads = 5;
   const CompressedVolume five = compress(reader, options);
   EXPECT_EQ(one.words, five.words);
-  EXPECT_EQ(one.max_error, five.max_error);
+  EXPECT_EQ(one.max_voxel_error, five.max_voxel_error);
 
   const std::vector<float> decoded = decode_with_libzfp(one);
   double max_error = 0;
   for (std::size_t i = 0; i < voxels.size(); ++i) {
     max_error = std::max(max_error, std::abs(double(decoded[i]) - double(voxels[i])));
   }
-  EXPECT_EQ(one.max_error, max_error);
+  EXPECT_EQ(one.max_voxel_error, max_error);
   EXPECT_EQ(one.value_range[0], *std::min_element(voxels.begin(), voxels.end()));
   EXPECT_EQ(one.value_range[1], *std::max_element(voxels.begin(), voxels.end()));
 }
@@ -156,8 +156,8 @@ TEST(ZfpFile, KeepsWhatZfpCannotSay) {
     EXPECT_EQ(read.info.type, info.type);
     EXPECT_EQ(read.bits_per_block, 512u);
     EXPECT_EQ(read.value_range, written.value_range);
-    EXPECT_EQ(read.max_error, written.max_error);
-    EXPECT_TRUE(read.max_error);
+    EXPECT_EQ(read.max_voxel_error, written.max_voxel_error);
+    EXPECT_TRUE(read.max_voxel_error);
   }
   EXPECT_TRUE(read_zfp_file_info(folder / "a.zfp").words.empty());
 }
@@ -250,7 +250,7 @@ TEST(ZfpFile, FilesOfOtherWriters) {
       EXPECT_EQ(volume.bits_per_block, bits);
       EXPECT_EQ(volume.words.size(), (volume.block_count() * bits + 31) / 32 + 2);
       EXPECT_EQ(volume.value_range[1], std::numeric_limits<float>::infinity());
-      EXPECT_FALSE(volume.max_error);
+      EXPECT_FALSE(volume.max_voxel_error);
 
       const auto run = test::run_command(fmt::format(
           "zfp -q -h -z '{}' -o '{}'", (folder / "a.zfp").string(), (folder / "a.f32").string()));

@@ -27,8 +27,8 @@ constexpr double kDistanceRounding = 2 * 0x1p-24, kCellRounding = 2 * 0x1p-21;
 /// A level's decoded voxels, block by block as they are asked for. Not thread-safe.
 class BlockValues {
  public:
-  BlockValues(const CompressedVolume &volume, double value_error, const ValueOffset &upper)
-      : volume_(volume), bound_(coarser(volume.error_bound, value_error)), upper_(upper) {}
+  BlockValues(const CompressedVolume &volume, double voxel_error, const ValueOffset &upper)
+      : volume_(volume), bound_(with_fewer_planes(volume.precision, voxel_error)), upper_(upper) {}
 
   /// Of a dual cell: both bounds of the field, minus the isovalue, as kernels compute them.
   void corners(const glm::ivec3 &cell, float isovalue, std::array<float, 8> &lower,
@@ -61,7 +61,7 @@ class BlockValues {
   }
 
   const CompressedVolume &volume_;
-  ErrorBound bound_;
+  BlockPrecision bound_;
   ValueOffset upper_;
   std::unordered_map<std::uint32_t, std::array<float, 64>> blocks_;
 };
@@ -125,19 +125,18 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
   }
   renderer.draw_bound(FieldBound::kNone);
 
-  const std::vector<const CompressedVolume *> levels =
-      levels_of(volume, options.max_pixel_error > 0);
+  const std::vector<const CompressedVolume *> levels = levels_of(volume, options.voxel_pixels > 0);
   std::vector<ValueOffset> offsets;
-  std::vector<double> value_errors;
+  std::vector<double> voxel_errors;
   for (const CompressedVolume *level : levels) {
-    value_errors.push_back(value_error_of(renderer.value_error(), value_errors.size()));
+    voxel_errors.push_back(voxel_error_of(renderer.voxel_error(), voxel_errors.size()));
     offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
-                                   plane_error(level->error_bound, value_errors.back()),
+                                   plane_error(level->precision, voxel_errors.back()),
                                    volume.value_range));
   }
   const std::vector<FrameParams> frames =
-      make_level_frames(level_infos(volume, options.max_pixel_error > 0), camera, options.size,
-                        isovalue, options.max_pixel_error);
+      make_level_frames(level_infos(volume, options.voxel_pixels > 0), camera, options.size,
+                        isovalue, options.voxel_pixels);
   std::size_t coarsest = levels.size() - 1;
   while (!draws(frames[coarsest])) --coarsest;
   const glm::dmat3 voxel = levels[coarsest]->info.index_to_world();
@@ -150,7 +149,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Ca
       (options.size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
         std::vector<BlockValues> values;
         for (std::size_t i = 0; i < levels.size(); ++i)
-          values.emplace_back(*levels[i], value_errors[i], offsets[i]);
+          values.emplace_back(*levels[i], voxel_errors[i], offsets[i]);
         const auto first = static_cast<std::uint32_t>(part * kRows * options.size.ray_columns());
         const std::uint32_t end = std::min(first + kRows * options.size.ray_columns(),
                                            static_cast<std::uint32_t>(drawn.size()));

@@ -16,24 +16,24 @@ namespace {
 constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
 /// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave
 /// less.
-constexpr int kNumPixelErrors = 41;
-std::vector<double> pixel_errors() {
+constexpr int kNumVoxelPixels = 41;
+std::vector<double> all_voxel_pixels() {
   std::vector<double> errors;
-  errors.reserve(kNumPixelErrors);
-  for (int i = 0; i < kNumPixelErrors; ++i) errors.push_back(std::exp2(3.0 - 0.125 * i));
+  errors.reserve(kNumVoxelPixels);
+  for (int i = 0; i < kNumVoxelPixels; ++i) errors.push_back(std::exp2(3.0 - 0.125 * i));
   return errors;
 }
 
 /// What values may lose: an eighth of their range, and so many times half of it, as long as that
 /// matters beside the error that the volume has anyway, and leaves out bit planes.
 constexpr int kNumValueErrors = 8;
-std::vector<double> value_errors(const CompressedVolume &volume, double error) {
+std::vector<double> voxel_errors(const CompressedVolume &volume, double error) {
   const double range = double{volume.value_range[1]} - double{volume.value_range[0]};
-  double value_error = std::exp2(std::floor(std::log2(std::max(range, 1e-30) / 8)));
+  double voxel_error = std::exp2(std::floor(std::log2(std::max(range, 1e-30) / 8)));
   std::vector<double> errors;
   errors.reserve(kNumValueErrors);
-  for (int i = 0; i < kNumValueErrors && value_error > error / 2; ++i, value_error /= 2) {
-    if (plane_error(volume.error_bound, value_error) != 0) errors.push_back(value_error);
+  for (int i = 0; i < kNumValueErrors && voxel_error > error / 2; ++i, voxel_error /= 2) {
+    if (plane_error(volume.precision, voxel_error) != 0) errors.push_back(voxel_error);
   }
   return errors;
 }
@@ -70,11 +70,13 @@ double rounded_down(double value) {
   return std::floor(value / digit) * digit;
 }
 
-/// Says what would help where most pixels do not keep max_error. error: of the volume's voxels.
-void advise(const CompressedVolume &volume, double error, double max_error, DetailChoice &choice) {
+/// Says what would help where most pixels do not keep max_surface_error. error: of the volume's
+/// voxels.
+void advise(const CompressedVolume &volume, double error, double max_surface_error,
+            DetailChoice &choice) {
   const double least = least_tolerance(volume.value_range);
-  if (choice.median > max_error && error > 0) {
-    const double tolerance = rounded_down(error * max_error / choice.median);
+  if (choice.median > max_surface_error && error > 0) {
+    const double tolerance = rounded_down(error * max_surface_error / choice.median);
     if (tolerance >= least && tolerance < error) choice.tolerance = tolerance;
   }
   const std::string half =
@@ -84,7 +86,7 @@ void advise(const CompressedVolume &volume, double error, double max_error, Deta
                                 *choice.tolerance);
   } else if (error <= least) {
     choice.advice = "voxels can hardly be stored with a smaller error than these have";
-  } else if (choice.median > max_error) {
+  } else if (choice.median > max_surface_error) {
     choice.advice = fmt::format("{}; no error that voxels can be stored with would do", half);
   } else {
     choice.advice = fmt::format(
@@ -96,38 +98,38 @@ void advise(const CompressedVolume &volume, double error, double max_error, Deta
 
 }  // namespace
 
-void check_max_error(double max_error) {
-  if (!(max_error > 0) || !std::isfinite(max_error))
-    throw Error("an error of {} pixels cannot be kept: give more than 0", max_error);
+void check_max_surface_error(double max_surface_error) {
+  if (!(max_surface_error > 0) || !std::isfinite(max_surface_error))
+    throw Error("an error of {} pixels cannot be kept: give more than 0", max_surface_error);
 }
 
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume) {
   options.with_bounds = true;
-  options.max_pixel_error = volume.coarser.empty() ? 0 : 1;
+  options.voxel_pixels = volume.coarser_levels.empty() ? 0 : 1;
   return options;
 }
 
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
-                           float isovalue, double max_error) {
-  check_max_error(max_error);
+                           float isovalue, double max_surface_error) {
+  check_max_surface_error(max_surface_error);
   const auto begin = std::chrono::steady_clock::now();
   const ImageSize size = renderer.options().size;
   const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
   const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
   const double stride = double(size.height) / small.height;
   const auto set = [&](const Detail &detail, double scale) {
-    renderer.set_max_pixel_error(detail.max_pixel_error / scale);
-    renderer.set_value_error(detail.value_error);
+    renderer.set_voxel_pixels(detail.voxel_pixels / scale);
+    renderer.set_voxel_error(detail.voxel_error);
   };
   // Neither is known: certify() throws.
-  const double error = known_max_error(volume).value_or(double{largest_bound(volume.bounds)});
+  const double error = known_voxel_error(volume).value_or(double{largest_bound(volume.bounds)});
   DetailChoice choice;
   const auto try_out = [&](const Detail &detail) {
     set(detail, stride);
     renderer.render(camera, isovalue);
     std::vector<HitRecord> hits = renderer.hits();
     const CertificateSummary summary =
-        summarize(certify(renderer, volume, camera, isovalue, hits), max_error / stride);
+        summarize(certify(renderer, volume, camera, isovalue, hits), max_surface_error / stride);
     const double all = std::max<double>(double(summary.num_pixels), 1);
     choice.tries.push_back(
         {detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
@@ -139,7 +141,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
     choice.median = stride * at_full_detail.median;
     const double best = choice.tries.front().certified;
     choice.reachable = best >= 0.5;
-    if (!choice.reachable) advise(volume, error, max_error, choice);
+    if (!choice.reachable) advise(volume, error, max_surface_error, choice);
     const auto suffices = [&](const Detail &detail) {
       try_out(detail);
       return choice.tries.back().certified >= best - kLostShare;
@@ -152,18 +154,18 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
       return found == numbers.end() ? 0.0 : *found;
     };
     if (choice.reachable && renderer.has_levels()) {
-      const double coarsest = first_to_suffice(pixel_errors(), [](double pixel_error) {
-        return Detail{pixel_error, 0};
+      const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
+        return Detail{voxel_pixels, 0};
       });
       const std::vector<FrameParams> frames =
           make_level_frames(level_infos(volume, true), camera, size, isovalue, coarsest);
       if (blocks_share(finest_hits, frames) <= kMaxBlocksShare)
-        choice.detail.max_pixel_error = coarsest;
+        choice.detail.voxel_pixels = coarsest;
     }
     if (choice.reachable && volume.rate() > kMinPlaneRate) {
-      choice.detail.value_error =
-          first_to_suffice(value_errors(volume, error), [&](double value_error) {
-            return Detail{choice.detail.max_pixel_error, value_error};
+      choice.detail.voxel_error =
+          first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
+            return Detail{choice.detail.voxel_pixels, voxel_error};
           });
     }
   } catch (...) {

@@ -11,8 +11,8 @@
 namespace isowave {
 
 struct Detail {
-  double max_pixel_error = 0;  ///< RendererOptions::max_pixel_error
-  double value_error = 0;      ///< Renderer::set_value_error()
+  double voxel_pixels = 0;  ///< RendererOptions::voxel_pixels
+  double voxel_error = 0;   ///< Renderer::set_voxel_error()
 };
 
 struct DetailChoice {
@@ -20,8 +20,8 @@ struct DetailChoice {
   bool reachable = true;  ///< most pixels keep the error at full detail
   double median = 0;      ///< bound there [pixels]
   /// Where it is not reachable: what would help. tolerance: error of the volume's voxels, smaller
-  /// than it is, with which the median would be max_error; none where none is known that any volume
-  /// can be stored with.
+  /// than it is, with which the median would be max_surface_error; none where none is known that
+  /// any volume can be stored with.
   std::optional<double> tolerance{};
   std::string advice{};
   /// What was tried, and the share of pixels that are not certain to miss and keep the error with
@@ -55,12 +55,12 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
 /// many pixels, and their bounds (certify()); so the choice depends on data, camera and size, never
 /// on timings. Levels of detail first, then bit planes: the coarsest that lose no more than
 /// kLostShare; no levels that spare hardly any blocks (kMaxBlocksShare), nor planes of volumes of
-/// few bits (kMinPlaneRate). Full detail, where most pixels do not keep max_error even so.
-/// max_error: pixels, above 0. Throws Error as certify() does.
+/// few bits (kMinPlaneRate). Full detail, where most pixels do not keep max_surface_error even so.
+/// max_surface_error: pixels, above 0. Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
-                           float isovalue, double max_error);
+                           float isovalue, double max_surface_error);
 
 /// Throws Error unless it is finite and above 0.
-void check_max_error(double max_error);
+void check_max_surface_error(double max_surface_error);
 
 }  // namespace isowave

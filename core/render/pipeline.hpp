@@ -33,8 +33,8 @@ std::string_view to_string(PipelineKind kind);
 /// The volume on the device, or one of its levels of detail.
 struct Level {
   VolumeInfo info;
-  ErrorBound error_bound;  ///< of its blocks
-  LevelError error;        ///< of its field against the volume's
+  BlockPrecision precision;  ///< of its blocks
+  LevelError error;          ///< of its field against the volume's
   DeviceStream stream;
   Macrocells macrocells;
   ZfpDecode decode;

@@ -28,8 +28,8 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
                         const ocl::Device &device) {
   check_volume_info(volume.info, "the volume");
   check_image_size(options.size);
-  check_levels(volume, options.max_pixel_error);
-  const bool with_levels = options.max_pixel_error > 0;
+  check_levels(volume, options.voxel_pixels);
+  const bool with_levels = options.voxel_pixels > 0;
   if (with_levels && options.pipeline == PipelineKind::kBlocks)
     throw Error(
         "pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
@@ -69,7 +69,7 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
       options.size.num_rays(), options.pipeline,
       options.grouping,        options.group_size,
       options.stream,          options.largest_stream_part,
-      options.window_blocks,   options.max_pixel_error > 0,
+      options.window_blocks,   options.voxel_pixels > 0,
       options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0};
   const std::uint64_t budget = options.memory_budget != 0
                                    ? options.memory_budget
@@ -97,10 +97,9 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
                       const RendererOptions &options, const MemoryPlan &plan) {
-  const std::vector<const CompressedVolume *> volumes =
-      levels_of(volume, options.max_pixel_error > 0);
+  const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.voxel_pixels > 0);
   const std::vector<FrameParams> grids =
-      make_level_grids(level_infos(volume, options.max_pixel_error > 0));
+      make_level_grids(level_infos(volume, options.voxel_pixels > 0));
   const FrameParams ids = make_id_grid(grids), &last = grids.back();
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(
@@ -118,7 +117,7 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
             : DeviceStream(device, level, options.largest_stream_part, options.with_bounds);
     Macrocells macrocells(device, grids[i], stream, buffers);
     ZfpDecode decode(device, most_requests, stream.defines(), has_levels);
-    levels.push_back({level.info, level.error_bound, LevelError(level, i == 0), std::move(stream),
+    levels.push_back({level.info, level.precision, LevelError(level, i == 0), std::move(stream),
                       std::move(macrocells), std::move(decode)});
   }
   Wavefront rays(device, num_rays, options.pipeline == PipelineKind::kBlocks, volumes.size());
@@ -236,7 +235,7 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
   std::vector<VolumeInfo> infos;
   for (const Level &level : state_.levels) infos.push_back(level.info);
   std::vector<FrameParams> frames =
-      make_level_frames(infos, camera, options_.size, isovalue, options_.max_pixel_error);
+      make_level_frames(infos, camera, options_.size, isovalue, options_.voxel_pixels);
   const auto first = std::ranges::find_if(frames, draws);
   const auto end = std::find_if_not(first, frames.end(), draws);
   state_.drawing = {static_cast<std::size_t>(first - frames.begin()),
@@ -305,9 +304,9 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   return stats;
 }
 
-void Renderer::set_value_error(double value_error) {
-  coarser({}, value_error);  // or throws
-  value_error_ = value_error;
+void Renderer::set_voxel_error(double voxel_error) {
+  with_fewer_planes({}, voxel_error);  // or throws
+  voxel_error_ = voxel_error;
   update_layouts();
 }
 
@@ -322,14 +321,14 @@ void Renderer::draw_bound(FieldBound bound) {
   update_layouts();
 }
 
-/// Has blocks decoded as value_error_ and bound_ say.
+/// Has blocks decoded as voxel_error_ and bound_ say.
 void Renderer::update_layouts() {
   bool changes = false;
   for (std::size_t i = 0; i < state_.levels.size(); ++i) {
     Level &level = state_.levels[i];
-    const double value_error = value_error_of(value_error_, i);
-    const ErrorBound planes = coarser(level.error_bound, value_error);
-    const double few_planes = plane_error(level.error_bound, value_error);
+    const double voxel_error = voxel_error_of(voxel_error_, i);
+    const BlockPrecision planes = with_fewer_planes(level.precision, voxel_error);
+    const double few_planes = plane_error(level.precision, voxel_error);
     StreamLayout layout = level.stream.layout;
     layout.min_exponent = planes.min_exponent;
     layout.whole_numbers = planes.whole_numbers ? 1 : 0;
@@ -344,13 +343,13 @@ void Renderer::update_layouts() {
   if (changes) clear_cache();
 }
 
-void Renderer::set_max_pixel_error(double max_pixel_error) {
-  check_max_pixel_error(max_pixel_error);
-  if (max_pixel_error > 0 && state_.levels.size() == 1) {
+void Renderer::set_voxel_pixels(double voxel_pixels) {
+  check_voxel_pixels(voxel_pixels);
+  if (voxel_pixels > 0 && state_.levels.size() == 1) {
     throw Error("a renderer of the finest level alone cannot draw with {} pixels between voxels",
-                max_pixel_error);
+                voxel_pixels);
   }
-  options_.max_pixel_error = max_pixel_error;
+  options_.voxel_pixels = voxel_pixels;
 }
 
 void Renderer::set_size(ImageSize size) {

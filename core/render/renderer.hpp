@@ -44,7 +44,7 @@ struct RendererOptions {
   std::uint32_t window_blocks = 0;
   /// Distance in pixels up to which voxels of a coarser level of detail may be apart, see
   /// make_level_frames(); 0: the finest level draws all.
-  double max_pixel_error = 0;
+  double voxel_pixels = 0;
   bool with_bounds = false;        ///< draw_bound() will be called
   bool with_kept_picture = false;  ///< keep_picture() will be called
   bool with_shading =
@@ -100,14 +100,14 @@ class Renderer {
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass = {});
 
   /// How far the voxels of further frames may be from the volume's: 0, as at first, not at all;
-  /// more, and fewer bit planes of each block are decoded (coarser()), of coarser levels of detail
-  /// fewer still (value_error_of()). Forgets the decoded blocks where that changes anything. Throws
-  /// Error unless it is finite and at least 0.
-  void set_value_error(double value_error);
+  /// more, and fewer bit planes of each block are decoded (with_fewer_planes()), of coarser levels
+  /// of detail fewer still (voxel_error_of()). Forgets the decoded blocks where that changes
+  /// anything. Throws Error unless it is finite and at least 0.
+  void set_voxel_error(double voxel_error);
 
   /// Whether it was made for levels of detail.
   bool has_levels() const { return state_.levels.size() > 1; }
-  double value_error() const { return value_error_; }
+  double voxel_error() const { return voxel_error_; }
 
   /// What further frames draw: the volume, as at first, or the field that is nowhere above, or
   /// nowhere below what the volume's voxels were before compression, trilinear between them:
@@ -116,9 +116,9 @@ class Renderer {
   void draw_bound(FieldBound bound);
 
   /// Distance in pixels up to which voxels of a coarser level may be apart in further frames;
-  /// options().max_pixel_error at first. Throws Error unless it is finite and at least 0, and 0
+  /// options().voxel_pixels at first. Throws Error unless it is finite and at least 0, and 0
   /// where the renderer was made for the finest level.
-  void set_max_pixel_error(double max_pixel_error);
+  void set_voxel_pixels(double voxel_pixels);
   /// Picture of further frames, with no more rays than the renderer was made for: hits() and
   /// shade() are of that size.
   void set_size(ImageSize size);
@@ -174,7 +174,7 @@ class Renderer {
   FrameState state_;
   std::vector<FrameParams> level_frames_;  ///< of the levels of detail that draw the frame at work
   std::array<float, 2> value_range_;       ///< of the volume before compression
-  double value_error_ = 0;
+  double voxel_error_ = 0;
   FieldBound bound_ = FieldBound::kNone;
   std::optional<float>
       cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty

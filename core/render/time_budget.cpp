@@ -44,17 +44,17 @@ TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budg
   check_time_budget(budget_ms);
   const double begin = now_();
   const ImageSize full = renderer_.options().size;
-  const double full_error = renderer_.options().max_pixel_error;
+  const double full_error = renderer_.options().voxel_pixels;
   TimedFrame frame;
   std::size_t step = kNumSteps - 1;
   try {
     for (;;) {
       const double scale = std::ldexp(1.0, static_cast<int>(step)) / full.samples;  // of its pixels
-      const double pixel_error = step == 0                ? full_error
-                                 : renderer_.has_levels() ? std::max(1.0, full_error / scale)
-                                                          : 0.0;
+      const double voxel_pixels = step == 0                ? full_error
+                                  : renderer_.has_levels() ? std::max(1.0, full_error / scale)
+                                                           : 0.0;
       renderer_.set_size(halved(full, static_cast<unsigned>(step)));
-      renderer_.set_max_pixel_error(pixel_error);
+      renderer_.set_voxel_pixels(voxel_pixels);
       const double step_begin = now_();
       double pass_begin = step_begin, first_pass_ms = 0;
       const bool may_be_cancelled = !frame.steps.empty();
@@ -68,7 +68,7 @@ TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budg
       const FrameStats stats = renderer_.render(camera, isovalue, in_time);
       const bool whole = !stats.cancelled;
       const double now = now_(), step_ms = now - step_begin;
-      frame.steps.push_back({renderer_.options().size, pixel_error, step_ms,
+      frame.steps.push_back({renderer_.options().size, voxel_pixels, step_ms,
                              stats.passes.back().completed_percent, stats.cancelled});
       add(frame.stats, stats);
       frame.complete = whole && step == 0;
@@ -83,11 +83,11 @@ TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budg
     }
   } catch (...) {
     renderer_.set_size(full);
-    renderer_.set_max_pixel_error(full_error);
+    renderer_.set_voxel_pixels(full_error);
     throw;
   }
   renderer_.set_size(full);
-  renderer_.set_max_pixel_error(full_error);
+  renderer_.set_voxel_pixels(full_error);
   if (step != 0) renderer_.enlarge_kept(camera, isovalue);
   frame.stats.total_ms = now_() - begin;
   return frame;

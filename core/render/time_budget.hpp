@@ -15,7 +15,7 @@ namespace isowave {
 /// yet, the one before shows through.
 struct TimedStep {
   ImageSize size;
-  double max_pixel_error = 0;    ///< of its own pixels
+  double voxel_pixels = 0;       ///< of its own pixels
   double ms = 0;                 ///< wall clock
   double completed_percent = 0;  ///< of its pixels
   bool cancelled = false;

@@ -155,14 +155,14 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
   return thresholds;
 }
 
-void Macrocells::select(const FrameParams &frame, double value_error, const DeviceStream *moved) {
+void Macrocells::select(const FrameParams &frame, double voxel_error, const DeviceStream *moved) {
   const auto index_of = [&](double value) {
     return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) -
                                       thresholds_.begin());
   };
   const double isovalue = double{frame.isovalue};
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
-  const std::array of = {isovalue, value_error, double{layout.value_offset},
+  const std::array of = {isovalue, voxel_error, double{layout.value_offset},
                          double{layout.bound_unit}};
   Selection &selected = selection();
   if (selected.of == of) return;
@@ -173,8 +173,8 @@ void Macrocells::select(const FrameParams &frame, double value_error, const Devi
   for (std::uint32_t code = 0; code < ISO_BOUND_CODES; ++code) {
     const double offset =
         double{layout.value_offset} + double{layout.bound_unit} * double{block_bound(code)};
-    const double error = value_error + std::abs(offset);
-    const double rounded = error == 0 ? 0.0 : value_error + 0x1p-20 * (std::abs(isovalue) + error);
+    const double error = voxel_error + std::abs(offset);
+    const double rounded = error == 0 ? 0.0 : voxel_error + 0x1p-20 * (std::abs(isovalue) + error);
     const std::uint32_t below = index_of(isovalue + rounded + std::max(-offset, 0.0)),
                         above = index_of(isovalue - rounded - std::max(offset, 0.0));
     limits[code] = below | above << 16;

@@ -43,10 +43,10 @@ class Macrocells {
   /// Bytes that building needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
-  /// Rebuilds masks() for frame.isovalue, where voxels may be value_error from those that the
+  /// Rebuilds masks() for frame.isovalue, where voxels may be voxel_error from those that the
   /// ranges were made of. moved: the stream, if its layout raises or lowers voxels as it did not
   /// when the ranges were made. Does nothing where the masks in use are those.
-  void select(const FrameParams &frame, double value_error = 0,
+  void select(const FrameParams &frame, double voxel_error = 0,
               const DeviceStream *moved = nullptr);
   /// Sets what a frame of the isovalue selected last needs: its isovalue_index ...
   void set_index(FrameParams &frame) { frame.isovalue_index = selection().isovalue_index; }
@@ -84,7 +84,7 @@ class Macrocells {
 
   /// What masks are made of, and what belongs to them.
   struct Selection {
-    /// Isovalue, value_error, uniform and per-block offset of the layout; none: nothing yet.
+    /// Isovalue, voxel_error, uniform and per-block offset of the layout; none: nothing yet.
     std::optional<std::array<double, 4>> of{};
     std::uint32_t isovalue_index = 0;
     ocl::Buffer<int> box;

@@ -12,8 +12,8 @@ namespace {
 StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_part) {
   return {volume.bits_per_block,
           words_per_part,
-          volume.error_bound.min_exponent,
-          volume.error_bound.whole_numbers ? 1u : 0u,
+          volume.precision.min_exponent,
+          volume.precision.whole_numbers ? 1u : 0u,
           0.0f,
           0.0f,
           0,

@@ -49,8 +49,8 @@ void place_levels(std::span<FrameParams> frames) {
 
 std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels) {
   std::vector<const CompressedVolume *> levels = {&volume};
-  for (std::size_t i = 0; with_levels && i < volume.coarser.size(); ++i)
-    levels.push_back(&volume.coarser[i]);
+  for (std::size_t i = 0; with_levels && i < volume.coarser_levels.size(); ++i)
+    levels.push_back(&volume.coarser_levels[i]);
   return levels;
 }
 
@@ -73,31 +73,31 @@ FrameParams make_id_grid(std::span<const FrameParams> level_grids) {
   return grid;
 }
 
-void check_max_pixel_error(double max_pixel_error) {
-  if (!(max_pixel_error >= 0) || !std::isfinite(max_pixel_error))
+void check_voxel_pixels(double voxel_pixels) {
+  if (!(voxel_pixels >= 0) || !std::isfinite(voxel_pixels))
     throw Error("a distance of {} pixels between voxels cannot be allowed: give 0 or more",
-                max_pixel_error);
+                voxel_pixels);
 }
 
-void check_levels(const CompressedVolume &volume, double max_pixel_error) {
-  check_max_pixel_error(max_pixel_error);
-  if (max_pixel_error > 0 && volume.coarser.empty() && max_levels(volume.info.dims) > 1) {
+void check_levels(const CompressedVolume &volume, double voxel_pixels) {
+  check_voxel_pixels(voxel_pixels);
+  if (voxel_pixels > 0 && volume.coarser_levels.empty() && max_levels(volume.info.dims) > 1) {
     throw Error(
         "the volume has no levels of detail, which {} pixels between voxels need: convert it with "
         "--levels",
-        max_pixel_error);
+        voxel_pixels);
   }
 }
 
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
-                                           ImageSize size, float isovalue, double max_pixel_error) {
-  check_max_pixel_error(max_pixel_error);
+                                           ImageSize size, float isovalue, double voxel_pixels) {
+  check_voxel_pixels(voxel_pixels);
   std::vector<FrameParams> frames;
   for (const VolumeInfo &info : levels)
     frames.push_back(make_frame_params(info, camera, size, isovalue));
   place_levels(frames);
   for (std::size_t i = 1; i < frames.size(); ++i) frames[i].begin_t = frames[i].end_t = 0.0f;
-  if (max_pixel_error == 0 || levels.size() == 1) return frames;
+  if (voxel_pixels == 0 || levels.size() == 1) return frames;
 
   const VolumeInfo &finest = levels[0];
   const glm::dmat3 to_world = finest.index_to_world();
@@ -108,7 +108,7 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   const auto [nearest, farthest] = reach(levels.back(), camera.eye);
   // Levels' t differ by powers of two, so that their borders are the same in all bits.
   const auto border = [&](std::size_t level, const FrameParams &frame) {
-    const double t = std::ldexp(voxel, static_cast<int>(level)) / (max_pixel_error * pixel);
+    const double t = std::ldexp(voxel, static_cast<int>(level)) / (voxel_pixels * pixel);
     return static_cast<float>(t / frames[0].t_scale) * (frames[0].t_scale / frame.t_scale);
   };
   const auto world_border = [&](std::size_t level) {

@@ -20,17 +20,17 @@ namespace isowave {
 /// level's band, begin_t to end_t, which is empty where it draws nothing, and block ids that count
 /// on through all levels. The first band begins at the eye, the last one has no end; a level whose
 /// band the volume does not reach into draws nothing. If there are several bands, the active box of
-/// each is its whole domain, and the first one's screen box is for all. max_pixel_error: distance
+/// each is its whole domain, and the first one's screen box is for all. voxel_pixels: distance
 /// between a level's voxels, in pixels, at most; 0: the finest level draws all. Throws Error: what
 /// make_frame_params() throws.
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
-                                           ImageSize size, float isovalue, double max_pixel_error);
+                                           ImageSize size, float isovalue, double voxel_pixels);
 
-/// How far decoded voxels of a level may be off where those of the finest may be by value_error:
+/// How far decoded voxels of a level may be off where those of the finest may be by voxel_error:
 /// twice as far as of the level before, since it is drawn from twice the distance on. So what
 /// planes leave out is as many pixels wide at each border.
-inline double value_error_of(double value_error, std::size_t level) {
-  return std::ldexp(value_error, static_cast<int>(level));
+inline double voxel_error_of(double voxel_error, std::size_t level) {
+  return std::ldexp(voxel_error, static_cast<int>(level));
 }
 
 /// The volume and, where levels are wanted, its coarser levels.
@@ -49,8 +49,8 @@ inline bool draws(const FrameParams &frame) {
 }
 
 /// Throws Error unless it is finite and at least 0.
-void check_max_pixel_error(double max_pixel_error);
+void check_voxel_pixels(double voxel_pixels);
 /// As well where a volume that could have levels of detail has none, and they are wanted.
-void check_levels(const CompressedVolume &volume, double max_pixel_error);
+void check_levels(const CompressedVolume &volume, double voxel_pixels);
 
 }  // namespace isowave

@@ -155,12 +155,11 @@ BlockBounds encode_bounds(std::span<const float> bounds) {
   return result;
 }
 
-std::optional<double> known_max_error(const CompressedVolume &volume) {
-  if (volume.max_error) return volume.max_error;
+std::optional<double> known_voxel_error(const CompressedVolume &volume) {
+  if (volume.max_voxel_error) return volume.max_voxel_error;
   // zfp's promise is for the float32 that it was given.
-  if (volume.error_bound.min_exponent == ISO_ALL_PLANES || !fits_float32(volume.info.type))
-    return {};
-  return std::ldexp(1.0, volume.error_bound.min_exponent);
+  if (volume.precision.min_exponent == ISO_ALL_PLANES || !fits_float32(volume.info.type)) return {};
+  return std::ldexp(1.0, volume.precision.min_exponent);
 }
 
 LevelError::LevelError(const CompressedVolume &level, bool finest) {
@@ -170,7 +169,7 @@ LevelError::LevelError(const CompressedVolume &level, bool finest) {
     unit = std::ldexp(1.0f, bounds.exponent);
     largest = double{largest_bound(bounds)};
   } else if (finest) {
-    uniform = known_max_error(level);
+    uniform = known_voxel_error(level);
     largest = uniform.value_or(0);
   }
 }
@@ -180,8 +179,8 @@ float largest_bound(const BlockBounds &bounds) {
   return std::ldexp(block_bound(std::ranges::max(bounds.codes)), bounds.exponent);
 }
 
-double plane_error(const ErrorBound &bound, double value_error) {
-  const ErrorBound fewer = coarser(bound, value_error);
+double plane_error(const BlockPrecision &bound, double voxel_error) {
+  const BlockPrecision fewer = with_fewer_planes(bound, voxel_error);
   if (fewer.min_exponent == bound.min_exponent) return 0;
   // Values of all planes are rounded to integers, where that is meant, and those of fewer are not.
   return std::ldexp(1.0, fewer.min_exponent) + (bound.whole_numbers ? 0.5 : 0.0);

@@ -72,7 +72,7 @@ inline constexpr std::size_t kNumFieldBounds = 3;
 
 /// Largest error of a volume's voxels, measured or, at fixed accuracy, as zfp promises; nothing
 /// where that is not known.
-std::optional<double> known_max_error(const CompressedVolume &volume);
+std::optional<double> known_voxel_error(const CompressedVolume &volume);
 
 /// How far a level's decoded values may be off.
 struct LevelError {
@@ -85,9 +85,9 @@ struct LevelError {
 };
 float largest_bound(const BlockBounds &bounds);
 
-/// How far decoded values may be from those of all bit planes where coarser(bound, value_error)
-/// leaves planes out.
-double plane_error(const ErrorBound &bound, double value_error);
+/// How far decoded values may be from those of all bit planes where with_fewer_planes(bound,
+/// voxel_error) leaves planes out.
+double plane_error(const BlockPrecision &bound, double voxel_error);
 
 /// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound,
 /// or the voxel's share of it (StreamLayout).

@@ -119,10 +119,10 @@ class ErrorMeter : public ChunkCoder {
   }
 
   /// The coarsest within the limit, or none.
-  std::optional<ErrorBound> best() const {
+  std::optional<BlockPrecision> best() const {
     for (std::size_t i = num_candidates_; i-- > 0;) {
       if (!given_up_[i].load() && error(i) <= limit_)
-        return ErrorBound{first_ + std::int32_t(i), rounded_, error(i)};
+        return BlockPrecision{first_ + std::int32_t(i), rounded_, error(i)};
     }
     return {};
   }
@@ -166,8 +166,8 @@ std::array<std::int32_t, 2> exponents_to_try(VoxelType type, const ErrorGoal &go
 
 }  // namespace
 
-ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal,
-                              const InputOptions &options) {
+BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
+                                const InputOptions &options) {
   const VolumeInfo &info = reader.info();
   if (goal.exact && !is_integer(info.type)) {
     throw Error("exact compression is for integer volumes, and this one is {}: give a tolerance",
@@ -185,7 +185,7 @@ ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal,
         "values from {} to {}: exact compression is for integers below 2^24, which float32 holds",
         range[0], range[1]);
   }
-  const std::optional<ErrorBound> best = meter.best();
+  const std::optional<BlockPrecision> best = meter.best();
   if (!best) {
     throw Error(
         "a tolerance of {} cannot be kept: voxels are stored as float32, and with all bit planes "
@@ -243,8 +243,8 @@ std::uint32_t BitAppender::pad() {
   return bits;
 }
 
-ErrorBoundCoder::ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink,
-                                 std::optional<BlockErrors> errors)
+ErrorBoundCoder::ErrorBoundCoder(const glm::uvec3 &dims, const BlockPrecision &bound,
+                                 const Sink &sink, std::optional<BlockErrors> errors)
     : dims_(dims), bound_(bound), sink_(sink), errors_(std::move(errors)) {}
 
 void ErrorBoundCoder::begin_chunk(const Chunk &chunk) {
@@ -321,7 +321,7 @@ void find_block_lengths(const CompressedVolume &volume, const std::string &what,
   std::vector<std::uint32_t> words((kChunkBits + ISO_MAX_BLOCK_BITS) / 32 + 4);
   for (std::uint64_t begin = 0, block = 0; block < num_blocks;) {
     volume.read_words(begin, words);  // with zeros behind its end, which libzfp does not know of
-    const ZfpStream stream = make_zfp_stream(0, volume.error_bound.min_exponent);
+    const ZfpStream stream = make_zfp_stream(0, volume.precision.min_exponent);
     const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)),
                        &stream_close);
     zfp_stream_set_bit_stream(stream.get(), bits.get());

@@ -22,8 +22,8 @@ struct ErrorGoal {
 /// to float32 loses counts (Chunk::lost). Reads the whole volume. Throws Error: what
 /// read_in_chunks() throws; a tolerance that is not positive, or that float32 and zfp cannot keep
 /// (names the smallest that they can); `exact` of other volumes than integers below 2^24.
-ErrorBound choose_error_bound(VolumeReader &reader, const ErrorGoal &goal,
-                              const InputOptions &options);
+BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
+                                const InputOptions &options);
 
 /// Builds CompressedVolume::index block by block.
 class BlockIndexBuilder {
@@ -64,7 +64,7 @@ class ErrorBoundCoder : public ChunkCoder {
  public:
   using Sink = std::function<void(std::span<const std::byte>)>;
   /// errors: to be measured.
-  ErrorBoundCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink,
+  ErrorBoundCoder(const glm::uvec3 &dims, const BlockPrecision &bound, const Sink &sink,
                   std::optional<BlockErrors> errors);
 
   void begin_chunk(const Chunk &chunk) override;
@@ -83,7 +83,7 @@ class ErrorBoundCoder : public ChunkCoder {
   };
 
   glm::uvec3 dims_;
-  ErrorBound bound_;
+  BlockPrecision bound_;
   const Sink &sink_;
   std::optional<BlockErrors> errors_;
   std::span<const float> chunk_{};  ///< the present one's voxels

@@ -34,10 +34,10 @@ std::uint32_t version_of(const CompressedVolume &volume, bool has_levels) {
 }  // namespace
 
 ZfpFileWriter::ZfpFileWriter(const fs::path &path, const CompressedVolume &volume) {
-  for (std::size_t level = 0; level <= volume.coarser.size(); ++level) {
-    const CompressedVolume &at = level == 0 ? volume : volume.coarser[level - 1];
+  for (std::size_t level = 0; level <= volume.coarser_levels.size(); ++level) {
+    const CompressedVolume &at = level == 0 ? volume : volume.coarser_levels[level - 1];
     const ZfpHeader header =
-        make_zfp_header(at.info.dims, at.bits_per_block, at.error_bound.min_exponent);
+        make_zfp_header(at.info.dims, at.bits_per_block, at.precision.min_exponent);
     parts_.emplace_back(path).write(std::as_bytes(std::span(header)));
   }
 }
@@ -51,7 +51,7 @@ void ZfpFileWriter::commit(const CompressedVolume &volume) {
   ZfpLayout layout{all.write_index(volume), all.write_bounds(volume)};
   for (std::size_t level = 1; level < parts_.size(); ++level) {
     Part &part = parts_[level];
-    const CompressedVolume &coarse = volume.coarser[level - 1];
+    const CompressedVolume &coarse = volume.coarser_levels[level - 1];
     const ZfpLayout part_layout{part.write_index(coarse), part.write_bounds(coarse)};
     part.write_trailer(zfp_trailer_text(coarse, part_layout), version_of(coarse, false));
     layout.level_bytes.push_back(part.size);

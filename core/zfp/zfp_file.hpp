@@ -21,7 +21,7 @@ namespace isowave {
 class ZfpFileWriter {
  public:
   /// Writes the headers of volume and of its coarser levels, from their info.dims and
-  /// bits_per_block (a multiple of 64), or error_bound.
+  /// bits_per_block (a multiple of 64), or precision.
   ZfpFileWriter(const std::filesystem::path &path, const CompressedVolume &volume);
   /// Appends payload of the volume (level 0) or of coarser level `level`.
   void write(std::span<const std::byte> payload, std::size_t level = 0);

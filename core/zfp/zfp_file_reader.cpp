@@ -64,7 +64,7 @@ class ZfpFileReader {
   }
 
   CompressedVolume take_info() {
-    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take_info());
+    for (ZfpFileReader &level : levels_) volume_.coarser_levels.push_back(level.take_info());
     return std::move(volume_);
   }
 
@@ -130,7 +130,7 @@ class ZfpFileReader {
     volume_.file_first_bit = 8 * begin_ + header_bits_;
     if (volume_.is_indexed()) read_index(keep);
     if (layout_.bounds_bytes != 0) read_bounds(keep);
-    for (ZfpFileReader &level : levels_) volume_.coarser.push_back(level.take(keep));
+    for (ZfpFileReader &level : levels_) volume_.coarser_levels.push_back(level.take(keep));
     if (!keep) volume_.file.reset();
     return std::move(volume_);
   }
@@ -209,7 +209,7 @@ class ZfpFileReader {
     volume_.info.type = VoxelType::kFloat32;
     const bool fixed_rate = zfp_stream_compression_mode(stream.get()) == zfp_mode_fixed_rate;
     volume_.bits_per_block = fixed_rate ? stream->maxbits : 0;
-    if (!fixed_rate) volume_.error_bound.min_exponent = stream->minexp;
+    if (!fixed_rate) volume_.precision.min_exponent = stream->minexp;
     volume_.value_range = {-std::numeric_limits<float>::infinity(),
                            std::numeric_limits<float>::infinity()};
 

@@ -97,7 +97,7 @@ class FixedRateCoder : public LevelCoder {
   }
 
   std::vector<float> finish(CompressedVolume &volume) override {
-    if (options_.measure_error) volume.max_error = errors_.max();
+    if (options_.measure_error) volume.max_voxel_error = errors_.max();
     return errors_.take();
   }
 
@@ -133,7 +133,7 @@ class DeviceCoder : public LevelCoder {
 
   std::vector<float> finish(CompressedVolume &volume) override {
     encoder_.finish(sink_);
-    if (measure_error_) volume.max_error = encoder_.errors().max();
+    if (measure_error_) volume.max_voxel_error = encoder_.errors().max();
     return encoder_.errors().take();
   }
 
@@ -148,9 +148,9 @@ class DeviceCoder : public LevelCoder {
 /// Compresses blocks of lengths of their own.
 class BoundedCoder : public LevelCoder {
  public:
-  BoundedCoder(const glm::uvec3 &dims, const ErrorBound &bound, const Sink &sink, bool keep)
+  BoundedCoder(const glm::uvec3 &dims, const BlockPrecision &bound, const Sink &sink, bool keep)
       : coder_(dims, bound, sink,
-               keep || !bound.max_error ? std::optional(BlockErrors(keep)) : std::nullopt) {}
+               keep || !bound.max_voxel_error ? std::optional(BlockErrors(keep)) : std::nullopt) {}
   void begin_chunk(const Chunk &chunk) override { coder_.begin_chunk(chunk); }
   void code_row(const BlockRow &row, std::uint32_t thread) override {
     coder_.code_row(row, thread);
@@ -160,8 +160,8 @@ class BoundedCoder : public LevelCoder {
     volume.index = coder_.finish();
     volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
     std::optional<BlockErrors> &errors = coder_.errors();
-    if (!volume.error_bound.max_error) volume.error_bound.max_error = errors->max();
-    volume.max_error = volume.error_bound.max_error;
+    if (!volume.precision.max_voxel_error) volume.precision.max_voxel_error = errors->max();
+    volume.max_voxel_error = volume.precision.max_voxel_error;
     return errors ? errors->take() : std::vector<float>();
   }
   std::span<const float> decoded() const override { return coder_.decoded(); }
@@ -181,7 +181,7 @@ class PyramidCoder : public ChunkCoder {
     const glm::uvec3 dims = volume_.info.dims;
     const bool keep = is_finest && volumes.size() > 1;
     if (volume_.is_indexed()) {
-      coder_ = std::make_unique<BoundedCoder>(dims, volume_.error_bound, sinks[0], keep);
+      coder_ = std::make_unique<BoundedCoder>(dims, volume_.precision, sinks[0], keep);
     } else if (options.device && is_finest) {
       coder_ = std::make_unique<DeviceCoder>(dims, options, sinks[0], keep);
     } else {
@@ -243,9 +243,9 @@ class PyramidCoder : public ChunkCoder {
 
 /// All but what the voxels decide.
 CompressedVolume describe(const VolumeReader &reader, const CompressOptions &options) {
-  if (options.error_bound && options.device)
+  if (options.precision && options.device)
     throw Error("a device compresses at a fixed rate only: leave the device, or the error bound");
-  if (!options.error_bound && (options.rate < 1 || options.rate > 32))
+  if (!options.precision && (options.rate < 1 || options.rate > 32))
     throw Error("rate {}: must be 1 to 32 bits per voxel", options.rate);
   check_volume_info(reader.info(), "volume");
   const glm::uvec3 dims = reader.info().dims;
@@ -256,16 +256,16 @@ CompressedVolume describe(const VolumeReader &reader, const CompressOptions &opt
   }
   CompressedVolume volume;
   volume.info = reader.info();
-  if (options.error_bound) {
-    volume.error_bound = *options.error_bound;
+  if (options.precision) {
+    volume.precision = *options.precision;
   } else {
     volume.bits_per_block = 64 * options.rate;
   }
-  for (CompressedVolume level = volume; volume.coarser.size() + 1 < num_levels;) {
+  for (CompressedVolume level = volume; volume.coarser_levels.size() + 1 < num_levels;) {
     level.info = coarser_level(level.info);
-    level.error_bound.whole_numbers = false;  // means of integers are none
-    level.error_bound.max_error.reset();
-    volume.coarser.push_back(level);
+    level.precision.whole_numbers = false;  // means of integers are none
+    level.precision.max_voxel_error.reset();
+    volume.coarser_levels.push_back(level);
   }
   return volume;
 }
@@ -273,7 +273,7 @@ CompressedVolume describe(const VolumeReader &reader, const CompressOptions &opt
 /// The volume and its coarser levels.
 std::vector<CompressedVolume *> all_levels(CompressedVolume &volume) {
   std::vector<CompressedVolume *> levels = {&volume};
-  for (CompressedVolume &level : volume.coarser) levels.push_back(&level);
+  for (CompressedVolume &level : volume.coarser_levels) levels.push_back(&level);
   return levels;
 }
 
@@ -345,7 +345,7 @@ void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_
 void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing) {
   volume.info.spacing = spacing;
   const VolumeInfo *finer = &volume.info;
-  for (CompressedVolume &level : volume.coarser) {
+  for (CompressedVolume &level : volume.coarser_levels) {
     level.info = coarser_level(*finer);
     finer = &level.info;
   }
@@ -373,17 +373,17 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
   CompressedVolume volume = describe(reader, options);
   ZfpFileWriter file(path, volume);
   std::vector<Sink> sinks;
-  for (std::size_t level = 0; level <= volume.coarser.size(); ++level)
+  for (std::size_t level = 0; level <= volume.coarser_levels.size(); ++level)
     sinks.emplace_back([&file, level](Payload payload) { file.write(payload, level); });
   run(reader, options, sinks, volume);
   file.commit(volume);
   return volume;
 }
 
-ErrorBound coarser(const ErrorBound &bound, double value_error) {
-  if (!(value_error >= 0) || !std::isfinite(value_error))
-    throw Error("a value error of {} cannot be allowed: give 0 or more", value_error);
-  const std::int32_t min_exponent = value_error > 0 ? std::ilogb(value_error) : ISO_ALL_PLANES;
+BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error) {
+  if (!(voxel_error >= 0) || !std::isfinite(voxel_error))
+    throw Error("a value error of {} cannot be allowed: give 0 or more", voxel_error);
+  const std::int32_t min_exponent = voxel_error > 0 ? std::ilogb(voxel_error) : ISO_ALL_PLANES;
   if (min_exponent <= bound.min_exponent) return bound;
   return {min_exponent, false, {}};  // rounding would only add to the error
 }
@@ -391,12 +391,12 @@ ErrorBound coarser(const ErrorBound &bound, double value_error) {
 /// A block with fewer bits has no exponent.
 constexpr std::uint32_t kExponentEnd = 9;
 
-std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double value_error) {
+std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double voxel_error) {
   // libzfp reads whole 64-bit words: four of 32 bits more keep its last read inside.
   std::vector<std::uint32_t> words(volume.word_count() + 4);
   volume.read_words(0, words);
   const glm::uvec3 dims = volume.info.dims, blocks = volume.num_blocks();
-  const ErrorBound bound = coarser(volume.error_bound, value_error);
+  const BlockPrecision bound = with_fewer_planes(volume.precision, voxel_error);
   const ZfpStream stream = make_zfp_stream(volume.bits_per_block, bound.min_exponent);
   const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)),
                      &stream_close);

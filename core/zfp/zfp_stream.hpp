@@ -25,25 +25,25 @@ class Device;
 }
 
 /// How much of its voxels a volume keeps whose blocks have lengths of their own.
-struct ErrorBound {
+struct BlockPrecision {
   /// Bit planes of blocks end where zfp can promise an error of at most 2^min_exponent (its
   /// fixed-accuracy mode).
   std::int32_t min_exponent = ISO_ALL_PLANES;
   bool whole_numbers = false;  ///< decoded values are rounded: the source's, which are integers
-  std::optional<double> max_error{};  ///< largest |decoded - source|, measured
+  std::optional<double> max_voxel_error{};  ///< largest |decoded - source|, measured
 };
 
-/// Drops the bit planes that a value error of at most value_error can spare. 0 drops none.
-ErrorBound coarser(const ErrorBound &bound, double value_error);
+/// Drops the bit planes that a value error of at most voxel_error can spare. 0 drops none.
+BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error);
 
 struct CompressOptions {
   std::uint32_t rate = 8;  ///< bits per voxel, 1..32; or
-  std::optional<ErrorBound>
-      error_bound{};  ///< as many bits as each block needs: see choose_error_bound()
+  std::optional<BlockPrecision>
+      precision{};  ///< as many bits as each block needs: see choose_precision()
   /// At a fixed rate, encodes instead of libzfp: the same result, bit for bit.
   ocl::Device *device = nullptr;
   bool measure_error =
-      false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_error
+      false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_voxel_error
   std::uint32_t levels =
       1;  ///< of detail, the volume itself among them, 1..max_levels(); 0: max_levels()
   InputOptions input{};
@@ -69,7 +69,7 @@ struct CompressedVolume {
   /// 64 * rate; from other writers 9..2048 (1 + 8 bits hold the exponent). 0: blocks have lengths
   /// of their own.
   std::uint32_t bits_per_block = 0;
-  ErrorBound error_bound{};  ///< at a fixed rate, as it is from the start
+  BlockPrecision precision{};  ///< at a fixed rate, as it is from the start
   std::vector<std::uint32_t>
       index{};  ///< where blocks begin that have lengths of their own: block_index.h
   std::uint64_t indexed_bits = 0;  ///< length of all of them
@@ -80,10 +80,10 @@ struct CompressedVolume {
   std::uint64_t file_first_bit = 0;         ///< from this bit on.
   /// [min, max] of the source's voxels, as float32 and after map_nan; {-inf, inf} when unknown.
   std::array<float, 2> value_range{};
-  std::optional<double> max_error{};  ///< largest |decoded - source| when it was measured
-  BlockBounds bounds{};               ///< of a level of detail; no codes: not known
+  std::optional<double> max_voxel_error{};  ///< largest |decoded - source| when it was measured
+  BlockBounds bounds{};                     ///< of a level of detail; no codes: not known
   /// Levels of detail, each of half the voxels along each axis: pyramid.hpp.
-  std::vector<CompressedVolume> coarser{};
+  std::vector<CompressedVolume> coarser_levels{};
 
   glm::uvec3 num_blocks() const { return (info.dims + 3u) / 4u; }
   std::uint64_t block_count() const {
@@ -137,8 +137,8 @@ CompressedVolume check_zfp_file(const std::filesystem::path &path);
 /// As check_zfp_file(), but neither reads nor checks the payload, index and bounds.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
-/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as value_error
-/// allows: see coarser(). The ground truth of every decoder here.
-std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double value_error = 0);
+/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as voxel_error
+/// allows: see with_fewer_planes(). The ground truth of every decoder here.
+std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double voxel_error = 0);
 
 }  // namespace isowave

@@ -51,9 +51,9 @@ void apply_errors(const json &trailer, bool counts_casts, CompressedVolume &volu
   if (trailer.contains("max_error")) {
     const auto max_error = number_from<double>(trailer["max_error"]);
     if (max_error < 0) throw Error("{} is no error", max_error);
-    if (counts_casts) volume.max_error = max_error;
+    if (counts_casts) volume.max_voxel_error = max_error;
   }
-  if (volume.is_indexed()) volume.error_bound.max_error = volume.max_error;
+  if (volume.is_indexed()) volume.precision.max_voxel_error = volume.max_voxel_error;
 }
 
 ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
@@ -79,7 +79,7 @@ ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
   }
   if (!volume.is_indexed()) return layout;
   volume.indexed_bits = number_from<std::uint64_t>(trailer.at("payload_bits"));
-  volume.error_bound.whole_numbers = trailer.at("whole_numbers").get<bool>();
+  volume.precision.whole_numbers = trailer.at("whole_numbers").get<bool>();
   layout.index_bytes = number_from<std::uint64_t>(trailer.at("index_bytes"));
   return layout;
 }
@@ -108,12 +108,12 @@ std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &la
   }
   trailer["type"] = to_string(info.type);
   if (std::isfinite(volume.value_range[0])) trailer["value_range"] = volume.value_range;
-  if (volume.max_error) trailer["max_error"] = *volume.max_error;
+  if (volume.max_voxel_error) trailer["max_error"] = *volume.max_voxel_error;
   if (!fits_float32(info.type)) trailer["cast_counts"] = true;
   if (volume.is_indexed()) {
     trailer["payload_bits"] = volume.indexed_bits;
     trailer["index_bytes"] = layout.index_bytes;
-    trailer["whole_numbers"] = volume.error_bound.whole_numbers;
+    trailer["whole_numbers"] = volume.precision.whole_numbers;
   }
   if (layout.bounds_bytes != 0) {
     trailer["bounds_bytes"] = layout.bounds_bytes;

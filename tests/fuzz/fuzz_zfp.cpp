@@ -47,8 +47,8 @@ std::array<float, 64> decode(const CompressedVolume &volume, std::uint32_t block
   std::vector<std::uint32_t> words((bits + 31) / 32 + kDecoderAhead);
   volume.read_words(volume.block_begin(block), words);
   std::array<float, 64> values{};
-  zfp_decode_block(words.data(), 0, bits, volume.error_bound.min_exponent, values.data());
-  if (volume.error_bound.whole_numbers)
+  zfp_decode_block(words.data(), 0, bits, volume.precision.min_exponent, values.data());
+  if (volume.precision.whole_numbers)
     std::ranges::transform(values, values.begin(), [](float v) { return std::rint(v) + 0.0f; });
   return values;
 }
@@ -78,9 +78,10 @@ bool same_head(const CompressedVolume &a, const CompressedVolume &b) {
   return a.info.dims == b.info.dims && a.info.spacing == b.info.spacing &&
          a.info.origin == b.info.origin && a.info.direction == b.info.direction &&
          a.info.type == b.info.type && a.bits_per_block == b.bits_per_block &&
-         a.error_bound.min_exponent == b.error_bound.min_exponent && a.max_error == b.max_error &&
-         a.error_bound.whole_numbers == b.error_bound.whole_numbers &&
-         a.coarser.size() == b.coarser.size();
+         a.precision.min_exponent == b.precision.min_exponent &&
+         a.max_voxel_error == b.max_voxel_error &&
+         a.precision.whole_numbers == b.precision.whole_numbers &&
+         a.coarser_levels.size() == b.coarser_levels.size();
 }
 
 void demand_same(const CompressedVolume &a, const CompressedVolume &b) {
@@ -88,8 +89,8 @@ void demand_same(const CompressedVolume &a, const CompressedVolume &b) {
                    a.bounds.codes == b.bounds.codes &&
                    (a.bounds.codes.empty() || a.bounds.exponent == b.bounds.exponent),
                "a volume is not the one that was written");
-  for (std::size_t level = 0; level < a.coarser.size(); ++level)
-    demand_same(a.coarser[level], b.coarser[level]);
+  for (std::size_t level = 0; level < a.coarser_levels.size(); ++level)
+    demand_same(a.coarser_levels[level], b.coarser_levels[level]);
 }
 
 void demand_written_again(const CompressedVolume &volume, const std::filesystem::path &path) {
@@ -100,8 +101,8 @@ void demand_written_again(const CompressedVolume &volume, const std::filesystem:
     writer.write(std::as_bytes(std::span(words)), level);
   };
   write(volume, 0);
-  for (std::size_t level = 0; level < volume.coarser.size(); ++level)
-    write(volume.coarser[level], level + 1);
+  for (std::size_t level = 0; level < volume.coarser_levels.size(); ++level)
+    write(volume.coarser_levels[level], level + 1);
   writer.commit(volume);
   demand_same(read_zfp_file(path), volume);
 }
@@ -129,7 +130,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
                    same_head(check_zfp_file(path), volume),
                "two ways to read a file differ");
   demand_libzfp_agrees(in_file);
-  for (const CompressedVolume &level : in_file.coarser) demand_libzfp_agrees(level);
+  for (const CompressedVolume &level : in_file.coarser_levels) demand_libzfp_agrees(level);
   // At a fixed rate, only blocks of whole 64-bit words are written.
   if (volume.bits_per_block % 64 == 0) demand_written_again(volume, path);
   return 0;

@@ -40,9 +40,9 @@ struct BenchParetoArgs {
   std::vector<std::string> storages = {"rate:2", "rate:4", "rate:8", "tolerance-relative:0.01",
                                        "tolerance-relative:0.002"};
   std::vector<std::string> pipelines = {"rays", "blocks"}, solvers = {"linear", "bernstein"};
-  std::vector<double> max_pixel_errors = {0, 0.5, 1, 2};
-  std::vector<double> value_errors = {0, 0.01, 0.04};  ///< as parts of the range of values
-  std::vector<double> max_errors = {0.25, 1, 4};       ///< [pixels]
+  std::vector<double> all_voxel_pixels = {0, 0.5, 1, 2};
+  std::vector<double> voxel_errors = {0, 0.01, 0.04};     ///< as parts of the range of values
+  std::vector<double> max_surface_errors = {0.25, 1, 4};  ///< [pixels]
   std::uint32_t views = 3, rounds = 3;
 };
 
@@ -168,34 +168,35 @@ struct Point {
   const Stored *stored = nullptr;
   std::string pipeline = "rays";
   std::string solver{to_string(kDefaultSolver)};
-  std::vector<Detail> details;       ///< of each view
-  std::optional<double> max_error;   ///< [pixels], for which they were chosen
-  std::vector<bool> reachable;       ///< DetailChoice::reachable, of each view
-  double ms = 0;                     ///< median of all cold frames
-  std::uint64_t decoded_blocks = 0;  ///< mean of the views
+  std::vector<Detail> details;              ///< of each view
+  std::optional<double> max_surface_error;  ///< [pixels], for which they were chosen
+  std::vector<bool> reachable;              ///< DetailChoice::reachable, of each view
+  double ms = 0;                            ///< median of all cold frames
+  std::uint64_t decoded_blocks = 0;         ///< mean of the views
   Errors errors;
   std::optional<double> over_front;  ///< see compare_choices()
 };
 
 /// Whether the levels of detail must be there for it.
 bool has_levels(const Point &point) {
-  return point.max_error || point.details.front().max_pixel_error > 0;
+  return point.max_surface_error || point.details.front().voxel_pixels > 0;
 }
 
 Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const Point &point) {
   RendererFlags flags{.pipeline = point.pipeline, .solver = point.solver, .values = {}};
-  if (!point.max_error) flags.values.max_pixel_error = point.details.front().max_pixel_error;
+  if (!point.max_surface_error) flags.values.voxel_pixels = point.details.front().voxel_pixels;
   const RendererOptions options = to_renderer_options(flags, subject.size);
   const CompressedVolume &volume = point.stored->volume;
-  return Renderer(device, volume, point.max_error ? with_choices(options, volume) : options);
+  return Renderer(device, volume,
+                  point.max_surface_error ? with_choices(options, volume) : options);
 }
 
 /// Sets the renderer to one view of the point, and draws it once: the first frame of an isovalue,
 /// or of a precision, does more.
 void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point,
              std::size_t view) {
-  renderer.set_max_pixel_error(point.details[view].max_pixel_error);
-  renderer.set_value_error(point.details[view].value_error);
+  renderer.set_voxel_pixels(point.details[view].voxel_pixels);
+  renderer.set_voxel_error(point.details[view].voxel_error);
   renderer.render(subject.cameras[view], subject.isovalue);
 }
 
@@ -257,7 +258,7 @@ CompressionOptions finest_storage(VoxelType type) {
 std::uint64_t stored_bytes(const CompressedVolume &volume, bool with_levels) {
   std::uint64_t bytes =
       (volume.payload_bits() + 7) / 8 + volume.index.size() * sizeof(std::uint32_t);
-  for (const CompressedVolume &level : volume.coarser)
+  for (const CompressedVolume &level : volume.coarser_levels)
     bytes += with_levels ? stored_bytes(level, false) : 0;
   return bytes;
 }
@@ -297,24 +298,25 @@ void print_header() {
 }
 
 /// Of the range of values, which may be none.
-double part_of(double value_range, double value_error) {
-  return value_error == 0 ? 0 : value_error / value_range;
+double part_of(double value_range, double voxel_error) {
+  return voxel_error == 0 ? 0 : voxel_error / value_range;
 }
 
 void print(const Point &point, double value_range) {
   const auto text = [&](double number) {
-    return point.max_error ? "by view" : fmt::format("{:.4g}", number);
+    return point.max_surface_error ? "by view" : fmt::format("{:.4g}", number);
   };
   const Errors &errors = point.errors;
-  fmt::print(kRowFormat, point.stored->name, point.pipeline,
-             point.max_error ? fmt::format("error {}", *point.max_error) : point.solver,
-             text(point.details.front().max_pixel_error),
-             text(part_of(value_range, point.details.front().value_error)),
-             with_commas(stored_bytes(point)), fmt::format("{:.3f}", point.ms),
-             with_commas(point.decoded_blocks), fmt::format("{:.2e}", errors.wrong_pixels()),
-             fmt::format("{:.2e}", errors.depth_p99), fmt::format("{:.2f}", errors.normal_p99),
-             fmt::format("{:.4f}", errors.flip),
-             std::isfinite(errors.psnr_db) ? fmt::format("{:.1f}", errors.psnr_db) : "same");
+  fmt::print(
+      kRowFormat, point.stored->name, point.pipeline,
+      point.max_surface_error ? fmt::format("error {}", *point.max_surface_error) : point.solver,
+      text(point.details.front().voxel_pixels),
+      text(part_of(value_range, point.details.front().voxel_error)),
+      with_commas(stored_bytes(point)), fmt::format("{:.3f}", point.ms),
+      with_commas(point.decoded_blocks), fmt::format("{:.2e}", errors.wrong_pixels()),
+      fmt::format("{:.2e}", errors.depth_p99), fmt::format("{:.2f}", errors.normal_p99),
+      fmt::format("{:.4f}", errors.flip),
+      std::isfinite(errors.psnr_db) ? fmt::format("{:.1f}", errors.psnr_db) : "same");
 }
 
 ordered_json to_json(const Point &point, double value_range) {
@@ -322,8 +324,8 @@ ordered_json to_json(const Point &point, double value_range) {
     return number ? ordered_json(*number) : ordered_json();
   };
   const auto detail_json = [&](const Detail &detail) -> ordered_json {
-    return {{"max_pixel_error", detail.max_pixel_error},
-            {"value_error", part_of(value_range, detail.value_error)}};
+    return {{"voxel_pixels", detail.voxel_pixels},
+            {"voxel_error", part_of(value_range, detail.voxel_error)}};
   };
   const Errors &errors = point.errors;
   ordered_json json = {
@@ -332,9 +334,9 @@ ordered_json to_json(const Point &point, double value_range) {
       {"rate", point.stored->volume.rate()},
       {"pipeline", point.pipeline},
       {"solver", point.solver},
-      {"max_pixel_error", nullptr},
-      {"value_error", nullptr},
-      {"max_error", or_null(point.max_error)},
+      {"voxel_pixels", nullptr},
+      {"voxel_error", nullptr},
+      {"max_surface_error", or_null(point.max_surface_error)},
       {"ms", point.ms},
       {"decoded_blocks", point.decoded_blocks},
       {"wrong_pixels", errors.wrong_pixels()},
@@ -344,7 +346,7 @@ ordered_json to_json(const Point &point, double value_range) {
       {"normal_p99", errors.normal_p99},
       {"flip", errors.flip},
       {"psnr_db", std::isfinite(errors.psnr_db) ? ordered_json(errors.psnr_db) : ordered_json()}};
-  if (!point.max_error) {
+  if (!point.max_surface_error) {
     json.update(detail_json(point.details.front()));
     return json;
   }
@@ -362,17 +364,17 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
            const Stored &stored, std::vector<Point> &points) {
   for (const std::string &pipeline : options.pipelines) {
     for (const std::string &solver : options.solvers) {
-      for (const double max_pixel_error : options.max_pixel_errors) {
-        if (pipeline == "blocks" && max_pixel_error > 0) continue;
+      for (const double voxel_pixels : options.all_voxel_pixels) {
+        if (pipeline == "blocks" && voxel_pixels > 0) continue;
         Point point;
         point.stored = &stored;
         point.pipeline = pipeline;
         point.solver = solver;
-        point.details.resize(subject.cameras.size(), Detail{.max_pixel_error = max_pixel_error});
+        point.details.resize(subject.cameras.size(), Detail{.voxel_pixels = voxel_pixels});
         Renderer renderer = make_renderer(device, subject, point);
-        for (const double value_error : options.value_errors) {
+        for (const double voxel_error : options.voxel_errors) {
           for (Detail &detail : point.details)
-            detail.value_error = value_error * subject.value_range;
+            detail.voxel_error = voxel_error * subject.value_range;
           points.push_back(point);
           measure(renderer, subject, points.back());
           print(points.back(), subject.value_range);
@@ -382,20 +384,20 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
   }
 }
 
-/// What render --max-error chooses for each view.
+/// What render --max-surface-error chooses for each view.
 void choose(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
             const Stored &stored, std::vector<Point> &points) {
-  if (options.max_errors.empty()) return;
+  if (options.max_surface_errors.empty()) return;
   Point any;
   any.stored = &stored;
-  any.max_error = options.max_errors.front();
+  any.max_surface_error = options.max_surface_errors.front();
   Renderer renderer = make_renderer(device, subject, any);
-  for (const double max_error : options.max_errors) {
+  for (const double max_surface_error : options.max_surface_errors) {
     Point point = any;
-    point.max_error = max_error;
+    point.max_surface_error = max_surface_error;
     for (const Camera &camera : subject.cameras) {
       const DetailChoice choice =
-          choose_detail(renderer, stored.volume, camera, subject.isovalue, max_error);
+          choose_detail(renderer, stored.volume, camera, subject.isovalue, max_surface_error);
       point.details.push_back(choice.detail);
       point.reachable.push_back(choice.reachable);
     }
@@ -405,24 +407,25 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
   }
 }
 
-/// Sets Point::over_front of the choices of --max-error: how many times as long they take as the
-/// fastest point of the sweep that is no worse in any error; none, where all are worse. The two are
-/// drawn in turn, once more: of many points that take as long, the one that seemed to be the
-/// fastest mostly was lucky.
+/// Sets Point::over_front of the choices of --max-surface-error: how many times as long they take
+/// as the fastest point of the sweep that is no worse in any error; none, where all are worse. The
+/// two are drawn in turn, once more: of many points that take as long, the one that seemed to be
+/// the fastest mostly was lucky.
 void compare_choices(ocl::Device &device, const ParetoSubject &subject,
                      std::vector<Point> &points) {
   for (Point &choice : points) {
-    if (!choice.max_error) continue;
+    if (!choice.max_surface_error) continue;
     const Point *fastest = nullptr;
     for (const Point &point : points) {
-      if (!point.max_error && point.errors.no_worse_than(choice.errors) &&
+      if (!point.max_surface_error && point.errors.no_worse_than(choice.errors) &&
           (!fastest || point.ms < fastest->ms))
         fastest = &point;
     }
     if (!fastest) continue;
     choice.over_front = time_ratio(device, subject, choice, *fastest);
-    fmt::print("{}, --max-error {}: {:.2f} times the time of the fastest point that is no worse\n",
-               choice.stored->name, *choice.max_error, *choice.over_front);
+    fmt::print(
+        "{}, --max-surface-error {}: {:.2f} times the time of the fastest point that is no worse\n",
+        choice.stored->name, *choice.max_surface_error, *choice.over_front);
   }
 }
 
@@ -435,8 +438,9 @@ void run_bench_pareto(BenchParetoArgs options) {
     throw Error("{}: is compressed already: give the volume that is to be compressed",
                 options.input);
   for (const std::string &storage : options.storages) parse_storage(storage);
-  std::erase(options.max_errors, 0.0);
-  for (const double max_error : options.max_errors) check_max_error(max_error);
+  std::erase(options.max_surface_errors, 0.0);
+  for (const double max_surface_error : options.max_surface_errors)
+    check_max_surface_error(max_surface_error);
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   ocl::Device device(info);
@@ -445,10 +449,10 @@ void run_bench_pareto(BenchParetoArgs options) {
   for (const std::string &storage : options.storages) {
     CompressionOptions compression = parse_storage(storage);
     const bool with_levels =
-        !options.max_errors.empty() ||
-        std::ranges::any_of(options.max_pixel_errors, [](double e) { return e > 0; });
+        !options.max_surface_errors.empty() ||
+        std::ranges::any_of(options.all_voxel_pixels, [](double e) { return e > 0; });
     compression.levels = with_levels ? 0 : 1;
-    compression.measure_error = !options.max_errors.empty();
+    compression.measure_error = !options.max_surface_errors.empty();
     stored.push_back(
         {storage, load_volume(options.input, to_overrides(options.volume), compression)});
   }
@@ -501,19 +505,19 @@ void add_bench_pareto(CLI::App &bench) {
       ->delimiter(',')
       ->capture_default_str();
   command
-      ->add_option("--max-pixel-error", options->max_pixel_errors,
+      ->add_option("--voxel-pixels", options->all_voxel_pixels,
                    "see render; a list; pipeline blocks takes 0 only")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
-      ->add_option("--value-error", options->value_errors,
+      ->add_option("--voxel-error", options->voxel_errors,
                    "see render, but as parts of the range of values; a list")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
-      ->add_option("--max-error", options->max_errors,
+      ->add_option("--max-surface-error", options->max_surface_errors,
                    "what render chooses for these, as points of their own; a list, 0: none")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)

@@ -52,7 +52,7 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
-  compress.error_bound =
+  compress.precision =
       find_error_bound(options.path, overrides, options.compression, options.input);
   compress.input.progress = make_progress_bar("compressing");
   const CompressedVolume volume = compress_to_file(*reader, compress, options.output);
@@ -61,12 +61,13 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);
   const std::uint64_t bytes_out = std::filesystem::file_size(options.output);
-  fmt::print(
-      "{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output),
-      dims.x, dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in),
-      with_commas(bytes_out), volume.rate(),
-      volume.max_error ? fmt::format(", max error {}", printed_bound(*volume.max_error)) : "");
-  for (const CompressedVolume &level : volume.coarser) {
+  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output),
+             dims.x, dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in),
+             with_commas(bytes_out), volume.rate(),
+             volume.max_voxel_error
+                 ? fmt::format(", max error {}", printed_bound(*volume.max_voxel_error))
+                 : "");
+  for (const CompressedVolume &level : volume.coarser_levels) {
     const glm::uvec3 coarse = level.info.dims;
     fmt::print("  level of detail {}x{}x{}: {} bytes\n", coarse.x, coarse.y, coarse.z,
                with_commas((level.payload_bits() + 7) / 8));

@@ -73,7 +73,7 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
           ->allow_extra_args(false);  // one number each time: VOLUME may follow
   add_compression_options(command, options.compression);
   command
-      .add_option("--value-error", options.value_error,
+      .add_option("--voxel-error", options.voxel_error,
                   "how far decoded voxels may be from the compressed volume's: fewer bit planes "
                   "are decoded")
       ->capture_default_str();

@@ -18,14 +18,14 @@ namespace isowave::tools {
 struct FrameOptions {
   CompressionOptions compression;  ///< of a volume that is not
   std::vector<float> isovalues;
-  double value_error = 0;     ///< see Renderer::set_value_error()
+  double voxel_error = 0;     ///< see Renderer::set_voxel_error()
   std::string size;           ///< WxH
   std::uint32_t samples = 1;  ///< ImageSize::samples
   std::uint32_t orbit = 0;    ///< views; 0: one, or the camera file's
   std::string cameras;        ///< camera file
 };
 
-/// Adds --isovalue, --value-error, --size, --orbit, --cameras and add_compression_options().
+/// Adds --isovalue, --voxel-error, --size, --orbit, --cameras and add_compression_options().
 /// Returns the option --isovalue.
 /// (--samples is render's alone.)
 CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options);

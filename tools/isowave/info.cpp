@@ -60,17 +60,17 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   result["block_count"] = volume.block_count();
   result["format"] = volume.is_indexed() ? "zfp, fixed accuracy" : "zfp, fixed rate";
   if (volume.is_indexed()) {
-    result["zfp_tolerance"] = std::ldexp(1.0, volume.error_bound.min_exponent);
-    result["exact"] = volume.error_bound.whole_numbers;
+    result["zfp_tolerance"] = std::ldexp(1.0, volume.precision.min_exponent);
+    result["exact"] = volume.precision.whole_numbers;
   } else {
     result["bits_per_block"] = volume.bits_per_block;
   }
   result["rate"] = volume.rate();
   if (std::isfinite(volume.value_range[0])) result["value_range"] = volume.value_range;
-  if (volume.max_error) result["max_error"] = *volume.max_error;
-  for (const CompressedVolume &level : volume.coarser) {
+  if (volume.max_voxel_error) result["max_voxel_error"] = *volume.max_voxel_error;
+  for (const CompressedVolume &level : volume.coarser_levels) {
     result["coarser"].push_back({level.info.dims.x, level.info.dims.y, level.info.dims.z});
-    if (!level.bounds.codes.empty()) result["coarser_error"].push_back(largest_bound(level.bounds));
+    if (!level.bounds.codes.empty()) result["level_errors"].push_back(largest_bound(level.bounds));
   }
   return result;
 }

@@ -44,9 +44,9 @@ struct RenderArgs {
   bool reference = false, no_stage_times = false, verbose = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
   std::string image, depth, stats, progress_dir, error_map, refined;
-  std::optional<double> max_error;    ///< pixels
-  std::optional<double> time_budget;  ///< ms
-  double max_pixel_error = 0;         ///< of whole frames
+  std::optional<double> max_surface_error;  ///< pixels
+  std::optional<double> time_budget;        ///< ms
+  double voxel_pixels = 0;                  ///< of whole frames
 };
 
 /// "#RRGGBB" -> [0,1]^3.
@@ -98,15 +98,16 @@ class DeviceFrames : public FrameSource {
       : volume_(scene.volume),
         renderer_(device, scene.volume, args.renderer),
         appearance_(appearance),
-        max_error_(args.max_error),
+        max_surface_error_(args.max_surface_error),
         time_budget_(args.time_budget) {
-    renderer_.set_value_error(args.frame.value_error);
+    renderer_.set_voxel_error(args.frame.voxel_error);
     if (!time_budget_) return;
-    renderer_.set_max_pixel_error(args.max_pixel_error);
+    renderer_.set_voxel_pixels(args.voxel_pixels);
     timed_frames_.emplace(renderer_);
   }
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
-    if (max_error_) choice_ = choose_detail(renderer_, volume_, camera, isovalue, *max_error_);
+    if (max_surface_error_)
+      choice_ = choose_detail(renderer_, volume_, camera, isovalue, *max_surface_error_);
     if (!timed_frames_) return renderer_.render(camera, isovalue, on_pass);
     timed_ = timed_frames_->render(camera, isovalue, *time_budget_);
     return timed_.stats;
@@ -116,7 +117,7 @@ class DeviceFrames : public FrameSource {
   }
   void report(const Camera &camera, float isovalue, const fs::path &error_map,
               nlohmann::ordered_json &frame) override {
-    if (max_error_) frame["error"] = bound_error(camera, isovalue, error_map);
+    if (max_surface_error_) frame["error"] = bound_error(camera, isovalue, error_map);
     if (timed_frames_) frame["time_budget"] = timed_steps();
   }
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
@@ -132,7 +133,7 @@ class DeviceFrames : public FrameSource {
   Renderer renderer_;
   std::optional<TimedFrames> timed_frames_;
   Appearance appearance_;
-  std::optional<double> max_error_, time_budget_;
+  std::optional<double> max_surface_error_, time_budget_;
   DetailChoice choice_;
   TimedFrame timed_;
 };
@@ -141,13 +142,13 @@ nlohmann::ordered_json DeviceFrames::timed_steps() const {
   nlohmann::ordered_json steps = nlohmann::ordered_json::array();
   for (const TimedStep &step : timed_.steps) {
     fmt::print("  {}x{}, {}: {:.2f} ms, {}\n", step.size.width, step.size.height,
-               step.max_pixel_error == 0
+               step.voxel_pixels == 0
                    ? "finest level"
-                   : fmt::format("voxels up to {} of its pixels apart", step.max_pixel_error),
+                   : fmt::format("voxels up to {} of its pixels apart", step.voxel_pixels),
                step.ms,
                step.cancelled ? fmt::format("{:.1f} % of it", step.completed_percent) : "whole");
     steps.push_back({{"size", {step.size.width, step.size.height}},
-                     {"max_pixel_error", step.max_pixel_error},
+                     {"voxel_pixels", step.voxel_pixels},
                      {"ms", step.ms},
                      {"completed_percent", step.completed_percent},
                      {"cancelled", step.cancelled}});
@@ -156,13 +157,13 @@ nlohmann::ordered_json DeviceFrames::timed_steps() const {
 }
 
 nlohmann::ordered_json detail_json(const Detail &detail) {
-  return {{"max_pixel_error", detail.max_pixel_error}, {"value_error", detail.value_error}};
+  return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
 }
 
 nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float isovalue,
                                                  const fs::path &error_map) {
   const Certificate certificate = certify(renderer_, volume_, camera, isovalue, renderer_.hits());
-  const CertificateSummary summary = summarize(certificate, *max_error_);
+  const CertificateSummary summary = summarize(certificate, *max_surface_error_);
   const double certified = summary.num_pixels == 0
                                ? 100.0
                                : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
@@ -173,11 +174,12 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
       "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
       "bounded in "
       "{:.0f} ms\n",
-      *max_error_, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
-      with_commas(summary.num_uncertain), choice_.detail.max_pixel_error,
-      choice_.detail.value_error, choice_.total_ms, certificate.total_ms);
+      *max_surface_error_, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
+      with_commas(summary.num_uncertain), choice_.detail.voxel_pixels, choice_.detail.voxel_error,
+      choice_.total_ms, certificate.total_ms);
   if (!choice_.reachable) {
-    spdlog::warn("most pixels cannot be kept within {} pixels: {}", *max_error_, choice_.advice);
+    spdlog::warn("most pixels cannot be kept within {} pixels: {}", *max_surface_error_,
+                 choice_.advice);
   }
   if (!error_map.empty())
     write_npy({renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(),
@@ -188,7 +190,7 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
     tries.push_back(detail_json(each.detail));
     tries.back()["certified"] = each.certified;
   }
-  return {{"max_error", *max_error_},
+  return {{"max_surface_error", *max_surface_error_},
           {"reachable", choice_.reachable},
           {"chosen", detail_json(choice_.detail)},
           {"tries", tries},
@@ -206,11 +208,11 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
 class TwinFrames : public FrameSource {
  public:
   TwinFrames(const Scene &scene, const Appearance &appearance, const RendererOptions &options,
-             double value_error)
+             double voxel_error)
       : scene_(scene),
         appearance_(appearance),
         options_(options),
-        twin_(scene.volume, options.max_pixel_error, value_error) {}
+        twin_(scene.volume, options.voxel_pixels, voxel_error) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
@@ -290,25 +292,26 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
                                  {"samples", scene.size.samples},
                                  {"views", scene.cameras.size()},
                                  {"isovalues", options.frame.isovalues},
-                                 {"value_error", options.frame.value_error},
+                                 {"voxel_error", options.frame.voxel_error},
                                  {"reference", options.reference}};
   json.update(renderer_options_json(options.renderer));
-  json["max_pixel_error"] =
-      options.max_pixel_error;  // where it is chosen, the renderer was made for others
+  json["voxel_pixels"] =
+      options.voxel_pixels;  // where it is chosen, the renderer was made for others
   return json;
 }
 
 nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVolume &volume) {
   const VolumeInfo &info = volume.info;
-  return {{"file", options.input},
-          {"dims", {info.dims.x, info.dims.y, info.dims.z}},
-          {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
-          {"type", to_string(info.type)},
-          {"rate", volume.rate()},
-          {"max_error",
-           volume.max_error ? nlohmann::ordered_json(*volume.max_error) : nlohmann::ordered_json()},
-          {"blocks", volume.block_count()},
-          {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
+  return {
+      {"file", options.input},
+      {"dims", {info.dims.x, info.dims.y, info.dims.z}},
+      {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
+      {"type", to_string(info.type)},
+      {"rate", volume.rate()},
+      {"max_voxel_error", volume.max_voxel_error ? nlohmann::ordered_json(*volume.max_voxel_error)
+                                                 : nlohmann::ordered_json()},
+      {"blocks", volume.block_count()},
+      {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
 }
 
 /// Outputs go to folders that exist, but for --progress-dir, which is made when frames are drawn.
@@ -363,24 +366,25 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
              with_commas(plan.setup_bytes));
 }
 
-/// --max-error, --time-budget and what goes with them.
+/// --max-surface-error, --time-budget and what goes with them.
 void check_choice(const RenderArgs &options) {
-  if (!options.max_error && !options.error_map.empty())
-    throw Error("--error-map needs --max-error");
+  if (!options.max_surface_error && !options.error_map.empty())
+    throw Error("--error-map needs --max-surface-error");
   if (!options.time_budget && !options.refined.empty())
     throw Error("--refined needs --time-budget");
-  if (!options.max_error && !options.time_budget) return;
-  const char *choice = options.max_error ? "--max-error" : "--time-budget";
+  if (!options.max_surface_error && !options.time_budget) return;
+  const char *choice = options.max_surface_error ? "--max-surface-error" : "--time-budget";
   if (options.reference) throw Error("--reference cannot choose: leave out {}", choice);
   if (options.time_budget) check_time_budget(*options.time_budget);
   if (options.time_budget && !options.progress_dir.empty())
     throw Error("--time-budget draws a frame in steps: leave out --progress-dir");
-  if (!options.max_error) return;
-  check_max_error(*options.max_error);
+  if (!options.max_surface_error) return;
+  check_max_surface_error(*options.max_surface_error);
   if (options.time_budget)
-    throw Error("--max-error takes the time it takes: leave out --time-budget");
-  if (options.frame.value_error > 0 || options.max_pixel_error > 0)
-    throw Error("--max-error chooses for itself: leave out --value-error and --max-pixel-error");
+    throw Error("--max-surface-error takes the time it takes: leave out --time-budget");
+  if (options.frame.voxel_error > 0 || options.voxel_pixels > 0)
+    throw Error(
+        "--max-surface-error chooses for itself: leave out --voxel-error and --voxel-pixels");
 }
 
 /// What can be told from the options alone.
@@ -392,13 +396,13 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   if (options.stats.empty())
     refuse_options(command, {"--no-stage-times"}, "no statistics are written: give --stats");
   check_renderer_options(command, options.renderer_flags);
-  coarser({}, options.frame.value_error);  // or throws
-  check_max_pixel_error(options.max_pixel_error);
+  with_fewer_planes({}, options.frame.voxel_error);  // or throws
+  check_voxel_pixels(options.voxel_pixels);
   check_choice(options);
 }
 
 void run_render(const CLI::App &command, RenderArgs options) {
-  options.max_pixel_error = options.renderer_flags.values.max_pixel_error;
+  options.voxel_pixels = options.renderer_flags.values.voxel_pixels;
   check_options(command, options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
@@ -409,25 +413,25 @@ void run_render(const CLI::App &command, RenderArgs options) {
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
   RendererOptions &wanted = options.renderer_flags.values;
-  options.frame.compression.measure_error |= options.max_error.has_value();
-  wanted.with_bounds = options.max_error.has_value();
+  options.frame.compression.measure_error |= options.max_surface_error.has_value();
+  wanted.with_bounds = options.max_surface_error.has_value();
   wanted.with_kept_picture = options.time_budget.has_value();
   wanted.with_shading =
       !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
   // Whoever chooses has levels of detail to choose from.
-  const bool chooses_levels =
-      options.max_error || (options.time_budget && options.renderer_flags.pipeline != "blocks");
-  if (chooses_levels) wanted.max_pixel_error = 1;
+  const bool chooses_levels = options.max_surface_error ||
+                              (options.time_budget && options.renderer_flags.pipeline != "blocks");
+  if (chooses_levels) wanted.voxel_pixels = 1;
   want_levels(options.renderer_flags, options.frame.compression);
   const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
   outputs.make_folder();
-  if (chooses_levels && scene.volume.coarser.empty())
-    wanted.max_pixel_error = options.max_pixel_error;
+  if (chooses_levels && scene.volume.coarser_levels.empty())
+    wanted.voxel_pixels = options.voxel_pixels;
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
   if (!device) {
-    TwinFrames frames(scene, appearance, options.renderer, options.frame.value_error);
+    TwinFrames frames(scene, appearance, options.renderer, options.frame.voxel_error);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {
@@ -479,12 +483,13 @@ void add_render(CLI::App &app) {
                       "float32 .npy [H,W]: distance from the eye, inf where nothing is hit; with "
                       "--samples of each ray");
   command->add_option(
-      "--max-error", options->max_error,
+      "--max-surface-error", options->max_surface_error,
       "choose levels of detail and bit planes for each frame, so that its surface is within so "
       "many pixels of the true one, and say for how many pixels that is certain");
-  command->add_option("--error-map", options->error_map,
-                      "float32 .npy [H,W] of --max-error: the bound of each pixel, or ray, inf "
-                      "where there is none");
+  command->add_option(
+      "--error-map", options->error_map,
+      "float32 .npy [H,W] of --max-surface-error: the bound of each pixel, or ray, inf "
+      "where there is none");
   command->add_option(
       "--time-budget", options->time_budget,
       "ms for each frame: draws small pictures by coarse levels of detail first, then larger ones, "

@@ -41,7 +41,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
                  "auto (on the device if that leaves room for a useful cache)")
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
-  app.add_option("--max-pixel-error", flags.values.max_pixel_error,
+  app.add_option("--voxel-pixels", flags.values.voxel_pixels,
                  "draw far parts by coarser levels of detail, whose voxels are at most so many "
                  "pixels apart; "
                  "0: all by the finest")
@@ -91,12 +91,11 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
   const char *speculation = options.max_speculation == 1  ? "off"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
-  return {
-      {"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
-      {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
-      {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
-      {"closest", to_string(options.closest)},      {"group_size", options.group_size},
-      {"stream", to_string(options.stream)},        {"max_pixel_error", options.max_pixel_error}};
+  return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
+          {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
+          {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
+          {"closest", to_string(options.closest)},      {"group_size", options.group_size},
+          {"stream", to_string(options.stream)},        {"voxel_pixels", options.voxel_pixels}};
 }
 
 }  // namespace isowave::tools

@@ -22,7 +22,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags);
 /// Asks for levels of detail of a volume that is compressed now, if they are to be drawn and nobody
 /// said how many.
 inline void want_levels(const RendererFlags &flags, CompressionOptions &compression) {
-  if (flags.values.max_pixel_error > 0 && !says_levels(compression)) compression.levels = 0;
+  if (flags.values.voxel_pixels > 0 && !says_levels(compression)) compression.levels = 0;
 }
 
 /// Throws Error on names that there are not, and on options without effect beside others.
@@ -32,7 +32,7 @@ void check_renderer_options(const CLI::App &app, const RendererFlags &flags);
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
 /// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size,
-/// stream, max_pixel_error.
+/// stream, voxel_pixels.
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options);
 
 }  // namespace isowave::tools

@@ -116,7 +116,7 @@ void check_options(const CLI::App &command, const VerifyArgs &options) {
   if (options.frames.input.empty()) {
     refuse_options(
         command,
-        {"--oracle", "--isovalue", "--value-error", "--size", "--orbit", "--cameras", "--dims",
+        {"--oracle", "--isovalue", "--voxel-error", "--size", "--orbit", "--cameras", "--dims",
          "--type", "--spacing", "--rate", "--tolerance", "--tolerance-relative", "--exact"},
         "is for frames: give a VOLUME");
   } else {
@@ -126,8 +126,8 @@ void check_options(const CLI::App &command, const VerifyArgs &options) {
       throw Error("{}: give --isovalue", options.frames.input);
   }
   refuse_options(command, {"--levels"},
-                 options.frames.max_error ? "--max-error has all levels of detail"
-                                          : "the finest level alone is judged");
+                 options.frames.max_surface_error ? "--max-surface-error has all levels of detail"
+                                                  : "the finest level alone is judged");
   Outputs outputs;
   outputs.read_volume(options.frames.input);
   if (!options.frames.frame.cameras.empty()) outputs.read(options.frames.frame.cameras);
@@ -141,9 +141,9 @@ void run_verify(const CLI::App &command, VerifyArgs options) {
   ordered_json document = {{"program", "isowave 0.1.0"}, {"seed", options.seed}};
   std::uint64_t failures = 0;
   const std::string_view judged = all ? to_string(kDefaultSolver) : std::string_view{};
-  if (options.frames.max_error) {
+  if (options.frames.max_surface_error) {
     if (options.frames.input.empty() || !all)
-      throw Error("--max-error is for frames by the default solver: give a VOLUME alone");
+      throw Error("--max-surface-error is for frames by the default solver: give a VOLUME alone");
     failures = verify_errors(options.frames, document);
   } else if (!options.frames.input.empty()) {
     if (all) options.solvers = {std::string(judged)};
@@ -160,7 +160,7 @@ void run_verify(const CLI::App &command, VerifyArgs options) {
     }
   }
   if (!options.json.empty()) write_json(document, options.json);
-  if (failures != 0 && options.frames.max_error)
+  if (failures != 0 && options.frames.max_surface_error)
     throw Error("{} pixels are farther off than their bounds", failures);
   if (failures != 0)
     throw Error("{} rays were missed, false, in a wrong cell or place, or leaked", failures);

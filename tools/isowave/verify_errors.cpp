@@ -13,15 +13,16 @@
 namespace isowave::tools {
 
 std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordered_json &document) {
-  const double max_error = *options.max_error;
-  check_max_error(max_error);
+  const double max_surface_error = *options.max_surface_error;
+  check_max_surface_error(max_surface_error);
   if (is_zfp_name(options.input))
     throw Error("{}: the volume before compression is needed, to be compressed and compared with",
                 options.input);
-  if (!options.oracles.empty() || options.frame.value_error > 0)
+  if (!options.oracles.empty() || options.frame.voxel_error > 0)
     throw Error(
-        "--max-error chooses for itself, and has an oracle of its own: leave out --oracle and "
-        "--value-error");
+        "--max-surface-error chooses for itself, and has an oracle of its own: leave out --oracle "
+        "and "
+        "--voxel-error");
   FrameOptions frame_options = options.frame;
   frame_options.compression.levels = 0;
   frame_options.compression.measure_error = true;
@@ -45,17 +46,17 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const DetailChoice choice =
-          choose_detail(renderer, scene.volume, camera, isovalue, max_error);
+          choose_detail(renderer, scene.volume, camera, isovalue, max_surface_error);
       renderer.render(camera, isovalue);
       const std::vector<HitRecord> drawn = renderer.hits();
       const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
-      const CertificateSummary summary = summarize(certificate, max_error);
+      const CertificateSummary summary = summarize(certificate, max_surface_error);
       const BoundTally tally =
           judge_bounds(truth, make_frame_params(scene.volume.info, camera, scene.size, isovalue),
                        drawn, certificate.bounds);
       const Quantiles slack = quantiles(tally.slack);
       fmt::print("{:>9} {:>5} {:>9.3g} {:>10} {:>10} {:>9.2f} {:>10} {:>9} {:>10.2f}\n", isovalue,
-                 view, choice.detail.max_pixel_error, choice.detail.value_error,
+                 view, choice.detail.voxel_pixels, choice.detail.voxel_error,
                  with_commas(summary.num_pixels),
                  summary.num_pixels == 0
                      ? 100.0
@@ -65,9 +66,9 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
                                     {"drawn_by", info.name},
                                     {"isovalue", isovalue},
                                     {"view", view},
-                                    {"max_error", max_error},
-                                    {"max_pixel_error", choice.detail.max_pixel_error},
-                                    {"value_error", choice.detail.value_error},
+                                    {"max_surface_error", max_surface_error},
+                                    {"voxel_pixels", choice.detail.voxel_pixels},
+                                    {"voxel_error", choice.detail.voxel_error},
                                     {"reachable", choice.reachable},
                                     {"pixels", summary.num_pixels},
                                     {"certified", summary.num_certified},

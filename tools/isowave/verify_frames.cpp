@@ -69,7 +69,7 @@ FrameJudge make_judge(const std::string &name, std::span<const float> voxels, co
 class FrameDrawer {
  public:
   FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device,
-              Solver solver, double value_error)
+              Solver solver, double voxel_error)
       : scene_(scene), voxels_(voxels), solver_(solver) {
     if (device.empty()) return;
     const ocl::DeviceInfo info = ocl::choose_device(device);
@@ -82,7 +82,7 @@ class FrameDrawer {
     options.with_shading = false;
     renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
     compiling.finish();
-    renderer_->set_value_error(value_error);
+    renderer_->set_voxel_error(voxel_error);
   }
 
   std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
@@ -139,7 +139,7 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
                             const std::vector<std::string> &solvers, ordered_json &document) {
   const Scene scene =
       load_scene(options.input, options.volume, options.frame, read_views(options.frame));
-  const std::vector<float> voxels = decode_with_libzfp(scene.volume, options.frame.value_error);
+  const std::vector<float> voxels = decode_with_libzfp(scene.volume, options.frame.voxel_error);
   const glm::uvec3 dims = scene.volume.info.dims;
   const std::vector<std::string> names = options.oracles.empty()
                                              ? std::vector<std::string>{"roots", "cells", "mesh"}
@@ -155,7 +155,7 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
     }
     for (const std::string &solver : solvers) {
       FrameDrawer drawer(scene, voxels, options.device, solver_from_string(solver),
-                         options.frame.value_error);
+                         options.frame.voxel_error);
       print_accuracy_header(solver);
       for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
         const FrameParams frame =
@@ -194,10 +194,11 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
           "or mesh (Embree and triangles); repeat it [all]")
       ->check(CLI::IsMember({"roots", "cells", "mesh"}))
       ->allow_extra_args(false);  // one name each time: VOLUME may follow
-  command.add_option("--max-error", options.max_error,
-                     "judge what render --max-error promises instead: each pixel's bound against "
-                     "the volume before "
-                     "compression");
+  command.add_option(
+      "--max-surface-error", options.max_surface_error,
+      "judge what render --max-surface-error promises instead: each pixel's bound against "
+      "the volume before "
+      "compression");
   command.add_option(
       "--device", options.device,
       "who draws frames, or is tested for leaks beside the scalar reference: index, cpu, gpu, "

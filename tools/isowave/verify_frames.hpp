@@ -19,11 +19,12 @@ struct VerifyFramesOptions {
   VolumeOptions volume;
   FrameOptions frame;
   std::vector<std::string> oracles;  ///< roots, cells, mesh; none: all
-  std::string device;  ///< empty: the scalar reference draws, or with max_error the default device
-  std::optional<double> max_error;  ///< pixels; see verify_errors()
+  std::string
+      device;  ///< empty: the scalar reference draws, or with max_surface_error the default device
+  std::optional<double> max_surface_error;  ///< pixels; see verify_errors()
 };
 
-/// Adds VOLUME, the options of volumes and frames, --oracle, --max-error and --device.
+/// Adds VOLUME, the options of volumes and frames, --oracle, --max-surface-error and --device.
 void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options);
 
 /// Draws every view and isovalue with every solver, prints a row for each oracle and adds it to

@@ -149,8 +149,10 @@ bool says_levels(const CompressionOptions &options) {
   return !options.options.empty() && options.options.back()->count() > 0;
 }
 
-std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
-                                           const CompressionOptions &options, InputOptions input) {
+std::optional<BlockPrecision> find_error_bound(const std::string &path,
+                                               const RawOverrides &overrides,
+                                               const CompressionOptions &options,
+                                               InputOptions input) {
   if (!options.bounded()) return {};
   const auto check = [](const char *option, const std::optional<double> &tolerance) {
     if (tolerance && !(*tolerance > 0)) throw Error("{} {}: must be above 0", option, *tolerance);
@@ -173,7 +175,7 @@ std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOve
           *options.relative_tolerance, range[0], range[1], goal.tolerance);
   }
   input.progress = make_progress_bar("measuring errors");
-  return choose_error_bound(*open_any_volume(path, overrides), goal, input);
+  return choose_precision(*open_any_volume(path, overrides), goal, input);
 }
 
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
@@ -194,11 +196,11 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   check_drawable(reader->info(), path);
   CompressOptions options;
   options.rate = compression.rate;
-  options.error_bound = find_error_bound(path, overrides, compression);
+  options.precision = find_error_bound(path, overrides, compression);
   options.levels = compression.levels;
   options.measure_error = compression.measure_error;
   options.input.progress = make_progress_bar("compressing");
-  options.device = options.error_bound ? nullptr : device;
+  options.device = options.precision ? nullptr : device;
   CompressedVolume volume = compress(*reader, options);
   if (device) device->timer().collect();  // they belong to no frame
   return volume;

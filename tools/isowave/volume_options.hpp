@@ -51,10 +51,11 @@ void refuse_compression(const CompressionOptions &options, const std::string &pa
 /// Whether the command line says how many levels there are to be.
 bool says_levels(const CompressionOptions &options);
 /// The bound that was asked for, or none: the rate. Reads all of the volume, for a relative
-/// tolerance twice. Throws Error: see choose_error_bound().
-std::optional<ErrorBound> find_error_bound(const std::string &path, const RawOverrides &overrides,
-                                           const CompressionOptions &options,
-                                           InputOptions input = {});
+/// tolerance twice. Throws Error: see choose_precision().
+std::optional<BlockPrecision> find_error_bound(const std::string &path,
+                                               const RawOverrides &overrides,
+                                               const CompressionOptions &options,
+                                               InputOptions input = {});
 
 /// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
