@@ -11,7 +11,7 @@
 #include "core/base/error.hpp"
 #include "tools/isowave/render_stats.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -176,4 +176,4 @@ ordered_json to_json(const BudgetSweep &sweep) {
   return json;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

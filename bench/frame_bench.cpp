@@ -21,7 +21,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -216,15 +216,15 @@ void add_options(CLI::App &app, Options &options) {
 
 }  // namespace
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench
 
 int main(int argc, char **argv) {
   CLI::App app("Times whole frames of a volume: cold, warm and the next view, and each stage.",
                "frame_bench");
-  isowave::bench::Options options;
-  isowave::bench::add_options(app, options);
+  isowave::core::bench::Options options;
+  isowave::core::bench::add_options(app, options);
   app.callback([&] {
-    isowave::bench::run(app, options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
+    isowave::core::bench::run(app, options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
   });
-  return isowave::tools::run_program(app, argc, argv);
+  return isowave::core::tools::run_program(app, argc, argv);
 }

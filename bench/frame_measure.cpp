@@ -6,7 +6,7 @@
 #include "core/base/error.hpp"
 #include "core/stages/resident.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 std::vector<double> all_times(const std::vector<ViewTimes> &views,
                               std::vector<FrameStats> ViewTimes::*kind) {
@@ -76,4 +76,4 @@ bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b)
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(HitRecord)) == 0;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

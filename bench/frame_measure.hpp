@@ -7,7 +7,7 @@
 
 #include "core/render/renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// One view, drawn once per round.
 struct ViewTimes {
@@ -52,4 +52,4 @@ FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVol
 /// Every bit.
 bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

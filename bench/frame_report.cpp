@@ -10,7 +10,7 @@
 #include "bench/run_info.hpp"
 #include "tools/isowave/renderer_options.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -290,4 +290,4 @@ ordered_json to_json(const FrameReport &report) {
   return json;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

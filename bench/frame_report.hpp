@@ -11,7 +11,7 @@
 #include "bench/frame_measure.hpp"
 #include "bench/run_info.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 struct FrameReport {
   std::string command;
@@ -46,4 +46,4 @@ nlohmann::ordered_json floor_json(const FrameReport &report, const std::vector<V
 /// "1.23 (1.10..1.30)".
 std::string spread_text(const Spread &spread);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

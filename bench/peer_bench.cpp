@@ -32,7 +32,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -314,22 +314,22 @@ void add_options(CLI::App &app, Options &options) {
 
 }  // namespace
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench
 
 int main(int argc, char **argv) {
   CLI::App app("Times a new isovalue, and further frames, beside VTK's Flying Edges and Embree.",
                "peer_bench");
-  isowave::bench::Options options;
+  isowave::core::bench::Options options;
   options.device = "cpu";
-  isowave::bench::add_options(app, options);
+  isowave::core::bench::add_options(app, options);
   app.callback([&] {
     if (options.side.empty()) {
-      isowave::bench::check_options(app, options);
-      isowave::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
-                              argv[0]);
+      isowave::core::bench::check_options(app, options);
+      isowave::core::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
+                                    argv[0]);
     } else {
-      isowave::bench::serve(options);
+      isowave::core::bench::serve(options);
     }
   });
-  return isowave::tools::run_program(app, argc, argv);
+  return isowave::core::tools::run_program(app, argc, argv);
 }

@@ -7,7 +7,7 @@
 #include "bench/peer_sides.hpp"
 #include "core/render/renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -53,4 +53,4 @@ std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Came
   return std::make_unique<RendererSide>(volume, camera, size, pipeline, device);
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -7,7 +7,7 @@
 #include "core/generate/generate.hpp"
 #include "core/zfp/zfp_encode.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 /// As much as compress() hands to a device at once.
@@ -69,4 +69,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

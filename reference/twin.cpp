@@ -2,7 +2,7 @@
 
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -45,4 +45,4 @@ std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float 
                               voxels_, solver);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

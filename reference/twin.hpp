@@ -9,7 +9,7 @@
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class Twin {
  public:
@@ -29,4 +29,4 @@ class Twin {
   std::vector<std::vector<float>> voxels_;  ///< of each level
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "reference/random.hpp"
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -176,4 +176,4 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
   return results;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

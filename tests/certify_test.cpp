@@ -23,7 +23,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -588,4 +588,4 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -310,4 +310,4 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -199,4 +199,4 @@ TEST_F(CliOutputs, WhatCannotBeWrittenIsSaidBeforeAnyWork) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -15,7 +15,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -240,4 +240,4 @@ TEST(CompileCommand, TheFirstOpeningSaysSoAndLeavesNothingToFrames) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

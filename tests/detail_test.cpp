@@ -18,7 +18,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::camera_along;
@@ -458,4 +458,4 @@ TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -12,7 +12,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TestVolume;
@@ -190,4 +190,4 @@ INSTANTIATE_TEST_SUITE_P(Pipelines, FrameCacheOnDevice, testing::ValuesIn(pipeli
                          pipeline_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -15,7 +15,7 @@
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TemporaryFolder;
@@ -193,4 +193,4 @@ TEST(Generate, RefusesBadRequests) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

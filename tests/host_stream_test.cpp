@@ -13,7 +13,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -236,4 +236,4 @@ TEST_P(HostStreamOnDevice, SplitFramesAreTheTwins) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

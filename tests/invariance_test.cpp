@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -382,4 +382,4 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

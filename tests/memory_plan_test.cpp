@@ -13,7 +13,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TestVolume;
@@ -189,4 +189,4 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

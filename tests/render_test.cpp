@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::camera_along;
@@ -392,4 +392,4 @@ TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

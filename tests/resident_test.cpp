@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -122,4 +122,4 @@ TEST_P(ResidentOnDevice, SaysWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

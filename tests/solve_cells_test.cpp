@@ -15,7 +15,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// A cubic of one kind of trouble. Its values are at least 1e-6 or 0, so that no product becomes
@@ -123,4 +123,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, SolveCellsOnDevice, testing::ValuesIn(devices_
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

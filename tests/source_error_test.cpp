@@ -20,7 +20,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TemporaryFolder;
@@ -370,4 +370,4 @@ TEST_P(SourceErrorOnDevice, SmallErrorsAreTheHosts) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

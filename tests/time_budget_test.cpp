@@ -12,7 +12,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -255,4 +255,4 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

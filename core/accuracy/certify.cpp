@@ -14,7 +14,7 @@
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/zfp_codec.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -195,4 +195,4 @@ CertificateSummary summarize(const Certificate &certificate, double limit) {
   return summary;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

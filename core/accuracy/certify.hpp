@@ -15,7 +15,7 @@
 
 #include "core/render/renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct Certificate {
   /// Of each ray: the distance between the drawn and the true hit along it, at most [pixels: what a
@@ -43,4 +43,4 @@ struct CertificateSummary {
 /// limit: pixels.
 CertificateSummary summarize(const Certificate &certificate, double limit);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include "core/base/error.hpp"
 #include "core/view/detail.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -180,4 +180,4 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
   return choice;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 
 #include "core/accuracy/certify.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct Detail {
   double voxel_pixels = 0;  ///< RendererOptions::voxel_pixels
@@ -63,4 +63,4 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, c
 /// Throws Error unless it is finite and above 0.
 void check_max_surface_error(double max_surface_error);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-namespace isowave {
+namespace isowave::core {
 
 /// Escapes, as \n, \t or \x1b, what would end a line or move a cursor, and bytes that are not
 /// UTF-8: names of files and strings from files may hold any.
@@ -37,4 +37,4 @@ class BuildError : public Error {
   std::string log_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

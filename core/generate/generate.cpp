@@ -14,7 +14,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/raw_reader.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
@@ -176,4 +176,4 @@ fs::path generate_to_file(const GenerateOptions &options, const fs::path &path,
   return target;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -12,7 +12,7 @@
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/block_grid.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -383,4 +383,4 @@ Image8 Renderer::shade(const Appearance &appearance) {
                 options_.size.samples);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

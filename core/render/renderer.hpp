@@ -19,7 +19,7 @@
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct RendererOptions {
   ImageSize size;
@@ -185,4 +185,4 @@ class Renderer {
   double setup_ms_ = 0;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,7 +7,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -108,4 +108,4 @@ std::size_t TimedFrames::next_step(std::size_t step, double step_ms, double firs
   return next;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

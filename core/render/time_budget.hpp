@@ -9,7 +9,7 @@
 
 #include "core/render/renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A picture that was drawn on the way. Where it was cancelled, since time was over, and has no hit
 /// yet, the one before shows through.
@@ -61,4 +61,4 @@ class TimedFrames {
 /// Throws Error unless it is finite and above 0.
 void check_time_budget(double budget_ms);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/block_grid.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -204,4 +204,4 @@ void Macrocells::set_active_box(FrameParams &frame) {
   }
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "core/stages/device_counts.hpp"
 #include "core/stream/device_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Of one level of detail or of several, one behind the other: FrameParams::ranges_begin,
 /// masks_begin.
@@ -117,4 +117,4 @@ class Macrocells {
       masks_kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "core/stages/wavefront.hpp"
 #include "kernels_cl/portable/shade.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Colours are display values, [0,1].
 struct Appearance {
@@ -43,4 +43,4 @@ class Shade {
   ocl::Kernel<FrameParams, ocl::In<ShadeParams>, uint, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -12,7 +12,7 @@
 #include "core/base/error.hpp"
 #include "core/io/input_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using nlohmann::json;
@@ -163,4 +163,4 @@ std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
   return cameras;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A pinhole camera in world space. fovy is the full vertical angle.
 struct Camera {
@@ -37,4 +37,4 @@ void check_camera(const Camera &camera, std::string_view what);
 /// fovy 60. The box spans index [0, dims-1] mapped to world.
 std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n);
 
-}  // namespace isowave
+}  // namespace isowave::core

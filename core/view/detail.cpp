@@ -9,7 +9,7 @@
 #include "core/base/error.hpp"
 #include "core/volume/pyramid.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -130,4 +130,4 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   return frames;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "core/zfp/libzfp.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
@@ -123,4 +123,4 @@ std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) 
   });
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

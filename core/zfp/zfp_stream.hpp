@@ -17,7 +17,7 @@
 #include "core/volume/voxel_chunks.hpp"
 #include "kernels_cl/portable/block_index.h"
 
-namespace isowave {
+namespace isowave::core {
 
 class InputFile;
 namespace ocl {
@@ -141,4 +141,4 @@ CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 /// allows: see with_fewer_planes(). The ground truth of every decoder here.
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double voxel_error = 0);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -27,7 +27,7 @@
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -537,4 +537,4 @@ void add_bench_pareto(CLI::App &bench) {
   command->callback([options] { run_bench_pareto(*options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -28,7 +28,7 @@
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -434,4 +434,4 @@ void add_bench_solvers(CLI::App &bench) {
   command->callback([command, options] { run_bench_solvers(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -18,7 +18,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -99,4 +99,4 @@ void add_convert(CLI::App &app) {
   command->callback([command, options] { run_convert(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -6,7 +6,7 @@
 #include "core/base/error.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 ImageSize parse_size(const std::string &text) {
   ImageSize size;
@@ -85,4 +85,4 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
   return isovalue;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -12,7 +12,7 @@
 #include "core/zfp/zfp_stream.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// Options as typed; read_views() and load_scene() check them.
 struct FrameOptions {
@@ -55,4 +55,4 @@ struct Scene {
 Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
                  const Views &views, ocl::Device *device = nullptr);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

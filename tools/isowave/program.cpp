@@ -24,7 +24,7 @@
 #include "core/ocl/pocl_environment.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -162,4 +162,4 @@ int run_program(CLI::App &app, int argc, char **argv) {
   return status;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

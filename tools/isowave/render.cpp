@@ -27,7 +27,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -506,4 +506,4 @@ void add_render(CLI::App &app) {
   command->callback([command, options] { run_render(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -3,7 +3,7 @@
 #include "core/base/error.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option("--pipeline", flags.pipeline,
@@ -98,4 +98,4 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
           {"stream", to_string(options.stream)},        {"voxel_pixels", options.voxel_pixels}};
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -8,7 +8,7 @@
 #include "core/render/renderer.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 struct RendererFlags {
   std::string pipeline = "auto", speculation = "auto", solver{to_string(kDefaultSolver)};
@@ -35,4 +35,4 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 /// stream, voxel_pixels.
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -10,7 +10,7 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/compile_report.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordered_json &document) {
   const double max_surface_error = *options.max_surface_error;
@@ -82,4 +82,4 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   return exceeded;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -18,7 +18,7 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/compile_report.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -206,4 +206,4 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
       "[frames: the scalar reference; leaks: as render]");
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -15,7 +15,7 @@
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -231,4 +231,4 @@ std::string with_commas(std::uint64_t number) {
   return text;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

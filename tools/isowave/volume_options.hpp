@@ -14,7 +14,7 @@
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// Options as typed; to_overrides() checks them.
 struct VolumeOptions {
@@ -80,4 +80,4 @@ Progress make_progress_bar(std::string_view label);
 /// 1,234,567
 std::string with_commas(std::uint64_t number);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools
