@@ -284,7 +284,7 @@ void compare(const Options &options, const std::string &command, const std::stri
 /// What can be told from the options alone.
 void check_options(const CLI::App &app, const Options &options) {
   if (!options.volume.empty()) tools::refuse_options(app, {"--dims"}, "leave it out, or --volume");
-  if (tools::is_zfp_name(options.volume))
+  if (is_zfp_name(options.volume))
     tools::refuse_options(app, {"--rate"}, "the volume is compressed already");
   tools::Outputs outputs;
   outputs.read_volume(options.volume);

@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
 namespace isowave::core::bench {
 

@@ -4,7 +4,7 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 #include "core/zfp/zfp_encode.hpp"
 
 namespace isowave::core::bench {

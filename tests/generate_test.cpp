@@ -1,6 +1,6 @@
 // Synthetic fields: closed forms, every type, the same bytes for any number of threads.
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 #include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>

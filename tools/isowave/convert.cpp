@@ -52,8 +52,7 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
-  compress.precision =
-      find_error_bound(options.path, overrides, options.compression, options.input);
+  compress.precision = find_precision(options.path, overrides, options.compression, options.input);
   compress.input.progress = make_progress_bar("compressing");
   const CompressedVolume volume = compress_to_file(*reader, compress, options.output);
   if (compiling) compiling->finish();

@@ -1,6 +1,6 @@
 // isowave generate: writes a synthetic volume in the Open-SciVis naming.
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
 #include <fmt/format.h>
 

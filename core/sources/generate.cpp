@@ -1,4 +1,4 @@
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,9 @@
 
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
-#include "core/generate/field_rows.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/raw_reader.hpp"
+#include "core/sources/field_rows.hpp"
 
 namespace isowave::core {
 namespace fs = std::filesystem;

@@ -1,4 +1,4 @@
-#include "core/generate/field_rows.hpp"
+#include "core/sources/field_rows.hpp"
 
 #include <algorithm>
 #include <cmath>

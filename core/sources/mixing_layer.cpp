@@ -16,7 +16,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/generate/field_rows.hpp"
+#include "core/sources/field_rows.hpp"
 
 namespace isowave::core {
 

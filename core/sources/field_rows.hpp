@@ -6,7 +6,7 @@
 #include <memory>
 #include <span>
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
 namespace isowave::core {
 
