@@ -236,6 +236,7 @@ ordered_json options_json(const FrameReport &report) {
       {"views", report.num_views},
       {"rounds", report.rounds}};
   json.update(tools::renderer_options_json(report.options));
+  json["voxel_pixels"] = report.voxel_pixels;
   return json;
 }
 

@@ -105,7 +105,7 @@ TEST_P(SolveCellsOnDevice, FramesOfEverySolverEqualTheTwins) {
     options.size = size;
     options.solver = solver_from_string(name);
     Renderer renderer(device_, volume.compressed, options);
-    renderer.render(camera, 0.1f);
+    renderer.render({camera, 0.1f});
     test::expect_same_hits(renderer.hits(),
                            render_scalar(make_frame_params(volume.info(), camera, size, 0.1f),
                                          volume.voxels, options.solver),

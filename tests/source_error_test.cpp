@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "core/base/error.hpp"
-#include "core/sources/generate.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/sources/generate.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_encode.hpp"

@@ -1,8 +1,9 @@
 #include "isowave/volume.hpp"
 
+#include "core/api/convert.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
-#include "core/sources/array_reader.hpp"
+#include "core/sources/memory_reader.hpp"
 #include "core/sources/load_volume.hpp"
 #include "core/view/frame.hpp"
 
@@ -19,13 +20,6 @@ core::VoxelType core_type(VoxelType type) {
   if (type < VoxelType::kUint8 || type > VoxelType::kFloat64)
     throw core::Error("{} is no type of voxels", static_cast<int>(type));
   return static_cast<core::VoxelType>(type);
-}
-
-glm::dvec3 to_glm(const Vector3 &v) {
-  return {v[0], v[1], v[2]};
-}
-Vector3 from_glm(const glm::dvec3 &v) {
-  return {v.x, v.y, v.z};
 }
 
 core::VolumeInfo core_info(const Grid &grid, VoxelType type) {
@@ -148,7 +142,7 @@ std::shared_ptr<const Volume> compress(const void *voxels, VoxelType type, const
     const std::span bytes(static_cast<const std::byte *>(voxels),
                           info.num_voxels() * core::size_of(info.type));
     return make_volume(
-        core::compress_volume([&] { return std::make_unique<core::ArrayReader>(info, bytes); },
+        core::compress_volume([&] { return std::make_unique<core::MemoryReader>(info, bytes); },
                               "the array", to_storage(compression)));
   });
 }

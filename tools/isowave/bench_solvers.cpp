@@ -333,7 +333,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
             std::make_unique<Renderer>(device, subject.volume, renderer_options),
             {},
             solver_json(solver)};
-    run.renderer->render(subject.camera, subject.isovalue);
+    run.renderer->render({subject.camera, subject.isovalue});
     run.entry.update(accuracy_json(judge_frame(oracle, subject.frame, run.renderer->hits())));
     if (!options.pictures.empty() && solver.max_steps != 1) {
       write_failure_picture(options, subject, oracle, solver, *run.renderer);
@@ -342,7 +342,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
   }
   for (std::uint32_t round = 0; round < options.rounds; ++round) {
     for (Run &run : runs)
-      run.ms.push_back(run.renderer->render(subject.camera, subject.isovalue).total_ms);
+      run.ms.push_back(run.renderer->render({subject.camera, subject.isovalue}).total_ms);
   }
   ordered_json entries = ordered_json::array();
   for (Run &run : runs) {

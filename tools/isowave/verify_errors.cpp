@@ -46,10 +46,11 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const DetailChoice choice =
-          choose_detail(renderer, scene.volume, camera, isovalue, max_surface_error);
-      renderer.render(camera, isovalue);
+          choose_detail(renderer, scene.volume, {camera, isovalue}, max_surface_error);
+      const FrameRequest request = with_detail({camera, isovalue}, choice.detail);
+      renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
-      const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
+      const Certificate certificate = certify(renderer, scene.volume, request, drawn);
       const CertificateSummary summary = summarize(certificate, max_surface_error);
       const BoundTally tally =
           judge_bounds(truth, make_frame_params(scene.volume.info, camera, scene.size, isovalue),

@@ -68,6 +68,7 @@ struct FrameRequest {
 /// Where a ray first crosses the isosurface. The true crossing of the decoded field, not a sample.
 struct Hit {
   float t = std::numeric_limits<float>::infinity();  ///< distance from the eye [world units]
+  std::uint32_t level = 0;                           ///< of detail; 0: the finest
   std::array<std::uint32_t, 3> cell{};  ///< voxel at its lowest corner: it ends one further
   std::array<float, 3> position{};      ///< in the cell, 0 to 1
   std::array<float, 3> gradient{};      ///< of the field there [voxel value per voxel]

@@ -38,12 +38,18 @@ class Renderer {
   /// drawn as if it had not been.
   Frame render(const FrameRequest &request);
 
+  /// A view from the front right and above in which the isosurface fills the picture; the volume,
+  /// where there is no surface.
+  Camera camera(float isovalue);
+
   const std::shared_ptr<Device> &device() const;
   const std::shared_ptr<const Volume> &volume() const;
   std::uint64_t memory_bytes() const;  ///< of device memory that it holds
   double setup_ms() const;             ///< wall clock of uploads, without compiling
 
  private:
+  void release() noexcept;
+
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
 };

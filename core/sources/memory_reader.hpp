@@ -8,10 +8,10 @@
 
 namespace isowave::core {
 
-class ArrayReader : public VolumeReader {
+class MemoryReader : public VolumeReader {
  public:
   /// voxels: [nz][ny][nx] of info.type, which must outlive the reader.
-  ArrayReader(const VolumeInfo &info, std::span<const std::byte> voxels);
+  MemoryReader(const VolumeInfo &info, std::span<const std::byte> voxels);
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override;
   void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
