@@ -254,7 +254,7 @@ TEST_P(ApiOnDevice, SmallSurfacesFillThePicture) {
       last_row = std::max(last_row, row);
     }
     EXPECT_EQ(at_border, 0u) << isovalue;
-    EXPECT_GT(last_row - first_row, isovalue < 0.8f ? 24u : 8u) << isovalue;
+    EXPECT_GT(last_row - first_row, isovalue < 0.8f ? 16u : 8u) << isovalue;
   }
 }
 

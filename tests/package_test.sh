@@ -34,8 +34,9 @@ headers=$(find "$work/prefix" -name '*.hpp')
 [ -n "$headers" ] || fail 'no headers are installed'
 if grep -nE '#include [<"](CL/|glm/|fmt/|core/|kernels_cl/)' $headers; then fail 'a public header includes a private one'; fi
 for header in $headers; do
+  echo "#include \"$header\"" > "$work/alone.cpp"
   # shellcheck disable=SC2086
-  g++ -std=c++20 $user_flags -fsyntax-only -I"$work/prefix/include" -x c++ "$header"
+  g++ -std=c++20 $user_flags -fsyntax-only -I"$work/prefix/include" "$work/alone.cpp" || fail "$header does not stand alone"
 done
 
 configure() { # configure SOURCE BUILD OPTION...

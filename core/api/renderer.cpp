@@ -287,7 +287,7 @@ Frame Renderer::render(const FrameRequest &request) {
 Camera Renderer::camera(float isovalue) {
   return guarded("looking for the surface", [&] {
     const std::lock_guard lock(implementation_->device->implementation().mutex);
-    const core::Camera camera = implementation_->renderer.camera(isovalue);
+    const core::Camera camera = implementation_->renderer.camera({&isovalue, 1});
     return Camera{from_glm(camera.eye), from_glm(camera.at), from_glm(camera.up), camera.fovy_deg};
   });
 }

@@ -3,8 +3,8 @@
 #include "core/api/convert.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
-#include "core/sources/memory_reader.hpp"
 #include "core/sources/load_volume.hpp"
+#include "core/sources/memory_reader.hpp"
 #include "core/view/frame.hpp"
 
 namespace isowave {

@@ -7,6 +7,7 @@
 
 #include "core/base/error.hpp"
 #include "core/render/stall_guard.hpp"
+#include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/block_grid.h"
 
@@ -288,19 +289,10 @@ void Renderer::decode_as(const std::vector<DecodedValues> &values, FieldBound bo
   if (changes) clear_cache();
 }
 
-Camera Renderer::camera(float isovalue) {
-  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-  Level &finest = state_.levels[0];
-  FrameParams frame = make_grid_params(finest.info);
-  frame.isovalue = isovalue;
-  finest.macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
-  finest.macrocells.select(frame);
-  const std::optional<BlockBox> blocks = finest.macrocells.active_blocks(frame);
-  const glm::dvec3 last(finest.info.dims - 1u);
-  const glm::dvec3 begin = blocks ? 4.0 * glm::dvec3(blocks->begin) : glm::dvec3(0);
-  const glm::dvec3 end = blocks ? glm::min(4.0 * glm::dvec3(blocks->end), last) : last;
-  return camera_of_box(finest.info, begin, end,
-                       double{1} * options_.size.width / options_.size.height);
+Camera Renderer::camera(std::span<const float> isovalues) {
+  const Level &finest = state_.levels[0];
+  state_.levels[0].macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
+  return surface_camera(state_.levels[0].macrocells, finest.info, isovalues, options_.size);
 }
 
 std::vector<HitRecord> Renderer::hits() const {

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/render/frame_request.hpp"
@@ -38,10 +39,9 @@ class Renderer {
   /// frame is drawn as if this had not been.
   FrameStats render(const FrameRequest &request);
 
-  /// A view in which the isosurface fills the largest picture: the box of the blocks that it may be
-  /// in, from where orbit_cameras() begins. Of the whole volume where it is in none. The same for
-  /// all devices. Waits. Throws Error: NaN.
-  Camera camera(float isovalue);
+  /// A view in which isosurfaces fill the largest picture, see surface_camera(). Waits. Throws
+  /// Error: NaN.
+  Camera camera(std::span<const float> isovalues);
 
   /// The hit buffer of the last frame, [size.ray_rows()][size.ray_columns()], row 0 at the top.
   /// Waits.

@@ -15,6 +15,7 @@
 #include "core/base/error.hpp"
 #include "core/io/npy.hpp"
 #include "core/render/renderer.hpp"
+#include "core/render/surface_camera.hpp"
 #include "core/render/time_budget.hpp"
 #include "core/view/detail.hpp"
 #include "reference/twin.hpp"
@@ -117,6 +118,7 @@ class DeviceFrames : public FrameSource {
     return renderer_.render(watched);
   }
   FrameStats refine() override { return renderer_.render(request_); }
+  Camera surface_camera(std::span<const float> isovalues) { return renderer_.camera(isovalues); }
   void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
     if (max_surface_error_) frame["error"] = bound_error(error_map);
     if (timed_frames_) frame["time_budget"] = timed_steps();
@@ -399,6 +401,13 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   check_choice(options);
 }
 
+/// The view that any device would take. Without a device, of the whole volume.
+Camera reference_camera(const RenderArgs &options, const Scene &scene) {
+  if (ocl::list_devices().empty()) return scene.cameras.front();
+  ocl::Device device(ocl::choose_device());
+  return surface_camera(device, scene.volume, options.frame.isovalues, scene.size);
+}
+
 void run_render(const CLI::App &command, RenderArgs options) {
   options.voxel_pixels = options.renderer_flags.voxel_pixels;
   check_options(command, options);
@@ -420,13 +429,15 @@ void run_render(const CLI::App &command, RenderArgs options) {
   const bool chooses_levels = options.max_surface_error ||
                               (options.time_budget && options.renderer_flags.pipeline != "blocks");
   if (options.voxel_pixels > 0 || chooses_levels) want_levels(options.frame.compression);
-  const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
+  Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
   outputs.make_folder();
   wanted.with_levels = chooses_levels && !scene.volume.coarser_levels.empty();
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
+  const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
   if (!device) {
+    if (fits_surface) scene.cameras = {reference_camera(options, scene)};
     TwinFrames frames(scene, appearance, options);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
@@ -434,6 +445,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
     DeviceFrames frames(*device, scene, appearance, options);
     compiling->finish();
     options.renderer = frames.renderer().options();
+    if (fits_surface) scene.cameras = {frames.surface_camera(options.frame.isovalues)};
     if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());
     document["options"] = options_json(options, scene);
