@@ -18,18 +18,18 @@ MemoryReader::MemoryReader(const VolumeInfo &info, std::span<const std::byte> vo
 }
 
 std::span<const std::byte> MemoryReader::layers(std::uint32_t z_begin,
-                                               std::uint32_t num_layers) const {
+                                                std::uint32_t num_layers) const {
   const std::size_t layer = std::size_t{info_.dims.x} * info_.dims.y * size_of(info_.type);
   return voxels_.subspan(z_begin * layer, num_layers * layer);
 }
 
 void MemoryReader::read_layers(std::uint32_t z_begin, std::uint32_t num_layers,
-                              std::span<float> out) {
+                               std::span<float> out) {
   convert_to_float(info_.type, layers(z_begin, num_layers), out);
 }
 
 void MemoryReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
-                                    std::span<double> out) {
+                                     std::span<double> out) {
   convert_to_double(info_.type, layers(z_begin, num_layers), out);
 }
 

@@ -21,7 +21,7 @@ enum class FieldBound { kNone, kLower, kUpper };
 
 /// Colours are sRGB, 0 to 1.
 struct Appearance {
-  std::array<float, 3> surface{0.86f, 0.74f, 0.53f};
+  std::array<float, 3> surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   std::array<float, 3> background{1, 1, 1};
   float ambient = 0.15f, diffuse = 0.75f, specular = 0.25f;  ///< of a headlight at the eye
 };
