@@ -11,7 +11,7 @@
 #include "core/base/error.hpp"
 #include "tools/isowave/render_stats.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -29,8 +29,9 @@ bool check_pictures(Renderer &renderer, const FrameReport &common,
   for (const Camera &camera : cameras) {
     for (const Camera &view : {camera, turned(camera)}) {
       std::uint32_t passes = 0;
-      const auto in_time = [&](const PassStats &) { return ++passes <= max_passes; };
-      if (renderer.render(view, common.isovalue, in_time).cancelled) return false;
+      FrameRequest request = seen_from(view, common.request());
+      request.on_pass = [&](const PassStats &) { return ++passes <= max_passes; };
+      if (renderer.render(request).cancelled) return false;
       if (first) {
         expected.push_back(renderer.hits());
       } else if (!same_hits(renderer.hits(), expected[index])) {
@@ -124,7 +125,7 @@ BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVo
       common.options = renderer.options();
     }
     if (check_pictures(renderer, common, cameras, max_passes, pictures)) {
-      budget.views = measure_views(renderer, cameras, common.isovalue, common.rounds);
+      budget.views = measure_views(renderer, cameras, common.request(), common.rounds);
     } else if (sweep.budgets.empty()) {
       throw Error(
           "the largest budget, {} bytes, takes more than {} passes a frame: allow more by "
@@ -176,4 +177,4 @@ ordered_json to_json(const BudgetSweep &sweep) {
   return json;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -6,7 +6,7 @@
 #include "core/base/error.hpp"
 #include "core/stages/resident.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 std::vector<double> all_times(const std::vector<ViewTimes> &views,
                               std::vector<FrameStats> ViewTimes::*kind) {
@@ -24,14 +24,14 @@ Camera turned(Camera camera) {
 }
 
 std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
-                                     float isovalue, std::uint32_t rounds) {
+                                     const FrameRequest &request, std::uint32_t rounds) {
   std::vector<ViewTimes> views(cameras.size());
   for (std::uint32_t round = 0; round < rounds; ++round) {
     for (std::size_t view = 0; view < cameras.size(); ++view) {
       renderer.clear_cache();
-      views[view].cold.push_back(renderer.render(cameras[view], isovalue));
-      views[view].warm.push_back(renderer.render(cameras[view], isovalue));
-      views[view].next.push_back(renderer.render(turned(cameras[view]), isovalue));
+      views[view].cold.push_back(renderer.render(seen_from(cameras[view], request)));
+      views[view].warm.push_back(renderer.render(seen_from(cameras[view], request)));
+      views[view].next.push_back(renderer.render(seen_from(turned(cameras[view]), request)));
     }
   }
   return views;
@@ -76,4 +76,4 @@ bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b)
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(HitRecord)) == 0;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

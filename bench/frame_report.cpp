@@ -10,7 +10,7 @@
 #include "bench/run_info.hpp"
 #include "tools/isowave/renderer_options.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -236,6 +236,7 @@ ordered_json options_json(const FrameReport &report) {
       {"views", report.num_views},
       {"rounds", report.rounds}};
   json.update(tools::renderer_options_json(report.options));
+  json["voxel_pixels"] = report.voxel_pixels;
   return json;
 }
 
@@ -290,4 +291,4 @@ ordered_json to_json(const FrameReport &report) {
   return json;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -7,7 +7,7 @@
 #include "bench/peer_sides.hpp"
 #include "core/render/renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -22,16 +22,16 @@ class RendererSide : public PeerSide {
   Measured draw(float isovalue) override {
     Measured measured;
     Stopwatch watch;
-    renderer_.render(camera_, isovalue);
+    renderer_.render({camera_, isovalue});
     watch.lap(measured, "new_kept");
-    renderer_.render(camera_, previous_);
+    renderer_.render({camera_, previous_});
     renderer_.clear_cache();
     watch = {};
-    measured["hit_count"] = static_cast<double>(renderer_.render(camera_, isovalue).rays_hit);
+    measured["hit_count"] = static_cast<double>(renderer_.render({camera_, isovalue}).rays_hit);
     watch.lap(measured, "new");
-    renderer_.render(camera_, isovalue);
+    renderer_.render({camera_, isovalue});
     watch.lap(measured, "warm");
-    renderer_.render(turned(camera_), isovalue);
+    renderer_.render({turned(camera_), isovalue});
     watch.lap(measured, "next");
     measured["device_byte_count"] = static_cast<double>(device_.ledger().peak());
     previous_ = isovalue;
@@ -53,4 +53,4 @@ std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Came
   return std::make_unique<RendererSide>(volume, camera, size, pipeline, device);
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -23,7 +23,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -220,12 +220,12 @@ class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Draws a frame, checks its bounds, and counts the pixels that keep max_surface_error. Returns
   /// the hits.
-  std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene, const Camera &camera,
-                                       float isovalue, double max_surface_error) {
-    renderer.render(camera, isovalue);
+  std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene,
+                                       const FrameRequest &request, double max_surface_error) {
+    renderer.render(request);
     std::vector<HitRecord> drawn = renderer.hits();
-    const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
-    expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
+    const Certificate certificate = certify(renderer, scene.volume, request, drawn);
+    expect_kept(certificate, drawn, scene, request.camera, kMedium, request.isovalue);
     const CertificateSummary summary = summarize(certificate, max_surface_error);
     certified_ += summary.num_certified;
     all_ += summary.num_pixels;
@@ -244,8 +244,7 @@ TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
   Renderer renderer(device_, scene.volume,
                     {.size = kSmall, .cache_slots = 20, .with_bounds = true});
   for (const FieldBound bound : {FieldBound::kLower, FieldBound::kUpper, FieldBound::kNone}) {
-    renderer.draw_bound(bound);
-    renderer.render(camera, 0.4f);
+    renderer.render({.camera = camera, .isovalue = 0.4f, .bound = bound});
     expect_same_hits(renderer.hits(), Twin(scene.volume, 0, 0, bound).render(camera, kSmall, 0.4f),
                      kSmall.width);
   }
@@ -259,19 +258,21 @@ TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
       ocl::Device device(GetParam());
-      Renderer renderer(device, scene.volume,
-                        {.size = kMedium, .stream = place, .voxel_pixels = 4, .with_bounds = true});
+      Renderer renderer(
+          device, scene.volume,
+          {.size = kMedium, .stream = place, .with_levels = true, .with_bounds = true});
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
       for (const double voxel_error : {0.0, 0.1}) {
-        renderer.set_voxel_error(voxel_error);
         for (const FieldBound bound : {FieldBound::kUpper, FieldBound::kNone, FieldBound::kLower}) {
-          renderer.draw_bound(bound);
-          renderer.render(camera, 0.4f);
+          renderer.render({.camera = camera,
+                           .isovalue = 0.4f,
+                           .voxel_pixels = 4,
+                           .voxel_error = voxel_error,
+                           .bound = bound});
           expect_same_hits(renderer.hits(),
                            Twin(scene.volume, 4, voxel_error, bound).render(camera, kMedium, 0.4f),
                            kMedium.width);
         }
-        renderer.draw_bound(FieldBound::kNone);
       }
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
       EXPECT_LE(device.ledger().peak(), renderer.memory_plan().peak());
@@ -288,16 +289,15 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
             CompressOptions{.precision = BlockPrecision{.min_exponent = -8}}}) {
         const Scene scene(dims, field, options);
         Renderer renderer(device_, scene.volume,
-                          {.size = kMedium, .voxel_pixels = 2, .with_bounds = true});
+                          {.size = kMedium, .with_levels = true, .with_bounds = true});
         std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
         cameras.push_back(camera_along({20, 18, 16}, {0.3, 0.2, 1}));  // from within
         for (const Camera &camera : cameras) {
           for (const Detail &detail :
                {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
-            renderer.set_voxel_pixels(detail.voxel_pixels);
-            renderer.set_voxel_error(detail.voxel_error);
-            const std::vector<HitRecord> drawn = certify_frame(renderer, scene, camera, 0.3f, 10);
-            renderer.render(camera, 0.3f);  // and the volume is drawn again
+            const FrameRequest request = with_detail({camera, 0.3f}, detail);
+            const std::vector<HitRecord> drawn = certify_frame(renderer, scene, request, 10);
+            renderer.render(request);  // and the volume is drawn again
             expect_same_hits(renderer.hits(), drawn, kMedium.width);
           }
         }
@@ -311,12 +311,12 @@ TEST_P(CertifyOnDevice, RealVolumes) {
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .voxel_pixels = 2, .with_bounds = true});
+                      {.size = kMedium, .with_levels = true, .with_bounds = true});
     for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
       for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
         for (const double voxel_pixels : {0.0, 2.0}) {
-          renderer.set_voxel_pixels(voxel_pixels);
-          certify_frame(renderer, scene, camera, isovalue, 4);
+          certify_frame(renderer, scene,
+                        {.camera = camera, .isovalue = isovalue, .voxel_pixels = voxel_pixels}, 4);
         }
       }
     }
@@ -332,10 +332,10 @@ TEST_P(CertifyOnDevice, FarAway) {
   camera.eye = camera.at + 700.0 * (camera.eye - camera.at);
   camera.fovy_deg /= 700;
   Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
-  renderer.render(camera, 80);
+  renderer.render({camera, 80});
   const std::vector<HitRecord> drawn = renderer.hits();
-  const std::vector<double> slack = expect_kept(certify(renderer, scene.volume, camera, 80, drawn),
-                                                drawn, scene, camera, kMedium, 80);
+  const std::vector<double> slack = expect_kept(
+      certify(renderer, scene.volume, {camera, 80}, drawn), drawn, scene, camera, kMedium, 80);
   ASSERT_GT(slack.size(), 500u);
   EXPECT_LT(slack[0], 3) << "farther off than rounding explains";
 }
@@ -354,7 +354,7 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
       const Camera camera = camera_along({x, 20, 21}, direction);
       for (const float isovalue : {60.0f, 120.5f})
-        certify_frame(renderer, scene, camera, isovalue, 0.01);
+        certify_frame(renderer, scene, {camera, isovalue}, 0.01);
     }
   }
   EXPECT_GT(all_, 10000u);
@@ -368,13 +368,13 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
                                                                  .max_voxel_error = 0.015625}}}) {
     const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                      {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const double voxel_pixels : {0.0, 2.0}) {
-      renderer.set_voxel_pixels(voxel_pixels);
-      renderer.render(camera, 0.3f);
+      const FrameRequest request{.camera = camera, .isovalue = 0.3f, .voxel_pixels = voxel_pixels};
+      renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
-      const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
+      const Certificate certificate = certify(renderer, scene.volume, request, drawn);
       const std::vector<double> slack =
           expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
       ASSERT_GT(slack.size(), 100u);
@@ -392,9 +392,9 @@ TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
   const Scene scene({33, 48, 40}, test::gyroid_field(24), {.rate = 4});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
-  renderer.render(camera, 0.3f);
+  renderer.render({camera, 0.3f});
   const std::vector<HitRecord> drawn = renderer.hits();
-  const std::vector<float> bounds = certify(renderer, scene.volume, camera, 0.3f, drawn).bounds;
+  const std::vector<float> bounds = certify(renderer, scene.volume, {camera, 0.3f}, drawn).bounds;
   const CellOracle truth(scene.source, {33, 48, 40}, 0.3f);
   const FrameParams frame = make_frame_params(scene.volume.info, camera, kMedium, 0.3f);
   const auto exceeded = [&](const std::function<float(float)> &change) {
@@ -415,22 +415,19 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
   const Scene scene(dims, test::sphere_field(dims),
                     {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                    {.size = kMedium, .with_levels = true, .with_bounds = true});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye += 0.35 * (camera.eye - camera.at);  // so far that levels spare most blocks
   double voxel_pixels = -1, voxel_error = -1;
   for (const double max_surface_error : {0.00005, 0.05, 1.0, 4.0}) {
     const DetailChoice choice =
-        choose_detail(renderer, scene.volume, camera, 0.5f, max_surface_error);
+        choose_detail(renderer, scene.volume, {camera, 0.5f}, max_surface_error);
     EXPECT_GE(choice.detail.voxel_pixels, voxel_pixels);
     if (choice.detail.voxel_pixels == voxel_pixels) {
       EXPECT_GE(choice.detail.voxel_error, voxel_error);
     }
     voxel_pixels = choice.detail.voxel_pixels;
     voxel_error = choice.detail.voxel_error;
-    EXPECT_EQ(renderer.options().voxel_pixels, voxel_pixels);
-    EXPECT_EQ(renderer.voxel_error(), voxel_error);
-    EXPECT_EQ(renderer.options().size.width, kMedium.width);
     if (max_surface_error == 0.00005) {
       EXPECT_FALSE(choice.reachable);
       ASSERT_TRUE(choice.tolerance);
@@ -438,10 +435,11 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
       EXPECT_EQ(voxel_pixels, 0);
     } else {
       EXPECT_TRUE(choice.reachable);
-      renderer.render(camera, 0.5f);
+      const FrameRequest request = with_detail({camera, 0.5f}, choice.detail);
+      renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
       const CertificateSummary summary =
-          summarize(certify(renderer, scene.volume, camera, 0.5f, drawn), max_surface_error);
+          summarize(certify(renderer, scene.volume, request, drawn), max_surface_error);
       EXPECT_GE(double(summary.num_certified) / double(summary.num_pixels),
                 choice.tries[0].certified - kLostShare)
           << "a picture so small is tried as it is";
@@ -454,9 +452,9 @@ TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   for (const std::uint32_t rate : {8u, 16u, 24u}) {
     const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                      {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-    const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 1);
+    const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 1);
     EXPECT_TRUE(choice.reachable);
     EXPECT_EQ(choice.detail.voxel_error > 0, rate > 16) << "rate " << rate;
   }
@@ -468,15 +466,15 @@ TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
   const Scene scene({96, 96, 96}, test::gyroid_field(48),
                     {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                    {.size = kMedium, .with_levels = true, .with_bounds = true});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 0.05);
+  const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
     return each.detail.voxel_pixels > 0.6 &&
            each.certified >= choice.tries[0].certified - kLostShare;
   })) << "the error would allow them";
   EXPECT_EQ(choice.detail.voxel_pixels, 0);
-  EXPECT_EQ(renderer.render(camera, 0.3f).last_level, 0u);
+  EXPECT_EQ(renderer.render(with_detail({camera, 0.3f}, choice.detail)).last_level, 0u);
 }
 
 /// Coarse levels reach a little out of the volume; where a ray is there at a border, on one side
@@ -487,18 +485,18 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
                     {.precision = BlockPrecision{.min_exponent = -10}});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                    {.size = kMedium, .with_levels = true, .with_bounds = true});
   for (const double voxel_pixels :
        {1.0, 1.4}) {  // a border among the places where rays enter, or in the surface
-    renderer.set_voxel_pixels(voxel_pixels);
+    FrameRequest request{.camera = camera, .isovalue = 0.5f, .voxel_pixels = voxel_pixels};
     const auto hits_of = [&](FieldBound bound) {
-      renderer.draw_bound(bound);
-      renderer.render(camera, 0.5f);
+      request.bound = bound;
+      renderer.render(request);
       return renderer.hits();
     };
     const auto lower = hits_of(FieldBound::kLower), upper = hits_of(FieldBound::kUpper),
                drawn = hits_of(FieldBound::kNone);
-    const Certificate certificate = certify(renderer, scene.volume, camera, 0.5f, drawn);
+    const Certificate certificate = certify(renderer, scene.volume, request, drawn);
     std::size_t num_hits = 0;
     for (std::size_t i = 0; i < drawn.size(); ++i) {
       const int met =
@@ -519,8 +517,7 @@ TEST_P(CertifyOnDevice, SmallerPicturesAreTheTwins) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume, {.size = kMedium});
   for (const ImageSize size : {kSmall, kMedium, ImageSize{7, 5}}) {
-    renderer.set_size(size);
-    renderer.render(camera, 0.3f);
+    renderer.render({camera, 0.3f, size});
     const auto expected = Twin(scene.volume).render(camera, size, 0.3f);
     expect_same_hits(renderer.hits(), expected, size.width);
     const FrameParams frame = make_frame_params(scene.volume.info, camera, size, 0.3f);
@@ -535,9 +532,10 @@ TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto bounds = [&](ImageSize size, double voxel_pixels) {
     Renderer renderer(device_, scene.volume,
-                      {.size = size, .voxel_pixels = voxel_pixels, .with_bounds = true});
-    renderer.render(camera, 0.3f);
-    return certify(renderer, scene.volume, camera, 0.3f, renderer.hits()).bounds;
+                      {.size = size, .with_levels = true, .with_bounds = true});
+    const FrameRequest request{.camera = camera, .isovalue = 0.3f, .voxel_pixels = voxel_pixels};
+    renderer.render(request);
+    return certify(renderer, scene.volume, request, renderer.hits()).bounds;
   };
   const std::vector<float> four = bounds({30, 20, 2}, 0.6), one = bounds({60, 40}, 1.2);
   ASSERT_EQ(four.size(), one.size());
@@ -554,11 +552,13 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto certify_with = [&](const CompressedVolume &volume, const RendererOptions &options) {
     Renderer renderer(device_, volume, options);
-    renderer.render(camera, 0.3f);
-    certify(renderer, volume, camera, 0.3f, renderer.hits());
+    const FrameRequest request{
+        .camera = camera, .isovalue = 0.3f, .voxel_pixels = options.with_levels ? 1.0 : 0.0};
+    renderer.render(request);
+    certify(renderer, volume, request, renderer.hits());
   };
   EXPECT_NO_THROW(
-      certify_with(scene.volume, {.size = kSmall, .voxel_pixels = 1, .with_bounds = true}));
+      certify_with(scene.volume, {.size = kSmall, .with_levels = true, .with_bounds = true}));
   CompressedVolume volume = scene.volume;
   volume.max_voxel_error.reset();
   volume.bounds = {};
@@ -568,7 +568,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   volume.coarser_levels[0].bounds = {};
   EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));
   EXPECT_THAT(
-      [&] { certify_with(volume, {.size = kSmall, .voxel_pixels = 1, .with_bounds = true}); },
+      [&] { certify_with(volume, {.size = kSmall, .with_levels = true, .with_bounds = true}); },
       ThrowsMessage<Error>(HasSubstr("--levels")));
   volume = scene.volume;
   volume.value_range = {-INFINITY, INFINITY};
@@ -581,11 +581,21 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
       },
       ThrowsMessage<Error>(HasSubstr("bernstein")));
   Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true});
-  EXPECT_THROW(renderer.set_voxel_pixels(1), Error);
-  EXPECT_THROW(renderer.set_size({13, 8}), Error);
+  renderer.render({camera, 0.3f});
+  const std::vector<HitRecord> hits = renderer.hits();
+  for (const FrameRequest &bad :
+       {FrameRequest{.camera = camera, .isovalue = 0.3f, .voxel_pixels = 1},
+        FrameRequest{.camera = camera, .isovalue = 0.3f, .voxel_error = -1},
+        FrameRequest{.camera = camera, .isovalue = 0.3f, .voxel_error = NAN},
+        FrameRequest{.camera = camera, .isovalue = 0.3f, .size = ImageSize{13, 8}}}) {
+    EXPECT_THROW(renderer.render(bad), Error);
+    EXPECT_EQ(renderer.render({camera, 0.3f}).passes[0].counts.requested_count, 0u)
+        << "the cache is as it was";
+    expect_same_hits(renderer.hits(), hits, kSmall.width);
+  }
   for (const double bad : {0.0, -1.0, double{INFINITY}, double{NAN}})
-    EXPECT_THROW(choose_detail(renderer, scene.volume, camera, 0.3f, bad), Error);
+    EXPECT_THROW(choose_detail(renderer, scene.volume, {camera, 0.3f}, bad), Error);
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -15,7 +15,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -56,20 +56,17 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const std::vector<std::string> programs = device_.built_programs();
     std::vector<std::string> late;
     device_.on_new_kernel([&](std::string_view kernel) { late.emplace_back(kernel); });
-    for (const double pixels : {options.voxel_pixels, 0.0}) {
-      renderer.set_voxel_pixels(pixels);
+    for (const double pixels : {options.with_levels ? 2.0 : 0.0, 0.0}) {
       for (const float isovalue :
            {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
-        renderer.render(cameras_[0], isovalue);
+        renderer.render({.camera = cameras_[0], .isovalue = isovalue, .voxel_pixels = pixels});
         EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.size.num_pixels());
       }
     }
     if (options.with_kept_picture) {
-      renderer.set_size(halved(kSize, 1));
-      renderer.render(cameras_[0], 0.1f);
+      renderer.render({cameras_[0], 0.1f, halved(kSize, 1)});
       renderer.keep_picture();
-      renderer.set_size(kSize);
-      renderer.enlarge_kept(cameras_[0], 0.1f);
+      renderer.enlarge_kept({cameras_[0], 0.1f});
       renderer.fill_from_kept();
     }
     device_.on_new_kernel({});
@@ -86,8 +83,8 @@ TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
           {.size = {20, 15, 2}, .pipeline = pipeline, .cache_slots = 8, .stream = stream});
     }
   }
-  expect_all_compiled({.size = kSize, .voxel_pixels = 2});
-  expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .voxel_pixels = 2});
+  expect_all_compiled({.size = kSize, .with_levels = true});
+  expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .with_levels = true});
   expect_all_compiled({.size = kSize, .with_kept_picture = true});
 }
 
@@ -106,7 +103,8 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
     ocl::Device device(GetParam());
     options.with_shading = shading;
     Renderer renderer(device, volume_, options);
-    renderer.render(cameras_[0], 0.1f);
+    renderer.render(
+        {.camera = cameras_[0], .isovalue = 0.1f, .voxel_pixels = options.with_levels ? 2.0 : 0.0});
     return stems_of(device);
   };
   EXPECT_THAT(stems({.size = kSize}),
@@ -116,7 +114,7 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
   EXPECT_THAT(stems({.size = kSize, .with_kept_picture = true}),
               ElementsAre("block_cache", "kept_picture", "macrocells", "march", "zfp_decode"));
   // One for frames that the finest level draws alone, one for others.
-  EXPECT_THAT(stems({.size = kSize, .voxel_pixels = 2}),
+  EXPECT_THAT(stems({.size = kSize, .with_levels = true}),
               ElementsAre("block_cache", "macrocells", "march x2", "zfp_decode"));
   // Where one work-group scans alone, a GPU gives it more work-items.
   const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";
@@ -136,10 +134,10 @@ TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
     Renderer renderer(device, volume_, {.size = kSize, .pipeline = pipeline});
     EXPECT_THAT(device.timer().collect(), IsEmpty());
     EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
-    const FrameStats first = renderer.render(cameras_[0], 0.1f);
+    const FrameStats first = renderer.render({cameras_[0], 0.1f});
     EXPECT_EQ(first.passes.front().counts.pass, 1u + (pipeline == PipelineKind::kBlocks ? 1u : 0u));
     renderer.clear_cache();
-    const FrameStats again = renderer.render(cameras_[0], 0.1f);
+    const FrameStats again = renderer.render({cameras_[0], 0.1f});
     ASSERT_EQ(first.passes.size(), again.passes.size());
     for (std::size_t i = 0; i < first.passes.size(); ++i) {
       EXPECT_EQ(first.passes[i].counts.decoded_count, again.passes[i].counts.decoded_count) << i;
@@ -240,4 +238,4 @@ TEST(CompileCommand, TheFirstOpeningSaysSoAndLeavesNothingToFrames) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

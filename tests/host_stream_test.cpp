@@ -13,7 +13,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -59,7 +59,7 @@ class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
       const auto expected = twin_hits(volume, camera, options.size, kIsovalue);
       for (int i = 0; i < 2; ++i) {
-        const FrameStats stats = renderer.render(camera, kIsovalue);
+        const FrameStats stats = renderer.render({camera, kIsovalue});
         expect_same_hits(renderer.hits(), expected, options.size.width);
         EXPECT_EQ(stats.uploaded_blocks, num_decoded(stats));
         if (!volume.compressed.is_indexed()) {
@@ -82,7 +82,7 @@ TEST_P(HostStreamOnDevice, SmallFrameIsTheTwins) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Renderer renderer =
       renderer_of(volume.compressed, {.size = kTiny, .cache_slots = 20, .window_blocks = 8});
-  renderer.render(camera, kIsovalue);
+  renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kTiny, kIsovalue), kTiny.width);
 }
 
@@ -130,11 +130,11 @@ TEST_P(HostStreamOnDevice, WarmFrameUploadsNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Renderer renderer = renderer_of(volume.compressed, {.size = kSmall});
-  EXPECT_GT(renderer.render(camera, kIsovalue).uploaded_blocks, 0u);
-  EXPECT_EQ(renderer.render(camera, kIsovalue).uploaded_blocks, 0u);
-  EXPECT_EQ(renderer.render(camera, kIsovalue).uploaded_bytes, 0u);
+  EXPECT_GT(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
+  EXPECT_EQ(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
+  EXPECT_EQ(renderer.render({camera, kIsovalue}).uploaded_bytes, 0u);
   renderer.clear_cache();
-  EXPECT_GT(renderer.render(camera, kIsovalue).uploaded_blocks, 0u);
+  EXPECT_GT(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
 }
 
 TEST_P(HostStreamOnDevice, CancelledFrameLeavesNoTrace) {
@@ -147,12 +147,14 @@ TEST_P(HostStreamOnDevice, CancelledFrameLeavesNoTrace) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
     const FrameStats cancelled = renderer.render(
-        cameras[0], kIsovalue, [&](const PassStats &) { return ++calls < stop_after; });
+        {.camera = cameras[0], .isovalue = kIsovalue, .on_pass = [&](const PassStats &) {
+           return ++calls < stop_after;
+         }});
     EXPECT_TRUE(cancelled.cancelled);
     EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u)
         << "else there was nothing to cancel";
     EXPECT_EQ(test::num_hits(renderer.hits()), cancelled.rays_hit);
-    renderer.render(cameras[1], kIsovalue);
+    renderer.render({cameras[1], kIsovalue});
     expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kTiny, kIsovalue), kTiny.width);
   }
 }
@@ -164,7 +166,7 @@ TEST_P(HostStreamOnDevice, ProfilingChangesNothing) {
   Renderer renderer(
       device, volume.compressed,
       GetParam().with({.size = kSmall, .stream = StreamPlace::kHost, .window_blocks = 8}));
-  const FrameStats stats = renderer.render(camera, kIsovalue);
+  const FrameStats stats = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   const bool uploads = std::ranges::any_of(
       stats.passes, [](const PassStats &pass) { return pass.stage_ms.contains("upload"); });
@@ -187,7 +189,7 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
     SCOPED_TRACE(to_string(place));
     Renderer renderer(device_, opened,
                       GetParam().with({.size = kMedium, .stream = place, .window_blocks = 50}));
-    renderer.render(cameras[0], kIsovalue);
+    renderer.render({cameras[0], kIsovalue});
     expect_same_hits(renderer.hits(), expected, kMedium.width);
   }
   Renderer renderer =
@@ -197,7 +199,7 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
     if (++passes == 1) std::filesystem::resize_file(path, 100);
     return true;
   };
-  renderer.render(cameras[1], kIsovalue, cut_after_one_pass);
+  renderer.render({.camera = cameras[1], .isovalue = kIsovalue, .on_pass = cut_after_one_pass});
   EXPECT_EQ(std::filesystem::file_size(path), 100u);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     EXPECT_THAT(
@@ -205,7 +207,7 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
         ThrowsMessage<Error>(HasSubstr("truncated while it was in use")));
   }
   EXPECT_THAT([&] { decode_with_libzfp(opened); }, ThrowsMessage<Error>(HasSubstr("truncated")));
-  renderer.render(cameras[0], kIsovalue);
+  renderer.render({cameras[0], kIsovalue});
   expect_same_hits(renderer.hits(), expected, kMedium.width);
 }
 
@@ -229,11 +231,11 @@ TEST_P(HostStreamOnDevice, SplitFramesAreTheTwins) {
     EXPECT_EQ(
         std::ranges::count(renderer.memory_plan().buffers, "zfp stream", &MemoryPlan::Buffer::name),
         parts);
-    renderer.render(camera, kIsovalue);
+    renderer.render({camera, kIsovalue});
     expect_same_hits(renderer.hits(), expected, kMedium.width);
     EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());
   }
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

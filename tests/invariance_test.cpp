@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -38,7 +38,7 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   FrameStats check(const TestVolume &volume, const RendererOptions &options) {
     const Camera camera = orbit_cameras(volume.info(), 1)[0];
     Renderer renderer(device_, volume.compressed, GetParam().with(options));
-    const FrameStats stats = renderer.render(camera, kIsovalue);
+    const FrameStats stats = renderer.render({camera, kIsovalue});
     expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue),
                      options.size.width);
     expect_consistent(stats, renderer.options());
@@ -199,7 +199,7 @@ TEST_P(InvarianceOnDevice, ManyViewsThroughFewSlots) {
     Renderer renderer(device_, volume.compressed,
                       GetParam().with({.size = size, .cache_slots = slots}));
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
-      expect_consistent(renderer.render(camera, kIsovalue), renderer.options());
+      expect_consistent(renderer.render({camera, kIsovalue}), renderer.options());
       expect_same_hits(renderer.hits(), twin_hits(volume, camera, size, kIsovalue), size.width);
     }
   }
@@ -242,9 +242,9 @@ TEST_P(InvarianceOnDevice, WarmCacheDecodesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Renderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
-  const FrameStats cold = renderer.render(camera, kIsovalue);
+  const FrameStats cold = renderer.render({camera, kIsovalue});
   const auto hits = renderer.hits();
-  const FrameStats warm = renderer.render(camera, kIsovalue);
+  const FrameStats warm = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), hits, kSmall.width);
   EXPECT_GT(total(cold, &PassCounts::decoded_count), 0u);
   EXPECT_EQ(total(warm, &PassCounts::requested_count), 0u);
@@ -274,7 +274,7 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
     for (const Frame &frame : frames) {
       SCOPED_TRACE(
           fmt::format("{} slots, isovalue {}, view {}", slots, isovalues[frame.iso], frame.view));
-      expect_consistent(renderer.render(cameras[frame.view], isovalues[frame.iso]),
+      expect_consistent(renderer.render({cameras[frame.view], isovalues[frame.iso]}),
                         renderer.options());
       expect_same_hits(renderer.hits(),
                        twin_hits(volume, cameras[frame.view], kFrame, isovalues[frame.iso]),
@@ -291,10 +291,10 @@ TEST_P(InvarianceOnDevice, MemoryIsFixedBeforeTheFirstFrame) {
   const std::uint64_t current = ledger.current(), peak = ledger.peak();
   EXPECT_GT(current, 0u);
   for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
-    renderer.render(camera, kIsovalue, [&](const PassStats &) {
-      EXPECT_EQ(ledger.current(), current);
-      return true;
-    });
+    renderer.render({.camera = camera, .isovalue = kIsovalue, .on_pass = [&](const PassStats &) {
+                       EXPECT_EQ(ledger.current(), current);
+                       return true;
+                     }});
     renderer.shade();
   }
   EXPECT_EQ(ledger.current(), current);
@@ -323,18 +323,20 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
         GetParam().with({.size = kFrame, .cache_slots = slots, .max_speculation = 4}));
     std::uint64_t found = 0;
     std::size_t calls = 0;
-    const FrameStats stats = renderer.render(camera, kIsovalue, [&](const PassStats &pass) {
-      ++calls;
-      found += pass.counts.hit_count;
-      const auto hits = renderer.hits();
-      EXPECT_EQ(test::num_hits(hits), found);
-      for (std::size_t i = 0; i < hits.size(); ++i) {  // a hit, once found, is final
-        if (std::isfinite(hits[i].t)) {
-          EXPECT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(HitRecord)), 0) << "pixel " << i;
-        }
-      }
-      return true;
-    });
+    const FrameStats stats = renderer.render(
+        {.camera = camera, .isovalue = kIsovalue, .on_pass = [&](const PassStats &pass) {
+           ++calls;
+           found += pass.counts.hit_count;
+           const auto hits = renderer.hits();
+           EXPECT_EQ(test::num_hits(hits), found);
+           for (std::size_t i = 0; i < hits.size(); ++i) {  // a hit, once found, is final
+             if (std::isfinite(hits[i].t)) {
+               EXPECT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(HitRecord)), 0)
+                   << "pixel " << i;
+             }
+           }
+           return true;
+         }});
     EXPECT_FALSE(stats.cancelled);
     EXPECT_EQ(calls, stats.passes.size());
     EXPECT_GT(calls, 3u) << "else this scene tests nothing";
@@ -351,14 +353,16 @@ TEST_P(InvarianceOnDevice, CancelledFrameLeavesNoTrace) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
     const FrameStats cancelled = renderer.render(
-        cameras[0], kIsovalue, [&](const PassStats &) { return ++calls < stop_after; });
+        {.camera = cameras[0], .isovalue = kIsovalue, .on_pass = [&](const PassStats &) {
+           return ++calls < stop_after;
+         }});
     EXPECT_TRUE(cancelled.cancelled);
     EXPECT_EQ(cancelled.passes.size(), stop_after);
     EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u)
         << "else there was nothing to cancel";
     EXPECT_EQ(test::num_hits(renderer.hits()), cancelled.rays_hit);
     expect_consistent(cancelled, renderer.options());
-    const FrameStats next = renderer.render(cameras[1], kIsovalue);
+    const FrameStats next = renderer.render({cameras[1], kIsovalue});
     expect_consistent(next, renderer.options());
     expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kTiny, kIsovalue), kTiny.width);
   }
@@ -370,7 +374,7 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   ocl::Device device(GetParam().device, true);
   Renderer renderer(device, volume.compressed, GetParam().with({.size = kSmall}));
-  const FrameStats stats = renderer.render(camera, kIsovalue);
+  const FrameStats stats = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   expect_consistent(stats, renderer.options());
   for (const PassStats &pass : stats.passes) {
@@ -382,4 +386,4 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

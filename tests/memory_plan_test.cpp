@@ -13,7 +13,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TestVolume;
@@ -89,7 +89,7 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
       ocl::Device device(GetParam().device);
       Renderer renderer(device, volume.compressed,
                         GetParam().with({.size = size_, .memory_budget = budget, .stream = place}));
-      renderer.render(camera, kIsovalue);
+      renderer.render({camera, kIsovalue});
       test::expect_same_hits(renderer.hits(), expected, size_.width);
       renderer.shade();
       expect_booked(device, renderer.memory_plan());
@@ -125,7 +125,7 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
     ocl::Device device(GetParam().device);
     Renderer renderer(device, volume.compressed,
                       GetParam().with({.size = size_, .memory_budget = budget}));
-    const FrameStats stats = renderer.render(camera, kIsovalue);
+    const FrameStats stats = renderer.render({camera, kIsovalue});
     test::expect_same_hits(renderer.hits(), expected, size_.width);
     renderer.shade();
     expect_booked(device, renderer.memory_plan());
@@ -189,4 +189,4 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "core/ocl/kernel.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::HasSubstr;
@@ -208,4 +208,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, OclDeviceOnDevice, testing::ValuesIn(devices_u
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

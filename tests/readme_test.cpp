@@ -10,7 +10,7 @@
 
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 const std::filesystem::path kRoot =
@@ -70,4 +70,4 @@ TEST(Readme, AutoIsTheSamePipelineEverywhere) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

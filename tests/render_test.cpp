@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::camera_along;
@@ -30,7 +30,7 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (const float isovalue : isovalues) {
       for (std::size_t view = 0; view < cameras.size(); ++view) {
         SCOPED_TRACE(fmt::format("isovalue {}, view {}", isovalue, view));
-        const FrameStats stats = renderer.render(cameras[view], isovalue);
+        const FrameStats stats = renderer.render({cameras[view], isovalue});
         const auto expected = twin_hits(volume, cameras[view], size, isovalue);
         expect_same_hits(renderer.hits(), expected, size.width);
         EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
@@ -134,14 +134,14 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
       const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
       for (std::size_t i = 0; i < voxels.size(); ++i)
         ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), voxel_error);
-      renderer.set_voxel_error(voxel_error);
-      renderer.render(camera, 0.1f);
+      renderer.render({.camera = camera, .isovalue = 0.1f, .voxel_error = voxel_error});
       expect_same_hits(renderer.hits(),
                        render_scalar(make_frame_params(info, camera, kSmall, 0.1f), voxels),
                        kSmall.width);
     }
     for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
-      EXPECT_THROW(renderer.set_voxel_error(bad), Error);
+      EXPECT_THROW(renderer.render({.camera = camera, .isovalue = 0.1f, .voxel_error = bad}),
+                   Error);
   }
 }
 
@@ -154,11 +154,10 @@ TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
   Renderer renderer(device_, volume.compressed, {.size = kMedium});
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   for (const double voxel_error : {0.5, 4.0, 64.0}) {
-    renderer.set_voxel_error(voxel_error);
     const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
     for (const float isovalue : {0.7f, 70.0f, 255.5f}) {
       SCOPED_TRACE(fmt::format("value error {}, isovalue {}", voxel_error, isovalue));
-      renderer.render(camera, isovalue);
+      renderer.render({.camera = camera, .isovalue = isovalue, .voxel_error = voxel_error});
       const FrameParams frame = make_frame_params(volume.info(), camera, kMedium, isovalue);
       expect_same_hits(renderer.hits(), render_scalar(frame, voxels), kMedium.width);
     }
@@ -378,18 +377,18 @@ TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Renderer renderer(device_, volume.compressed, {.size = kSmall});
-  EXPECT_THROW(renderer.render(camera, NAN), Error);
+  EXPECT_THROW(renderer.render({camera, NAN}), Error);
   for (const Camera &bad :
        {Camera{camera.eye, camera.eye, camera.up}, Camera{camera.eye, camera.at, {0, 0, 0}},
         Camera{camera.eye, camera.at, camera.at - camera.eye},
         Camera{camera.eye, camera.at, camera.up, 180.0},
         Camera{camera.eye, camera.at, camera.up, 0.0}, Camera{{NAN, 0, 0}, camera.at, camera.up},
         Camera{{1e9, 0, 0}, camera.at, camera.up}}) {
-    EXPECT_THROW(renderer.render(bad, 0.1f), Error);
+    EXPECT_THROW(renderer.render({bad, 0.1f}), Error);
   }
-  renderer.render(camera, 0.1f);
+  renderer.render({camera, 0.1f});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, 0.1f), kSmall.width);
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

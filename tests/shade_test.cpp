@@ -13,7 +13,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TestVolume;
@@ -53,7 +53,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, ShadeOnDevice, testing::ValuesIn(pipelines_und
 TEST_P(ShadeOnDevice, SmallPictureIsTheTwins) {
   constexpr ImageSize kSize{12, 8};
   Renderer renderer(device_, volume_.compressed, GetParam().with({.size = kSize}));
-  renderer.render(camera_, 0.1f);
+  renderer.render({camera_, 0.1f});
   const FrameParams frame = make_frame_params(volume_.info(), camera_, kSize, 0.1f);
   for (const Appearance &appearance :
        {Appearance{}, Appearance{{0.2f, 0.4f, 1.0f}, {0, 0, 0}, 0.0f, 1.0f, 2.0f}}) {
@@ -73,7 +73,7 @@ TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
     SCOPED_TRACE(fmt::format("{} x {} rays a pixel", samples, samples));
     const ImageSize size{7, 5, samples}, all_rays{7 * samples, 5 * samples};
     Renderer renderer(device_, volume_.compressed, GetParam().with({.size = size}));
-    const FrameStats stats = renderer.render(camera_, 0.1f);
+    const FrameStats stats = renderer.render({camera_, 0.1f});
     const auto expected_hits = test::twin_hits(volume_, camera_, all_rays, 0.1f);
     test::expect_same_hits(renderer.hits(), expected_hits, all_rays.width);
     EXPECT_EQ(stats.rays_hit, test::num_hits(expected_hits));
@@ -105,8 +105,7 @@ TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
   for (const ImageSize size : {ImageSize{20, 14, 4}, {40, 28, 2}, {80, 56}, {9, 7, 8}, {5, 4, 3}}) {
     SCOPED_TRACE(
         fmt::format("{}x{}, {} x {} rays", size.width, size.height, size.samples, size.samples));
-    renderer.set_size(size);
-    renderer.render(camera_, 0.1f);
+    renderer.render({camera_, 0.1f, size});
     const FrameParams frame = make_frame_params(volume_.info(), camera_, size, 0.1f);
     const auto hits = render_scalar(frame, volume_.voxels);
     test::expect_same_hits(renderer.hits(), hits, size.ray_columns());
@@ -116,14 +115,11 @@ TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
         got.pixels,
         shade_scalar(frame, make_shade_params(volume_.info(), {}), hits, size.samples).pixels);
   }
-  EXPECT_THROW(renderer.set_size({20, 14, 5}), Error) << "more rays";
-  EXPECT_THROW(renderer.set_size({1, 1, 0}), Error);
-  EXPECT_THAT(
-      [&] {
-        renderer.set_size({1, 1, 9});
-      },
-      ThrowsMessage<Error>(HasSubstr("9 x 9 rays a pixel")));
+  const auto draw = [&](ImageSize size) { renderer.render({camera_, 0.1f, size}); };
+  EXPECT_THROW(draw({20, 14, 5}), Error) << "more rays";
+  EXPECT_THROW(draw({1, 1, 0}), Error);
+  EXPECT_THAT([&] { draw({1, 1, 9}); }, ThrowsMessage<Error>(HasSubstr("9 x 9 rays a pixel")));
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

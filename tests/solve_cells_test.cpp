@@ -15,7 +15,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// A cubic of one kind of trouble. Its values are at least 1e-6 or 0, so that no product becomes
@@ -105,7 +105,7 @@ TEST_P(SolveCellsOnDevice, FramesOfEverySolverEqualTheTwins) {
     options.size = size;
     options.solver = solver_from_string(name);
     Renderer renderer(device_, volume.compressed, options);
-    renderer.render(camera, 0.1f);
+    renderer.render({camera, 0.1f});
     test::expect_same_hits(renderer.hits(),
                            render_scalar(make_frame_params(volume.info(), camera, size, 0.1f),
                                          volume.voxels, options.solver),
@@ -123,4 +123,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, SolveCellsOnDevice, testing::ValuesIn(devices_
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include "core/base/error.hpp"
 #include "core/view/detail.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -105,79 +105,74 @@ void check_max_surface_error(double max_surface_error) {
 
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume) {
   options.with_bounds = true;
-  options.voxel_pixels = volume.coarser_levels.empty() ? 0 : 1;
+  options.with_levels = !volume.coarser_levels.empty();
   return options;
 }
 
-DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
-                           float isovalue, double max_surface_error) {
+FrameRequest with_detail(FrameRequest request, const Detail &detail) {
+  request.voxel_pixels = detail.voxel_pixels;
+  request.voxel_error = detail.voxel_error;
+  return request;
+}
+
+DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
+                           const FrameRequest &request, double max_surface_error) {
   check_max_surface_error(max_surface_error);
   const auto begin = std::chrono::steady_clock::now();
-  const ImageSize size = renderer.options().size;
+  const ImageSize size = renderer.size_of(request);
+  check_image_size(size);
   const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
   const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
   const double stride = double(size.height) / small.height;
-  const auto set = [&](const Detail &detail, double scale) {
-    renderer.set_voxel_pixels(detail.voxel_pixels / scale);
-    renderer.set_voxel_error(detail.voxel_error);
-  };
   // Neither is known: certify() throws.
   const double error = known_voxel_error(volume).value_or(double{largest_bound(volume.bounds)});
   DetailChoice choice;
   const auto try_out = [&](const Detail &detail) {
-    set(detail, stride);
-    renderer.render(camera, isovalue);
+    FrameRequest sample = with_detail(request, {detail.voxel_pixels / stride, detail.voxel_error});
+    sample.size = small;
+    sample.on_pass = {};
+    renderer.render(sample);
     std::vector<HitRecord> hits = renderer.hits();
     const CertificateSummary summary =
-        summarize(certify(renderer, volume, camera, isovalue, hits), max_surface_error / stride);
+        summarize(certify(renderer, volume, sample, hits), max_surface_error / stride);
     const double all = std::max<double>(double(summary.num_pixels), 1);
     choice.tries.push_back(
         {detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
     return std::pair(summary, std::move(hits));
   };
-  renderer.set_size(small);
-  try {
-    const auto [at_full_detail, finest_hits] = try_out({});
-    choice.median = stride * at_full_detail.median;
-    const double best = choice.tries.front().certified;
-    choice.reachable = best >= 0.5;
-    if (!choice.reachable) advise(volume, error, max_surface_error, choice);
-    const auto suffices = [&](const Detail &detail) {
-      try_out(detail);
-      return choice.tries.back().certified >= best - kLostShare;
-    };
-    // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so
-    // with any less, too: a bisection.
-    const auto first_to_suffice = [&](const std::vector<double> &numbers, const auto &detail_of) {
-      const auto found = std::ranges::partition_point(
-          numbers, [&](double number) { return !suffices(detail_of(number)); });
-      return found == numbers.end() ? 0.0 : *found;
-    };
-    if (choice.reachable && renderer.has_levels()) {
-      const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
-        return Detail{voxel_pixels, 0};
-      });
-      const std::vector<FrameParams> frames =
-          make_level_frames(level_infos(volume, true), camera, size, isovalue, coarsest);
-      if (blocks_share(finest_hits, frames) <= kMaxBlocksShare)
-        choice.detail.voxel_pixels = coarsest;
-    }
-    if (choice.reachable && volume.rate() > kMinPlaneRate) {
-      choice.detail.voxel_error =
-          first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
-            return Detail{choice.detail.voxel_pixels, voxel_error};
-          });
-    }
-  } catch (...) {
-    renderer.set_size(size);
-    set({}, 1);
-    throw;
+  const auto [at_full_detail, finest_hits] = try_out({});
+  choice.median = stride * at_full_detail.median;
+  const double best = choice.tries.front().certified;
+  choice.reachable = best >= 0.5;
+  if (!choice.reachable) advise(volume, error, max_surface_error, choice);
+  const auto suffices = [&](const Detail &detail) {
+    try_out(detail);
+    return choice.tries.back().certified >= best - kLostShare;
+  };
+  // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with
+  // any less, too: a bisection.
+  const auto first_to_suffice = [&](const std::vector<double> &numbers, const auto &detail_of) {
+    const auto found = std::ranges::partition_point(
+        numbers, [&](double number) { return !suffices(detail_of(number)); });
+    return found == numbers.end() ? 0.0 : *found;
+  };
+  if (choice.reachable && renderer.options().with_levels) {
+    const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
+      return Detail{voxel_pixels, 0};
+    });
+    const std::vector<FrameParams> frames = make_level_frames(
+        level_infos(volume, true), request.camera, size, request.isovalue, coarsest);
+    if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
   }
-  renderer.set_size(size);
-  set(choice.detail, 1);
+  if (choice.reachable && volume.rate() > kMinPlaneRate) {
+    choice.detail.voxel_error =
+        first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
+          return Detail{choice.detail.voxel_pixels, voxel_error};
+        });
+  }
   choice.total_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   return choice;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

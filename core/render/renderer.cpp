@@ -1,18 +1,17 @@
 #include "core/render/renderer.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <stdexcept>
 
 #include "core/base/error.hpp"
 #include "core/render/stall_guard.hpp"
+#include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/block_grid.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -24,82 +23,10 @@ double ms_since(std::chrono::steady_clock::time_point begin) {
       .count();
 }
 
-RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
-                        const ocl::Device &device) {
-  check_volume_info(volume.info, "the volume");
-  check_image_size(options.size);
-  check_levels(volume, options.voxel_pixels);
-  const bool with_levels = options.voxel_pixels > 0;
-  if (with_levels && options.pipeline == PipelineKind::kBlocks)
-    throw Error(
-        "pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
-  const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
-  std::uint64_t num_ids = 0;  // see make_id_grid()
-  for (const CompressedVolume *level : levels_of(volume, with_levels))
-    num_ids += layer_ids * level->num_blocks().z;
-  if (num_ids >= ISO_MAX_BLOCK_IDS) {
-    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids,
-                ISO_MAX_BLOCK_IDS);
-  }
-  if (options.max_speculation < 1 || options.max_speculation > ISO_MAX_SPECULATION) {
-    throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
-                ISO_MAX_SPECULATION);
-  }
-  if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
-  const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
-  if (!std::has_single_bit(options.group_size) || options.group_size < 8 ||
-      options.group_size > largest) {
-    throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
-                options.group_size, device.info().name, largest);
-  }
-  if (options.window_blocks != 0 && options.window_blocks < kMinCacheSlots) {
-    throw Error("a window of {} blocks cannot be used: {} (one dual grid) and more can",
-                options.window_blocks, kMinCacheSlots);
-  }
-  if (options.largest_stream_part == 0) {
-    options.largest_stream_part = device.capabilities().largest_allocation;
-  }
-  return options;
-}
-
-/// All memory, before any is taken.
-MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
-                     const RendererOptions &options) {
-  const MemoryRequest request{
-      options.size.num_rays(), options.pipeline,
-      options.grouping,        options.group_size,
-      options.stream,          options.largest_stream_part,
-      options.window_blocks,   options.voxel_pixels > 0,
-      options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0};
-  const std::uint64_t budget = options.memory_budget != 0
-                                   ? options.memory_budget
-                                   : device.capabilities().global_memory / 4 * 3;
-  std::uint64_t num_blocks = 0;
-  for (const CompressedVolume *level : levels_of(volume, request.with_levels))
-    num_blocks += level->block_count();
-  if (options.cache_slots != 0) {
-    MemoryPlan plan = plan_with_slots(volume, request, budget, options.cache_slots);
-    if (options.memory_budget != 0 && plan.peak() > budget) {
-      throw Error(
-          "{} cache slots need {} bytes of device memory, more than the budget of {}: give one of "
-          "the two "
-          "alone",
-          options.cache_slots, plan.peak(), budget);
-    }
-    return plan;
-  }
-  const std::uint64_t most =
-      options.memory_budget != 0 ? std::uint64_t{ISO_MAX_CACHE_SLOTS} : kAmpleCacheSlots;
-  return plan_within(
-      device, volume, request, budget,
-      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most)));
-}
-
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
                       const RendererOptions &options, const MemoryPlan &plan) {
-  const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.voxel_pixels > 0);
-  const std::vector<FrameParams> grids =
-      make_level_grids(level_infos(volume, options.voxel_pixels > 0));
+  const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.with_levels);
+  const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.with_levels));
   const FrameParams ids = make_id_grid(grids), &last = grids.back();
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(
@@ -152,6 +79,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       plan_(make_plan(device, volume, options_)),
       state_(make_state(device, volume, options_, plan_)),
       value_range_(volume.value_range),
+      size_(options_.size),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
       shade_(device, options_.size.num_rays()),
@@ -193,12 +121,13 @@ void Renderer::compile_kernels() {
   rays.reset_counts();
 }
 
-FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &on_pass) {
+FrameStats Renderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   const Uploads uploaded_before = uploads();
+  const OnPass &on_pass = request.on_pass;
   const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
   FrameStats stats;
-  begin_frame(camera, isovalue);
+  begin_frame(request);
   stats.first_level = state_.drawing.first;
   stats.last_level = state_.drawing.end - 1;
   StallGuard guard(state_.levels[0].info.dims);
@@ -230,12 +159,35 @@ FrameStats Renderer::render(const Camera &camera, float isovalue, const OnPass &
   return stats;
 }
 
-void Renderer::begin_frame(const Camera &camera, float isovalue) {
-  readback_.drain();  // of what the frame before had enqueued beyond its last pass
+/// Throws Error before anything has changed.
+void Renderer::check(const FrameRequest &request) const {
+  const ImageSize size = size_of(request);
+  check_image_size(size);
+  if (size.num_rays() > state_.rays.num_rays) {
+    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
+                size.width, size.height, state_.rays.num_rays);
+  }
+  check_voxel_pixels(request.voxel_pixels);
+  if (request.voxel_pixels > 0 && !options_.with_levels) {
+    throw Error("a renderer of the finest level alone cannot draw with {} pixels between voxels",
+                request.voxel_pixels);
+  }
+  if (request.bound != FieldBound::kNone && !options_.with_bounds)
+    throw Error("a renderer that was made without bounds cannot draw one");
+}
+
+void Renderer::begin_frame(const FrameRequest &request) {
+  check(request);
+  const float isovalue = request.isovalue;
+  const ImageSize size = size_of(request);
   std::vector<VolumeInfo> infos;
   for (const Level &level : state_.levels) infos.push_back(level.info);
   std::vector<FrameParams> frames =
-      make_level_frames(infos, camera, options_.size, isovalue, options_.voxel_pixels);
+      make_level_frames(infos, request.camera, size, isovalue, request.voxel_pixels);
+  const std::vector<DecodedValues> values = decoded_values(request);
+  readback_.drain();  // of what the frame before had enqueued beyond its last pass
+  decode_as(values, request.bound);
+  size_ = size;
   const auto first = std::ranges::find_if(frames, draws);
   const auto end = std::find_if_not(first, frames.end(), draws);
   state_.drawing = {static_cast<std::size_t>(first - frames.begin()),
@@ -260,7 +212,7 @@ void Renderer::begin_frame(const Camera &camera, float isovalue) {
   level_frames_.assign(first, end);
   state_.rays.frame = level_frames_.front();
   state_.rays.num_level_frames = static_cast<std::uint32_t>(level_frames_.size());
-  if (has_levels()) state_.rays.level_frames.write_async(level_frames_);
+  if (state_.levels.size() > 1) state_.rays.level_frames.write_async(level_frames_);
   if (cached_isovalue_.value_or(isovalue) != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
     state_.cache.classify(state_.rays);
@@ -281,7 +233,7 @@ Renderer::Uploads Renderer::uploads() const {
 }
 
 PassStats Renderer::stats_of(const PassCounts &counts) {
-  const double rays = static_cast<double>(options_.size.num_rays());
+  const double rays = static_cast<double>(size_.num_rays());
   PassStats stats;
   stats.counts = counts;
   stats.counts.window_count = std::min(counts.window_count, counts.active_count);
@@ -304,61 +256,53 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   return stats;
 }
 
-void Renderer::set_voxel_error(double voxel_error) {
-  with_fewer_planes({}, voxel_error);  // or throws
-  voxel_error_ = voxel_error;
-  update_layouts();
-}
-
-void Renderer::draw_bound(FieldBound bound) {
-  if (bound != FieldBound::kNone) {
-    if (!options_.with_bounds) throw std::logic_error("the renderer was made without bounds");
-    for (const Level &level : state_.levels)
-      value_offset(level.error, bound, 0, value_range_);  // or throws
-  }
-  bound_ = bound;
-  if (options_.with_bounds) state_.levels[0].macrocells.use(static_cast<std::size_t>(bound));
-  update_layouts();
-}
-
-/// Has blocks decoded as voxel_error_ and bound_ say.
-void Renderer::update_layouts() {
-  bool changes = false;
-  for (std::size_t i = 0; i < state_.levels.size(); ++i) {
-    Level &level = state_.levels[i];
-    const double voxel_error = voxel_error_of(voxel_error_, i);
+/// What the request makes of each level's blocks. Throws Error where the error is not known that a
+/// bound needs.
+std::vector<Renderer::DecodedValues> Renderer::decoded_values(const FrameRequest &request) const {
+  std::vector<DecodedValues> values;
+  for (const Level &level : state_.levels) {
+    const double voxel_error = voxel_error_of(request.voxel_error, values.size());
     const BlockPrecision planes = with_fewer_planes(level.precision, voxel_error);
     const double few_planes = plane_error(level.precision, voxel_error);
+    const ValueOffset offset = value_offset(level.error, request.bound, few_planes, value_range_);
     StreamLayout layout = level.stream.layout;
     layout.min_exponent = planes.min_exponent;
     layout.whole_numbers = planes.whole_numbers ? 1 : 0;
-    const ValueOffset offset = value_offset(level.error, bound_, few_planes, value_range_);
     layout.value_offset = offset.uniform;
     layout.bound_unit = offset.unit;
-    if (std::memcmp(&layout, &level.stream.layout, sizeof(layout)) == 0) continue;
+    values.push_back({layout, few_planes});
+  }
+  return values;
+}
+
+/// Has blocks decoded to these values, and forgets those of others.
+void Renderer::decode_as(const std::vector<DecodedValues> &values, FieldBound bound) {
+  if (options_.with_bounds) state_.levels[0].macrocells.use(static_cast<std::size_t>(bound));
+  bool changes = false;
+  for (std::size_t i = 0; i < state_.levels.size(); ++i) {
+    Level &level = state_.levels[i];
+    if (std::memcmp(&values[i].layout, &level.stream.layout, sizeof(StreamLayout)) == 0) continue;
     changes = true;
-    level.stream.layout = layout;
-    level.range_error = few_planes;
+    level.stream.layout = values[i].layout;
+    level.range_error = values[i].range_error;
   }
   if (changes) clear_cache();
 }
 
-void Renderer::set_voxel_pixels(double voxel_pixels) {
-  check_voxel_pixels(voxel_pixels);
-  if (voxel_pixels > 0 && state_.levels.size() == 1) {
-    throw Error("a renderer of the finest level alone cannot draw with {} pixels between voxels",
-                voxel_pixels);
-  }
-  options_.voxel_pixels = voxel_pixels;
+Camera Renderer::camera(std::span<const float> isovalues) {
+  const Level &finest = state_.levels[0];
+  state_.levels[0].macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
+  return surface_camera(state_.levels[0].macrocells, finest.info, isovalues, options_.size);
 }
 
-void Renderer::set_size(ImageSize size) {
-  check_image_size(size);
-  if (size.num_rays() > state_.rays.num_rays) {
-    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
-                size.width, size.height, state_.rays.num_rays);
-  }
-  options_.size = size;
+std::vector<HitRecord> Renderer::hits() const {
+  std::vector<HitRecord> hits(size_.num_rays());
+  state_.rays.hits.read(hits);
+  return hits;
+}
+
+Image8 Renderer::shade(const Appearance &appearance) {
+  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, size_.samples);
 }
 
 void Renderer::fill_from_kept() {
@@ -366,8 +310,12 @@ void Renderer::fill_from_kept() {
   device_.finish();
 }
 
-void Renderer::enlarge_kept(const Camera &camera, float isovalue) {
-  state_.rays.frame = make_frame_params(state_.levels[0].info, camera, options_.size, isovalue);
+void Renderer::enlarge_kept(const FrameRequest &request) {
+  check(request);
+  const ImageSize size = size_of(request);
+  state_.rays.frame =
+      make_frame_params(state_.levels[0].info, request.camera, size, request.isovalue);
+  size_ = size;
   kept_.value().show(state_.rays, true);
   device_.finish();
 }
@@ -378,9 +326,4 @@ void Renderer::clear_cache() {
   cached_isovalue_.reset();
 }
 
-Image8 Renderer::shade(const Appearance &appearance) {
-  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays,
-                options_.size.samples);
-}
-
-}  // namespace isowave
+}  // namespace isowave::core

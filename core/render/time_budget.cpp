@@ -7,7 +7,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -40,57 +40,57 @@ TimedFrames::TimedFrames(Renderer &renderer, Clock now)
     throw std::logic_error("the renderer keeps no picture");
 }
 
-TimedFrame TimedFrames::render(const Camera &camera, float isovalue, double budget_ms) {
+TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
   check_time_budget(budget_ms);
   const double begin = now_();
-  const ImageSize full = renderer_.options().size;
-  const double full_error = renderer_.options().voxel_pixels;
+  const ImageSize full = renderer_.size_of(request);
+  check_image_size(full);
   TimedFrame frame;
   std::size_t step = kNumSteps - 1;
-  try {
-    for (;;) {
-      const double scale = std::ldexp(1.0, static_cast<int>(step)) / full.samples;  // of its pixels
-      const double voxel_pixels = step == 0                ? full_error
-                                  : renderer_.has_levels() ? std::max(1.0, full_error / scale)
-                                                           : 0.0;
-      renderer_.set_size(halved(full, static_cast<unsigned>(step)));
-      renderer_.set_voxel_pixels(voxel_pixels);
-      const double step_begin = now_();
-      double pass_begin = step_begin, first_pass_ms = 0;
-      const bool may_be_cancelled = !frame.steps.empty();
-      // Further passes have fewer rays, so the next one takes no longer than the last, mostly.
-      const OnPass in_time = [&](const PassStats &) {
-        const double now = now_(), pass_ms = now - pass_begin;
-        if (first_pass_ms == 0) first_pass_ms = pass_ms;
-        pass_begin = now;
-        return !may_be_cancelled || now + pass_ms - begin <= budget_ms;
-      };
-      const FrameStats stats = renderer_.render(camera, isovalue, in_time);
-      const bool whole = !stats.cancelled;
-      const double now = now_(), step_ms = now - step_begin;
-      frame.steps.push_back({renderer_.options().size, voxel_pixels, step_ms,
-                             stats.passes.back().completed_percent, stats.cancelled});
-      add(frame.stats, stats);
-      frame.complete = whole && step == 0;
-      last_ms_[step] = whole ? step_ms : 2 * step_ms;
-      if (!whole) renderer_.fill_from_kept();
-      if (step == 0) break;
-      renderer_.keep_picture();
-      const std::size_t next =
-          whole ? next_step(step, step_ms, first_pass_ms, budget_ms - (now - begin)) : step;
-      if (next == step) break;
-      step = next;
-    }
-  } catch (...) {
-    renderer_.set_size(full);
-    renderer_.set_voxel_pixels(full_error);
-    throw;
+  double step_begin = begin;
+  for (;;) {
+    const FrameRequest of_step = request_of(request, step);
+    double pass_begin = step_begin, first_pass_ms = 0;
+    const bool may_be_cancelled = !frame.steps.empty();
+    FrameRequest in_time = of_step;
+    // Further passes have fewer rays, so the next one takes no longer than the last, mostly.
+    in_time.on_pass = [&](const PassStats &) {
+      const double now = now_(), pass_ms = now - pass_begin;
+      if (first_pass_ms == 0) first_pass_ms = pass_ms;
+      pass_begin = now;
+      return !may_be_cancelled || now + pass_ms - begin <= budget_ms;
+    };
+    const FrameStats stats = renderer_.render(in_time);
+    const bool whole = !stats.cancelled;
+    const double now = now_(), step_ms = now - step_begin;
+    frame.steps.push_back({*of_step.size, of_step.voxel_pixels, step_ms,
+                           stats.passes.back().completed_percent, stats.cancelled});
+    add(frame.stats, stats);
+    frame.complete = whole && step == 0;
+    last_ms_[step] = whole ? step_ms : 2 * step_ms;
+    if (!whole) renderer_.fill_from_kept();
+    if (step == 0) break;
+    renderer_.keep_picture();
+    const std::size_t next =
+        whole ? next_step(step, step_ms, first_pass_ms, budget_ms - (now - begin)) : step;
+    if (next == step) break;
+    step = next;
+    step_begin = now;
   }
-  renderer_.set_size(full);
-  renderer_.set_voxel_pixels(full_error);
-  if (step != 0) renderer_.enlarge_kept(camera, isovalue);
+  if (step != 0) renderer_.enlarge_kept(request);
   frame.stats.total_ms = now_() - begin;
   return frame;
+}
+
+/// The frame with fewer rays, and levels of detail that suffice for them.
+FrameRequest TimedFrames::request_of(const FrameRequest &request, std::size_t step) const {
+  const ImageSize full = renderer_.size_of(request);
+  const double scale = std::ldexp(1.0, static_cast<int>(step)) / full.samples;  // of its pixels
+  FrameRequest smaller = request;
+  smaller.size = halved(full, static_cast<unsigned>(step));
+  if (step != 0 && renderer_.options().with_levels)
+    smaller.voxel_pixels = std::max(1.0, request.voxel_pixels / scale);
+  return smaller;
 }
 
 /// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms,
@@ -108,4 +108,4 @@ std::size_t TimedFrames::next_step(std::size_t step, double step_ms, double firs
   return next;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 
 #include "core/render/renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A picture that was drawn on the way. Where it was cancelled, since time was over, and has no hit
 /// yet, the one before shows through.
@@ -28,7 +28,7 @@ struct TimedFrame {
 };
 
 /// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the rays along
-/// each axis, then all of them as the renderer was set. Pictures of fewer rays have one for each
+/// each axis, then all of them as the request says. Pictures of fewer rays have one for each
 /// pixel. Where the renderer has levels of detail, smaller pictures use those whose voxels are at
 /// most one of their pixels apart.
 class TimedFrames {
@@ -40,15 +40,17 @@ class TimedFrames {
 
   /// Draws the smallest picture, however long it takes, then the largest that is expected to be
   /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
-  /// in time is filled from the one before. The hit buffer holds a picture of the full size. Throws
-  /// Error unless budget_ms is finite and above 0, and as Renderer::render() does.
-  TimedFrame render(const Camera &camera, float isovalue, double budget_ms);
+  /// in time is filled from the one before. The hit buffer holds a picture of the full size. The
+  /// request's on_pass is not called. Throws Error unless budget_ms is finite and above 0, and as
+  /// Renderer::render() does.
+  TimedFrame render(const FrameRequest &request, double budget_ms);
 
   static double steady_clock_ms();
 
  private:
   static constexpr std::size_t kNumSteps = 4;  ///< 1/8 to 1/1; steps count down to 0, all rays
 
+  FrameRequest request_of(const FrameRequest &request, std::size_t step) const;
   std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms,
                         double left_ms) const;
 
@@ -61,4 +63,4 @@ class TimedFrames {
 /// Throws Error unless it is finite and above 0.
 void check_time_budget(double budget_ms);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "core/base/error.hpp"
 #include "core/volume/pyramid.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -79,14 +79,9 @@ void check_voxel_pixels(double voxel_pixels) {
                 voxel_pixels);
 }
 
-void check_levels(const CompressedVolume &volume, double voxel_pixels) {
-  check_voxel_pixels(voxel_pixels);
-  if (voxel_pixels > 0 && volume.coarser_levels.empty() && max_levels(volume.info.dims) > 1) {
-    throw Error(
-        "the volume has no levels of detail, which {} pixels between voxels need: convert it with "
-        "--levels",
-        voxel_pixels);
-  }
+void check_has_levels(const CompressedVolume &volume) {
+  if (!volume.coarser_levels.empty() || max_levels(volume.info.dims) == 1) return;
+  throw Error("the volume has no levels of detail: convert it with --levels");
 }
 
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
@@ -130,4 +125,4 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   return frames;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

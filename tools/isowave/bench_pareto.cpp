@@ -27,7 +27,7 @@
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -184,25 +184,27 @@ bool has_levels(const Point &point) {
 
 Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const Point &point) {
   RendererFlags flags{.pipeline = point.pipeline, .solver = point.solver, .values = {}};
-  if (!point.max_surface_error) flags.values.voxel_pixels = point.details.front().voxel_pixels;
+  if (!point.max_surface_error) flags.voxel_pixels = point.details.front().voxel_pixels;
   const RendererOptions options = to_renderer_options(flags, subject.size);
   const CompressedVolume &volume = point.stored->volume;
   return Renderer(device, volume,
                   point.max_surface_error ? with_choices(options, volume) : options);
 }
 
-/// Sets the renderer to one view of the point, and draws it once: the first frame of an isovalue,
-/// or of a precision, does more.
-void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point,
-             std::size_t view) {
-  renderer.set_voxel_pixels(point.details[view].voxel_pixels);
-  renderer.set_voxel_error(point.details[view].voxel_error);
-  renderer.render(subject.cameras[view], subject.isovalue);
+FrameRequest request_of(const ParetoSubject &subject, const Point &point, std::size_t view) {
+  return with_detail({subject.cameras[view], subject.isovalue}, point.details[view]);
 }
 
-FrameStats draw_cold(Renderer &renderer, const ParetoSubject &subject, std::size_t view) {
+/// Draws one view of the point once: the first frame of an isovalue, or of a precision, does more.
+void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point,
+             std::size_t view) {
+  renderer.render(request_of(subject, point, view));
+}
+
+FrameStats draw_cold(Renderer &renderer, const ParetoSubject &subject, const Point &point,
+                     std::size_t view) {
   renderer.clear_cache();
-  return renderer.render(subject.cameras[view], subject.isovalue);
+  return renderer.render(request_of(subject, point, view));
 }
 
 /// Draws every view `rounds` times from an empty cache.
@@ -213,7 +215,7 @@ void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
     warm_up(renderer, subject, point, view);
     for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const FrameStats stats = draw_cold(renderer, subject, view);
+      const FrameStats stats = draw_cold(renderer, subject, point, view);
       times.push_back(stats.total_ms);
       for (const PassStats &pass : stats.passes)
         decoded += round == 0 ? pass.counts.decoded_count : 0;
@@ -239,8 +241,8 @@ double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point
     warm_up(renderer, subject, point, view);
     warm_up(others, subject, other, view);
     for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const double ms = draw_cold(renderer, subject, view).total_ms;
-      ratios.push_back(ms / draw_cold(others, subject, view).total_ms);
+      const double ms = draw_cold(renderer, subject, point, view).total_ms;
+      ratios.push_back(ms / draw_cold(others, subject, other, view).total_ms);
     }
   }
   return quantiles(std::move(ratios)).p50;
@@ -279,7 +281,7 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   subject.value_range = double{finest.value_range[1]} - double{finest.value_range[0]};
   Renderer renderer(device, finest, {.size = subject.size});
   for (const Camera &camera : subject.cameras) {
-    renderer.render(camera, options.isovalue);
+    renderer.render({camera, options.isovalue});
     subject.truth.emplace_back(view_of(renderer));
   }
   return subject;
@@ -397,7 +399,7 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
     point.max_surface_error = max_surface_error;
     for (const Camera &camera : subject.cameras) {
       const DetailChoice choice =
-          choose_detail(renderer, stored.volume, camera, subject.isovalue, max_surface_error);
+          choose_detail(renderer, stored.volume, {camera, subject.isovalue}, max_surface_error);
       point.details.push_back(choice.detail);
       point.reachable.push_back(choice.reachable);
     }
@@ -537,4 +539,4 @@ void add_bench_pareto(CLI::App &bench) {
   command->callback([options] { run_bench_pareto(*options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

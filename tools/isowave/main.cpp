@@ -13,7 +13,7 @@ int main(int argc, char **argv) {
   app.name("isowave");
   app.set_version_flag("--version", "isowave 0.1.0");
   app.require_subcommand(1);
-  using namespace isowave::tools;
+  using namespace isowave::core::tools;
   add_devices(app);
   add_info(app);
   add_generate(app);

@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// Parses the command line, which runs the callbacks of `app`, and returns the exit status.
 /// Everything that is thrown becomes one line on stderr and status 1; so does a standard output
@@ -12,4 +12,4 @@ namespace isowave::tools {
 /// status alone. Options are made strict first (strict_options.hpp).
 int run_program(CLI::App &app, int argc, char **argv);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -15,6 +15,7 @@
 #include "core/base/error.hpp"
 #include "core/io/npy.hpp"
 #include "core/render/renderer.hpp"
+#include "core/render/surface_camera.hpp"
 #include "core/render/time_budget.hpp"
 #include "core/view/detail.hpp"
 #include "reference/twin.hpp"
@@ -27,7 +28,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -79,16 +80,13 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
   virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
-  /// Draws the frame once more, however long it takes.
-  virtual FrameStats refine(const Camera &camera, float isovalue) {
-    return render(camera, isovalue, {});
-  }
+  /// Draws the last frame once more, however long it takes.
+  virtual FrameStats refine() { return {}; }
   virtual std::vector<HitRecord> hits() = 0;
   virtual Image8 shade() = 0;
   /// Prints what else is known of the frame drawn last, and adds it to its --stats: how far it may
   /// be off, the steps it was drawn in. error_map: the .npy to write, or empty.
-  virtual void report(const Camera &, float /*isovalue*/, const fs::path & /*error_map*/,
-                      nlohmann::ordered_json & /*frame*/) {}
+  virtual void report(const fs::path & /*error_map*/, nlohmann::ordered_json & /*frame*/) {}
 };
 
 class DeviceFrames : public FrameSource {
@@ -100,24 +98,29 @@ class DeviceFrames : public FrameSource {
         appearance_(appearance),
         max_surface_error_(args.max_surface_error),
         time_budget_(args.time_budget) {
-    renderer_.set_voxel_error(args.frame.voxel_error);
-    if (!time_budget_) return;
-    renderer_.set_voxel_pixels(args.voxel_pixels);
-    timed_frames_.emplace(renderer_);
+    base_.voxel_pixels = args.voxel_pixels;
+    base_.voxel_error = args.frame.voxel_error;
+    if (time_budget_) timed_frames_.emplace(renderer_);
   }
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
-    if (max_surface_error_)
-      choice_ = choose_detail(renderer_, volume_, camera, isovalue, *max_surface_error_);
-    if (!timed_frames_) return renderer_.render(camera, isovalue, on_pass);
-    timed_ = timed_frames_->render(camera, isovalue, *time_budget_);
-    return timed_.stats;
+    request_ = seen_from(camera, base_);
+    request_.isovalue = isovalue;
+    if (timed_frames_) {
+      timed_ = timed_frames_->render(request_, *time_budget_);
+      return timed_.stats;
+    }
+    if (max_surface_error_) {
+      choice_ = choose_detail(renderer_, volume_, request_, *max_surface_error_);
+      request_ = with_detail(request_, choice_.detail);
+    }
+    FrameRequest watched = request_;
+    watched.on_pass = on_pass;
+    return renderer_.render(watched);
   }
-  FrameStats refine(const Camera &camera, float isovalue) override {
-    return renderer_.render(camera, isovalue);
-  }
-  void report(const Camera &camera, float isovalue, const fs::path &error_map,
-              nlohmann::ordered_json &frame) override {
-    if (max_surface_error_) frame["error"] = bound_error(camera, isovalue, error_map);
+  FrameStats refine() override { return renderer_.render(request_); }
+  Camera surface_camera(std::span<const float> isovalues) { return renderer_.camera(isovalues); }
+  void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
+    if (max_surface_error_) frame["error"] = bound_error(error_map);
     if (timed_frames_) frame["time_budget"] = timed_steps();
   }
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
@@ -125,8 +128,7 @@ class DeviceFrames : public FrameSource {
   const Renderer &renderer() const { return renderer_; }
 
  private:
-  nlohmann::ordered_json bound_error(const Camera &camera, float isovalue,
-                                     const fs::path &error_map);
+  nlohmann::ordered_json bound_error(const fs::path &error_map);
   nlohmann::ordered_json timed_steps() const;
 
   const CompressedVolume &volume_;
@@ -134,6 +136,8 @@ class DeviceFrames : public FrameSource {
   std::optional<TimedFrames> timed_frames_;
   Appearance appearance_;
   std::optional<double> max_surface_error_, time_budget_;
+  FrameRequest base_;     ///< of all frames
+  FrameRequest request_;  ///< of the last one, as it was drawn
   DetailChoice choice_;
   TimedFrame timed_;
 };
@@ -160,9 +164,8 @@ nlohmann::ordered_json detail_json(const Detail &detail) {
   return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
 }
 
-nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float isovalue,
-                                                 const fs::path &error_map) {
-  const Certificate certificate = certify(renderer_, volume_, camera, isovalue, renderer_.hits());
+nlohmann::ordered_json DeviceFrames::bound_error(const fs::path &error_map) {
+  const Certificate certificate = certify(renderer_, volume_, request_, renderer_.hits());
   const CertificateSummary summary = summarize(certificate, *max_surface_error_);
   const double certified = summary.num_pixels == 0
                                ? 100.0
@@ -207,16 +210,15 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
 
 class TwinFrames : public FrameSource {
  public:
-  TwinFrames(const Scene &scene, const Appearance &appearance, const RendererOptions &options,
-             double voxel_error)
+  TwinFrames(const Scene &scene, const Appearance &appearance, const RenderArgs &args)
       : scene_(scene),
         appearance_(appearance),
-        options_(options),
-        twin_(scene.volume, options.voxel_pixels, voxel_error) {}
+        solver_(args.renderer.solver),
+        twin_(scene.volume, args.voxel_pixels, args.frame.voxel_error) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
-    hits_ = twin_.render(camera, scene_.size, isovalue, options_.solver);
+    hits_ = twin_.render(camera, scene_.size, isovalue, solver_);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
@@ -231,7 +233,7 @@ class TwinFrames : public FrameSource {
  private:
   const Scene &scene_;
   Appearance appearance_;
-  RendererOptions options_;
+  Solver solver_;
   Twin twin_;
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
@@ -272,11 +274,10 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
       result.push_back(frame_json(isovalue, view, camera, stats));
-      frames.report(camera, isovalue,
-                    frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
+      frames.report(frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
                     result.back());
       if (!options.refined.empty()) {
-        const FrameStats refined = frames.refine(camera, isovalue);
+        const FrameStats refined = frames.refine();
         write_png(frames.shade(),
                   frame_path(options.refined, scene.cameras.size(), options, isovalue, view));
         fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.rays_hit),
@@ -295,8 +296,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
                                  {"voxel_error", options.frame.voxel_error},
                                  {"reference", options.reference}};
   json.update(renderer_options_json(options.renderer));
-  json["voxel_pixels"] =
-      options.voxel_pixels;  // where it is chosen, the renderer was made for others
+  json["voxel_pixels"] = options.voxel_pixels;
   return json;
 }
 
@@ -401,8 +401,15 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   check_choice(options);
 }
 
+/// The view that any device would take. Without a device, of the whole volume.
+Camera reference_camera(const RenderArgs &options, const Scene &scene) {
+  if (ocl::list_devices().empty()) return scene.cameras.front();
+  ocl::Device device(ocl::choose_device());
+  return surface_camera(device, scene.volume, options.frame.isovalues, scene.size);
+}
+
 void run_render(const CLI::App &command, RenderArgs options) {
-  options.voxel_pixels = options.renderer_flags.values.voxel_pixels;
+  options.voxel_pixels = options.renderer_flags.voxel_pixels;
   check_options(command, options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
@@ -421,23 +428,24 @@ void run_render(const CLI::App &command, RenderArgs options) {
   // Whoever chooses has levels of detail to choose from.
   const bool chooses_levels = options.max_surface_error ||
                               (options.time_budget && options.renderer_flags.pipeline != "blocks");
-  if (chooses_levels) wanted.voxel_pixels = 1;
-  want_levels(options.renderer_flags, options.frame.compression);
-  const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
+  if (options.voxel_pixels > 0 || chooses_levels) want_levels(options.frame.compression);
+  Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
   outputs.make_folder();
-  if (chooses_levels && scene.volume.coarser_levels.empty())
-    wanted.voxel_pixels = options.voxel_pixels;
+  wanted.with_levels = chooses_levels && !scene.volume.coarser_levels.empty();
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
+  const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
   if (!device) {
-    TwinFrames frames(scene, appearance, options.renderer, options.frame.voxel_error);
+    if (fits_surface) scene.cameras = {reference_camera(options, scene)};
+    TwinFrames frames(scene, appearance, options);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {
     DeviceFrames frames(*device, scene, appearance, options);
     compiling->finish();
     options.renderer = frames.renderer().options();
+    if (fits_surface) scene.cameras = {frames.surface_camera(options.frame.isovalues)};
     if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());
     document["options"] = options_json(options, scene);
@@ -506,4 +514,4 @@ void add_render(CLI::App &app) {
   command->callback([command, options] { run_render(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -3,7 +3,7 @@
 #include "core/base/error.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option("--pipeline", flags.pipeline,
@@ -41,7 +41,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
                  "auto (on the device if that leaves room for a useful cache)")
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
-  app.add_option("--voxel-pixels", flags.values.voxel_pixels,
+  app.add_option("--voxel-pixels", flags.voxel_pixels,
                  "draw far parts by coarser levels of detail, whose voxels are at most so many "
                  "pixels apart; "
                  "0: all by the finest")
@@ -71,6 +71,7 @@ void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) {
   RendererOptions options = flags.values;
   options.size = size;
+  options.with_levels |= flags.voxel_pixels > 0;
   options.pipeline = flags.pipeline == "blocks" ? PipelineKind::kBlocks
                      : flags.pipeline == "rays" ? PipelineKind::kRays
                                                 : PipelineKind::kAuto;
@@ -95,7 +96,7 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
           {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
           {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
           {"closest", to_string(options.closest)},      {"group_size", options.group_size},
-          {"stream", to_string(options.stream)},        {"voxel_pixels", options.voxel_pixels}};
+          {"stream", to_string(options.stream)}};
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

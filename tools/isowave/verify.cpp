@@ -20,7 +20,7 @@
 #include "tools/isowave/verify_errors.hpp"
 #include "tools/isowave/verify_frames.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -192,4 +192,4 @@ void add_verify(CLI::App &app) {
   command->callback([command, options] { run_verify(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

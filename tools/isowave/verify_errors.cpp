@@ -10,7 +10,7 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/compile_report.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordered_json &document) {
   const double max_surface_error = *options.max_surface_error;
@@ -46,10 +46,11 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const DetailChoice choice =
-          choose_detail(renderer, scene.volume, camera, isovalue, max_surface_error);
-      renderer.render(camera, isovalue);
+          choose_detail(renderer, scene.volume, {camera, isovalue}, max_surface_error);
+      const FrameRequest request = with_detail({camera, isovalue}, choice.detail);
+      renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
-      const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
+      const Certificate certificate = certify(renderer, scene.volume, request, drawn);
       const CertificateSummary summary = summarize(certificate, max_surface_error);
       const BoundTally tally =
           judge_bounds(truth, make_frame_params(scene.volume.info, camera, scene.size, isovalue),
@@ -82,4 +83,4 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   return exceeded;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

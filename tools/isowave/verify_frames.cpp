@@ -18,7 +18,7 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/compile_report.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -70,7 +70,7 @@ class FrameDrawer {
  public:
   FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device,
               Solver solver, double voxel_error)
-      : scene_(scene), voxels_(voxels), solver_(solver) {
+      : scene_(scene), voxels_(voxels), solver_(solver), voxel_error_(voxel_error) {
     if (device.empty()) return;
     const ocl::DeviceInfo info = ocl::choose_device(device);
     fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
@@ -82,12 +82,12 @@ class FrameDrawer {
     options.with_shading = false;
     renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
     compiling.finish();
-    renderer_->set_voxel_error(voxel_error);
   }
 
   std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
     if (!renderer_) return render_scalar(frame, voxels_, solver_);
-    renderer_->render(scene_.cameras[view], frame.isovalue);
+    renderer_->render(
+        {.camera = scene_.cameras[view], .isovalue = frame.isovalue, .voxel_error = voxel_error_});
     return renderer_->hits();
   }
   std::string name() const { return device_ ? device_->info().name : "scalar reference"; }
@@ -96,6 +96,7 @@ class FrameDrawer {
   const Scene &scene_;
   std::span<const float> voxels_;
   Solver solver_;
+  double voxel_error_;
   std::unique_ptr<ocl::Device> device_;  // before the renderer, which it must outlive
   std::unique_ptr<Renderer> renderer_;
 };
@@ -206,4 +207,4 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
       "[frames: the scalar reference; leaks: as render]");
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -1,0 +1,74 @@
+#pragma once
+// What a frame is asked for, and what drawing it has done.
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/view/camera.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "kernels_cl/portable/shared_types.h"
+
+namespace isowave::core {
+
+/// What one pass did: the counts of the device, and what follows from them.
+struct PassStats {
+  PassCounts counts{};
+  double n_spec = 0;  ///< blocks that the pass's rays were to look ahead at, mean over the rays; 0
+                      ///< where none looked
+  /// Distinct blocks that rays were intersected in; not counted in pipeline `rays`, which does not
+  /// gather rays by block.
+  std::optional<std::uint32_t> visible_blocks{};
+  double utilization_percent = 0;  ///< ray-block pairs that were intersected, of all rays
+  double completed_percent = 0;    ///< rays that have ended, of all
+  std::map<std::string, double>
+      stage_ms;  ///< by stage; empty unless the device was opened with profiling
+};
+
+struct FrameStats {
+  std::vector<PassStats> passes;
+  std::size_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
+  double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
+  std::uint64_t rays_hit = 0;
+  std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
+  std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
+  bool cancelled =
+      false;  ///< on_pass said so while rays were left; the hit buffer holds the picture so far
+};
+
+/// Called after each pass, the last included; Renderer::hits() and shade() show the picture so far.
+/// Return false to stop. With a callback, or with profiling, the host waits after each pass;
+/// without, it stays a pass ahead.
+using OnPass = std::function<bool(const PassStats &)>;
+
+/// One frame: what to draw, and how precisely. The same request gives the same picture, bit for
+/// bit, whatever was drawn before.
+struct FrameRequest {
+  Camera camera{};
+  float isovalue = 0;
+  std::optional<ImageSize> size{};  ///< none: the renderer's largest
+  /// Voxels of a coarser level of detail may be so many pixels apart, see make_level_frames(); 0:
+  /// the finest level draws all.
+  double voxel_pixels = 0;
+  /// How far the voxels may be from the volume's: 0, not at all; more, and fewer bit planes of each
+  /// block are decoded (with_fewer_planes()), of coarser levels of detail fewer still
+  /// (voxel_error_of()).
+  double voxel_error = 0;
+  /// What is drawn: the volume, or the field that is nowhere above, or nowhere below what the
+  /// volume's voxels were before compression, trilinear between them: decoded values are lowered or
+  /// raised by the bound of their error.
+  FieldBound bound = FieldBound::kNone;
+  OnPass on_pass{};
+};
+
+/// The same request from another place.
+inline FrameRequest seen_from(const Camera &camera, FrameRequest request) {
+  request.camera = camera;
+  return request;
+}
+
+}  // namespace isowave::core
