@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <isowave/version.hpp>
 #include <regex>
 #include <sstream>
 
@@ -51,6 +52,11 @@ TEST(Readme, EveryStageHasItsFiles) {
     EXPECT_TRUE(exists(kRoot / "tests" / (stem + "_test.cpp"))) << stem;
     EXPECT_TRUE(exists(kRoot / "bench" / (stem + "_bench.cpp"))) << stem;
   }
+}
+
+TEST(Readme, CitationIsOfThisVersion) {
+  EXPECT_THAT(test::read_file(kRoot / "CITATION.cff"),
+              testing::HasSubstr("\nversion: " + std::string(isowave::version()) + "\n"));
 }
 
 TEST(Readme, AutoIsTheSamePipelineEverywhere) {

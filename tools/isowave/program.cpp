@@ -23,6 +23,7 @@
 #include "core/base/error.hpp"
 #include "core/ocl/device.hpp"
 #include "core/ocl/pocl_environment.hpp"
+#include "isowave/version.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::core::tools {
@@ -133,6 +134,10 @@ int run_program(CLI::App &app, int argc, char **argv) {
   if (const std::string notice = ocl::cache_notice(); status == 0 && !notice.empty())
     print_line(app, notice);
   return status;
+}
+
+std::string program_name() {
+  return fmt::format("isowave {}", version());
 }
 
 }  // namespace isowave::core::tools

@@ -3,6 +3,7 @@
 // one, options are strict.
 
 #include <CLI/CLI.hpp>
+#include <string>
 
 namespace isowave::core::tools {
 
@@ -11,5 +12,8 @@ namespace isowave::core::tools {
 /// that cannot be written to. A CLI::RuntimeError, of what has said already why it fails, gives its
 /// status alone. Options are made strict first (strict_options.hpp).
 int run_program(CLI::App &app, int argc, char **argv);
+
+/// "isowave 0.1.0"
+std::string program_name();
 
 }  // namespace isowave::core::tools

@@ -23,6 +23,7 @@
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -433,7 +434,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   outputs.make_folder();
   wanted.with_levels = chooses_levels && !scene.volume.coarser_levels.empty();
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
-  nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
+  nlohmann::ordered_json document = {{"program", program_name()},
                                      {"volume", volume_json(options, scene.volume)}};
   const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
   if (!device) {
