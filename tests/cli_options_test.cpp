@@ -288,7 +288,9 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
     return run_command(as_user +
                        "env -u XDG_CACHE_HOME -u POCL_CACHE_DIR OCL_ICD_VENDORS=pocl.icd TMPDIR=" +
                        quoted(temporary.path()) + " " + environment + " " + isowave_program() +
-                       " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8 --pipeline rays");
+                       " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8 --pipeline rays "
+                       "--stats " +
+                       quoted(folder / "stats.json"));
   };
   for (const char *environment :
        {"HOME=/nonexistent", "XDG_CACHE_HOME=/proc/x", "POCL_CACHE_DIR= HOME=/dev/null"}) {
@@ -299,9 +301,10 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
               std::string::npos)
         << run.err;
   }
-  const auto no_path = run_command("env PATH= POCL_CACHE_DIR=" + quoted(temporary / "new") +
-                                   " OCL_ICD_VENDORS=pocl.icd " + isowave_program() +
-                                   " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8");
+  const auto no_path = run_command(
+      "env PATH= POCL_CACHE_DIR=" + quoted(temporary / "new") + " OCL_ICD_VENDORS=pocl.icd " +
+      isowave_program() + " render generate:gyroid_8x8x8_uint8 -i 128 --size 8x8 --stats " +
+      quoted(folder / "root.json"));
   EXPECT_EQ(no_path.status, 0) << no_path.err;
   const auto given = render("HOME=" + quoted(folder.path()));
   EXPECT_EQ(given.status, 0) << given.err;

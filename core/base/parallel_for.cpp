@@ -16,8 +16,9 @@ std::uint32_t thread_count(std::uint32_t requested) {
 
 void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,
                   const std::function<void(std::uint64_t item, std::uint32_t thread)> &body) {
-  // An arena of its own, so that a thread's number is below the count whoever calls.
-  tbb::task_arena arena(static_cast<int>(thread_count(num_threads)));
+  // An arena of its own, so that a thread's number is below the count whoever calls. More threads
+  // than processors do not help, and TBB warns of them.
+  tbb::task_arena arena(static_cast<int>(std::min(thread_count(num_threads), thread_count(0))));
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, num_items), [&](const auto &range) {
       const auto thread = static_cast<std::uint32_t>(tbb::this_task_arena::current_thread_index());

@@ -120,8 +120,10 @@ fs::path output_path(const GenerateOptions &options, const fs::path &path) {
     return path / fmt::format("{}_{}x{}x{}_{}.raw", to_string(options.field), options.dims.x,
                               options.dims.y, options.dims.z, to_string(options.type));
   }
+  if (path.extension() == ".nrrd") return path;
   if (path.extension() != ".raw")
-    throw Error("{}: generate writes raw voxels: end the name in .raw", path.string());
+    throw Error("{}: generate writes raw voxels or NRRD: end the name in .raw or .nrrd",
+                path.string());
   const std::optional<RawName> name = parse_raw_name(path.stem().string());
   if (name && (name->dims != options.dims || name->type != options.type)) {
     throw Error("{}: the name says {}x{}x{} {}, the voxels are {}x{}x{} {}", path.string(),
@@ -129,6 +131,16 @@ fs::path output_path(const GenerateOptions &options, const fs::path &path) {
                 options.dims.y, options.dims.z, to_string(options.type));
   }
   return path;
+}
+
+/// What stands before raw voxels in a NRRD file [teem.sourceforge.net/nrrd/format.html].
+std::string nrrd_header(const VolumeInfo &info) {
+  const std::string_view type = info.type == VoxelType::kFloat32   ? "float"
+                                : info.type == VoxelType::kFloat64 ? "double"
+                                                                   : to_string(info.type);
+  return fmt::format(
+      "NRRD0004\ntype: {}\ndimension: 3\nsizes: {} {} {}\nendian: little\nencoding: raw\n\n", type,
+      info.dims.x, info.dims.y, info.dims.z);
 }
 
 }  // namespace
@@ -165,6 +177,8 @@ fs::path generate_to_file(const GenerateOptions &options, const fs::path &path,
   const auto chunk =
       std::uint32_t(std::clamp<std::uint64_t>(kChunkBytes / layer_bytes, 1, info.dims.z));
   std::vector<std::byte> voxels;
+  const std::string header = target.extension() == ".nrrd" ? nrrd_header(info) : "";
+  file.write(std::as_bytes(std::span(header)));
   for (std::uint32_t z = 0; z < info.dims.z; z += chunk) {
     const std::uint32_t layers = std::min(chunk, info.dims.z - z);
     voxels.resize(layer_bytes * layers);

@@ -57,10 +57,10 @@ struct GenerateOptions {
 /// may be read in any order. Throws Error on bad dims.
 std::unique_ptr<VolumeReader> open_generated(const GenerateOptions &options);
 
-/// Writes the volume as raw little-endian voxels, in memory O(nx * ny); nothing is left behind on
-/// an error. A path without file name, or an existing folder, gets the Open-SciVis name. Returns
-/// the file's path. Throws Error: bad dims, unwritable, a file name that says other dims or another
-/// type.
+/// Writes the volume as raw little-endian voxels, in a `.nrrd` file behind a header, in memory
+/// O(nx * ny); nothing is left behind on an error. A path without file name, or an existing folder,
+/// gets the Open-SciVis name. Returns the file's path. Throws Error: bad dims, unwritable, a file
+/// name that says other dims or another type.
 std::filesystem::path generate_to_file(const GenerateOptions &options,
                                        const std::filesystem::path &path,
                                        const Progress &progress = {});

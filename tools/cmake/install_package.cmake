@@ -15,4 +15,20 @@ install(FILES ${PROJECT_BINARY_DIR}/isowaveConfig.cmake ${PROJECT_BINARY_DIR}/is
         DESTINATION ${package_folder} COMPONENT library)
 if(ISOWAVE_BUILD_PROGRAM)
   install(TARGETS isowave COMPONENT program)
+  # The program writes its manual page and completion scripts.
+  set(shell_files ${PROJECT_BINARY_DIR}/isowave.1)
+  set(commands COMMAND isowave man > ${PROJECT_BINARY_DIR}/isowave.1)
+  foreach(shell bash zsh fish)
+    list(APPEND shell_files ${PROJECT_BINARY_DIR}/completion.${shell})
+    list(APPEND commands COMMAND isowave completion ${shell} > ${PROJECT_BINARY_DIR}/completion.${shell})
+  endforeach()
+  add_custom_command(OUTPUT ${shell_files} ${commands} DEPENDS isowave VERBATIM)
+  add_custom_target(isowave_shell_files ALL DEPENDS ${shell_files})
+  install(FILES ${PROJECT_BINARY_DIR}/isowave.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
+  install(FILES ${PROJECT_BINARY_DIR}/completion.bash RENAME isowave
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT program)
+  install(FILES ${PROJECT_BINARY_DIR}/completion.zsh RENAME _isowave
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions COMPONENT program)
+  install(FILES ${PROJECT_BINARY_DIR}/completion.fish RENAME isowave.fish
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT program)
 endif()

@@ -15,5 +15,7 @@ void add_render(CLI::App &app);
 void add_compare(CLI::App &app);
 void add_verify(CLI::App &app);
 void add_bench(CLI::App &app);
+void add_man(CLI::App &app);
+void add_completion(CLI::App &app);
 
 }  // namespace isowave::core::tools

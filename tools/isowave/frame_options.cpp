@@ -79,9 +79,7 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
       ->capture_default_str();
   command.add_option("--size", options.size, "picture size WxH [1280x720, or the camera file's]");
   CLI::Option *orbit =
-      command
-          .add_option("--orbit", options.orbit,
-                      "draw N views around the whole volume [one view, which the surfaces fill]")
+      command.add_option("--orbit", options.orbit, "draw N views around the volume [1]")
           ->check(CLI::Range(1u, 100000u));
   command.add_option("--cameras", options.cameras, "camera file (JSON)")->excludes(orbit);
   return isovalue;

@@ -1,3 +1,7 @@
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
 // isowave generate: writes a synthetic volume in the Open-SciVis naming.
 
 #include "core/sources/generate.hpp"
@@ -9,6 +13,7 @@
 #include <system_error>
 
 #include "core/base/error.hpp"
+#include "core/io/raw_reader.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
@@ -36,6 +41,25 @@ void check_space(const GenerateOptions &options, const std::filesystem::path &ou
                 space.available);
 }
 
+/// What a raw file's name does not say.
+std::string raw_options(const GenerateOptions &options, const std::filesystem::path &path) {
+  if (path.extension() != ".raw" || parse_raw_name(path.stem().string())) return {};
+  return fmt::format(" --dims {} {} {} --type {}", options.dims.x, options.dims.y, options.dims.z,
+                     to_string(options.type));
+}
+
+/// Half of the largest value that fields have.
+double middle_of(VoxelType type) {
+  return with_voxel_type(type, [](auto zero) {
+    using T = decltype(zero);
+    if constexpr (std::is_integral_v<T>) {
+      return std::floor(0.5 * static_cast<double>(std::numeric_limits<T>::max()));
+    } else {
+      return 0.5;
+    }
+  });
+}
+
 void run_generate(const CLI::App &command, const GenerateArgs &options) {
   GenerateOptions generate = options.generate;
   generate.field = field_from_string(options.field);
@@ -49,6 +73,8 @@ void run_generate(const CLI::App &command, const GenerateArgs &options) {
   fmt::print("{}: {}x{}x{} {}, {} bytes\n", one_line(path.string()), generate.dims.x,
              generate.dims.y, generate.dims.z, to_string(generate.type),
              with_commas(std::filesystem::file_size(path)));
+  fmt::print("draw it: isowave render {}{} -i {}\n", one_line(path.string()),
+             raw_options(generate, path), middle_of(generate.type));
 }
 
 }  // namespace
@@ -70,7 +96,7 @@ void add_generate(CLI::App &app) {
       ->capture_default_str();
   command
       ->add_option("-o,--output", options->output,
-                   "file (.raw), or a folder for a file FIELD_XxYxZ_TYPE.raw")
+                   "file (.raw, .nrrd), or a folder for a file FIELD_XxYxZ_TYPE.raw")
       ->capture_default_str();
   command->callback([command, options] { run_generate(*command, *options); });
 }

@@ -1,5 +1,7 @@
 // The program `isowave`: parses the command line and runs one subcommand.
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 
 #include "tools/isowave/commands.hpp"
@@ -21,5 +23,11 @@ int main(int argc, char **argv) {
   add_compare(app);
   add_verify(app);
   add_bench(app);
+  add_man(app);
+  add_completion(app);
+  std::string statuses = "Exit status:\n";
+  for (const auto &[status, meaning] : kExitStatuses)
+    statuses += fmt::format("  {:<3} {}\n", status, meaning);
+  app.footer(statuses);
   return run_program(app, argc, argv);
 }

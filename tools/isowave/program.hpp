@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <utility>
 
 namespace isowave::core::tools {
 
@@ -12,6 +13,12 @@ namespace isowave::core::tools {
 /// that cannot be written to. A CLI::RuntimeError, of what has said already why it fails, gives its
 /// status alone. Options are made strict first (strict_options.hpp).
 int run_program(CLI::App &app, int argc, char **argv);
+
+/// What the program's exit status says.
+inline constexpr std::pair<int, const char *> kExitStatuses[] = {
+    {0, "all is done"},
+    {1, "wrong input, a failure (one line on standard error says which), or a check that failed"},
+    {130, "interrupted (Ctrl-C): no output is left half-written"}};
 
 /// "isowave 0.1.0"
 std::string program_name();

@@ -22,6 +22,7 @@
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/frame_options.hpp"
+#include "tools/isowave/help_groups.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
@@ -409,13 +410,31 @@ Camera reference_camera(const RenderArgs &options, const Scene &scene) {
   return surface_camera(device, scene.volume, options.frame.isovalues, scene.size);
 }
 
+/// Whether a file was asked for.
+bool asks_for_output(const RenderArgs &options) {
+  for (const std::string *name : {&options.image, &options.depth, &options.stats,
+                                  &options.progress_dir, &options.error_map, &options.refined}) {
+    if (!name->empty()) return true;
+  }
+  return false;
+}
+
+/// VOLUME_iso40.png, in the current folder; of several frames, frame_path() says the rest.
+std::string default_image(const RenderArgs &options, std::size_t num_views) {
+  const std::string stem = volume_stem(options.input);
+  if (num_views * options.frame.isovalues.size() > 1) return stem + ".png";
+  return fmt::format("{}_iso{}.png", stem, options.frame.isovalues.front());
+}
+
 void run_render(const CLI::App &command, RenderArgs options) {
   options.voxel_pixels = options.renderer_flags.voxel_pixels;
+  const bool names_picture = !asks_for_output(options);
+  const Views views = read_views(options.frame);
+  if (names_picture) options.image = default_image(options, views.count);
   check_options(command, options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
-  const Views views = read_views(options.frame);
   const Outputs outputs = check_outputs(options, views.count);
   const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
   std::optional<CompileReport> compiling;
@@ -458,9 +477,33 @@ void run_render(const CLI::App &command, RenderArgs options) {
                double(device->ledger().peak()) / (1 << 20));
   }
   if (!options.stats.empty()) write_json(document, options.stats);
+  if (names_picture) {
+    fmt::print("wrote {}; --output names another file\n",
+               views.count * options.frame.isovalues.size() == 1
+                   ? options.image
+                   : fmt::format("{}_isoV_viewK.png", volume_stem(options.input)));
+  }
 }
 
 }  // namespace
+
+/// Options of every day come first, those of researchers last.
+void group_render_options(CLI::App &command) {
+  group_options(command, "Options of every day",
+                {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
+                 "--color", "--background", "--device"});
+  group_volume_options(command);
+  group_compression_options(command);
+  group_options(command, "Precision and time",
+                {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--error-map",
+                 "--time-budget", "--refined"});
+  group_options(command, "Memory", {"--memory-budget", "--cache-slots", "--stream", "--verbose"});
+  group_options(command, "Further outputs",
+                {"--depth", "--stats", "--no-stage-times", "--progress-dir"});
+  group_options(command, "For researchers",
+                {"--reference", "--pipeline", "--speculation", "--max-speculation", "--solver",
+                 "--grouping", "--closest", "--group-size"});
+}
 
 void add_render(CLI::App &app) {
   CLI::App *command =
@@ -487,7 +530,8 @@ void add_render(CLI::App &app) {
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
   command->add_option("--output,-o", options->image,
-                      "PNG; NAME_isoV_viewK.png when there are several frames");
+                      "PNG; NAME_isoV_viewK.png when there are several frames [VOLUME_isoV.png in "
+                      "the current folder, where no other output is asked for]");
   command->add_option("--depth", options->depth,
                       "float32 .npy [H,W]: distance from the eye, inf where nothing is hit; with "
                       "--samples of each ray");
@@ -512,6 +556,9 @@ void add_render(CLI::App &app) {
   command->add_flag("--verbose", options->verbose, "print the plan of the device's memory");
   command->add_option("--progress-dir", options->progress_dir,
                       "folder for the picture after every pass");
+  command->get_option("--orbit")->description(
+      "draw N views around the whole volume [one, which the surfaces fill]");
+  group_render_options(*command);
   command->callback([command, options] { run_render(*command, *options); });
 }
 

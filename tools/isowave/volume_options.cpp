@@ -2,8 +2,10 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
@@ -120,6 +122,19 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   Storage storage = to_storage(compression);
   storage.device = device;
   return compress_volume([&] { return open_any_volume(path, overrides); }, path, storage);
+}
+
+std::string volume_stem(const std::string &path) {
+  constexpr std::string_view kGenerate = "generate:";
+  std::string name = path.starts_with(kGenerate) ? path.substr(kGenerate.size())
+                                                 : std::filesystem::path(path).filename().string();
+  for (const std::string_view ending :
+       {".gz", ".zfp", ".raw", ".nrrd", ".nhdr", ".mha", ".mhd", ".nii"}) {
+    if (name.size() > ending.size() && lower_case(name).ends_with(ending))
+      name.resize(name.size() - ending.size());
+  }
+  std::ranges::replace(name, ':', '_');
+  return name;
 }
 
 Progress make_progress_bar(std::string_view label) {

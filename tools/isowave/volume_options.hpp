@@ -56,6 +56,10 @@ std::optional<BlockPrecision> find_precision(const std::string &path, const RawO
                                              const CompressionOptions &options,
                                              const InputOptions &input = {});
 
+/// The volume's name for files that are named after it: without folder and endings, and of a
+/// generator without the word "generate".
+std::string volume_stem(const std::string &path);
+
 /// The help text of an argument that open_any_volume() takes.
 inline constexpr const char *kVolumeHelp =
     "a volume: .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, or "
