@@ -26,7 +26,8 @@ void add_offset(const CompressedVolume &level, const ValueOffset &offset,
 Twin::Twin(const CompressedVolume &volume, double voxel_pixels, double voxel_error,
            FieldBound bound)
     : max_pixel_error_(voxel_pixels) {
-  check_levels(volume, voxel_pixels);
+  check_voxel_pixels(voxel_pixels);
+  if (voxel_pixels > 0) check_levels(volume);
   for (const CompressedVolume *level : levels_of(volume, voxel_pixels > 0)) {
     const double level_error = voxel_error_of(voxel_error, levels_.size());
     levels_.push_back(level->info);

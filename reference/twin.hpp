@@ -13,8 +13,8 @@ namespace isowave {
 
 class Twin {
  public:
-  /// Decodes the volume, and its coarser levels where voxel_pixels, as RendererOptions', is not
-  /// 0. voxel_error: as Renderer::set_voxel_error(). bound: as Renderer::draw_bound(). Throws
+  /// Decodes the volume, and its coarser levels where voxel_pixels, as FrameRequest's, is not
+  /// 0. voxel_error, bound: as FrameRequest's. Throws
   /// Error: what check_levels() throws.
   explicit Twin(const CompressedVolume &volume, double voxel_pixels = 0, double voxel_error = 0,
                 FieldBound bound = FieldBound::kNone);

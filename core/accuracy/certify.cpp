@@ -98,77 +98,73 @@ std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel
 
 }  // namespace
 
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
-                    float isovalue, std::span<const HitRecord> drawn) {
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &drawn,
+                    std::span<const HitRecord> hits) {
   const auto begin = std::chrono::steady_clock::now();
-  const RendererOptions &options = renderer.options();
-  if (!finds_all(options.solver)) {
+  const Solver solver = renderer.options().solver;
+  if (!finds_all(solver)) {
     throw Error(
         "the error of frames drawn with solver {} has no bound, since it may miss a surface: take "
         "bernstein",
-        to_string(options.solver));
+        to_string(solver));
   }
+  const ImageSize size = drawn.size;
+  if (hits.size() != size.num_rays())
+    throw Error("{} hits are not those of {} rays", hits.size(), size.num_rays());
   Certificate certificate;
   const auto draw = [&](FieldBound bound) {
-    renderer.draw_bound(bound);
-    for (const PassStats &pass : renderer.render(camera, isovalue).passes)
+    FrameRequest request = drawn;
+    request.bound = bound;
+    request.on_pass = {};
+    for (const PassStats &pass : renderer.render(request).passes)
       certificate.decoded_blocks += pass.counts.decoded_count;
     return renderer.hits();
   };
-  std::vector<HitRecord> lower, upper;
-  try {
-    lower = draw(FieldBound::kLower);
-    upper = draw(FieldBound::kUpper);
-  } catch (...) {
-    renderer.draw_bound(FieldBound::kNone);
-    throw;
-  }
-  renderer.draw_bound(FieldBound::kNone);
+  const std::vector<HitRecord> lower = draw(FieldBound::kLower), upper = draw(FieldBound::kUpper);
 
-  const std::vector<const CompressedVolume *> levels = levels_of(volume, options.voxel_pixels > 0);
+  const bool with_levels = drawn.voxel_pixels > 0;
+  const std::vector<const CompressedVolume *> levels = levels_of(volume, with_levels);
   std::vector<ValueOffset> offsets;
   std::vector<double> voxel_errors;
   for (const CompressedVolume *level : levels) {
-    voxel_errors.push_back(voxel_error_of(renderer.voxel_error(), voxel_errors.size()));
+    voxel_errors.push_back(voxel_error_of(drawn.voxel_error, voxel_errors.size()));
     offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
                                    plane_error(level->precision, voxel_errors.back()),
                                    volume.value_range));
   }
-  const std::vector<FrameParams> frames =
-      make_level_frames(level_infos(volume, options.voxel_pixels > 0), camera, options.size,
-                        isovalue, options.voxel_pixels);
+  const std::vector<FrameParams> frames = make_level_frames(
+      level_infos(volume, with_levels), drawn.camera, size, drawn.isovalue, drawn.voxel_pixels);
   std::size_t coarsest = levels.size() - 1;
   while (!draws(frames[coarsest])) --coarsest;
   const glm::dmat3 voxel = levels[coarsest]->info.index_to_world();
   const double cell_rounding =
       kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
-  const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / options.size.height;
-  certificate.bounds.assign(drawn.size(), kNotCertain);
+  const double pixel_at_1 = 2.0 * std::tan(glm::radians(drawn.camera.fovy_deg) / 2) / size.height;
+  certificate.bounds.assign(hits.size(), kNotCertain);
   constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks
-  parallel_for(
-      (options.size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
-        std::vector<BlockValues> values;
-        for (std::size_t i = 0; i < levels.size(); ++i)
-          values.emplace_back(*levels[i], voxel_errors[i], offsets[i]);
-        const auto first = static_cast<std::uint32_t>(part * kRows * options.size.ray_columns());
-        const std::uint32_t end = std::min(first + kRows * options.size.ray_columns(),
-                                           static_cast<std::uint32_t>(drawn.size()));
-        for (std::uint32_t pixel = first; pixel < end; ++pixel) {
-          const double t = double{drawn[pixel].t},
-                       first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
-                       last_t = double{std::max(lower[pixel].t, upper[pixel].t)};
-          const std::array<double, 2> way = way_through(frames[0], pixel);
-          float &bound = certificate.bounds[pixel];
-          if (std::isinf(t) && std::isinf(first_t)) {
-            if (way[0] > way[1] || starts_certainly(frames, values, pixel)) bound = 0;
-          } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] &&
-                     last_t <= way[1] && starts_certainly(frames, values, pixel)) {
-            const double rounding = kDistanceRounding * last_t + cell_rounding;
-            const double distance = std::max(t - first_t, last_t - t) + rounding;
-            bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
-          }
-        }
-      });
+  parallel_for((size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
+    std::vector<BlockValues> values;
+    for (std::size_t i = 0; i < levels.size(); ++i)
+      values.emplace_back(*levels[i], voxel_errors[i], offsets[i]);
+    const auto first = static_cast<std::uint32_t>(part * kRows * size.ray_columns());
+    const std::uint32_t end =
+        std::min(first + kRows * size.ray_columns(), static_cast<std::uint32_t>(hits.size()));
+    for (std::uint32_t pixel = first; pixel < end; ++pixel) {
+      const double t = double{hits[pixel].t},
+                   first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
+                   last_t = double{std::max(lower[pixel].t, upper[pixel].t)};
+      const std::array<double, 2> way = way_through(frames[0], pixel);
+      float &bound = certificate.bounds[pixel];
+      if (std::isinf(t) && std::isinf(first_t)) {
+        if (way[0] > way[1] || starts_certainly(frames, values, pixel)) bound = 0;
+      } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] &&
+                 last_t <= way[1] && starts_certainly(frames, values, pixel)) {
+        const double rounding = kDistanceRounding * last_t + cell_rounding;
+        const double distance = std::max(t - first_t, last_t - t) + rounding;
+        bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
+      }
+    }
+  });
   certificate.total_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   return certificate;

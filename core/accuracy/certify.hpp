@@ -26,11 +26,13 @@ struct Certificate {
   std::uint64_t decoded_blocks = 0;  ///< for them
 };
 
-/// Bounds the error of a frame that `renderer`, made with_bounds, has just drawn. volume: what it
-/// was made for. drawn: its hits. Its cache is cold afterwards. Throws Error where the volume's
-/// error is not known, or where the solver may miss crossings.
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
-                    float isovalue, std::span<const HitRecord> drawn);
+/// Bounds the error of a frame. The renderer draws both bounds of the field: the hit buffer then
+/// holds the upper one's, and the cache their blocks. Waits.
+/// renderer: made with_bounds. volume: what it was made for.
+/// drawn: the request; its bound and on_pass are not used. hits: its hit buffer.
+/// errors: Error where the volume's error is not known, or where the solver may miss crossings.
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &drawn,
+                    std::span<const HitRecord> hits);
 
 /// What a certificate says of pixels that are not certain to miss.
 struct CertificateSummary {

@@ -11,9 +11,14 @@
 namespace isowave {
 
 struct Detail {
-  double voxel_pixels = 0;  ///< RendererOptions::voxel_pixels
-  double voxel_error = 0;   ///< Renderer::set_voxel_error()
+  double voxel_pixels = 0;  ///< FrameRequest::voxel_pixels
+  double voxel_error = 0;   ///< FrameRequest::voxel_error
 };
+inline FrameRequest with_detail(FrameRequest request, const Detail &detail) {
+  request.voxel_pixels = detail.voxel_pixels;
+  request.voxel_error = detail.voxel_error;
+  return request;
+}
 
 struct DetailChoice {
   Detail detail;
@@ -51,14 +56,17 @@ inline constexpr double kMinPlaneRate = 16;
 /// volume has.
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
 
-/// Chooses for one frame, and sets the renderer to it. Draws small pictures of the frame, every so
-/// many pixels, and their bounds (certify()); so the choice depends on data, camera and size, never
-/// on timings. Levels of detail first, then bit planes: the coarsest that lose no more than
-/// kLostShare; no levels that spare hardly any blocks (kMaxBlocksShare), nor planes of volumes of
-/// few bits (kMinPlaneRate). Full detail, where most pixels do not keep max_surface_error even so.
-/// max_surface_error: pixels, above 0. Throws Error as certify() does.
-DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, const Camera &camera,
-                           float isovalue, double max_surface_error);
+/// Chooses for one frame. Draws small pictures of the frame, every so many pixels, and their bounds
+/// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail
+/// first, then bit planes: the coarsest that lose no more than kLostShare; no levels that spare
+/// hardly any blocks (kMaxBlocksShare), nor planes of volumes of few bits (kMinPlaneRate). Full
+/// detail, where most pixels do not keep max_surface_error even so. Waits.
+/// renderer: made with_choices(). volume: what it was made for.
+/// request: camera, isovalue and size are used.
+/// max_surface_error: [pixels], above 0.
+/// errors: Error as certify().
+DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
+                           const FrameRequest &request, double max_surface_error);
 
 /// Throws Error unless it is finite and above 0.
 void check_max_surface_error(double max_surface_error);

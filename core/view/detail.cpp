@@ -79,13 +79,11 @@ void check_voxel_pixels(double voxel_pixels) {
                 voxel_pixels);
 }
 
-void check_levels(const CompressedVolume &volume, double voxel_pixels) {
-  check_voxel_pixels(voxel_pixels);
-  if (voxel_pixels > 0 && volume.coarser_levels.empty() && max_levels(volume.info.dims) > 1) {
+void check_levels(const CompressedVolume &volume) {
+  if (volume.coarser_levels.empty() && max_levels(volume.info.dims) > 1) {
     throw Error(
-        "the volume has no levels of detail, which {} pixels between voxels need: convert it with "
-        "--levels",
-        voxel_pixels);
+        "the volume has no levels of detail, which more than 0 pixels between voxels need: convert "
+        "it with --levels");
   }
 }
 

@@ -50,7 +50,7 @@ inline bool draws(const FrameParams &frame) {
 
 /// Throws Error unless it is finite and at least 0.
 void check_voxel_pixels(double voxel_pixels);
-/// As well where a volume that could have levels of detail has none, and they are wanted.
-void check_levels(const CompressedVolume &volume, double voxel_pixels);
+/// Throws Error where the volume could have levels of detail, and has none.
+void check_levels(const CompressedVolume &volume);
 
 }  // namespace isowave
