@@ -56,13 +56,13 @@ CompressedVolume load(const Options &options, const ocl::DeviceInfo &device_info
 /// Stage -> ms of a cold frame, for each view.
 std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, Renderer &renderer,
                                                           const std::vector<Camera> &cameras,
-                                                          float isovalue) {
-  renderer.render(cameras.front(), isovalue);
+                                                          const FrameRequest &request) {
+  renderer.render(seen_from(cameras.front(), request));
   std::vector<std::map<std::string, double>> views(cameras.size());
   for (std::size_t view = 0; view < cameras.size(); ++view) {
     renderer.clear_cache();
     device.timer().collect();  // what clearing took
-    for (const PassStats &pass : renderer.render(cameras[view], isovalue).passes) {
+    for (const PassStats &pass : renderer.render(seen_from(cameras[view], request)).passes) {
       for (const auto &[stage, ms] : pass.stage_ms) views[view][stage] += ms;
     }
   }
@@ -77,9 +77,11 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   report.volume = options.volume;
   report.grid.info = volume.info;
   report.grid.bits_per_block = volume.bits_per_block;
-  report.isovalue = isovalue_of(options, volume);
   report.options = tools::to_renderer_options(
       options.renderer, {options.size.at(0), options.size.at(1), options.samples});
+  report.request = {.isovalue = isovalue_of(options, volume),
+                    .size = report.options.max_size,
+                    .voxel_pixels = options.renderer.voxel_pixels};
   report.num_views = options.orbit;
   report.rounds = options.rounds;
   return report;
@@ -97,9 +99,9 @@ FrameReport measure(const Options &options, std::string command) {
     report.run_info = run_info(device);
     report.options = renderer.options();
     report.setup_ms = renderer.setup_ms();
-    renderer.render(cameras.front(), report.isovalue);
+    renderer.render(seen_from(cameras.front(), report.request));
     first_hits = renderer.hits();
-    report.views = measure_views(renderer, cameras, report.isovalue, options.rounds);
+    report.views = measure_views(renderer, cameras, report.request, options.rounds);
     report.peak_bytes = device.ledger().peak();
     report.memory = tools::memory_json(device.ledger());
   }
@@ -107,11 +109,11 @@ FrameReport measure(const Options &options, std::string command) {
     ocl::Device device(device_info, true);
     Renderer renderer(device, volume, report.options);
     report.stage_clock = clock_name(device.timer().source());
-    report.stage_ms = measure_stages(device, renderer, cameras, report.isovalue);
+    report.stage_ms = measure_stages(device, renderer, cameras, report.request);
   }
   if (options.resident) {
-    report.floor = measure_floor(device_info, volume, report.options, cameras, report.isovalue,
-                                 options.rounds, first_hits);
+    report.floor = measure_floor(device_info, volume, report.options, cameras,
+                                 report.request.isovalue, options.rounds, first_hits);
   }
   return report;
 }
@@ -162,8 +164,7 @@ void check_options(const CLI::App &app, const Options &options) {
 void run(const CLI::App &app, Options options, const std::string &command) {
   check_options(app, options);
   tools::want_levels(options.renderer, options.compression);
-  if (options.renderer.values.voxel_pixels > 0)
-    options.resident = false;  // it draws the finest level
+  if (options.renderer.voxel_pixels > 0) options.resident = false;  // it draws the finest level
   nlohmann::ordered_json json;
   if (options.budgets.empty()) {
     const FrameReport report = measure(options, command);

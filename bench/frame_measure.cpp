@@ -23,15 +23,20 @@ Camera turned(Camera camera) {
   return camera;
 }
 
+FrameRequest seen_from(const Camera &camera, FrameRequest request) {
+  request.camera = camera;
+  return request;
+}
+
 std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
-                                     float isovalue, std::uint32_t rounds) {
+                                     const FrameRequest &request, std::uint32_t rounds) {
   std::vector<ViewTimes> views(cameras.size());
   for (std::uint32_t round = 0; round < rounds; ++round) {
     for (std::size_t view = 0; view < cameras.size(); ++view) {
       renderer.clear_cache();
-      views[view].cold.push_back(renderer.render(cameras[view], isovalue));
-      views[view].warm.push_back(renderer.render(cameras[view], isovalue));
-      views[view].next.push_back(renderer.render(turned(cameras[view]), isovalue));
+      views[view].cold.push_back(renderer.render(seen_from(cameras[view], request)));
+      views[view].warm.push_back(renderer.render(seen_from(cameras[view], request)));
+      views[view].next.push_back(renderer.render(seen_from(turned(cameras[view]), request)));
     }
   }
   return views;
@@ -53,11 +58,11 @@ FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVol
                          const std::vector<HitRecord> &first_hits) {
   ocl::Device device(device_info);
   FloorTimes times;
-  if (const auto obstacle = Resident::obstacle(device, volume, options.size)) {
+  if (const auto obstacle = Resident::obstacle(device, volume, options.max_size)) {
     times.why_not = *obstacle;
     return times;
   }
-  Resident resident(device, volume, options.size, options.solver);
+  Resident resident(device, volume, options.max_size, options.solver);
   resident.render(cameras.front(), isovalue);
   if (!same_hits(resident.hits(), first_hits)) {
     throw Error(

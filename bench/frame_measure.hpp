@@ -27,10 +27,13 @@ std::vector<double> all_times(const std::vector<ViewTimes> &views,
 /// The camera one degree further around the vertical through the point it looks at.
 Camera turned(Camera camera);
 
+FrameRequest seen_from(const Camera &camera, FrameRequest request);
+
+/// request: of each frame, but for its camera.
 /// The renderer must have drawn a frame of the isovalue before: a driver may compile a kernel when
 /// it first runs, and an isovalue's first frame finds its blocks.
 std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
-                                     float isovalue, std::uint32_t rounds);
+                                     const FrameRequest &request, std::uint32_t rounds);
 
 double num_passes(const FrameStats &frame);
 

@@ -18,7 +18,7 @@ struct FrameReport {
   std::vector<std::pair<std::string, std::string>> run_info;
   std::string volume;
   CompressedVolume grid;  ///< without its words
-  float isovalue = 0;
+  FrameRequest request;   ///< of each frame, but for its camera
   RendererOptions options;
   std::uint32_t num_views = 0, rounds = 0;
   std::vector<ViewTimes> views;

@@ -156,19 +156,17 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
         compress(reader, CompressOptions{.rate = 16, .levels = with_levels ? kNumLevels : 1});
     const GridLevels levels = decoded_levels(volume, with_levels);
     Renderer renderer(device, volume,
-                      {.size = {kPicture, kPicture},
+                      {.max_size = {kPicture, kPicture},
                        .pipeline = pipeline,
                        .cache_slots = kCacheSlots,
                        .solver = solver,
-                       .voxel_pixels = with_levels ? 1.0 : 0.0,
+                       .with_levels = with_levels,
                        .with_shading = false});
     WatertightResult result{surface.name + std::string(with_levels ? ", levels" : "")};
     Random random(seed);
     for (std::uint64_t view_id = 0; result.rays < num_rays; ++view_id) {
       const View view = random_view(levels, random);
-      renderer.set_size(view.size);
-      if (with_levels) renderer.set_voxel_pixels(view.voxel_pixels);
-      renderer.render(view.camera, 0);
+      renderer.render({view.camera, 0, view.size, with_levels ? view.voxel_pixels : 0});
       judge_view(levels, view, renderer.hits(), (seed + view_id) * 0x9E3779B97F4A7C15u, result);
     }
     results.push_back(result);

@@ -221,10 +221,12 @@ class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Draws a frame, checks its bounds, and counts the pixels that keep max_surface_error. Returns
   /// the hits.
   std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene, const Camera &camera,
-                                       float isovalue, double max_surface_error) {
-    renderer.render(camera, isovalue);
+                                       float isovalue, double max_surface_error,
+                                       const Detail &detail = {}) {
+    const FrameRequest request = with_detail({camera, isovalue, kMedium}, detail);
+    renderer.render(request);
     std::vector<HitRecord> drawn = renderer.hits();
-    const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
+    const Certificate certificate = certify(renderer, scene.volume, request, drawn);
     expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
     const CertificateSummary summary = summarize(certificate, max_surface_error);
     certified_ += summary.num_certified;
@@ -242,10 +244,9 @@ TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
   const Scene scene({9, 10, 11}, test::gyroid_field(9), {.rate = 6});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume,
-                    {.size = kSmall, .cache_slots = 20, .with_bounds = true});
+                    {.max_size = kSmall, .cache_slots = 20, .with_bounds = true});
   for (const FieldBound bound : {FieldBound::kLower, FieldBound::kUpper, FieldBound::kNone}) {
-    renderer.draw_bound(bound);
-    renderer.render(camera, 0.4f);
+    renderer.render({camera, 0.4f, kSmall, 0, 0, bound});
     expect_same_hits(renderer.hits(), Twin(scene.volume, 0, 0, bound).render(camera, kSmall, 0.4f),
                      kSmall.width);
   }
@@ -259,19 +260,17 @@ TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
       ocl::Device device(GetParam());
-      Renderer renderer(device, scene.volume,
-                        {.size = kMedium, .stream = place, .voxel_pixels = 4, .with_bounds = true});
+      Renderer renderer(
+          device, scene.volume,
+          {.max_size = kMedium, .stream = place, .with_levels = true, .with_bounds = true});
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
       for (const double voxel_error : {0.0, 0.1}) {
-        renderer.set_voxel_error(voxel_error);
         for (const FieldBound bound : {FieldBound::kUpper, FieldBound::kNone, FieldBound::kLower}) {
-          renderer.draw_bound(bound);
-          renderer.render(camera, 0.4f);
+          renderer.render({camera, 0.4f, kMedium, 4, voxel_error, bound});
           expect_same_hits(renderer.hits(),
                            Twin(scene.volume, 4, voxel_error, bound).render(camera, kMedium, 0.4f),
                            kMedium.width);
         }
-        renderer.draw_bound(FieldBound::kNone);
       }
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
       EXPECT_LE(device.ledger().peak(), renderer.memory_plan().peak());
@@ -288,16 +287,16 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
             CompressOptions{.precision = BlockPrecision{.min_exponent = -8}}}) {
         const Scene scene(dims, field, options);
         Renderer renderer(device_, scene.volume,
-                          {.size = kMedium, .voxel_pixels = 2, .with_bounds = true});
+                          {.max_size = kMedium, .with_levels = true, .with_bounds = true});
         std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
         cameras.push_back(camera_along({20, 18, 16}, {0.3, 0.2, 1}));  // from within
         for (const Camera &camera : cameras) {
           for (const Detail &detail :
                {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
-            renderer.set_voxel_pixels(detail.voxel_pixels);
-            renderer.set_voxel_error(detail.voxel_error);
-            const std::vector<HitRecord> drawn = certify_frame(renderer, scene, camera, 0.3f, 10);
-            renderer.render(camera, 0.3f);  // and the volume is drawn again
+            const std::vector<HitRecord> drawn =
+                certify_frame(renderer, scene, camera, 0.3f, 10, detail);
+            // and the volume is drawn again
+            renderer.render(with_detail({camera, 0.3f, kMedium}, detail));
             expect_same_hits(renderer.hits(), drawn, kMedium.width);
           }
         }
@@ -311,12 +310,11 @@ TEST_P(CertifyOnDevice, RealVolumes) {
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .voxel_pixels = 2, .with_bounds = true});
+                      {.max_size = kMedium, .with_levels = true, .with_bounds = true});
     for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
       for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
         for (const double voxel_pixels : {0.0, 2.0}) {
-          renderer.set_voxel_pixels(voxel_pixels);
-          certify_frame(renderer, scene, camera, isovalue, 4);
+          certify_frame(renderer, scene, camera, isovalue, 4, {voxel_pixels});
         }
       }
     }
@@ -331,11 +329,12 @@ TEST_P(CertifyOnDevice, FarAway) {
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye = camera.at + 700.0 * (camera.eye - camera.at);
   camera.fovy_deg /= 700;
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
-  renderer.render(camera, 80);
+  Renderer renderer(device_, scene.volume, {.max_size = kMedium, .with_bounds = true});
+  renderer.render({camera, 80, kMedium});
   const std::vector<HitRecord> drawn = renderer.hits();
-  const std::vector<double> slack = expect_kept(certify(renderer, scene.volume, camera, 80, drawn),
-                                                drawn, scene, camera, kMedium, 80);
+  const std::vector<double> slack =
+      expect_kept(certify(renderer, scene.volume, {camera, 80, kMedium}, drawn), drawn, scene,
+                  camera, kMedium, 80);
   ASSERT_GT(slack.size(), 500u);
   EXPECT_LT(slack[0], 3) << "farther off than rounding explains";
 }
@@ -349,7 +348,7 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
   const Scene scene({40, 40, 40}, noise,
                     {.precision = BlockPrecision{
                          .min_exponent = -6, .whole_numbers = true, .max_voxel_error = 0}});
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  Renderer renderer(device_, scene.volume, {.max_size = kMedium, .with_bounds = true});
   for (const double x : {12.0, 19.0, 26.0}) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
       const Camera camera = camera_along({x, 20, 21}, direction);
@@ -368,13 +367,13 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
                                                                  .max_voxel_error = 0.015625}}}) {
     const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                      {.max_size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const double voxel_pixels : {0.0, 2.0}) {
-      renderer.set_voxel_pixels(voxel_pixels);
-      renderer.render(camera, 0.3f);
+      const FrameRequest request{camera, 0.3f, kMedium, voxel_pixels};
+      renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
-      const Certificate certificate = certify(renderer, scene.volume, camera, 0.3f, drawn);
+      const Certificate certificate = certify(renderer, scene.volume, request, drawn);
       const std::vector<double> slack =
           expect_kept(certificate, drawn, scene, camera, kMedium, 0.3f);
       ASSERT_GT(slack.size(), 100u);
@@ -391,10 +390,11 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
 TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
   const Scene scene({33, 48, 40}, test::gyroid_field(24), {.rate = 4});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
-  renderer.render(camera, 0.3f);
+  Renderer renderer(device_, scene.volume, {.max_size = kMedium, .with_bounds = true});
+  renderer.render({camera, 0.3f, kMedium});
   const std::vector<HitRecord> drawn = renderer.hits();
-  const std::vector<float> bounds = certify(renderer, scene.volume, camera, 0.3f, drawn).bounds;
+  const std::vector<float> bounds =
+      certify(renderer, scene.volume, {camera, 0.3f, kMedium}, drawn).bounds;
   const CellOracle truth(scene.source, {33, 48, 40}, 0.3f);
   const FrameParams frame = make_frame_params(scene.volume.info, camera, kMedium, 0.3f);
   const auto exceeded = [&](const std::function<float(float)> &change) {
@@ -415,22 +415,19 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
   const Scene scene(dims, test::sphere_field(dims),
                     {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                    {.max_size = kMedium, .with_levels = true, .with_bounds = true});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye += 0.35 * (camera.eye - camera.at);  // so far that levels spare most blocks
   double voxel_pixels = -1, voxel_error = -1;
   for (const double max_surface_error : {0.00005, 0.05, 1.0, 4.0}) {
     const DetailChoice choice =
-        choose_detail(renderer, scene.volume, camera, 0.5f, max_surface_error);
+        choose_detail(renderer, scene.volume, {camera, 0.5f, kMedium}, max_surface_error);
     EXPECT_GE(choice.detail.voxel_pixels, voxel_pixels);
     if (choice.detail.voxel_pixels == voxel_pixels) {
       EXPECT_GE(choice.detail.voxel_error, voxel_error);
     }
     voxel_pixels = choice.detail.voxel_pixels;
     voxel_error = choice.detail.voxel_error;
-    EXPECT_EQ(renderer.options().voxel_pixels, voxel_pixels);
-    EXPECT_EQ(renderer.voxel_error(), voxel_error);
-    EXPECT_EQ(renderer.options().size.width, kMedium.width);
     if (max_surface_error == 0.00005) {
       EXPECT_FALSE(choice.reachable);
       ASSERT_TRUE(choice.tolerance);
@@ -438,10 +435,11 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
       EXPECT_EQ(voxel_pixels, 0);
     } else {
       EXPECT_TRUE(choice.reachable);
-      renderer.render(camera, 0.5f);
+      const FrameRequest request = with_detail({camera, 0.5f, kMedium}, choice.detail);
+      renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
       const CertificateSummary summary =
-          summarize(certify(renderer, scene.volume, camera, 0.5f, drawn), max_surface_error);
+          summarize(certify(renderer, scene.volume, request, drawn), max_surface_error);
       EXPECT_GE(double(summary.num_certified) / double(summary.num_pixels),
                 choice.tries[0].certified - kLostShare)
           << "a picture so small is tried as it is";
@@ -454,9 +452,9 @@ TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   for (const std::uint32_t rate : {8u, 16u, 24u}) {
     const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
     Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                      {.max_size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-    const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 1);
+    const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f, kMedium}, 1);
     EXPECT_TRUE(choice.reachable);
     EXPECT_EQ(choice.detail.voxel_error > 0, rate > 16) << "rate " << rate;
   }
@@ -468,15 +466,15 @@ TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
   const Scene scene({96, 96, 96}, test::gyroid_field(48),
                     {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                    {.max_size = kMedium, .with_levels = true, .with_bounds = true});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  const DetailChoice choice = choose_detail(renderer, scene.volume, camera, 0.3f, 0.05);
+  const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f, kMedium}, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
     return each.detail.voxel_pixels > 0.6 &&
            each.certified >= choice.tries[0].certified - kLostShare;
   })) << "the error would allow them";
   EXPECT_EQ(choice.detail.voxel_pixels, 0);
-  EXPECT_EQ(renderer.render(camera, 0.3f).last_level, 0u);
+  EXPECT_EQ(renderer.render(with_detail({camera, 0.3f, kMedium}, choice.detail)).last_level, 0u);
 }
 
 /// Coarse levels reach a little out of the volume; where a ray is there at a border, on one side
@@ -487,18 +485,17 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
                     {.precision = BlockPrecision{.min_exponent = -10}});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .voxel_pixels = 1, .with_bounds = true});
+                    {.max_size = kMedium, .with_levels = true, .with_bounds = true});
   for (const double voxel_pixels :
        {1.0, 1.4}) {  // a border among the places where rays enter, or in the surface
-    renderer.set_voxel_pixels(voxel_pixels);
     const auto hits_of = [&](FieldBound bound) {
-      renderer.draw_bound(bound);
-      renderer.render(camera, 0.5f);
+      renderer.render({camera, 0.5f, kMedium, voxel_pixels, 0, bound});
       return renderer.hits();
     };
     const auto lower = hits_of(FieldBound::kLower), upper = hits_of(FieldBound::kUpper),
                drawn = hits_of(FieldBound::kNone);
-    const Certificate certificate = certify(renderer, scene.volume, camera, 0.5f, drawn);
+    const Certificate certificate =
+        certify(renderer, scene.volume, {camera, 0.5f, kMedium, voxel_pixels}, drawn);
     std::size_t num_hits = 0;
     for (std::size_t i = 0; i < drawn.size(); ++i) {
       const int met =
@@ -517,10 +514,9 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
 TEST_P(CertifyOnDevice, SmallerPicturesAreTheTwins) {
   const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.size = kMedium});
+  Renderer renderer(device_, scene.volume, {.max_size = kMedium});
   for (const ImageSize size : {kSmall, kMedium, ImageSize{7, 5}}) {
-    renderer.set_size(size);
-    renderer.render(camera, 0.3f);
+    renderer.render({camera, 0.3f, size});
     const auto expected = Twin(scene.volume).render(camera, size, 0.3f);
     expect_same_hits(renderer.hits(), expected, size.width);
     const FrameParams frame = make_frame_params(scene.volume.info, camera, size, 0.3f);
@@ -535,9 +531,10 @@ TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto bounds = [&](ImageSize size, double voxel_pixels) {
     Renderer renderer(device_, scene.volume,
-                      {.size = size, .voxel_pixels = voxel_pixels, .with_bounds = true});
-    renderer.render(camera, 0.3f);
-    return certify(renderer, scene.volume, camera, 0.3f, renderer.hits()).bounds;
+                      {.max_size = size, .with_levels = true, .with_bounds = true});
+    const FrameRequest request{camera, 0.3f, size, voxel_pixels};
+    renderer.render(request);
+    return certify(renderer, scene.volume, request, renderer.hits()).bounds;
   };
   const std::vector<float> four = bounds({30, 20, 2}, 0.6), one = bounds({60, 40}, 1.2);
   ASSERT_EQ(four.size(), one.size());
@@ -554,37 +551,83 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto certify_with = [&](const CompressedVolume &volume, const RendererOptions &options) {
     Renderer renderer(device_, volume, options);
-    renderer.render(camera, 0.3f);
-    certify(renderer, volume, camera, 0.3f, renderer.hits());
+    const FrameRequest request{camera, 0.3f, kSmall, options.with_levels ? 1.0 : 0.0};
+    renderer.render(request);
+    certify(renderer, volume, request, renderer.hits());
   };
   EXPECT_NO_THROW(
-      certify_with(scene.volume, {.size = kSmall, .voxel_pixels = 1, .with_bounds = true}));
+      certify_with(scene.volume, {.max_size = kSmall, .with_levels = true, .with_bounds = true}));
   CompressedVolume volume = scene.volume;
   volume.max_voxel_error.reset();
   volume.bounds = {};
-  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
+  EXPECT_THAT([&] { certify_with(volume, {.max_size = kSmall, .with_bounds = true}); },
               ThrowsMessage<Error>(HasSubstr("--no-verify")));
   volume = scene.volume;
   volume.coarser_levels[0].bounds = {};
-  EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));
+  EXPECT_NO_THROW(certify_with(volume, {.max_size = kSmall, .with_bounds = true}));
   EXPECT_THAT(
-      [&] { certify_with(volume, {.size = kSmall, .voxel_pixels = 1, .with_bounds = true}); },
+      [&] { certify_with(volume, {.max_size = kSmall, .with_levels = true, .with_bounds = true}); },
       ThrowsMessage<Error>(HasSubstr("--levels")));
   volume = scene.volume;
   volume.value_range = {-INFINITY, INFINITY};
-  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
+  EXPECT_THAT([&] { certify_with(volume, {.max_size = kSmall, .with_bounds = true}); },
               ThrowsMessage<Error>(HasSubstr("range of values")));
   EXPECT_THAT(
       [&] {
-        certify_with(scene.volume,
-                     {.size = kSmall, .solver = solver_from_string("linear"), .with_bounds = true});
+        certify_with(
+            scene.volume,
+            {.max_size = kSmall, .solver = solver_from_string("linear"), .with_bounds = true});
       },
       ThrowsMessage<Error>(HasSubstr("bernstein")));
-  Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true});
-  EXPECT_THROW(renderer.set_voxel_pixels(1), Error);
-  EXPECT_THROW(renderer.set_size({13, 8}), Error);
+  Renderer renderer(device_, scene.volume, {.max_size = kSmall, .with_bounds = true});
+  const FrameRequest request{camera, 0.3f, kSmall};
+  renderer.render(request);
+  const std::vector<HitRecord> hits = renderer.hits();
+  EXPECT_THROW(certify(renderer, scene.volume, {camera, 0.3f, kSmall, 1}, hits), Error);
+  EXPECT_THAT(
+      [&] {
+        certify(renderer, scene.volume, {camera, 0.3f, {6, 16}}, std::span(hits).first(9));
+      },
+      ThrowsMessage<Error>(HasSubstr("9 hits are not those of 96 rays")));
+  EXPECT_THROW(choose_detail(renderer, scene.volume, {camera, 0.3f, {13, 8}}, 1), Error);
   for (const double bad : {0.0, -1.0, double{INFINITY}, double{NAN}})
-    EXPECT_THROW(choose_detail(renderer, scene.volume, camera, 0.3f, bad), Error);
+    EXPECT_THROW(choose_detail(renderer, scene.volume, request, bad), Error);
+  expect_same_hits(renderer.hits(), hits, kSmall.width);
+  Renderer plain(device_, scene.volume, {.max_size = kSmall});
+  plain.render(request);
+  EXPECT_THAT([&] { certify(plain, scene.volume, request, hits); },
+              ThrowsMessage<Error>(HasSubstr("without bounds")));
+}
+
+/// Whatever kind of frame comes between, and where it ends: the next is right.
+TEST_P(CertifyOnDevice, RequestsOfAllKindsInAnyOrder) {
+  const Scene scene({30, 27, 33}, test::gyroid_field(10), {.rate = 8});
+  const std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
+  Renderer renderer(
+      device_, scene.volume,
+      {.max_size = kMedium, .cache_slots = 100, .with_levels = true, .with_bounds = true});
+  const FieldBound bounds[] = {FieldBound::kNone, FieldBound::kUpper, FieldBound::kLower};
+  for (int i = 0; i < 24; ++i) {
+    SCOPED_TRACE(fmt::format("request {}", i));
+    FrameRequest request{
+        cameras[i % 2],        i % 3 == 0 ? 0.4f : 0.2f, i % 5 == 0 ? kSmall : kMedium,
+        i % 4 < 2 ? 0.0 : 3.0, i % 7 < 3 ? 0.05 : 0.0,   bounds[i / 2 % 3]};
+    FrameRequest thrown = request;
+    thrown.bound = bounds[i % 3];
+    thrown.voxel_error = 0.2;
+    thrown.on_pass = [](const PassStats &) -> bool { throw std::runtime_error("enough"); };
+    if (i % 2 == 0) {
+      EXPECT_THROW(renderer.render(thrown), std::runtime_error);
+    } else {
+      thrown.isovalue = NAN;
+      EXPECT_THROW(renderer.render(thrown), Error);
+    }
+    renderer.render(request);
+    expect_same_hits(renderer.hits(),
+                     Twin(scene.volume, request.voxel_pixels, request.voxel_error, request.bound)
+                         .render(request.camera, request.size, request.isovalue),
+                     request.size.width);
+  }
 }
 
 }  // namespace

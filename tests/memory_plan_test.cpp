@@ -63,7 +63,7 @@ TEST_P(MemoryPlanOnDevice, PlanIsWhatIsBooked) {
                                  dims.z, volume->compressed.bits_per_block, slots));
         ocl::Device device(GetParam().device);
         const Renderer renderer(device, volume->compressed,
-                                GetParam().with({.size = size_,
+                                GetParam().with({.max_size = size_,
                                                  .cache_slots = slots,
                                                  .stream = place,
                                                  .with_kept_picture = slots == 8}));
@@ -87,9 +87,10 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
       SCOPED_TRACE(
           fmt::format("stream on {}, budget {}, least {}", to_string(place), budget, least));
       ocl::Device device(GetParam().device);
-      Renderer renderer(device, volume.compressed,
-                        GetParam().with({.size = size_, .memory_budget = budget, .stream = place}));
-      renderer.render(camera, kIsovalue);
+      Renderer renderer(
+          device, volume.compressed,
+          GetParam().with({.max_size = size_, .memory_budget = budget, .stream = place}));
+      renderer.render({camera, kIsovalue, size_});
       test::expect_same_hits(renderer.hits(), expected, size_.width);
       renderer.shade();
       expect_booked(device, renderer.memory_plan());
@@ -124,8 +125,8 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
     SCOPED_TRACE(fmt::format("budget {}, least {}, stream {}", budget, least, stream_bytes));
     ocl::Device device(GetParam().device);
     Renderer renderer(device, volume.compressed,
-                      GetParam().with({.size = size_, .memory_budget = budget}));
-    const FrameStats stats = renderer.render(camera, kIsovalue);
+                      GetParam().with({.max_size = size_, .memory_budget = budget}));
+    const FrameStats stats = renderer.render({camera, kIsovalue, size_});
     test::expect_same_hits(renderer.hits(), expected, size_.width);
     renderer.shade();
     expect_booked(device, renderer.memory_plan());
@@ -141,7 +142,7 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
   ocl::Device device(GetParam().device);
   EXPECT_THAT(refusal([&] {
                 Renderer(device, volume.compressed,
-                         GetParam().with({.size = size_, .memory_budget = least - 1}));
+                         GetParam().with({.max_size = size_, .memory_budget = least - 1}));
               }),
               HasSubstr(fmt::format("{} would do", least)));
 }
@@ -179,7 +180,7 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
   ocl::Device device(GetParam().device);
   const auto render_within = [&](std::uint64_t budget, std::uint32_t slots) {
     Renderer(device, volume.compressed,
-             GetParam().with({.size = size_, .memory_budget = budget, .cache_slots = slots}));
+             GetParam().with({.max_size = size_, .memory_budget = budget, .cache_slots = slots}));
   };
   EXPECT_THAT(refusal([&] { render_within(least - 1, 0); }),
               HasSubstr(fmt::format("{} would do", least)));

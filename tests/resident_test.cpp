@@ -105,8 +105,8 @@ TEST_P(ResidentOnDevice, EqualsBothPipelines) {
   Resident resident(device_, volume.compressed, kMedium);
   resident.render(camera, 0.3f);
   for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
-    Renderer renderer(device_, volume.compressed, {.size = kMedium, .pipeline = pipeline});
-    renderer.render(camera, 0.3f);
+    Renderer renderer(device_, volume.compressed, {.max_size = kMedium, .pipeline = pipeline});
+    renderer.render({camera, 0.3f, kMedium});
     expect_same_hits(resident.hits(), renderer.hits(), kMedium.width);
   }
 }

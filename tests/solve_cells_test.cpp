@@ -102,10 +102,10 @@ TEST_P(SolveCellsOnDevice, FramesOfEverySolverEqualTheTwins) {
     if (is_llvmpipe(device_.info()) && name != "marmitt") continue;
     SCOPED_TRACE(name);
     RendererOptions options;
-    options.size = size;
+    options.max_size = size;
     options.solver = solver_from_string(name);
     Renderer renderer(device_, volume.compressed, options);
-    renderer.render(camera, 0.1f);
+    renderer.render({camera, 0.1f, size});
     test::expect_same_hits(renderer.hits(),
                            render_scalar(make_frame_params(volume.info(), camera, size, 0.1f),
                                          volume.voxels, options.solver),

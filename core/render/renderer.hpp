@@ -38,6 +38,8 @@ class Renderer {
   /// bounds, numbers out of range. Does not wait.
   void check(const FrameRequest &request) const { plan_of(request); }
 
+  /// Of hits() and shade(): the size of the request rendered last; 0x0 where there is none.
+  ImageSize size() const { return drawn_; }
   /// The hit buffer of the request rendered last [size.ray_rows()][size.ray_columns()], row 0 at
   /// the top. Waits.
   /// errors: Error where nothing was rendered.

@@ -15,11 +15,6 @@ namespace isowave {
 /// requests may ask for is said here.
 struct RendererOptions {
   ImageSize max_size;  ///< no request has more rays; a kept picture is of half of it (halved())
-  bool with_levels = false;        ///< requests may set voxel_pixels
-  bool with_bounds = false;        ///< requests may set bound
-  bool with_kept_picture = false;  ///< keep_picture() may be called
-  bool with_shading =
-      true;  ///< shade() will be called: else its kernel is not built before that is
   PipelineKind pipeline = PipelineKind::kAuto;
   std::uint64_t memory_budget = 0;  ///< bound on all device memory [bytes]; 0: 3/4 of the device's
   std::uint32_t cache_slots = 0;    ///< decoded blocks kept, at least 8; 0: as many as the budget
@@ -39,6 +34,11 @@ struct RendererOptions {
   /// Blocks uploaded at a time from a volume on the host, at least 8; 0: by the size of cache and
   /// blocks.
   std::uint32_t window_blocks = 0;
+  bool with_levels = false;        ///< requests may set voxel_pixels
+  bool with_bounds = false;        ///< requests may set bound
+  bool with_kept_picture = false;  ///< keep_picture() may be called
+  bool with_shading =
+      true;  ///< shade() will be called: else its kernel is not built before that is
 };
 
 /// Slots (325 MiB with their share of the tables) that no budget was asked for are enough: a cold

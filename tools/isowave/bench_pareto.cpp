@@ -184,25 +184,22 @@ bool has_levels(const Point &point) {
 
 Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const Point &point) {
   RendererFlags flags{.pipeline = point.pipeline, .solver = point.solver, .values = {}};
-  if (!point.max_surface_error) flags.values.voxel_pixels = point.details.front().voxel_pixels;
+  if (!point.max_surface_error) flags.voxel_pixels = point.details.front().voxel_pixels;
   const RendererOptions options = to_renderer_options(flags, subject.size);
   const CompressedVolume &volume = point.stored->volume;
   return Renderer(device, volume,
                   point.max_surface_error ? with_choices(options, volume) : options);
 }
 
-/// Sets the renderer to one view of the point, and draws it once: the first frame of an isovalue,
+/// One view of the point. To be drawn once before it is measured: the first frame of an isovalue,
 /// or of a precision, does more.
-void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point,
-             std::size_t view) {
-  renderer.set_voxel_pixels(point.details[view].voxel_pixels);
-  renderer.set_voxel_error(point.details[view].voxel_error);
-  renderer.render(subject.cameras[view], subject.isovalue);
+FrameRequest request_of(const ParetoSubject &subject, const Point &point, std::size_t view) {
+  return with_detail({subject.cameras[view], subject.isovalue, subject.size}, point.details[view]);
 }
 
-FrameStats draw_cold(Renderer &renderer, const ParetoSubject &subject, std::size_t view) {
+FrameStats draw_cold(Renderer &renderer, const FrameRequest &request) {
   renderer.clear_cache();
-  return renderer.render(subject.cameras[view], subject.isovalue);
+  return renderer.render(request);
 }
 
 /// Draws every view `rounds` times from an empty cache.
@@ -211,9 +208,10 @@ void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
   std::uint64_t decoded = 0;
   std::vector<View> views;
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
-    warm_up(renderer, subject, point, view);
+    const FrameRequest request = request_of(subject, point, view);
+    renderer.render(request);
     for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const FrameStats stats = draw_cold(renderer, subject, view);
+      const FrameStats stats = draw_cold(renderer, request);
       times.push_back(stats.total_ms);
       for (const PassStats &pass : stats.passes)
         decoded += round == 0 ? pass.counts.decoded_count : 0;
@@ -236,11 +234,13 @@ double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point
            others = make_renderer(device, subject, other);
   std::vector<double> ratios;
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
-    warm_up(renderer, subject, point, view);
-    warm_up(others, subject, other, view);
+    const FrameRequest request = request_of(subject, point, view),
+                       others_request = request_of(subject, other, view);
+    renderer.render(request);
+    others.render(others_request);
     for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const double ms = draw_cold(renderer, subject, view).total_ms;
-      ratios.push_back(ms / draw_cold(others, subject, view).total_ms);
+      const double ms = draw_cold(renderer, request).total_ms;
+      ratios.push_back(ms / draw_cold(others, others_request).total_ms);
     }
   }
   return quantiles(std::move(ratios)).p50;
@@ -277,9 +277,9 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   subject.cameras = orbit_cameras(info, options.views);
   subject.voxel = std::max({info.spacing.x, info.spacing.y, info.spacing.z});
   subject.value_range = double{finest.value_range[1]} - double{finest.value_range[0]};
-  Renderer renderer(device, finest, {.size = subject.size});
+  Renderer renderer(device, finest, {.max_size = subject.size});
   for (const Camera &camera : subject.cameras) {
-    renderer.render(camera, options.isovalue);
+    renderer.render({camera, options.isovalue, subject.size});
     subject.truth.emplace_back(view_of(renderer));
   }
   return subject;
@@ -396,8 +396,8 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
     Point point = any;
     point.max_surface_error = max_surface_error;
     for (const Camera &camera : subject.cameras) {
-      const DetailChoice choice =
-          choose_detail(renderer, stored.volume, camera, subject.isovalue, max_surface_error);
+      const DetailChoice choice = choose_detail(
+          renderer, stored.volume, {camera, subject.isovalue, subject.size}, max_surface_error);
       point.details.push_back(choice.detail);
       point.reachable.push_back(choice.reachable);
     }

@@ -18,7 +18,7 @@ namespace isowave::tools {
 struct FrameOptions {
   CompressionOptions compression;  ///< of a volume that is not
   std::vector<float> isovalues;
-  double voxel_error = 0;     ///< see Renderer::set_voxel_error()
+  double voxel_error = 0;     ///< FrameRequest::voxel_error
   std::string size;           ///< WxH
   std::uint32_t samples = 1;  ///< ImageSize::samples
   std::uint32_t orbit = 0;    ///< views; 0: one, or the camera file's

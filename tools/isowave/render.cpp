@@ -78,17 +78,14 @@ fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArg
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
+  virtual FrameStats render(const FrameRequest &request) = 0;
   /// Draws the frame once more, however long it takes.
-  virtual FrameStats refine(const Camera &camera, float isovalue) {
-    return render(camera, isovalue, {});
-  }
+  virtual FrameStats refine(const FrameRequest &request) { return render(request); }
   virtual std::vector<HitRecord> hits() = 0;
   virtual Image8 shade() = 0;
   /// Prints what else is known of the frame drawn last, and adds it to its --stats: how far it may
   /// be off, the steps it was drawn in. error_map: the .npy to write, or empty.
-  virtual void report(const Camera &, float /*isovalue*/, const fs::path & /*error_map*/,
-                      nlohmann::ordered_json & /*frame*/) {}
+  virtual void report(const fs::path & /*error_map*/, nlohmann::ordered_json & /*frame*/) {}
 };
 
 class DeviceFrames : public FrameSource {
@@ -100,24 +97,21 @@ class DeviceFrames : public FrameSource {
         appearance_(appearance),
         max_surface_error_(args.max_surface_error),
         time_budget_(args.time_budget) {
-    renderer_.set_voxel_error(args.frame.voxel_error);
-    if (!time_budget_) return;
-    renderer_.set_voxel_pixels(args.voxel_pixels);
-    timed_frames_.emplace(renderer_);
+    if (time_budget_) timed_frames_.emplace(renderer_);
   }
-  FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
-    if (max_surface_error_)
-      choice_ = choose_detail(renderer_, volume_, camera, isovalue, *max_surface_error_);
-    if (!timed_frames_) return renderer_.render(camera, isovalue, on_pass);
-    timed_ = timed_frames_->render(camera, isovalue, *time_budget_);
+  FrameStats render(const FrameRequest &request) override {
+    drawn_ = request;
+    if (max_surface_error_) {
+      choice_ = choose_detail(renderer_, volume_, request, *max_surface_error_);
+      drawn_ = with_detail(request, choice_.detail);
+    }
+    if (!timed_frames_) return renderer_.render(drawn_);
+    timed_ = timed_frames_->render(drawn_, *time_budget_);
     return timed_.stats;
   }
-  FrameStats refine(const Camera &camera, float isovalue) override {
-    return renderer_.render(camera, isovalue);
-  }
-  void report(const Camera &camera, float isovalue, const fs::path &error_map,
-              nlohmann::ordered_json &frame) override {
-    if (max_surface_error_) frame["error"] = bound_error(camera, isovalue, error_map);
+  FrameStats refine(const FrameRequest &request) override { return renderer_.render(request); }
+  void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
+    if (max_surface_error_) frame["error"] = bound_error(error_map);
     if (timed_frames_) frame["time_budget"] = timed_steps();
   }
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
@@ -125,8 +119,7 @@ class DeviceFrames : public FrameSource {
   const Renderer &renderer() const { return renderer_; }
 
  private:
-  nlohmann::ordered_json bound_error(const Camera &camera, float isovalue,
-                                     const fs::path &error_map);
+  nlohmann::ordered_json bound_error(const fs::path &error_map);
   nlohmann::ordered_json timed_steps() const;
 
   const CompressedVolume &volume_;
@@ -134,6 +127,7 @@ class DeviceFrames : public FrameSource {
   std::optional<TimedFrames> timed_frames_;
   Appearance appearance_;
   std::optional<double> max_surface_error_, time_budget_;
+  FrameRequest drawn_;
   DetailChoice choice_;
   TimedFrame timed_;
 };
@@ -160,9 +154,8 @@ nlohmann::ordered_json detail_json(const Detail &detail) {
   return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
 }
 
-nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float isovalue,
-                                                 const fs::path &error_map) {
-  const Certificate certificate = certify(renderer_, volume_, camera, isovalue, renderer_.hits());
+nlohmann::ordered_json DeviceFrames::bound_error(const fs::path &error_map) {
+  const Certificate certificate = certify(renderer_, volume_, drawn_, renderer_.hits());
   const CertificateSummary summary = summarize(certificate, *max_surface_error_);
   const double certified = summary.num_pixels == 0
                                ? 100.0
@@ -182,9 +175,7 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
                  choice_.advice);
   }
   if (!error_map.empty())
-    write_npy({renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(),
-               certificate.bounds},
-              error_map);
+    write_npy({drawn_.size.ray_columns(), drawn_.size.ray_rows(), certificate.bounds}, error_map);
   nlohmann::ordered_json tries = nlohmann::ordered_json::array();
   for (const DetailChoice::Try &each : choice_.tries) {
     tries.push_back(detail_json(each.detail));
@@ -207,16 +198,15 @@ nlohmann::ordered_json DeviceFrames::bound_error(const Camera &camera, float iso
 
 class TwinFrames : public FrameSource {
  public:
-  TwinFrames(const Scene &scene, const Appearance &appearance, const RendererOptions &options,
-             double voxel_error)
+  TwinFrames(const Scene &scene, const Appearance &appearance, const RenderArgs &args)
       : scene_(scene),
         appearance_(appearance),
-        options_(options),
-        twin_(scene.volume, options.voxel_pixels, voxel_error) {}
-  FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
+        solver_(args.renderer.solver),
+        twin_(scene.volume, args.voxel_pixels, args.frame.voxel_error) {}
+  FrameStats render(const FrameRequest &request) override {
     const auto begin = Clock::now();
-    frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
-    hits_ = twin_.render(camera, scene_.size, isovalue, options_.solver);
+    frame_ = make_frame_params(scene_.volume.info, request.camera, request.size, request.isovalue);
+    hits_ = twin_.render(request.camera, request.size, request.isovalue, solver_);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
@@ -231,7 +221,7 @@ class TwinFrames : public FrameSource {
  private:
   const Scene &scene_;
   Appearance appearance_;
-  RendererOptions options_;
+  Solver solver_;
   Twin twin_;
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
@@ -266,17 +256,18 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
   for (const float isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
-      const FrameStats stats =
-          frames.render(camera, isovalue, progress_writer(options, scene, frames, isovalue, view));
+      FrameRequest request{camera, isovalue, scene.size, options.voxel_pixels,
+                           options.frame.voxel_error};
+      request.on_pass = progress_writer(options, scene, frames, isovalue, view);
+      const FrameStats stats = frames.render(request);
       write_outputs(options, scene, frames, isovalue, view);
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
       result.push_back(frame_json(isovalue, view, camera, stats));
-      frames.report(camera, isovalue,
-                    frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
+      frames.report(frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
                     result.back());
       if (!options.refined.empty()) {
-        const FrameStats refined = frames.refine(camera, isovalue);
+        const FrameStats refined = frames.refine(request);
         write_png(frames.shade(),
                   frame_path(options.refined, scene.cameras.size(), options, isovalue, view));
         fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.rays_hit),
@@ -294,9 +285,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
                                  {"isovalues", options.frame.isovalues},
                                  {"voxel_error", options.frame.voxel_error},
                                  {"reference", options.reference}};
-  json.update(renderer_options_json(options.renderer));
-  json["voxel_pixels"] =
-      options.voxel_pixels;  // where it is chosen, the renderer was made for others
+  json.update(renderer_options_json(options.renderer, options.voxel_pixels));
   return json;
 }
 
@@ -402,7 +391,7 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
 }
 
 void run_render(const CLI::App &command, RenderArgs options) {
-  options.voxel_pixels = options.renderer_flags.values.voxel_pixels;
+  options.voxel_pixels = options.renderer_flags.voxel_pixels;
   check_options(command, options);
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
@@ -421,17 +410,17 @@ void run_render(const CLI::App &command, RenderArgs options) {
   // Whoever chooses has levels of detail to choose from.
   const bool chooses_levels = options.max_surface_error ||
                               (options.time_budget && options.renderer_flags.pipeline != "blocks");
-  if (chooses_levels) wanted.voxel_pixels = 1;
+  if (chooses_levels) options.renderer_flags.voxel_pixels = 1;
   want_levels(options.renderer_flags, options.frame.compression);
   const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
   outputs.make_folder();
   if (chooses_levels && scene.volume.coarser_levels.empty())
-    wanted.voxel_pixels = options.voxel_pixels;
+    options.renderer_flags.voxel_pixels = options.voxel_pixels;
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
                                      {"volume", volume_json(options, scene.volume)}};
   if (!device) {
-    TwinFrames frames(scene, appearance, options.renderer, options.frame.voxel_error);
+    TwinFrames frames(scene, appearance, options);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
   } else {

@@ -1,6 +1,7 @@
 #include "tools/isowave/renderer_options.hpp"
 
 #include "core/base/error.hpp"
+#include "core/view/detail.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::tools {
@@ -41,7 +42,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
                  "auto (on the device if that leaves room for a useful cache)")
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
-  app.add_option("--voxel-pixels", flags.values.voxel_pixels,
+  app.add_option("--voxel-pixels", flags.voxel_pixels,
                  "draw far parts by coarser levels of detail, whose voxels are at most so many "
                  "pixels apart; "
                  "0: all by the finest")
@@ -61,6 +62,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
 void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
   if (flags.speculation == "off")
     refuse_options(app, {"--max-speculation"}, "--speculation off is 1");
+  check_voxel_pixels(flags.voxel_pixels);
   solver_from_string(flags.solver);
   grouping_from_string(flags.grouping);
   closest_hit_from_string(flags.closest);
@@ -68,9 +70,10 @@ void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
     refuse_options(app, {"--grouping", "--closest"}, "give --pipeline blocks, which alone has it");
 }
 
-RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) {
+RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize max_size) {
   RendererOptions options = flags.values;
-  options.size = size;
+  options.max_size = max_size;
+  options.with_levels |= flags.voxel_pixels > 0;
   options.pipeline = flags.pipeline == "blocks" ? PipelineKind::kBlocks
                      : flags.pipeline == "rays" ? PipelineKind::kRays
                                                 : PipelineKind::kAuto;
@@ -87,7 +90,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
   return options;
 }
 
-nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
+nlohmann::ordered_json renderer_options_json(const RendererOptions &options, double voxel_pixels) {
   const char *speculation = options.max_speculation == 1  ? "off"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
@@ -95,7 +98,7 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
           {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
           {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
           {"closest", to_string(options.closest)},      {"group_size", options.group_size},
-          {"stream", to_string(options.stream)},        {"voxel_pixels", options.voxel_pixels}};
+          {"stream", to_string(options.stream)},        {"voxel_pixels", voxel_pixels}};
 }
 
 }  // namespace isowave::tools

@@ -36,7 +36,7 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   std::vector<double> source(scene.volume.info.num_voxels());
   open_any_volume(options.input, to_overrides(options.volume))
       ->read_exact_layers(0, dims.z, source);
-  Renderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
+  Renderer renderer(device, scene.volume, with_choices({.max_size = scene.size}, scene.volume));
   compiling.finish();
   fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view",
              "px chosen", "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");
@@ -46,10 +46,11 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const DetailChoice choice =
-          choose_detail(renderer, scene.volume, camera, isovalue, max_surface_error);
-      renderer.render(camera, isovalue);
+          choose_detail(renderer, scene.volume, {camera, isovalue, scene.size}, max_surface_error);
+      const FrameRequest request = with_detail({camera, isovalue, scene.size}, choice.detail);
+      renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
-      const Certificate certificate = certify(renderer, scene.volume, camera, isovalue, drawn);
+      const Certificate certificate = certify(renderer, scene.volume, request, drawn);
       const CertificateSummary summary = summarize(certificate, max_surface_error);
       const BoundTally tally =
           judge_bounds(truth, make_frame_params(scene.volume.info, camera, scene.size, isovalue),

@@ -70,24 +70,23 @@ class FrameDrawer {
  public:
   FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device,
               Solver solver, double voxel_error)
-      : scene_(scene), voxels_(voxels), solver_(solver) {
+      : scene_(scene), voxels_(voxels), solver_(solver), voxel_error_(voxel_error) {
     if (device.empty()) return;
     const ocl::DeviceInfo info = ocl::choose_device(device);
     fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
     device_ = std::make_unique<ocl::Device>(info);
     CompileReport compiling(*device_);
     RendererOptions options;
-    options.size = scene.size;
+    options.max_size = scene.size;
     options.solver = solver;
     options.with_shading = false;
     renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
     compiling.finish();
-    renderer_->set_voxel_error(voxel_error);
   }
 
   std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
     if (!renderer_) return render_scalar(frame, voxels_, solver_);
-    renderer_->render(scene_.cameras[view], frame.isovalue);
+    renderer_->render({scene_.cameras[view], frame.isovalue, scene_.size, 0, voxel_error_});
     return renderer_->hits();
   }
   std::string name() const { return device_ ? device_->info().name : "scalar reference"; }
@@ -96,6 +95,7 @@ class FrameDrawer {
   const Scene &scene_;
   std::span<const float> voxels_;
   Solver solver_;
+  double voxel_error_;
   std::unique_ptr<ocl::Device> device_;  // before the renderer, which it must outlive
   std::unique_ptr<Renderer> renderer_;
 };
