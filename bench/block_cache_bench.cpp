@@ -11,7 +11,7 @@
 #include "bench/block_pairs.hpp"
 #include "core/stages/block_cache.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::size_t kNumVisible = 1u << 14;
@@ -136,4 +136,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

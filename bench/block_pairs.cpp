@@ -4,7 +4,7 @@
 
 #include "bench/scenes.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 BlockPairs make_block_pairs(Distribution distribution, std::size_t num_pairs,
                             std::size_t num_visible, std::uint32_t key_bits, std::uint32_t half) {
@@ -60,4 +60,4 @@ PassCounts pair_counts(std::size_t num_pairs, std::uint32_t pass) {
   return counts;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

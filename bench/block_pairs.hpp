@@ -8,7 +8,7 @@
 #include "bench/harness.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// The pairs of one pass and the blocks their dual grids need.
 struct BlockPairs {
@@ -29,4 +29,4 @@ FrameParams cube_params(std::uint32_t key_bits);
 /// Counts of a pass in which every one of num_pairs rays asks for one block.
 PassCounts pair_counts(std::size_t num_pairs, std::uint32_t pass);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

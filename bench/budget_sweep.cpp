@@ -11,7 +11,7 @@
 #include "core/base/error.hpp"
 #include "tools/isowave/render_stats.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -29,9 +29,8 @@ bool check_pictures(Renderer &renderer, const FrameReport &common,
   for (const Camera &camera : cameras) {
     for (const Camera &view : {camera, turned(camera)}) {
       std::uint32_t passes = 0;
-      const auto in_time = [&](const PassStats &) { return ++passes <= max_passes; };
-      FrameRequest request = seen_from(view, common.request);
-      request.on_pass = in_time;
+      FrameRequest request = seen_from(view, common.request());
+      request.on_pass = [&](const PassStats &) { return ++passes <= max_passes; };
       if (renderer.render(request).cancelled) return false;
       if (first) {
         expected.push_back(renderer.hits());
@@ -83,7 +82,7 @@ std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
   ocl::Device device(device_info);
   const Renderer ample(device, volume, options);
   const RendererOptions &chosen = ample.options();
-  MemoryRequest request{chosen.max_size.num_rays(), chosen.pipeline, chosen.grouping,
+  MemoryRequest request{chosen.size.num_rays(), chosen.pipeline, chosen.grouping,
                         chosen.group_size};
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
@@ -126,7 +125,7 @@ BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVo
       common.options = renderer.options();
     }
     if (check_pictures(renderer, common, cameras, max_passes, pictures)) {
-      budget.views = measure_views(renderer, cameras, common.request, common.rounds);
+      budget.views = measure_views(renderer, cameras, common.request(), common.rounds);
     } else if (sweep.budgets.empty()) {
       throw Error(
           "the largest budget, {} bytes, takes more than {} passes a frame: allow more by "
@@ -137,8 +136,8 @@ BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVo
     sweep.budgets.push_back(std::move(budget));
   }
   if (with_floor) {
-    common.floor = measure_floor(device_info, volume, common.options, cameras,
-                                 common.request.isovalue, common.rounds, pictures.front());
+    common.floor = measure_floor(device_info, volume, common.options, cameras, common.isovalue,
+                                 common.rounds, pictures.front());
   }
   sweep.common = std::move(common);
   return sweep;
@@ -178,4 +177,4 @@ ordered_json to_json(const BudgetSweep &sweep) {
   return json;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

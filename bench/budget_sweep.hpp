@@ -8,7 +8,7 @@
 
 #include "bench/frame_report.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 struct BudgetTimes {
   std::uint64_t bytes = 0;
@@ -41,4 +41,4 @@ void print_sweep(const BudgetSweep &sweep);
 /// What tools/charts reads.
 nlohmann::ordered_json to_json(const BudgetSweep &sweep);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

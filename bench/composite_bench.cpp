@@ -7,7 +7,7 @@
 #include "bench/scenes.hpp"
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::int64_t kEdge = 128;
@@ -94,4 +94,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

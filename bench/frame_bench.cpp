@@ -21,7 +21,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -77,11 +77,10 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   report.volume = options.volume;
   report.grid.info = volume.info;
   report.grid.bits_per_block = volume.bits_per_block;
+  report.isovalue = isovalue_of(options, volume);
+  report.voxel_pixels = options.renderer.voxel_pixels;
   report.options = tools::to_renderer_options(
       options.renderer, {options.size.at(0), options.size.at(1), options.samples});
-  report.request = {.isovalue = isovalue_of(options, volume),
-                    .size = report.options.max_size,
-                    .voxel_pixels = options.renderer.voxel_pixels};
   report.num_views = options.orbit;
   report.rounds = options.rounds;
   return report;
@@ -99,9 +98,9 @@ FrameReport measure(const Options &options, std::string command) {
     report.run_info = run_info(device);
     report.options = renderer.options();
     report.setup_ms = renderer.setup_ms();
-    renderer.render(seen_from(cameras.front(), report.request));
+    renderer.render(seen_from(cameras.front(), report.request()));
     first_hits = renderer.hits();
-    report.views = measure_views(renderer, cameras, report.request, options.rounds);
+    report.views = measure_views(renderer, cameras, report.request(), options.rounds);
     report.peak_bytes = device.ledger().peak();
     report.memory = tools::memory_json(device.ledger());
   }
@@ -109,11 +108,11 @@ FrameReport measure(const Options &options, std::string command) {
     ocl::Device device(device_info, true);
     Renderer renderer(device, volume, report.options);
     report.stage_clock = clock_name(device.timer().source());
-    report.stage_ms = measure_stages(device, renderer, cameras, report.request);
+    report.stage_ms = measure_stages(device, renderer, cameras, report.request());
   }
   if (options.resident) {
-    report.floor = measure_floor(device_info, volume, report.options, cameras,
-                                 report.request.isovalue, options.rounds, first_hits);
+    report.floor = measure_floor(device_info, volume, report.options, cameras, report.isovalue,
+                                 options.rounds, first_hits);
   }
   return report;
 }
@@ -163,8 +162,10 @@ void check_options(const CLI::App &app, const Options &options) {
 /// Prints one report or the other, and writes it where asked.
 void run(const CLI::App &app, Options options, const std::string &command) {
   check_options(app, options);
-  tools::want_levels(options.renderer, options.compression);
-  if (options.renderer.voxel_pixels > 0) options.resident = false;  // it draws the finest level
+  if (options.renderer.voxel_pixels > 0) {
+    tools::want_levels(options.compression);
+    options.resident = false;  // it draws the finest level
+  }
   nlohmann::ordered_json json;
   if (options.budgets.empty()) {
     const FrameReport report = measure(options, command);
@@ -217,15 +218,15 @@ void add_options(CLI::App &app, Options &options) {
 
 }  // namespace
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench
 
 int main(int argc, char **argv) {
   CLI::App app("Times whole frames of a volume: cold, warm and the next view, and each stage.",
                "frame_bench");
-  isowave::bench::Options options;
-  isowave::bench::add_options(app, options);
+  isowave::core::bench::Options options;
+  isowave::core::bench::add_options(app, options);
   app.callback([&] {
-    isowave::bench::run(app, options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
+    isowave::core::bench::run(app, options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
   });
-  return isowave::tools::run_program(app, argc, argv);
+  return isowave::core::tools::run_program(app, argc, argv);
 }

@@ -6,7 +6,7 @@
 #include "core/base/error.hpp"
 #include "core/stages/resident.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 std::vector<double> all_times(const std::vector<ViewTimes> &views,
                               std::vector<FrameStats> ViewTimes::*kind) {
@@ -21,11 +21,6 @@ Camera turned(Camera camera) {
   const glm::dquat turn = glm::angleAxis(glm::radians(1.0), glm::normalize(camera.up));
   camera.eye = camera.at + turn * (camera.eye - camera.at);
   return camera;
-}
-
-FrameRequest seen_from(const Camera &camera, FrameRequest request) {
-  request.camera = camera;
-  return request;
 }
 
 std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
@@ -58,11 +53,11 @@ FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVol
                          const std::vector<HitRecord> &first_hits) {
   ocl::Device device(device_info);
   FloorTimes times;
-  if (const auto obstacle = Resident::obstacle(device, volume, options.max_size)) {
+  if (const auto obstacle = Resident::obstacle(device, volume, options.size)) {
     times.why_not = *obstacle;
     return times;
   }
-  Resident resident(device, volume, options.max_size, options.solver);
+  Resident resident(device, volume, options.size, options.solver);
   resident.render(cameras.front(), isovalue);
   if (!same_hits(resident.hits(), first_hits)) {
     throw Error(
@@ -81,4 +76,4 @@ bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b)
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(HitRecord)) == 0;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

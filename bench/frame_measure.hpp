@@ -7,7 +7,7 @@
 
 #include "core/render/renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// One view, drawn once per round.
 struct ViewTimes {
@@ -27,11 +27,9 @@ std::vector<double> all_times(const std::vector<ViewTimes> &views,
 /// The camera one degree further around the vertical through the point it looks at.
 Camera turned(Camera camera);
 
-FrameRequest seen_from(const Camera &camera, FrameRequest request);
-
-/// request: of each frame, but for its camera.
-/// The renderer must have drawn a frame of the isovalue before: a driver may compile a kernel when
-/// it first runs, and an isovalue's first frame finds its blocks.
+/// request: its camera does not matter. The renderer must have drawn a frame of the isovalue
+/// before: a driver may compile a kernel when it first runs, and an isovalue's first frame finds
+/// its blocks.
 std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
                                      const FrameRequest &request, std::uint32_t rounds);
 
@@ -55,4 +53,4 @@ FloorTimes measure_floor(const ocl::DeviceInfo &device_info, const CompressedVol
 /// Every bit.
 bool same_hits(const std::vector<HitRecord> &a, const std::vector<HitRecord> &b);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -10,7 +10,7 @@
 #include "bench/run_info.hpp"
 #include "tools/isowave/renderer_options.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -74,7 +74,7 @@ struct Column {
 const Column kColumns[] = {
     {"hit %", "rays_hit_percent", 1,
      [](const FrameReport &report, const FrameStats &frame) {
-       return 100.0 * double(frame.rays_hit) / double(report.request.size.num_rays());
+       return 100.0 * double(frame.rays_hit) / double(report.options.size.num_rays());
      }},
     {"passes", "passes", 0,
      [](const FrameReport &, const FrameStats &frame) { return num_passes(frame); }},
@@ -194,8 +194,8 @@ void print_run(const FrameReport &report) {
   for (const auto &[name, value] : report.run_info) fmt::print("  {:<16}{}\n", name, value);
   fmt::print("  {:<16}{} x {} x {} {}, {} blocks, rate {}, isovalue {}\n", "volume", dims.x, dims.y,
              dims.z, to_string(report.grid.info.type), report.grid.block_count(),
-             report.grid.rate(), report.request.isovalue);
-  const ImageSize &size = report.request.size;
+             report.grid.rate(), report.isovalue);
+  const ImageSize &size = report.options.size;
   fmt::print("  {:<16}{} x {}, {} rays a pixel, {} views, {} rounds, N_spec up to {}\n", "frames",
              size.width, size.height, size.samples * size.samples, report.num_views, report.rounds,
              report.options.max_speculation);
@@ -229,13 +229,14 @@ ordered_json options_json(const FrameReport &report) {
       {"type", to_string(report.grid.info.type)},
       {"blocks", report.grid.block_count()},
       {"rate", report.grid.rate()},
-      {"isovalue", report.request.isovalue},
-      {"width", report.request.size.width},
-      {"height", report.request.size.height},
-      {"samples", report.request.size.samples},
+      {"isovalue", report.isovalue},
+      {"width", report.options.size.width},
+      {"height", report.options.size.height},
+      {"samples", report.options.size.samples},
       {"views", report.num_views},
       {"rounds", report.rounds}};
-  json.update(tools::renderer_options_json(report.options, report.request.voxel_pixels));
+  json.update(tools::renderer_options_json(report.options));
+  json["voxel_pixels"] = report.voxel_pixels;
   return json;
 }
 
@@ -290,4 +291,4 @@ ordered_json to_json(const FrameReport &report) {
   return json;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -11,14 +11,15 @@
 #include "bench/frame_measure.hpp"
 #include "bench/run_info.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 struct FrameReport {
   std::string command;
   std::vector<std::pair<std::string, std::string>> run_info;
   std::string volume;
   CompressedVolume grid;  ///< without its words
-  FrameRequest request;   ///< of each frame, but for its camera
+  float isovalue = 0;
+  double voxel_pixels = 0;
   RendererOptions options;
   std::uint32_t num_views = 0, rounds = 0;
   std::vector<ViewTimes> views;
@@ -29,6 +30,9 @@ struct FrameReport {
   double setup_ms = 0;
   std::uint64_t peak_bytes = 0;  ///< device memory
   nlohmann::ordered_json memory;
+
+  /// Of its frames, but for the camera.
+  FrameRequest request() const { return {.isovalue = isovalue, .voxel_pixels = voxel_pixels}; }
 };
 
 /// Per view and as medians over the views: see the legend it prints.
@@ -46,4 +50,4 @@ nlohmann::ordered_json floor_json(const FrameReport &report, const std::vector<V
 /// "1.23 (1.10..1.30)".
 std::string spread_text(const Spread &spread);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -4,7 +4,7 @@
 
 #include "bench/scenes.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -80,4 +80,4 @@ FrameSetup mixing_layer_setup(std::int64_t edge, ImageSize size, std::uint32_t m
   return setup;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

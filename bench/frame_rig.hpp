@@ -14,7 +14,7 @@
 #include "core/stages/zfp_decode.hpp"
 #include "core/view/frame.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// The scene and the limits of a rig.
 struct FrameSetup {
@@ -76,4 +76,4 @@ class WavefrontSnapshot {
   std::vector<uint> ray_block_ids_;
 };
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -8,7 +8,7 @@
 #include "bench/block_pairs.hpp"
 #include "core/stages/group.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::uint32_t kKeyBits = 18;  // blocks of 256^3 voxels
@@ -97,4 +97,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -8,7 +8,7 @@
 #include "core/base/error.hpp"
 #include "core/ocl/kernel.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -155,4 +155,4 @@ benchmark::internal::Benchmark *stage_benchmark(
       ->Unit(benchmark::kMillisecond);
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

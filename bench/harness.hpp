@@ -25,7 +25,7 @@
 #include "core/ocl/device.hpp"
 #include "core/render/renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// What no stage can beat, measured in the same run and by the clock that stages are timed with:
 /// OpenCL events where the driver reports them, else the wall clock.
@@ -140,4 +140,4 @@ void measure(benchmark::State &state, const Work &work, const Step &prepare, con
 benchmark::internal::Benchmark *stage_benchmark(
     const std::string &name, const std::function<void(benchmark::State &)> &body);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

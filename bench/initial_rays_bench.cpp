@@ -3,7 +3,7 @@
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::int64_t kEdge = 128;
@@ -47,4 +47,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -9,7 +9,7 @@
 #include "bench/scenes.hpp"
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::uint32_t kBlocksX = 640, kBlocksY = 360;
@@ -93,4 +93,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -10,7 +10,7 @@
 #include "core/stages/zfp_decode.hpp"
 #include "core/view/frame.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 FrameParams volume_params(const CompressedVolume &volume, float isovalue) {
@@ -100,4 +100,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

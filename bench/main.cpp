@@ -30,11 +30,11 @@ int run_benchmarks(const std::string &device, bool profiling, std::vector<std::s
   benchmark::Initialize(&argc, argv.data());
   if (benchmark::ReportUnrecognizedArguments(argc, argv.data())) return 1;
 
-  isowave::bench::Session session(isowave::ocl::choose_device(device), profiling);
-  for (const auto &[name, value] : isowave::bench::run_info(session.device())) {
+  isowave::core::bench::Session session(isowave::core::ocl::choose_device(device), profiling);
+  for (const auto &[name, value] : isowave::core::bench::run_info(session.device())) {
     benchmark::AddCustomContext(name, value);
   }
-  const isowave::bench::Ceiling &ceiling = session.ceiling();
+  const isowave::core::bench::Ceiling &ceiling = session.ceiling();
   benchmark::AddCustomContext("copy_GB_per_s",
                               fmt::format("{:.1f}", ceiling.bytes_per_second * 1e-9));
   benchmark::AddCustomContext("launch_us", fmt::format("{:.2f}", ceiling.launch_seconds * 1e6));
@@ -62,5 +62,5 @@ int main(int argc, char **argv) {
     }
     if (run_benchmarks(device, !no_events, std::move(arguments)) != 0) throw CLI::RuntimeError(1);
   });
-  return isowave::tools::run_program(app, argc, argv);
+  return isowave::core::tools::run_program(app, argc, argv);
 }

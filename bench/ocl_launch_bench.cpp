@@ -7,7 +7,7 @@
 #include "core/ocl/kernel.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -63,4 +63,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

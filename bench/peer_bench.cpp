@@ -32,7 +32,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -284,7 +284,7 @@ void compare(const Options &options, const std::string &command, const std::stri
 /// What can be told from the options alone.
 void check_options(const CLI::App &app, const Options &options) {
   if (!options.volume.empty()) tools::refuse_options(app, {"--dims"}, "leave it out, or --volume");
-  if (tools::is_zfp_name(options.volume))
+  if (is_zfp_name(options.volume))
     tools::refuse_options(app, {"--rate"}, "the volume is compressed already");
   tools::Outputs outputs;
   outputs.read_volume(options.volume);
@@ -314,22 +314,22 @@ void add_options(CLI::App &app, Options &options) {
 
 }  // namespace
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench
 
 int main(int argc, char **argv) {
   CLI::App app("Times a new isovalue, and further frames, beside VTK's Flying Edges and Embree.",
                "peer_bench");
-  isowave::bench::Options options;
+  isowave::core::bench::Options options;
   options.device = "cpu";
-  isowave::bench::add_options(app, options);
+  isowave::core::bench::add_options(app, options);
   app.callback([&] {
     if (options.side.empty()) {
-      isowave::bench::check_options(app, options);
-      isowave::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
-                              argv[0]);
+      isowave::core::bench::check_options(app, options);
+      isowave::core::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
+                                    argv[0]);
     } else {
-      isowave::bench::serve(options);
+      isowave::core::bench::serve(options);
     }
   });
-  return isowave::tools::run_program(app, argc, argv);
+  return isowave::core::tools::run_program(app, argc, argv);
 }

@@ -26,7 +26,7 @@
 #include "core/base/error.hpp"
 #include "core/volume/volume.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -265,4 +265,4 @@ std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &
       medium_quality ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_LOW);
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -7,7 +7,7 @@
 #include "bench/peer_sides.hpp"
 #include "core/render/renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -16,24 +16,22 @@ class RendererSide : public PeerSide {
   RendererSide(const CompressedVolume &volume, const Camera &camera, ImageSize size,
                PipelineKind pipeline, const std::string &device)
       : camera_(camera),
-        size_(size),
         device_(ocl::choose_device(device)),
-        renderer_(device_, volume, {.max_size = size, .pipeline = pipeline}) {}
+        renderer_(device_, volume, {.size = size, .pipeline = pipeline}) {}
 
   Measured draw(float isovalue) override {
     Measured measured;
     Stopwatch watch;
-    renderer_.render({camera_, isovalue, size_});
+    renderer_.render({camera_, isovalue});
     watch.lap(measured, "new_kept");
-    renderer_.render({camera_, previous_, size_});
+    renderer_.render({camera_, previous_});
     renderer_.clear_cache();
     watch = {};
-    measured["hit_count"] =
-        static_cast<double>(renderer_.render({camera_, isovalue, size_}).rays_hit);
+    measured["hit_count"] = static_cast<double>(renderer_.render({camera_, isovalue}).rays_hit);
     watch.lap(measured, "new");
-    renderer_.render({camera_, isovalue, size_});
+    renderer_.render({camera_, isovalue});
     watch.lap(measured, "warm");
-    renderer_.render({turned(camera_), isovalue, size_});
+    renderer_.render({turned(camera_), isovalue});
     watch.lap(measured, "next");
     measured["device_byte_count"] = static_cast<double>(device_.ledger().peak());
     previous_ = isovalue;
@@ -42,7 +40,6 @@ class RendererSide : public PeerSide {
 
  private:
   Camera camera_;
-  ImageSize size_;
   float previous_ = 0;
   ocl::Device device_;
   Renderer renderer_;
@@ -56,4 +53,4 @@ std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Came
   return std::make_unique<RendererSide>(volume, camera, size, pipeline, device);
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -13,7 +13,7 @@
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// Name -> value: ms; ms of processor time, of all threads, by names that end in _cpu_ms; counts by
 /// names that end in _count. A machine that others use as well stretches the one and hardly the
@@ -65,4 +65,4 @@ std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Came
                                              ImageSize size, PipelineKind pipeline,
                                              const std::string &device);
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

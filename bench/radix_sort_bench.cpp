@@ -7,7 +7,7 @@
 #include "bench/scenes.hpp"
 #include "core/stages/radix_sort.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 struct SortInput {
@@ -77,4 +77,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

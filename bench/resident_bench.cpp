@@ -5,7 +5,7 @@
 #include "core/stages/resident.hpp"
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::int64_t kEdge = 256;
@@ -43,4 +43,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

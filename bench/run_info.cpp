@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <ctime>
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 std::string clock_name(ocl::TimerSource source) {
   switch (source) {
@@ -56,4 +56,4 @@ std::string utc_now() {
   return text;
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -8,7 +8,7 @@
 
 #include "core/ocl/device.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// Name -> value: device, driver, platform, clock, compiler, commit.
 std::vector<std::pair<std::string, std::string>> run_info(ocl::Device &device);
@@ -29,4 +29,4 @@ nlohmann::ordered_json spread_json(const Spread &spread);
 /// "2026-11-21T09:30:00Z": now.
 std::string utc_now();
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -7,7 +7,7 @@
 #include "bench/scenes.hpp"
 #include "core/stages/scan.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 /// A table such as the stages scan: one entry per tile of a compaction.
@@ -108,4 +108,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

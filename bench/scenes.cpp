@@ -5,9 +5,9 @@
 #include <span>
 #include <utility>
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 namespace {
 
@@ -65,4 +65,4 @@ void Random::shuffle(std::vector<std::uint32_t> &entries) {
   for (std::size_t i = entries.size(); i > 1; --i) std::swap(entries[i - 1], entries[below(i)]);
 }
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

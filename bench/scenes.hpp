@@ -6,7 +6,7 @@
 
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 
 /// mixing_layer in an edge^3 cube, compressed at `rate` bits per voxel; its surface is at 0.5. Kept
 /// for the rest of the run.
@@ -31,4 +31,4 @@ class Random {
   std::uint64_t state_;
 };
 
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -5,7 +5,7 @@
 #include "bench/scenes.hpp"
 #include "core/stages/shade.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::int64_t kEdge = 128;
@@ -43,4 +43,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

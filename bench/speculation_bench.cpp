@@ -6,7 +6,7 @@
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 constexpr std::int64_t kEdge = 128;
@@ -35,4 +35,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -4,7 +4,7 @@
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 struct TraverseInput : FrameRig {
@@ -66,4 +66,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -7,7 +7,7 @@
 #include "bench/scenes.hpp"
 #include "core/stages/zfp_decode.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 /// A real stream of 128^3 voxels, eight times over: as many blocks as 256^3 voxels have.
@@ -106,4 +106,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -4,10 +4,10 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 #include "core/zfp/zfp_encode.hpp"
 
-namespace isowave::bench {
+namespace isowave::core::bench {
 namespace {
 
 /// As much as compress() hands to a device at once.
@@ -69,4 +69,4 @@ const bool kRegistered = [] {
 }();
 
 }  // namespace
-}  // namespace isowave::bench
+}  // namespace isowave::core::bench

@@ -6,7 +6,7 @@
 
 #include "core/base/parallel_for.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -200,4 +200,4 @@ Accuracy judge_frame(const HitOracle &oracle, const FrameParams &frame,
   });
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

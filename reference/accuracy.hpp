@@ -10,7 +10,7 @@
 #include "kernels_cl/portable/grid_dda.h"
 #include "reference/hit_oracle.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A hit closer than this to the oracle's along the ray is the same hit [voxels]. Only what lies
 /// beyond counts as missed or false; what lies within shows in the distances.
@@ -86,4 +86,4 @@ using JudgeRay = std::function<void(const Ray &ray, const HitRecord &hit, Accura
 Accuracy judge_rays(const FrameParams &frame, std::span<const HitRecord> hits,
                     const JudgeRay &judge_ray);
 
-}  // namespace isowave
+}  // namespace isowave::core

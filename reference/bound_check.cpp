@@ -7,7 +7,7 @@
 #include "kernels_cl/portable/grid_dda.h"
 #include "reference/accuracy.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -55,4 +55,4 @@ BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame,
   return sum;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

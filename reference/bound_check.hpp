@@ -9,7 +9,7 @@
 #include "kernels_cl/portable/shared_types.h"
 #include "reference/hit_oracle.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct BoundTally {
   std::uint64_t hits = 0;       ///< pixels with a hit within a finite bound
@@ -26,4 +26,4 @@ struct BoundTally {
 BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame,
                         std::span<const HitRecord> drawn, std::span<const float> bounds);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "reference/embree_reach.hpp"
 #include "reference/embree_scene.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -320,4 +320,4 @@ std::array<double, 3> CellOracle::gradient(const std::array<double, 3> &point) c
   return result;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -26,7 +26,7 @@
 
 #include "reference/hit_oracle.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class EmbreeScene;
 
@@ -73,4 +73,4 @@ class CellOracle final : public HitOracle {
   std::unique_ptr<EmbreeScene> scene_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

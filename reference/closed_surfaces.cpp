@@ -5,7 +5,7 @@
 
 #include "core/volume/pyramid.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -91,4 +91,4 @@ GridLevels surface_levels(const ClosedSurface &surface, std::size_t num_levels) 
   return levels;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 
 #include "core/view/frame.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct ClosedSurface {
   const char *name;
@@ -36,4 +36,4 @@ struct GridLevels {
 /// num_levels: by downsample().
 GridLevels surface_levels(const ClosedSurface &surface, std::size_t num_levels);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace isowave {
+namespace isowave::core {
 
 double farthest_plane(const std::array<double, 3> &eye, const std::array<std::uint32_t, 3> &dims) {
   double farthest = 0;
@@ -28,4 +28,4 @@ std::string out_of_reach(const std::array<double, 3> &eye,
       farthest_plane(eye, dims), kEmbreeReach);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-namespace isowave {
+namespace isowave::core {
 
 /// Bounds are grown by this much on each side [voxels]: a power of two, so that voxel +- margin is
 /// exact.
@@ -31,4 +31,4 @@ bool within_embree_reach(const std::array<double, 3> &eye,
 std::string out_of_reach(const std::array<double, 3> &eye,
                          const std::array<std::uint32_t, 3> &dims);
 
-}  // namespace isowave
+}  // namespace isowave::core

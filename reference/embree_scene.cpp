@@ -4,7 +4,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 RTCRayHit to_embree(const OracleRay &ray) {
   RTCRayHit result{};
@@ -49,4 +49,4 @@ void EmbreeScene::check(const char *what) const {
               code == RTC_ERROR_OUT_OF_MEMORY ? ", out of memory" : "");
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 
 #include "reference/hit_oracle.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The ray, rounded to float32, from t = 0 to infinity; nothing hit yet.
 RTCRayHit to_embree(const OracleRay &ray);
@@ -33,4 +33,4 @@ class EmbreeScene {
   RTCScene scene_ = nullptr;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -6,7 +6,7 @@
 #include <array>
 #include <limits>
 
-namespace isowave {
+namespace isowave::core {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -35,4 +35,4 @@ class HitOracle {
   virtual std::array<double, 3> gradient(const std::array<double, 3> &point) const = 0;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "reference/embree_reach.hpp"
 #include "reference/embree_scene.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -462,4 +462,4 @@ Accuracy judge_frame(const MeshOracle &oracle, const FrameParams &frame,
   });
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -34,7 +34,7 @@
 
 #include "reference/accuracy.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Triangles that share vertices by index. Index space. The outside is on the side from which they
 /// are counter-clockwise.
@@ -97,4 +97,4 @@ void judge(const MeshOracle &oracle, const FrameParams &frame, const Ray &ray, c
 Accuracy judge_frame(const MeshOracle &oracle, const FrameParams &frame,
                      std::span<const HitRecord> hits);
 
-}  // namespace isowave
+}  // namespace isowave::core

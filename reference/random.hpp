@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <random>
 
-namespace isowave {
+namespace isowave::core {
 
 class Random {
  public:
@@ -35,4 +35,4 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

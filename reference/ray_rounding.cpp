@@ -6,7 +6,7 @@
 
 #include "reference/accuracy.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, ImageSize size,
                                  std::span<const HitRecord> hits) {
@@ -35,4 +35,4 @@ std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, I
   return distances;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Distance of each hit point from the exact ray of its pixel, computed in double [voxels]; nothing
 /// for pixels without a hit. hits [height * width] of make_frame_params(info, camera, size, ...).
@@ -16,4 +16,4 @@ namespace isowave {
 std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, ImageSize size,
                                  std::span<const HitRecord> hits);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -367,4 +367,4 @@ std::optional<double> first_change_of_cubic(const std::array<double, 4> &b) {
   return answer.s;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

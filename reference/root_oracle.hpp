@@ -15,7 +15,7 @@
 
 #include "reference/hit_oracle.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class RootOracle final : public HitOracle {
  public:
@@ -42,4 +42,4 @@ class RootOracle final : public HitOracle {
 /// inside), none if it never does. Exact, placed to double precision.
 std::optional<double> first_change_of_cubic(const std::array<double, 4> &coefficients);
 
-}  // namespace isowave
+}  // namespace isowave::core

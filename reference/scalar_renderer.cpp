@@ -12,7 +12,7 @@
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -233,4 +233,4 @@ std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
   });
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

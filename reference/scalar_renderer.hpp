@@ -10,7 +10,7 @@
 #include "core/stages/solvers.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// voxels   [nz][ny][nx] decoded values, x fastest (decode_with_libzfp).
 /// threads  0: one per core.
@@ -51,4 +51,4 @@ struct CellSegment {
 void append_segments(const FrameParams &frame, std::span<const float> voxels, const Ray &ray,
                      std::vector<CellSegment> &segments);
 
-}  // namespace isowave
+}  // namespace isowave::core

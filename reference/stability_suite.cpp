@@ -11,7 +11,7 @@
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -575,4 +575,4 @@ bool passes(const CaseResult &result) {
   return result.failures() == 0 && quantiles(result.accuracy.residual).p99 <= kResidualLimit;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -11,7 +11,7 @@
 #include "kernels_cl/portable/grid_dda.h"
 #include "reference/accuracy.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// One field and the rays that are shot at it. Index space.
 struct StabilityScene {
@@ -49,4 +49,4 @@ CaseResult run_case(const StabilityCase &stability_case, Solver solver);
 inline constexpr double kResidualLimit = 1e-4;
 bool passes(const CaseResult &result);
 
-}  // namespace isowave
+}  // namespace isowave::core

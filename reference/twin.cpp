@@ -2,7 +2,7 @@
 
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -25,9 +25,9 @@ void add_offset(const CompressedVolume &level, const ValueOffset &offset,
 
 Twin::Twin(const CompressedVolume &volume, double voxel_pixels, double voxel_error,
            FieldBound bound)
-    : max_pixel_error_(voxel_pixels) {
+    : voxel_pixels_(voxel_pixels) {
   check_voxel_pixels(voxel_pixels);
-  if (voxel_pixels > 0) check_levels(volume);
+  if (voxel_pixels > 0) check_has_levels(volume);
   for (const CompressedVolume *level : levels_of(volume, voxel_pixels > 0)) {
     const double level_error = voxel_error_of(voxel_error, levels_.size());
     levels_.push_back(level->info);
@@ -42,8 +42,8 @@ Twin::Twin(const CompressedVolume &volume, double voxel_pixels, double voxel_err
 
 std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float isovalue,
                                     Solver solver) const {
-  return render_scalar_levels(make_level_frames(levels_, camera, size, isovalue, max_pixel_error_),
+  return render_scalar_levels(make_level_frames(levels_, camera, size, isovalue, voxel_pixels_),
                               voxels_, solver);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

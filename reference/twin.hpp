@@ -9,13 +9,12 @@
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class Twin {
  public:
-  /// Decodes the volume, and its coarser levels where voxel_pixels, as FrameRequest's, is not
-  /// 0. voxel_error, bound: as FrameRequest's. Throws
-  /// Error: what check_levels() throws.
+  /// Decodes the volume, and its coarser levels where voxel_pixels is not 0. The arguments are
+  /// those of FrameRequest. Throws Error as Renderer does.
   explicit Twin(const CompressedVolume &volume, double voxel_pixels = 0, double voxel_error = 0,
                 FieldBound bound = FieldBound::kNone);
 
@@ -24,9 +23,9 @@ class Twin {
                                 Solver solver = kDefaultSolver) const;
 
  private:
-  double max_pixel_error_;
+  double voxel_pixels_;
   std::vector<VolumeInfo> levels_;
   std::vector<std::vector<float>> voxels_;  ///< of each level
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "reference/random.hpp"
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -97,4 +97,4 @@ std::vector<WatertightResult> run_watertight(std::uint64_t num_rays, std::uint32
   return results;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

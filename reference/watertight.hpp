@@ -7,7 +7,7 @@
 
 #include "core/stages/solvers.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct WatertightResult {
   std::string surface;  ///< "sphere", "torus", "gyroid shell"; with ", levels" behind it
@@ -31,4 +31,4 @@ enum class RayBands {
 std::vector<WatertightResult> run_watertight(std::uint64_t num_rays, std::uint32_t seed,
                                              Solver solver, RayBands bands = RayBands::kOne);
 
-}  // namespace isowave
+}  // namespace isowave::core

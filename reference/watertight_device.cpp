@@ -10,7 +10,7 @@
 #include "reference/random.hpp"
 #include "reference/scalar_renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -156,7 +156,7 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
         compress(reader, CompressOptions{.rate = 16, .levels = with_levels ? kNumLevels : 1});
     const GridLevels levels = decoded_levels(volume, with_levels);
     Renderer renderer(device, volume,
-                      {.max_size = {kPicture, kPicture},
+                      {.size = {kPicture, kPicture},
                        .pipeline = pipeline,
                        .cache_slots = kCacheSlots,
                        .solver = solver,
@@ -166,7 +166,9 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
     Random random(seed);
     for (std::uint64_t view_id = 0; result.rays < num_rays; ++view_id) {
       const View view = random_view(levels, random);
-      renderer.render({view.camera, 0, view.size, with_levels ? view.voxel_pixels : 0});
+      renderer.render({.camera = view.camera,
+                       .size = view.size,
+                       .voxel_pixels = with_levels ? view.voxel_pixels : 0.0});
       judge_view(levels, view, renderer.hits(), (seed + view_id) * 0x9E3779B97F4A7C15u, result);
     }
     results.push_back(result);
@@ -174,4 +176,4 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
   return results;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

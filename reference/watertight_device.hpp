@@ -8,7 +8,7 @@
 #include "core/render/renderer.hpp"
 #include "reference/watertight.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// As run_watertight(), with rays of pictures instead of single ones, since only these go through
 /// whole pipelines: traversal by macrocells, the cache, decoding. Draws views of each surface until
@@ -20,4 +20,4 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
                                                 std::uint64_t num_rays, std::uint32_t seed,
                                                 Solver solver, RayBands bands = RayBands::kOne);
 
-}  // namespace isowave
+}  // namespace isowave::core

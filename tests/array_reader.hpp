@@ -10,7 +10,7 @@
 
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class ArrayReader : public VolumeReader {
  public:
@@ -49,4 +49,4 @@ class ArrayReader : public VolumeReader {
   std::vector<double> voxels_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::read_file;
@@ -83,4 +83,4 @@ TEST(AtomicFile, RefusesTargetsItCannotReplace) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -18,7 +18,7 @@
 #include "tests/stage_world.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr glm::uvec3 kDims(29, 25, 22);  // 8 x 7 x 6 blocks
@@ -340,4 +340,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, BlockCacheOnDevice, testing::ValuesIn(devices_
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

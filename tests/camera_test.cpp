@@ -13,7 +13,7 @@
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::AllOf;
@@ -170,4 +170,4 @@ TEST(OrbitCameras, FollowADirectionMatrix) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "tests/cubic_oracle.hpp"
 #include "tests/stage_support.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 Real largest_of(const Cubic &c) {
@@ -421,4 +421,4 @@ TEST(CellIntersect, CornersDifferIsHalfOpen) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "reference/stability_suite.hpp"
 #include "tests/frame_scene.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::sample;
@@ -278,4 +278,4 @@ TEST_F(CellOracleFrame, WithAnotherDepthIsWrong) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

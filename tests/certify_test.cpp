@@ -23,7 +23,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -220,14 +220,12 @@ class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Draws a frame, checks its bounds, and counts the pixels that keep max_surface_error. Returns
   /// the hits.
-  std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene, const Camera &camera,
-                                       float isovalue, double max_surface_error,
-                                       const Detail &detail = {}) {
-    const FrameRequest request = with_detail({camera, isovalue, kMedium}, detail);
+  std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene,
+                                       const FrameRequest &request, double max_surface_error) {
     renderer.render(request);
     std::vector<HitRecord> drawn = renderer.hits();
     const Certificate certificate = certify(renderer, scene.volume, request, drawn);
-    expect_kept(certificate, drawn, scene, camera, kMedium, isovalue);
+    expect_kept(certificate, drawn, scene, request.camera, kMedium, request.isovalue);
     const CertificateSummary summary = summarize(certificate, max_surface_error);
     certified_ += summary.num_certified;
     all_ += summary.num_pixels;
@@ -244,9 +242,9 @@ TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
   const Scene scene({9, 10, 11}, test::gyroid_field(9), {.rate = 6});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume,
-                    {.max_size = kSmall, .cache_slots = 20, .with_bounds = true});
+                    {.size = kSmall, .cache_slots = 20, .with_bounds = true});
   for (const FieldBound bound : {FieldBound::kLower, FieldBound::kUpper, FieldBound::kNone}) {
-    renderer.render({camera, 0.4f, kSmall, 0, 0, bound});
+    renderer.render({.camera = camera, .isovalue = 0.4f, .bound = bound});
     expect_same_hits(renderer.hits(), Twin(scene.volume, 0, 0, bound).render(camera, kSmall, 0.4f),
                      kSmall.width);
   }
@@ -262,11 +260,15 @@ TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
       ocl::Device device(GetParam());
       Renderer renderer(
           device, scene.volume,
-          {.max_size = kMedium, .stream = place, .with_levels = true, .with_bounds = true});
+          {.size = kMedium, .stream = place, .with_levels = true, .with_bounds = true});
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
       for (const double voxel_error : {0.0, 0.1}) {
         for (const FieldBound bound : {FieldBound::kUpper, FieldBound::kNone, FieldBound::kLower}) {
-          renderer.render({camera, 0.4f, kMedium, 4, voxel_error, bound});
+          renderer.render({.camera = camera,
+                           .isovalue = 0.4f,
+                           .voxel_pixels = 4,
+                           .voxel_error = voxel_error,
+                           .bound = bound});
           expect_same_hits(renderer.hits(),
                            Twin(scene.volume, 4, voxel_error, bound).render(camera, kMedium, 0.4f),
                            kMedium.width);
@@ -287,16 +289,15 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
             CompressOptions{.precision = BlockPrecision{.min_exponent = -8}}}) {
         const Scene scene(dims, field, options);
         Renderer renderer(device_, scene.volume,
-                          {.max_size = kMedium, .with_levels = true, .with_bounds = true});
+                          {.size = kMedium, .with_levels = true, .with_bounds = true});
         std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
         cameras.push_back(camera_along({20, 18, 16}, {0.3, 0.2, 1}));  // from within
         for (const Camera &camera : cameras) {
           for (const Detail &detail :
                {Detail{0, 0}, Detail{0, 0.02}, Detail{1.5, 0}, Detail{4, 0.02}}) {
-            const std::vector<HitRecord> drawn =
-                certify_frame(renderer, scene, camera, 0.3f, 10, detail);
-            // and the volume is drawn again
-            renderer.render(with_detail({camera, 0.3f, kMedium}, detail));
+            const FrameRequest request = with_detail({camera, 0.3f}, detail);
+            const std::vector<HitRecord> drawn = certify_frame(renderer, scene, request, 10);
+            renderer.render(request);  // and the volume is drawn again
             expect_same_hits(renderer.hits(), drawn, kMedium.width);
           }
         }
@@ -310,11 +311,12 @@ TEST_P(CertifyOnDevice, RealVolumes) {
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
     Renderer renderer(device_, scene.volume,
-                      {.max_size = kMedium, .with_levels = true, .with_bounds = true});
+                      {.size = kMedium, .with_levels = true, .with_bounds = true});
     for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
       for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
         for (const double voxel_pixels : {0.0, 2.0}) {
-          certify_frame(renderer, scene, camera, isovalue, 4, {voxel_pixels});
+          certify_frame(renderer, scene,
+                        {.camera = camera, .isovalue = isovalue, .voxel_pixels = voxel_pixels}, 4);
         }
       }
     }
@@ -329,12 +331,11 @@ TEST_P(CertifyOnDevice, FarAway) {
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye = camera.at + 700.0 * (camera.eye - camera.at);
   camera.fovy_deg /= 700;
-  Renderer renderer(device_, scene.volume, {.max_size = kMedium, .with_bounds = true});
-  renderer.render({camera, 80, kMedium});
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  renderer.render({camera, 80});
   const std::vector<HitRecord> drawn = renderer.hits();
-  const std::vector<double> slack =
-      expect_kept(certify(renderer, scene.volume, {camera, 80, kMedium}, drawn), drawn, scene,
-                  camera, kMedium, 80);
+  const std::vector<double> slack = expect_kept(
+      certify(renderer, scene.volume, {camera, 80}, drawn), drawn, scene, camera, kMedium, 80);
   ASSERT_GT(slack.size(), 500u);
   EXPECT_LT(slack[0], 3) << "farther off than rounding explains";
 }
@@ -348,12 +349,12 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
   const Scene scene({40, 40, 40}, noise,
                     {.precision = BlockPrecision{
                          .min_exponent = -6, .whole_numbers = true, .max_voxel_error = 0}});
-  Renderer renderer(device_, scene.volume, {.max_size = kMedium, .with_bounds = true});
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   for (const double x : {12.0, 19.0, 26.0}) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
       const Camera camera = camera_along({x, 20, 21}, direction);
       for (const float isovalue : {60.0f, 120.5f})
-        certify_frame(renderer, scene, camera, isovalue, 0.01);
+        certify_frame(renderer, scene, {camera, isovalue}, 0.01);
     }
   }
   EXPECT_GT(all_, 10000u);
@@ -367,10 +368,10 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
                                                                  .max_voxel_error = 0.015625}}}) {
     const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
     Renderer renderer(device_, scene.volume,
-                      {.max_size = kMedium, .with_levels = true, .with_bounds = true});
+                      {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const double voxel_pixels : {0.0, 2.0}) {
-      const FrameRequest request{camera, 0.3f, kMedium, voxel_pixels};
+      const FrameRequest request{.camera = camera, .isovalue = 0.3f, .voxel_pixels = voxel_pixels};
       renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
       const Certificate certificate = certify(renderer, scene.volume, request, drawn);
@@ -390,11 +391,10 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
 TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
   const Scene scene({33, 48, 40}, test::gyroid_field(24), {.rate = 4});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.max_size = kMedium, .with_bounds = true});
-  renderer.render({camera, 0.3f, kMedium});
+  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  renderer.render({camera, 0.3f});
   const std::vector<HitRecord> drawn = renderer.hits();
-  const std::vector<float> bounds =
-      certify(renderer, scene.volume, {camera, 0.3f, kMedium}, drawn).bounds;
+  const std::vector<float> bounds = certify(renderer, scene.volume, {camera, 0.3f}, drawn).bounds;
   const CellOracle truth(scene.source, {33, 48, 40}, 0.3f);
   const FrameParams frame = make_frame_params(scene.volume.info, camera, kMedium, 0.3f);
   const auto exceeded = [&](const std::function<float(float)> &change) {
@@ -415,13 +415,13 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
   const Scene scene(dims, test::sphere_field(dims),
                     {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.max_size = kMedium, .with_levels = true, .with_bounds = true});
+                    {.size = kMedium, .with_levels = true, .with_bounds = true});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye += 0.35 * (camera.eye - camera.at);  // so far that levels spare most blocks
   double voxel_pixels = -1, voxel_error = -1;
   for (const double max_surface_error : {0.00005, 0.05, 1.0, 4.0}) {
     const DetailChoice choice =
-        choose_detail(renderer, scene.volume, {camera, 0.5f, kMedium}, max_surface_error);
+        choose_detail(renderer, scene.volume, {camera, 0.5f}, max_surface_error);
     EXPECT_GE(choice.detail.voxel_pixels, voxel_pixels);
     if (choice.detail.voxel_pixels == voxel_pixels) {
       EXPECT_GE(choice.detail.voxel_error, voxel_error);
@@ -435,7 +435,7 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
       EXPECT_EQ(voxel_pixels, 0);
     } else {
       EXPECT_TRUE(choice.reachable);
-      const FrameRequest request = with_detail({camera, 0.5f, kMedium}, choice.detail);
+      const FrameRequest request = with_detail({camera, 0.5f}, choice.detail);
       renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
       const CertificateSummary summary =
@@ -452,9 +452,9 @@ TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   for (const std::uint32_t rate : {8u, 16u, 24u}) {
     const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
     Renderer renderer(device_, scene.volume,
-                      {.max_size = kMedium, .with_levels = true, .with_bounds = true});
+                      {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-    const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f, kMedium}, 1);
+    const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 1);
     EXPECT_TRUE(choice.reachable);
     EXPECT_EQ(choice.detail.voxel_error > 0, rate > 16) << "rate " << rate;
   }
@@ -466,15 +466,15 @@ TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
   const Scene scene({96, 96, 96}, test::gyroid_field(48),
                     {.precision = BlockPrecision{.min_exponent = -10}});
   Renderer renderer(device_, scene.volume,
-                    {.max_size = kMedium, .with_levels = true, .with_bounds = true});
+                    {.size = kMedium, .with_levels = true, .with_bounds = true});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f, kMedium}, 0.05);
+  const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
     return each.detail.voxel_pixels > 0.6 &&
            each.certified >= choice.tries[0].certified - kLostShare;
   })) << "the error would allow them";
   EXPECT_EQ(choice.detail.voxel_pixels, 0);
-  EXPECT_EQ(renderer.render(with_detail({camera, 0.3f, kMedium}, choice.detail)).last_level, 0u);
+  EXPECT_EQ(renderer.render(with_detail({camera, 0.3f}, choice.detail)).last_level, 0u);
 }
 
 /// Coarse levels reach a little out of the volume; where a ray is there at a border, on one side
@@ -485,17 +485,18 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
                     {.precision = BlockPrecision{.min_exponent = -10}});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   Renderer renderer(device_, scene.volume,
-                    {.max_size = kMedium, .with_levels = true, .with_bounds = true});
+                    {.size = kMedium, .with_levels = true, .with_bounds = true});
   for (const double voxel_pixels :
        {1.0, 1.4}) {  // a border among the places where rays enter, or in the surface
+    FrameRequest request{.camera = camera, .isovalue = 0.5f, .voxel_pixels = voxel_pixels};
     const auto hits_of = [&](FieldBound bound) {
-      renderer.render({camera, 0.5f, kMedium, voxel_pixels, 0, bound});
+      request.bound = bound;
+      renderer.render(request);
       return renderer.hits();
     };
     const auto lower = hits_of(FieldBound::kLower), upper = hits_of(FieldBound::kUpper),
                drawn = hits_of(FieldBound::kNone);
-    const Certificate certificate =
-        certify(renderer, scene.volume, {camera, 0.5f, kMedium, voxel_pixels}, drawn);
+    const Certificate certificate = certify(renderer, scene.volume, request, drawn);
     std::size_t num_hits = 0;
     for (std::size_t i = 0; i < drawn.size(); ++i) {
       const int met =
@@ -514,7 +515,7 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
 TEST_P(CertifyOnDevice, SmallerPicturesAreTheTwins) {
   const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.max_size = kMedium});
+  Renderer renderer(device_, scene.volume, {.size = kMedium});
   for (const ImageSize size : {kSmall, kMedium, ImageSize{7, 5}}) {
     renderer.render({camera, 0.3f, size});
     const auto expected = Twin(scene.volume).render(camera, size, 0.3f);
@@ -531,8 +532,8 @@ TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto bounds = [&](ImageSize size, double voxel_pixels) {
     Renderer renderer(device_, scene.volume,
-                      {.max_size = size, .with_levels = true, .with_bounds = true});
-    const FrameRequest request{camera, 0.3f, size, voxel_pixels};
+                      {.size = size, .with_levels = true, .with_bounds = true});
+    const FrameRequest request{.camera = camera, .isovalue = 0.3f, .voxel_pixels = voxel_pixels};
     renderer.render(request);
     return certify(renderer, scene.volume, request, renderer.hits()).bounds;
   };
@@ -551,84 +552,50 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto certify_with = [&](const CompressedVolume &volume, const RendererOptions &options) {
     Renderer renderer(device_, volume, options);
-    const FrameRequest request{camera, 0.3f, kSmall, options.with_levels ? 1.0 : 0.0};
+    const FrameRequest request{
+        .camera = camera, .isovalue = 0.3f, .voxel_pixels = options.with_levels ? 1.0 : 0.0};
     renderer.render(request);
     certify(renderer, volume, request, renderer.hits());
   };
   EXPECT_NO_THROW(
-      certify_with(scene.volume, {.max_size = kSmall, .with_levels = true, .with_bounds = true}));
+      certify_with(scene.volume, {.size = kSmall, .with_levels = true, .with_bounds = true}));
   CompressedVolume volume = scene.volume;
   volume.max_voxel_error.reset();
   volume.bounds = {};
-  EXPECT_THAT([&] { certify_with(volume, {.max_size = kSmall, .with_bounds = true}); },
+  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
               ThrowsMessage<Error>(HasSubstr("--no-verify")));
   volume = scene.volume;
   volume.coarser_levels[0].bounds = {};
-  EXPECT_NO_THROW(certify_with(volume, {.max_size = kSmall, .with_bounds = true}));
+  EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));
   EXPECT_THAT(
-      [&] { certify_with(volume, {.max_size = kSmall, .with_levels = true, .with_bounds = true}); },
+      [&] { certify_with(volume, {.size = kSmall, .with_levels = true, .with_bounds = true}); },
       ThrowsMessage<Error>(HasSubstr("--levels")));
   volume = scene.volume;
   volume.value_range = {-INFINITY, INFINITY};
-  EXPECT_THAT([&] { certify_with(volume, {.max_size = kSmall, .with_bounds = true}); },
+  EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
               ThrowsMessage<Error>(HasSubstr("range of values")));
   EXPECT_THAT(
       [&] {
-        certify_with(
-            scene.volume,
-            {.max_size = kSmall, .solver = solver_from_string("linear"), .with_bounds = true});
+        certify_with(scene.volume,
+                     {.size = kSmall, .solver = solver_from_string("linear"), .with_bounds = true});
       },
       ThrowsMessage<Error>(HasSubstr("bernstein")));
-  Renderer renderer(device_, scene.volume, {.max_size = kSmall, .with_bounds = true});
-  const FrameRequest request{camera, 0.3f, kSmall};
-  renderer.render(request);
+  Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true});
+  renderer.render({camera, 0.3f});
   const std::vector<HitRecord> hits = renderer.hits();
-  EXPECT_THROW(certify(renderer, scene.volume, {camera, 0.3f, kSmall, 1}, hits), Error);
-  EXPECT_THAT(
-      [&] {
-        certify(renderer, scene.volume, {camera, 0.3f, {6, 16}}, std::span(hits).first(9));
-      },
-      ThrowsMessage<Error>(HasSubstr("9 hits are not those of 96 rays")));
-  EXPECT_THROW(choose_detail(renderer, scene.volume, {camera, 0.3f, {13, 8}}, 1), Error);
-  for (const double bad : {0.0, -1.0, double{INFINITY}, double{NAN}})
-    EXPECT_THROW(choose_detail(renderer, scene.volume, request, bad), Error);
-  expect_same_hits(renderer.hits(), hits, kSmall.width);
-  Renderer plain(device_, scene.volume, {.max_size = kSmall});
-  plain.render(request);
-  EXPECT_THAT([&] { certify(plain, scene.volume, request, hits); },
-              ThrowsMessage<Error>(HasSubstr("without bounds")));
-}
-
-/// Whatever kind of frame comes between, and where it ends: the next is right.
-TEST_P(CertifyOnDevice, RequestsOfAllKindsInAnyOrder) {
-  const Scene scene({30, 27, 33}, test::gyroid_field(10), {.rate = 8});
-  const std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
-  Renderer renderer(
-      device_, scene.volume,
-      {.max_size = kMedium, .cache_slots = 100, .with_levels = true, .with_bounds = true});
-  const FieldBound bounds[] = {FieldBound::kNone, FieldBound::kUpper, FieldBound::kLower};
-  for (int i = 0; i < 24; ++i) {
-    SCOPED_TRACE(fmt::format("request {}", i));
-    FrameRequest request{
-        cameras[i % 2],        i % 3 == 0 ? 0.4f : 0.2f, i % 5 == 0 ? kSmall : kMedium,
-        i % 4 < 2 ? 0.0 : 3.0, i % 7 < 3 ? 0.05 : 0.0,   bounds[i / 2 % 3]};
-    FrameRequest thrown = request;
-    thrown.bound = bounds[i % 3];
-    thrown.voxel_error = 0.2;
-    thrown.on_pass = [](const PassStats &) -> bool { throw std::runtime_error("enough"); };
-    if (i % 2 == 0) {
-      EXPECT_THROW(renderer.render(thrown), std::runtime_error);
-    } else {
-      thrown.isovalue = NAN;
-      EXPECT_THROW(renderer.render(thrown), Error);
-    }
-    renderer.render(request);
-    expect_same_hits(renderer.hits(),
-                     Twin(scene.volume, request.voxel_pixels, request.voxel_error, request.bound)
-                         .render(request.camera, request.size, request.isovalue),
-                     request.size.width);
+  for (const FrameRequest &bad :
+       {FrameRequest{.camera = camera, .isovalue = 0.3f, .voxel_pixels = 1},
+        FrameRequest{.camera = camera, .isovalue = 0.3f, .voxel_error = -1},
+        FrameRequest{.camera = camera, .isovalue = 0.3f, .voxel_error = NAN},
+        FrameRequest{.camera = camera, .isovalue = 0.3f, .size = ImageSize{13, 8}}}) {
+    EXPECT_THROW(renderer.render(bad), Error);
+    EXPECT_EQ(renderer.render({camera, 0.3f}).passes[0].counts.requested_count, 0u)
+        << "the cache is as it was";
+    expect_same_hits(renderer.hits(), hits, kSmall.width);
   }
+  for (const double bad : {0.0, -1.0, double{INFINITY}, double{NAN}})
+    EXPECT_THROW(choose_detail(renderer, scene.volume, {camera, 0.3f}, bad), Error);
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -79,13 +79,14 @@ TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
   for (const char *option : {"--voxel-error", "--voxel-pixels", "--max-surface-error",
                              "--time-budget", "--tolerance", "--spacing"})
     expect_one_line_error(kRender + option + " inf", option);
-  for (const std::string option : {"--tolerance", "--tolerance-relative"}) {
-    for (const char *value : {"0", "-1"})
-      expect_one_line_error("convert " + kNucleon + " -o a.zfp " + option + " " + value,
-                            option + " " + value);
+  for (const char *value : {"0", "-1"}) {
+    expect_one_line_error("convert " + kNucleon + " -o a.zfp --tolerance " + value,
+                          std::string("a tolerance of ") + value + ": must be above 0");
+    expect_one_line_error("convert " + kNucleon + " -o a.zfp --tolerance-relative " + value,
+                          std::string("a relative tolerance of ") + value + ": must be above 0");
   }
   expect_one_line_error("convert " + kNucleon + " -o a.zfp --tolerance-relative 1e308",
-                        "--tolerance-relative 1e+308");
+                        "a relative tolerance of 1e+308");
   expect_one_line_error(kRender + "--levels 0", "--levels: ");
   expect_one_line_error(kRender + "--levels -1", "--levels: ");
   expect_one_line_error(kRender + "--orbit 99999999999", "--orbit");
@@ -310,4 +311,4 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -147,7 +147,7 @@ TEST_F(CliOutputs, FilesThatMayNotGrowAreAnErrorLikeOthers) {
   const std::size_t before = folder_.num_files();
   for (const auto &arguments : {"convert generate:gyroid_64x64x64_uint8 -o " + name("a.zfp"),
                                 "generate gyroid --dims 64 -o " + name("a.raw"),
-                                render(raw()) + "--stats " + name("a.json")}) {
+                                render(raw()) + "--orbit 1 --stats " + name("a.json")}) {
     const auto result = test::run_command("{ ( ulimit -f 0; " + test::isowave_program() + " " +
                                           arguments + " ) 2>&1; echo status $?; } | cat");
     EXPECT_THAT(result.out, testing::HasSubstr("cannot write")) << arguments;
@@ -199,4 +199,4 @@ TEST_F(CliOutputs, WhatCannotBeWrittenIsSaidBeforeAnyWork) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "core/io/png.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using nlohmann::json;
@@ -508,4 +508,4 @@ TEST(CliRender, UnwritableOutputsAreOneLine) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

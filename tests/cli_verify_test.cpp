@@ -10,7 +10,7 @@
 
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using nlohmann::json;
@@ -113,4 +113,4 @@ TEST(CliVerify, RefusesWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

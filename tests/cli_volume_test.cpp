@@ -9,7 +9,7 @@
 #include "core/zfp/zfp_stream.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_one_line_error;
@@ -220,4 +220,4 @@ TEST(Cli, FullDiskLeavesNothingAndKeepsTheOldFile) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -16,7 +16,7 @@
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::HasSubstr;
@@ -151,4 +151,4 @@ TEST_F(CompareProgram, ErrorsAreOneLine) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

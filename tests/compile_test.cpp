@@ -15,7 +15,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -59,14 +59,14 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (const double pixels : {options.with_levels ? 2.0 : 0.0, 0.0}) {
       for (const float isovalue :
            {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
-        renderer.render({cameras_[0], isovalue, options.max_size, pixels});
-        EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.max_size.num_pixels());
+        renderer.render({.camera = cameras_[0], .isovalue = isovalue, .voxel_pixels = pixels});
+        EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.size.num_pixels());
       }
     }
     if (options.with_kept_picture) {
       renderer.render({cameras_[0], 0.1f, halved(kSize, 1)});
       renderer.keep_picture();
-      renderer.enlarge_kept({cameras_[0], 0.1f, kSize});
+      renderer.enlarge_kept({cameras_[0], 0.1f});
       renderer.fill_from_kept();
     }
     device_.on_new_kernel({});
@@ -78,20 +78,20 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
   for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
     for (const StreamPlace stream : {StreamPlace::kDevice, StreamPlace::kHost}) {
-      expect_all_compiled({.max_size = kSize, .pipeline = pipeline, .stream = stream});
+      expect_all_compiled({.size = kSize, .pipeline = pipeline, .stream = stream});
       expect_all_compiled(
-          {.max_size = {20, 15, 2}, .pipeline = pipeline, .cache_slots = 8, .stream = stream});
+          {.size = {20, 15, 2}, .pipeline = pipeline, .cache_slots = 8, .stream = stream});
     }
   }
-  expect_all_compiled({.max_size = kSize, .with_levels = true});
-  expect_all_compiled({.max_size = kSize, .stream = StreamPlace::kHost, .with_levels = true});
-  expect_all_compiled({.max_size = kSize, .with_kept_picture = true});
+  expect_all_compiled({.size = kSize, .with_levels = true});
+  expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .with_levels = true});
+  expect_all_compiled({.size = kSize, .with_kept_picture = true});
 }
 
 TEST_P(CompileOnDevice, EverySolverAndGroupingIsCompiled) {
   for (const std::string_view solver : kSolverNames)
-    expect_all_compiled({.max_size = kSize, .solver = solver_from_string(solver)});
-  expect_all_compiled({.max_size = kSize,
+    expect_all_compiled({.size = kSize, .solver = solver_from_string(solver)});
+  expect_all_compiled({.size = kSize,
                        .pipeline = PipelineKind::kBlocks,
                        .group_size = 32,
                        .grouping = Grouping::kRadix,
@@ -103,25 +103,26 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
     ocl::Device device(GetParam());
     options.with_shading = shading;
     Renderer renderer(device, volume_, options);
-    renderer.render({cameras_[0], 0.1f, kSize});
+    renderer.render(
+        {.camera = cameras_[0], .isovalue = 0.1f, .voxel_pixels = options.with_levels ? 2.0 : 0.0});
     return stems_of(device);
   };
-  EXPECT_THAT(stems({.max_size = kSize}),
+  EXPECT_THAT(stems({.size = kSize}),
               ElementsAre("block_cache", "macrocells", "march", "zfp_decode"));
-  EXPECT_THAT(stems({.max_size = kSize}, true),
+  EXPECT_THAT(stems({.size = kSize}, true),
               ElementsAre("block_cache", "macrocells", "march", "shade", "zfp_decode"));
-  EXPECT_THAT(stems({.max_size = kSize, .with_kept_picture = true}),
+  EXPECT_THAT(stems({.size = kSize, .with_kept_picture = true}),
               ElementsAre("block_cache", "kept_picture", "macrocells", "march", "zfp_decode"));
   // One for frames that the finest level draws alone, one for others.
-  EXPECT_THAT(stems({.max_size = kSize, .with_levels = true}),
+  EXPECT_THAT(stems({.size = kSize, .with_levels = true}),
               ElementsAre("block_cache", "macrocells", "march x2", "zfp_decode"));
   // Where one work-group scans alone, a GPU gives it more work-items.
   const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";
-  EXPECT_THAT(stems({.max_size = kSize, .pipeline = PipelineKind::kBlocks}),
+  EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks}),
               ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect",
                           "macrocells", scan, "speculation", "traverse", "zfp_decode"));
   EXPECT_THAT(
-      stems({.max_size = kSize, .pipeline = PipelineKind::kBlocks, .grouping = Grouping::kRadix}),
+      stems({.size = kSize, .pipeline = PipelineKind::kBlocks, .grouping = Grouping::kRadix}),
       ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect", "macrocells",
                   "radix_sort", scan, "speculation", "traverse", "zfp_decode"));
 }
@@ -130,13 +131,13 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
 TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
   for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
     ocl::Device device(GetParam(), true);
-    Renderer renderer(device, volume_, {.max_size = kSize, .pipeline = pipeline});
+    Renderer renderer(device, volume_, {.size = kSize, .pipeline = pipeline});
     EXPECT_THAT(device.timer().collect(), IsEmpty());
     EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
-    const FrameStats first = renderer.render({cameras_[0], 0.1f, kSize});
+    const FrameStats first = renderer.render({cameras_[0], 0.1f});
     EXPECT_EQ(first.passes.front().counts.pass, 1u + (pipeline == PipelineKind::kBlocks ? 1u : 0u));
     renderer.clear_cache();
-    const FrameStats again = renderer.render({cameras_[0], 0.1f, kSize});
+    const FrameStats again = renderer.render({cameras_[0], 0.1f});
     ASSERT_EQ(first.passes.size(), again.passes.size());
     for (std::size_t i = 0; i < first.passes.size(); ++i) {
       EXPECT_EQ(first.passes[i].counts.decoded_count, again.passes[i].counts.decoded_count) << i;
@@ -237,4 +238,4 @@ TEST(CompileCommand, TheFirstOpeningSaysSoAndLeavesNothingToFrames) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -14,7 +14,7 @@
 #include "tests/stage_world.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr glm::uvec3 kDims(14, 14, 11);  // 4 x 4 x 3 blocks
@@ -201,4 +201,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, CompositeOnDevice, testing::ValuesIn(devices_u
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 
 #include "kernels_cl/portable/cell_intersect.h"
 
-namespace isowave {
+namespace isowave::core {
 
 using Real = long double;
 inline constexpr Real kUnit = 0x1p-24L;  ///< largest relative error of one float32 operation
@@ -68,4 +68,4 @@ inline FirstChange first_change_of(const Polynomial &f) {
   return change;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

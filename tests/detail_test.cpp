@@ -18,7 +18,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::camera_along;
@@ -209,15 +209,14 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     Renderer renderer(device_, volume, options);
     std::size_t at_border = 0;
     for (const Camera &camera : cameras) {
-      const auto expected = twin.render(camera, options.max_size, isovalue);
+      const auto expected = twin.render(camera, options.size, isovalue);
       for (int i = 0; i < 2; ++i) {
         const FrameStats stats =
-            renderer.render({camera, isovalue, options.max_size, voxel_pixels});
-        expect_same_hits(renderer.hits(), expected, options.max_size.width);
+            renderer.render({.camera = camera, .isovalue = isovalue, .voxel_pixels = voxel_pixels});
+        expect_same_hits(renderer.hits(), expected, options.size.width);
         EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
       }
-      const auto frames =
-          make_level_frames(infos, camera, options.max_size, isovalue, voxel_pixels);
+      const auto frames = make_level_frames(infos, camera, options.size, isovalue, voxel_pixels);
       EXPECT_GT(std::ranges::count_if(frames, draws), 1) << "no border is tested";
       at_border += num_border_hits(expected, frames);
     }
@@ -233,7 +232,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, LevelsOnDevice, testing::ValuesIn(devices_unde
 TEST_P(LevelsOnDevice, SmallFrameIsTheTwins) {
   const CompressedVolume volume = pyramid_of({9, 10, 11}, test::noise_field(8));
   EXPECT_GT(check(volume, {orbit_cameras(volume.info, 1)[0]}, 0.1f, 1.4,
-                  {.max_size = kSmall, .cache_slots = 20}),
+                  {.size = kSmall, .cache_slots = 20}),
             0u);
 }
 
@@ -260,7 +259,7 @@ TEST_P(LevelsOnDevice, EveryKindOfVolumeAndPlace) {
         for (const double voxel_pixels : {2.5, 6.0}) {
           at_border +=
               check(volume, cameras(volume), 0.4f, voxel_pixels,
-                    {.max_size = kMedium, .stream = place, .largest_stream_part = largest_part});
+                    {.size = kMedium, .stream = place, .largest_stream_part = largest_part});
         }
       }
     }
@@ -279,23 +278,23 @@ TEST_P(LevelsOnDevice, ActiveBlocksFarFromBorders) {
   std::vector<Camera> cameras = orbit_cameras(volume.info, 3);
   cameras.push_back(camera_along({12, 11, 10}, {1, 0.8, 0.6}));  // from within
   for (const double voxel_pixels : {1.2, 2.0, 3.0})
-    check(volume, cameras, 0.5f, voxel_pixels, {.max_size = kMedium});
+    check(volume, cameras, 0.5f, voxel_pixels, {.size = kMedium});
   // Coarser levels that are inside where this one is outside: every ray that comes to their border
   // hits there.
   volume.coarser_levels = pyramid_of(dims, ball({20, 20, 20}, 0, 1)).coarser_levels;
-  EXPECT_GT(check(volume, cameras, 0.5f, 1.2, {.max_size = kMedium}), 500u);
+  EXPECT_GT(check(volume, cameras, 0.5f, 1.2, {.size = kMedium}), 500u);
 }
 
 TEST_P(LevelsOnDevice, AnyCacheAndSpeculation) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const std::vector<Camera> cameras = orbit_cameras(volume.info, 2);
-  check(volume, cameras, 0.4f, 0.5, {.max_size = kTiny, .cache_slots = 8});
-  check(volume, cameras, 0.4f, 1, {.max_size = kSmall, .cache_slots = 13});
+  check(volume, cameras, 0.4f, 0.5, {.size = kTiny, .cache_slots = 8});
+  check(volume, cameras, 0.4f, 1, {.size = kSmall, .cache_slots = 13});
   for (const std::uint32_t slots : {64u, 300u}) {
     for (const std::uint32_t speculation : {1u, 7u, 64u}) {
       for (const bool per_ray : {false, true}) {
         check(volume, cameras, 0.4f, 3,
-              {.max_size = kMedium,
+              {.size = kMedium,
                .cache_slots = slots,
                .max_speculation = speculation,
                .per_ray_speculation = per_ray});
@@ -310,19 +309,17 @@ TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
   std::map<double, Twin> twins;
   for (const double voxel_pixels : {0.0, 3.0, 30.0})
     twins.try_emplace(voxel_pixels, volume, voxel_pixels);
-  Renderer renderer(device_, volume,
-                    {.max_size = kMedium, .cache_slots = 100, .with_levels = true});
+  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .with_levels = true});
   for (std::size_t last_pass = 1; last_pass < 12; ++last_pass) {
     std::size_t pass = 0;
     renderer.render({.camera = cameras[last_pass % 3],
                      .isovalue = last_pass % 2 ? 0.4f : 0.2f,
-                     .size = kMedium,
                      .voxel_pixels = 3,
                      .on_pass = [&](const PassStats &) { return ++pass < last_pass; }});
     for (const double voxel_pixels :
          last_pass % 2 ? std::array{3.0, 0.0, 30.0} : std::array{0.0, 30.0, 3.0}) {
-      // several levels, the finest or a coarse one alone
-      renderer.render({cameras[0], 0.4f, kMedium, voxel_pixels});
+      // Several levels, the finest or a coarse one alone.
+      renderer.render({.camera = cameras[0], .isovalue = 0.4f, .voxel_pixels = voxel_pixels});
       expect_same_hits(renderer.hits(), twins.at(voxel_pixels).render(cameras[0], kMedium, 0.4f),
                        kMedium.width);
     }
@@ -332,9 +329,10 @@ TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
 TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const Camera camera = orbit_cameras(volume.info, 1)[0];
-  Renderer renderer(device_, volume, {.max_size = kMedium, .with_levels = true});
+  Renderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
   for (const double voxel_error : {0.0, 0.3, 0.01}) {
-    renderer.render({camera, 0.4f, kMedium, 3, voxel_error});
+    renderer.render(
+        {.camera = camera, .isovalue = 0.4f, .voxel_pixels = 3, .voxel_error = voxel_error});
     expect_same_hits(renderer.hits(), Twin(volume, 3, voxel_error).render(camera, kMedium, 0.4f),
                      kMedium.width);
   }
@@ -344,8 +342,9 @@ TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
 TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const Camera camera = orbit_cameras(volume.info, 1)[0];
-  Renderer renderer(device_, volume, {.max_size = kMedium, .with_levels = true});
-  const FrameStats stats = renderer.render({camera, 0.4f, kMedium, 30, 0.02});
+  Renderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
+  const FrameStats stats = renderer.render(
+      {.camera = camera, .isovalue = 0.4f, .voxel_pixels = 30, .voxel_error = 0.02});
   const std::size_t level = stats.first_level;
   ASSERT_GT(level, 0u);
   ASSERT_EQ(stats.last_level, level);
@@ -362,9 +361,9 @@ TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
 /// A band's end is not the rays'.
 TEST_P(LevelsOnDevice, FramesAreCompleteAfterTheLastBand) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
-  Renderer renderer(device_, volume,
-                    {.max_size = kMedium, .cache_slots = 100, .with_levels = true});
-  const FrameStats stats = renderer.render({orbit_cameras(volume.info, 1)[0], 0.4f, kMedium, 3});
+  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .with_levels = true});
+  const FrameStats stats = renderer.render(
+      {.camera = orbit_cameras(volume.info, 1)[0], .isovalue = 0.4f, .voxel_pixels = 3});
   ASSERT_LT(stats.first_level, stats.last_level);
   for (std::size_t i = 1; i < stats.passes.size(); ++i) {
     EXPECT_GE(stats.passes[i].completed_percent, stats.passes[i - 1].completed_percent);
@@ -377,8 +376,9 @@ TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
   const CompressedVolume volume = pyramid_of({64, 64, 64}, test::gyroid_field(16));
   const Camera camera = camera_along({32, 32, -200}, {0, 0, 1}, {0, 1, 0}, 30);
   const auto num_decoded = [&](double voxel_pixels) {
-    Renderer renderer(device_, volume, {.max_size = kMedium, .with_levels = true});
-    const FrameStats stats = renderer.render({camera, 0.4f, kMedium, voxel_pixels});
+    Renderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
+    const FrameStats stats =
+        renderer.render({.camera = camera, .isovalue = 0.4f, .voxel_pixels = voxel_pixels});
     return std::accumulate(
         stats.passes.begin(), stats.passes.end(), std::uint64_t{0},
         [](std::uint64_t sum, const PassStats &pass) { return sum + pass.counts.decoded_count; });
@@ -398,10 +398,11 @@ TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
     std::uint64_t decoded = 0;
   };
   const auto draw = [&](ImageSize size, double voxel_pixels) {
-    Renderer renderer(device_, volume, {.max_size = size, .with_levels = true});
+    Renderer renderer(device_, volume, {.size = size, .with_levels = true});
     Picture picture;
-    for (const PassStats &pass : renderer.render({camera, 80, size, voxel_pixels}).passes)
-      picture.decoded += pass.counts.decoded_count;
+    const FrameStats stats =
+        renderer.render({.camera = camera, .isovalue = 80, .voxel_pixels = voxel_pixels});
+    for (const PassStats &pass : stats.passes) picture.decoded += pass.counts.decoded_count;
     picture.image = renderer.shade();
     return picture;
   };
@@ -420,24 +421,20 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
   const CompressedVolume volume = pyramid_of({20, 20, 20}, test::gyroid_field(10));
   CompressedVolume flat = volume;
   flat.coarser_levels.clear();
-  EXPECT_THAT([&] { Renderer(device_, flat, {.max_size = kSmall, .with_levels = true}); },
+  EXPECT_THAT([&] { Renderer(device_, flat, {.size = kSmall, .with_levels = true}); },
               ThrowsMessage<Error>(AllOf(HasSubstr("no levels of detail"), HasSubstr("--levels"))));
   EXPECT_THAT(
       [&] {
         Renderer(device_, volume,
-                 {.max_size = kSmall, .pipeline = PipelineKind::kBlocks, .with_levels = true});
+                 {.size = kSmall, .pipeline = PipelineKind::kBlocks, .with_levels = true});
       },
       ThrowsMessage<Error>(HasSubstr("pipeline blocks")));
-  Renderer with(device_, volume, {.max_size = kSmall, .with_levels = true}),
-      without(device_, volume, {.max_size = kSmall});
-  const Camera camera = orbit_cameras(volume.info, 1)[0];
-  for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
-    EXPECT_THROW(with.render({camera, 0.4f, kSmall, bad}), Error);
-  EXPECT_THAT(
-      [&] {
-        without.render({camera, 0.4f, kSmall, 1});
-      },
-      ThrowsMessage<Error>(HasSubstr("without levels of detail")));
+  Renderer renderer(device_, volume, {.size = kSmall, .with_levels = true});
+  FrameRequest request{.camera = orbit_cameras(volume.info, 1)[0], .isovalue = 0.4f};
+  for (const double bad : {-1.0, double{NAN}, double{INFINITY}}) {
+    request.voxel_pixels = bad;
+    EXPECT_THROW(renderer.render(request), Error) << bad;
+  }
 }
 
 // ---- what it is for
@@ -469,4 +466,4 @@ TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

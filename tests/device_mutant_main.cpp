@@ -8,7 +8,7 @@
 #include "reference/watertight_device.hpp"
 
 int main(int argc, char **argv) {
-  using namespace isowave;
+  using namespace isowave::core;
   ocl::Device device(ocl::choose_device());
   bool all_leak = argc > 1;
   for (int i = 1; i < argc; ++i) {

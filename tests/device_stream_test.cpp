@@ -19,7 +19,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::HasSubstr;
@@ -400,4 +400,4 @@ TEST_P(DeviceStreamOnDevice, SmallMemoryIsBooked) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "core/ocl/device.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::HasSubstr;
@@ -60,4 +60,4 @@ TEST(DevicesCommand, WrongEnvironmentStillListsTheDevices) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

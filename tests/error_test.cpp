@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 TEST(Error, IsOneLine) {
@@ -24,4 +24,4 @@ TEST(Error, OneLineKeepsTextAndEscapesTheRest) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using Rgb = std::array<int, 3>;
@@ -86,4 +86,4 @@ TEST(Flip, SizesMustAgree) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -12,7 +12,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TestVolume;
@@ -56,23 +56,23 @@ class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   std::vector<std::uint32_t> blocks_read(const TestVolume &volume, ImageSize size,
                                          const std::vector<Camera> &cameras) {
     Renderer ample(device_, volume.compressed,
-                   {.max_size = size,
+                   {.size = size,
                     .pipeline = PipelineKind::kBlocks,
                     .cache_slots = static_cast<std::uint32_t>(volume.compressed.block_count()),
                     .max_speculation = 1});
     std::vector<std::uint32_t> counts;
     for (const Camera &camera : cameras) {
       ample.clear_cache();
-      counts.push_back(num_decoded(ample.render({camera, kIsovalue, size})));
+      counts.push_back(num_decoded(ample.render({camera, kIsovalue})));
     }
     return counts;
   }
 
   Renderer renderer_of(const TestVolume &volume, ImageSize size, std::uint32_t slots,
                        std::uint32_t max_speculation = ISO_MAX_SPECULATION) {
-    return {device_, volume.compressed,
-            GetParam().with(
-                {.max_size = size, .cache_slots = slots, .max_speculation = max_speculation})};
+    return {
+        device_, volume.compressed,
+        GetParam().with({.size = size, .cache_slots = slots, .max_speculation = max_speculation})};
   }
 
   ocl::Device device_{GetParam().device};
@@ -106,8 +106,7 @@ TEST_P(FrameCacheOnDevice, ViewsThatFitAreDecodedOnce) {
       const std::uint32_t needed =
           std::accumulate(since.begin(), since.end(), 0u,
                           [&](std::uint32_t sum, std::size_t v) { return sum + needs[v]; });
-      const std::uint32_t decoded =
-          num_decoded(renderer.render({cameras[view], kIsovalue, renderer.options().max_size}));
+      const std::uint32_t decoded = num_decoded(renderer.render({cameras[view], kIsovalue}));
       if (last != drawn.rend() && needed <= slots) {
         EXPECT_EQ(decoded, 0u) << "all views since, this one included, read " << needed
                                << " blocks";
@@ -135,11 +134,9 @@ TEST_P(FrameCacheOnDevice, ViewsThatComeAgainAtOnceAreDecodedOnce) {
   for (int frame = 0; frame < 60; ++frame) {
     const std::size_t view = random() % cameras.size();
     SCOPED_TRACE(fmt::format("frame {}, view {}", frame, view));
-    const FrameStats first =
-        renderer.render({cameras[view], kIsovalue, renderer.options().max_size});
+    const FrameStats first = renderer.render({cameras[view], kIsovalue});
     num_decoding += num_decoded(first) != 0;
-    const FrameStats again =
-        renderer.render({cameras[view], kIsovalue, renderer.options().max_size});
+    const FrameStats again = renderer.render({cameras[view], kIsovalue});
     if (num_recycled(first) == 0) {
       EXPECT_EQ(num_decoded(again), 0u);
     }
@@ -160,19 +157,19 @@ TEST_P(FrameCacheOnDevice, ViewsThatDoNotFitAreNoWorseOffThanCold) {
   {
     Renderer ample =
         renderer_of(volume, size, static_cast<std::uint32_t>(volume.compressed.block_count()));
-    needed = num_decoded(ample.render({camera, kIsovalue, size}));
+    needed = num_decoded(ample.render({camera, kIsovalue}));
   }
   int num_kept = 0, num_emptied = 0;
   for (const double share : {0.97, 0.8, 0.6, 0.4}) {
     const auto slots = static_cast<std::uint32_t>(share * needed);
     Renderer renderer = renderer_of(volume, size, slots);
-    FrameStats last = renderer.render({camera, kIsovalue, size});
+    FrameStats last = renderer.render({camera, kIsovalue});
     const std::uint32_t cold = num_decoded(last);
     for (int frame = 0; frame < 4; ++frame) {
       SCOPED_TRACE(fmt::format("{} slots, {} blocks needed, warm frame {}", slots, needed, frame));
       const bool emptied =
           num_recycled(last) > slots / (GetParam().device.type == ocl::DeviceType::kCpu ? 2 : 8);
-      last = renderer.render({camera, kIsovalue, size});
+      last = renderer.render({camera, kIsovalue});
       test::expect_same_hits(renderer.hits(), expected, size.width);
       const PassCounts &first = last.passes.front().counts;
       if (emptied) {
@@ -193,4 +190,4 @@ INSTANTIATE_TEST_SUITE_P(Pipelines, FrameCacheOnDevice, testing::ValuesIn(pipeli
                          pipeline_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -21,7 +21,7 @@
 #include "reference/scalar_renderer.hpp"
 #include "tests/array_reader.hpp"
 
-namespace isowave::test {
+namespace isowave::core::test {
 
 /// Value of the voxel at integer coordinates.
 using VoxelFunction = std::function<double(const glm::dvec3 &voxel)>;
@@ -141,4 +141,4 @@ inline VoxelFunction plateau_field() {
   };
 }
 
-}  // namespace isowave::test
+}  // namespace isowave::core::test

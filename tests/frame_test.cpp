@@ -12,7 +12,7 @@
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// Columns and rows of pixels; end is behind the last.
@@ -151,4 +151,4 @@ TEST(Frame, ScreenBoxIsEmptyWhereNothingIsSeen) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

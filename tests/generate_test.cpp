@@ -1,6 +1,6 @@
 // Synthetic fields: closed forms, every type, the same bytes for any number of threads.
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 #include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TemporaryFolder;
@@ -193,4 +193,4 @@ TEST(Generate, RefusesBadRequests) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -16,7 +16,7 @@
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using Real = long double;
@@ -302,4 +302,4 @@ INSTANTIATE_TEST_SUITE_P(Dims, GridDdaWalks,
                                          glm::uvec3(2, 9, 33), glm::uvec3(2, 2, 2)));
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -16,7 +16,7 @@
 #include "tests/stage_world.hpp"
 #include "tests/test_groupings.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr glm::uvec3 kDims(29, 25, 22);  // 8 x 7 x 6 blocks
@@ -206,4 +206,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, GroupOnDevice, testing::ValuesIn(groupings_und
                          grouping_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -57,10 +57,10 @@ class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     SCOPED_TRACE(fmt::format("{} slots, window of {}", options.cache_slots, options.window_blocks));
     Renderer renderer = renderer_of(volume.compressed, options);
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
-      const auto expected = twin_hits(volume, camera, options.max_size, kIsovalue);
+      const auto expected = twin_hits(volume, camera, options.size, kIsovalue);
       for (int i = 0; i < 2; ++i) {
-        const FrameStats stats = renderer.render({camera, kIsovalue, options.max_size});
-        expect_same_hits(renderer.hits(), expected, options.max_size.width);
+        const FrameStats stats = renderer.render({camera, kIsovalue});
+        expect_same_hits(renderer.hits(), expected, options.size.width);
         EXPECT_EQ(stats.uploaded_blocks, num_decoded(stats));
         if (!volume.compressed.is_indexed()) {
           EXPECT_EQ(stats.uploaded_bytes,
@@ -81,8 +81,8 @@ TEST_P(HostStreamOnDevice, SmallFrameIsTheTwins) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Renderer renderer =
-      renderer_of(volume.compressed, {.max_size = kTiny, .cache_slots = 20, .window_blocks = 8});
-  renderer.render({camera, kIsovalue, kTiny});
+      renderer_of(volume.compressed, {.size = kTiny, .cache_slots = 20, .window_blocks = 8});
+  renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kTiny, kIsovalue), kTiny.width);
 }
 
@@ -92,23 +92,21 @@ TEST_P(HostStreamOnDevice, WindowsAndCaches) {
     if (is_slow() && slots != 200) continue;
     for (const std::uint32_t window : {8u, 33u, 0u, 5000u}) {
       if (is_slow() && window != 33) continue;
-      check(volume, {.max_size = slots < 64 ? kSmall : kMedium,
-                     .cache_slots = slots,
-                     .window_blocks = window});
+      check(volume,
+            {.size = slots < 64 ? kSmall : kMedium, .cache_slots = slots, .window_blocks = window});
     }
   }
 }
 
 TEST_P(HostStreamOnDevice, SmallBlocksOfLengthsOfTheirOwn) {
-  check(accurate_volume({9, 10, 11}, 0.01),
-        {.max_size = kTiny, .cache_slots = 20, .window_blocks = 8});
+  check(accurate_volume({9, 10, 11}, 0.01), {.size = kTiny, .cache_slots = 20, .window_blocks = 8});
 }
 
 TEST_P(HostStreamOnDevice, BlocksOfLengthsOfTheirOwn) {
   for (const double tolerance : {0.2, 1e-5}) {
     const TestVolume volume = accurate_volume({30, 27, 33}, tolerance);
     for (const std::uint32_t window : {8u, 0u, 5000u}) {
-      check(volume, {.max_size = kMedium, .cache_slots = 200, .window_blocks = window});
+      check(volume, {.size = kMedium, .cache_slots = 200, .window_blocks = window});
     }
   }
 }
@@ -116,27 +114,27 @@ TEST_P(HostStreamOnDevice, BlocksOfLengthsOfTheirOwn) {
 /// One dual grid for all rays, and one at a time through the window.
 TEST_P(HostStreamOnDevice, OneDualGridAtATime) {
   check(small_volume(),
-        {.max_size = kTiny, .cache_slots = 8, .max_speculation = 1, .window_blocks = 8});
-  if (!is_slow()) check(medium_volume(), {.max_size = kTiny, .cache_slots = 8, .window_blocks = 8});
+        {.size = kTiny, .cache_slots = 8, .max_speculation = 1, .window_blocks = 8});
+  if (!is_slow()) check(medium_volume(), {.size = kTiny, .cache_slots = 8, .window_blocks = 8});
 }
 
 TEST_P(HostStreamOnDevice, AwkwardRates) {
   for (const std::uint32_t rate : {1u, 5u, 32u}) {
     SCOPED_TRACE(rate);
     check(TestVolume({30, 27, 33}, test::gyroid_field(10), rate),
-          {.max_size = kSmall, .window_blocks = 50});
+          {.size = kSmall, .window_blocks = 50});
   }
 }
 
 TEST_P(HostStreamOnDevice, WarmFrameUploadsNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer = renderer_of(volume.compressed, {.max_size = kSmall});
-  EXPECT_GT(renderer.render({camera, kIsovalue, kSmall}).uploaded_blocks, 0u);
-  EXPECT_EQ(renderer.render({camera, kIsovalue, kSmall}).uploaded_blocks, 0u);
-  EXPECT_EQ(renderer.render({camera, kIsovalue, kSmall}).uploaded_bytes, 0u);
+  Renderer renderer = renderer_of(volume.compressed, {.size = kSmall});
+  EXPECT_GT(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
+  EXPECT_EQ(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
+  EXPECT_EQ(renderer.render({camera, kIsovalue}).uploaded_bytes, 0u);
   renderer.clear_cache();
-  EXPECT_GT(renderer.render({camera, kIsovalue, kSmall}).uploaded_blocks, 0u);
+  EXPECT_GT(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
 }
 
 TEST_P(HostStreamOnDevice, CancelledFrameLeavesNoTrace) {
@@ -144,20 +142,19 @@ TEST_P(HostStreamOnDevice, CancelledFrameLeavesNoTrace) {
   const auto cameras = orbit_cameras(volume.info(), 2);
   Renderer renderer =
       renderer_of(volume.compressed,
-                  {.max_size = kTiny, .cache_slots = 8, .max_speculation = 2, .window_blocks = 8});
+                  {.size = kTiny, .cache_slots = 8, .max_speculation = 2, .window_blocks = 8});
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
-    const FrameStats cancelled =
-        renderer.render({.camera = cameras[0],
-                         .isovalue = kIsovalue,
-                         .size = kTiny,
-                         .on_pass = [&](const PassStats &) { return ++calls < stop_after; }});
+    const FrameStats cancelled = renderer.render(
+        {.camera = cameras[0], .isovalue = kIsovalue, .on_pass = [&](const PassStats &) {
+           return ++calls < stop_after;
+         }});
     EXPECT_TRUE(cancelled.cancelled);
     EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u)
         << "else there was nothing to cancel";
     EXPECT_EQ(test::num_hits(renderer.hits()), cancelled.rays_hit);
-    renderer.render({cameras[1], kIsovalue, kTiny});
+    renderer.render({cameras[1], kIsovalue});
     expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kTiny, kIsovalue), kTiny.width);
   }
 }
@@ -168,8 +165,8 @@ TEST_P(HostStreamOnDevice, ProfilingChangesNothing) {
   ocl::Device device(GetParam().device, true);
   Renderer renderer(
       device, volume.compressed,
-      GetParam().with({.max_size = kSmall, .stream = StreamPlace::kHost, .window_blocks = 8}));
-  const FrameStats stats = renderer.render({camera, kIsovalue, kSmall});
+      GetParam().with({.size = kSmall, .stream = StreamPlace::kHost, .window_blocks = 8}));
+  const FrameStats stats = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   const bool uploads = std::ranges::any_of(
       stats.passes, [](const PassStats &pass) { return pass.stage_ms.contains("upload"); });
@@ -191,35 +188,32 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     SCOPED_TRACE(to_string(place));
     Renderer renderer(device_, opened,
-                      GetParam().with({.max_size = kMedium, .stream = place, .window_blocks = 50}));
-    renderer.render({cameras[0], kIsovalue, kMedium});
+                      GetParam().with({.size = kMedium, .stream = place, .window_blocks = 50}));
+    renderer.render({cameras[0], kIsovalue});
     expect_same_hits(renderer.hits(), expected, kMedium.width);
   }
   Renderer renderer =
-      renderer_of(opened, {.max_size = kMedium, .cache_slots = 200, .window_blocks = 50});
+      renderer_of(opened, {.size = kMedium, .cache_slots = 200, .window_blocks = 50});
   std::size_t passes = 0;
   const OnPass cut_after_one_pass = [&](const PassStats &) {
     if (++passes == 1) std::filesystem::resize_file(path, 100);
     return true;
   };
-  renderer.render({.camera = cameras[1],
-                   .isovalue = kIsovalue,
-                   .size = kMedium,
-                   .on_pass = cut_after_one_pass});
+  renderer.render({.camera = cameras[1], .isovalue = kIsovalue, .on_pass = cut_after_one_pass});
   EXPECT_EQ(std::filesystem::file_size(path), 100u);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     EXPECT_THAT(
-        [&] { Renderer(device_, opened, GetParam().with({.max_size = kMedium, .stream = place})); },
+        [&] { Renderer(device_, opened, GetParam().with({.size = kMedium, .stream = place})); },
         ThrowsMessage<Error>(HasSubstr("truncated while it was in use")));
   }
   EXPECT_THAT([&] { decode_with_libzfp(opened); }, ThrowsMessage<Error>(HasSubstr("truncated")));
-  renderer.render({cameras[0], kIsovalue, kMedium});
+  renderer.render({cameras[0], kIsovalue});
   expect_same_hits(renderer.hits(), expected, kMedium.width);
 }
 
 TEST_P(HostStreamOnDevice, WindowsBelowOneDualGridAreRefused) {
   const TestVolume volume = small_volume();
-  EXPECT_THAT([&] { renderer_of(volume.compressed, {.max_size = kTiny, .window_blocks = 7}); },
+  EXPECT_THAT([&] { renderer_of(volume.compressed, {.size = kTiny, .window_blocks = 7}); },
               ThrowsMessage<Error>(HasSubstr("a window of 7 blocks cannot be used: 8")));
 }
 
@@ -230,18 +224,18 @@ TEST_P(HostStreamOnDevice, SplitFramesAreTheTwins) {
   for (const std::uint32_t parts : {2u, 3u, 4u}) {
     SCOPED_TRACE(fmt::format("{} parts", parts));
     const std::uint64_t part_blocks = (volume.compressed.block_count() + parts - 1) / parts;
-    Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.max_size = kMedium,
-                                       .cache_slots = 300,
-                                       .largest_stream_part = part_blocks * 64 + 72}));
+    Renderer renderer(
+        device_, volume.compressed,
+        GetParam().with(
+            {.size = kMedium, .cache_slots = 300, .largest_stream_part = part_blocks * 64 + 72}));
     EXPECT_EQ(
         std::ranges::count(renderer.memory_plan().buffers, "zfp stream", &MemoryPlan::Buffer::name),
         parts);
-    renderer.render({camera, kIsovalue, kMedium});
+    renderer.render({camera, kIsovalue});
     expect_same_hits(renderer.hits(), expected, kMedium.width);
     EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());
   }
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

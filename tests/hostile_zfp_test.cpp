@@ -19,7 +19,7 @@
 #include "tests/volume_file.hpp"
 #include "tests/zfp_trailer_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -361,4 +361,4 @@ TEST_F(HostileZfp, AdviceCanBeFollowed) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

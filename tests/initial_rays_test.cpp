@@ -12,7 +12,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 class InitialRaysOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
@@ -59,4 +59,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, InitialRaysOnDevice, testing::ValuesIn(devices
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::HasSubstr;
@@ -45,4 +45,4 @@ TEST(InputFile, MissingShortAndTruncatedFilesAreOneLine) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

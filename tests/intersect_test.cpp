@@ -17,7 +17,7 @@
 #include "tests/stage_world.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// A hit within a block, with the moment in double.
@@ -338,4 +338,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, IntersectOnDevice, testing::ValuesIn(devices_u
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -38,16 +38,16 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   FrameStats check(const TestVolume &volume, const RendererOptions &options) {
     const Camera camera = orbit_cameras(volume.info(), 1)[0];
     Renderer renderer(device_, volume.compressed, GetParam().with(options));
-    const FrameStats stats = renderer.render({camera, kIsovalue, options.max_size});
-    expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.max_size, kIsovalue),
-                     options.max_size.width);
+    const FrameStats stats = renderer.render({camera, kIsovalue});
+    expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue),
+                     options.size.width);
     expect_consistent(stats, renderer.options());
     return stats;
   }
 
   /// The relations between the counts of one frame.
   static void expect_consistent(const FrameStats &stats, const RendererOptions &options) {
-    const std::uint64_t pixels = options.max_size.num_pixels();
+    const std::uint64_t pixels = options.size.num_pixels();
     ASSERT_FALSE(stats.passes.empty());
     std::uint64_t hits = 0;
     for (std::size_t i = 0; i < stats.passes.size(); ++i) {
@@ -97,7 +97,7 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
 
   static void expect_consistent_pairs(const PassCounts &c, const RendererOptions &options) {
     EXPECT_EQ(c.pair_slot_count, c.window_count * c.spec_count);
-    EXPECT_LE(c.pair_slot_count, options.max_size.num_pixels());
+    EXPECT_LE(c.pair_slot_count, options.size.num_pixels());
     EXPECT_LE(c.pair_count, c.pair_slot_count);
     EXPECT_LE(c.granted_count, c.pair_count);
     EXPECT_LE(c.visible_count, c.granted_count);
@@ -123,7 +123,7 @@ TEST_P(InvarianceOnDevice, SmallSpeculationLimits) {
   const TestVolume volume = small_volume();
   for (const std::uint32_t limit : {1u, 64u}) {
     SCOPED_TRACE(limit);
-    check(volume, {.max_size = kSmall, .max_speculation = limit});
+    check(volume, {.size = kSmall, .max_speculation = limit});
   }
 }
 
@@ -132,7 +132,7 @@ TEST_P(InvarianceOnDevice, SpeculationNeverNeedsMorePasses) {
   std::vector<std::size_t> num_passes;
   for (const std::uint32_t limit : {1u, 2u, 3u, 7u, 16u, 33u, 64u}) {
     SCOPED_TRACE(limit);
-    const FrameStats stats = check(volume, {.max_size = kMedium, .max_speculation = limit});
+    const FrameStats stats = check(volume, {.size = kMedium, .max_speculation = limit});
     EXPECT_EQ(total(stats, &PassCounts::decoded_count), total(stats, &PassCounts::requested_count));
     for (const PassStats &pass : stats.passes) {  // an ample cache: nobody waits for slots
       if (is_blocks()) {
@@ -152,7 +152,7 @@ TEST_P(InvarianceOnDevice, SpeculationNeverNeedsMorePasses) {
 /// ray on.
 TEST_P(InvarianceOnDevice, CacheOfEightSlots) {
   const TestVolume volume = small_volume();
-  const FrameStats ample = check(volume, {.max_size = kTiny, .max_speculation = 1});
+  const FrameStats ample = check(volume, {.size = kTiny, .max_speculation = 1});
   // A block or a ray's end in every pass (blocks) or every other (rays: what is asked for comes
   // with the next).
   const std::uint64_t steps =
@@ -161,7 +161,7 @@ TEST_P(InvarianceOnDevice, CacheOfEightSlots) {
   for (const std::uint32_t limit : {1u, 64u}) {
     SCOPED_TRACE(limit);
     const FrameStats stats =
-        check(volume, {.max_size = kTiny, .cache_slots = 8, .max_speculation = limit});
+        check(volume, {.size = kTiny, .cache_slots = 8, .max_speculation = limit});
     EXPECT_GT(total(stats, &PassCounts::requested_count), total(stats, &PassCounts::decoded_count))
         << "else this scene tests nothing";
     EXPECT_LE(stats.passes.size(), bound);
@@ -178,7 +178,7 @@ TEST_P(InvarianceOnDevice, CacheSizes) {
   for (const std::uint32_t slots : {16u, 64u, 200u, blocks, 4 * blocks}) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
     const ImageSize size = slots <= 64 ? kSmall : kMedium;
-    const FrameStats stats = check(volume, {.max_size = size, .cache_slots = slots});
+    const FrameStats stats = check(volume, {.size = size, .cache_slots = slots});
     const bool waited =
         total(stats, &PassCounts::requested_count) > total(stats, &PassCounts::decoded_count);
     if (is_blocks()) {
@@ -197,9 +197,9 @@ TEST_P(InvarianceOnDevice, ManyViewsThroughFewSlots) {
     if (is_slow() && slots != 13) continue;
     SCOPED_TRACE(fmt::format("{} slots", slots));
     Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.max_size = size, .cache_slots = slots}));
+                      GetParam().with({.size = size, .cache_slots = slots}));
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
-      expect_consistent(renderer.render({camera, kIsovalue, size}), renderer.options());
+      expect_consistent(renderer.render({camera, kIsovalue}), renderer.options());
       expect_same_hits(renderer.hits(), twin_hits(volume, camera, size, kIsovalue), size.width);
     }
   }
@@ -213,7 +213,7 @@ TEST_P(InvarianceOnDevice, SmallWorkGroups) {
     if (is_slow() && (group != 8 || !is_blocks())) continue;
     if (group > device_.capabilities().max_work_group_size) continue;
     SCOPED_TRACE(group);
-    check(volume, {.max_size = kSmall, .group_size = group});
+    check(volume, {.size = kSmall, .group_size = group});
   }
 }
 
@@ -223,9 +223,8 @@ TEST_P(InvarianceOnDevice, WorkGroupSizes) {
     if (is_slow() && group != 256) continue;  // 8: see SmallWorkGroups
     if (group > device_.capabilities().max_work_group_size) continue;
     SCOPED_TRACE(group);
-    check(volume, {.max_size = kMedium, .group_size = group});
-    check(volume,
-          {.max_size = kSmall, .cache_slots = 40, .max_speculation = 7, .group_size = group});
+    check(volume, {.size = kMedium, .group_size = group});
+    check(volume, {.size = kSmall, .cache_slots = 40, .max_speculation = 7, .group_size = group});
   }
 }
 
@@ -233,7 +232,7 @@ TEST_P(InvarianceOnDevice, ImageShapes) {
   const TestVolume volume = medium_volume();
   for (const ImageSize size : {ImageSize{1, 1}, {1, 97}, {513, 1}, {63, 65}, {7, 3}}) {
     SCOPED_TRACE(fmt::format("{}x{}", size.width, size.height));
-    check(volume, {.max_size = size});
+    check(volume, {.size = size});
   }
 }
 
@@ -242,10 +241,10 @@ TEST_P(InvarianceOnDevice, ImageShapes) {
 TEST_P(InvarianceOnDevice, WarmCacheDecodesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed, GetParam().with({.max_size = kSmall}));
-  const FrameStats cold = renderer.render({camera, kIsovalue, kSmall});
+  Renderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
+  const FrameStats cold = renderer.render({camera, kIsovalue});
   const auto hits = renderer.hits();
-  const FrameStats warm = renderer.render({camera, kIsovalue, kSmall});
+  const FrameStats warm = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), hits, kSmall.width);
   EXPECT_GT(total(cold, &PassCounts::decoded_count), 0u);
   EXPECT_EQ(total(warm, &PassCounts::requested_count), 0u);
@@ -270,12 +269,12 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
   SCOPED_TRACE(fmt::format("seed {}", kSeed));
   for (const std::uint32_t slots : {0u, 150u}) {
     Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.max_size = kFrame, .cache_slots = slots}));
+                      GetParam().with({.size = kFrame, .cache_slots = slots}));
     std::shuffle(frames.begin(), frames.end(), random);
     for (const Frame &frame : frames) {
       SCOPED_TRACE(
           fmt::format("{} slots, isovalue {}, view {}", slots, isovalues[frame.iso], frame.view));
-      expect_consistent(renderer.render({cameras[frame.view], isovalues[frame.iso], kFrame}),
+      expect_consistent(renderer.render({cameras[frame.view], isovalues[frame.iso]}),
                         renderer.options());
       expect_same_hits(renderer.hits(),
                        twin_hits(volume, cameras[frame.view], kFrame, isovalues[frame.iso]),
@@ -287,16 +286,15 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
 TEST_P(InvarianceOnDevice, MemoryIsFixedBeforeTheFirstFrame) {
   const TestVolume volume = small_volume();
   Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.max_size = kTiny, .cache_slots = 20}));
+                    GetParam().with({.size = kTiny, .cache_slots = 20}));
   const ocl::MemoryLedger &ledger = device_.ledger();
   const std::uint64_t current = ledger.current(), peak = ledger.peak();
   EXPECT_GT(current, 0u);
   for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
-    renderer.render(
-        {.camera = camera, .isovalue = kIsovalue, .size = kTiny, .on_pass = [&](const PassStats &) {
-           EXPECT_EQ(ledger.current(), current);
-           return true;
-         }});
+    renderer.render({.camera = camera, .isovalue = kIsovalue, .on_pass = [&](const PassStats &) {
+                       EXPECT_EQ(ledger.current(), current);
+                       return true;
+                     }});
     renderer.shade();
   }
   EXPECT_EQ(ledger.current(), current);
@@ -322,14 +320,11 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
     Renderer renderer(
         device_, volume.compressed,
-        GetParam().with({.max_size = kFrame, .cache_slots = slots, .max_speculation = 4}));
+        GetParam().with({.size = kFrame, .cache_slots = slots, .max_speculation = 4}));
     std::uint64_t found = 0;
     std::size_t calls = 0;
     const FrameStats stats = renderer.render(
-        {.camera = camera,
-         .isovalue = kIsovalue,
-         .size = kFrame,
-         .on_pass = [&](const PassStats &pass) {
+        {.camera = camera, .isovalue = kIsovalue, .on_pass = [&](const PassStats &pass) {
            ++calls;
            found += pass.counts.hit_count;
            const auto hits = renderer.hits();
@@ -353,22 +348,21 @@ TEST_P(InvarianceOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
   Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.max_size = kTiny, .cache_slots = 8, .max_speculation = 2}));
+                    GetParam().with({.size = kTiny, .cache_slots = 8, .max_speculation = 2}));
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
-    const FrameStats cancelled =
-        renderer.render({.camera = cameras[0],
-                         .isovalue = kIsovalue,
-                         .size = kTiny,
-                         .on_pass = [&](const PassStats &) { return ++calls < stop_after; }});
+    const FrameStats cancelled = renderer.render(
+        {.camera = cameras[0], .isovalue = kIsovalue, .on_pass = [&](const PassStats &) {
+           return ++calls < stop_after;
+         }});
     EXPECT_TRUE(cancelled.cancelled);
     EXPECT_EQ(cancelled.passes.size(), stop_after);
     EXPECT_GT(cancelled.passes.back().counts.next_active_count, 0u)
         << "else there was nothing to cancel";
     EXPECT_EQ(test::num_hits(renderer.hits()), cancelled.rays_hit);
     expect_consistent(cancelled, renderer.options());
-    const FrameStats next = renderer.render({cameras[1], kIsovalue, kTiny});
+    const FrameStats next = renderer.render({cameras[1], kIsovalue});
     expect_consistent(next, renderer.options());
     expect_same_hits(renderer.hits(), twin_hits(volume, cameras[1], kTiny, kIsovalue), kTiny.width);
   }
@@ -379,8 +373,8 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   ocl::Device device(GetParam().device, true);
-  Renderer renderer(device, volume.compressed, GetParam().with({.max_size = kSmall}));
-  const FrameStats stats = renderer.render({camera, kIsovalue, kSmall});
+  Renderer renderer(device, volume.compressed, GetParam().with({.size = kSmall}));
+  const FrameStats stats = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   expect_consistent(stats, renderer.options());
   for (const PassStats &pass : stats.passes) {
@@ -392,4 +386,4 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

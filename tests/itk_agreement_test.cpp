@@ -13,7 +13,7 @@
 #include "core/io/raw_reader.hpp"
 #include "tests/volume_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
@@ -289,4 +289,4 @@ TEST_F(NiftiAgreement, TypesOrdersAndScales) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -408,4 +408,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, MacrocellsOnDevice, testing::ValuesIn(devices_
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

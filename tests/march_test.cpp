@@ -15,7 +15,7 @@
 #include "tests/ray_cases.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr uint kGroupSize = 64;
@@ -180,4 +180,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, MarchOnDevice, testing::ValuesIn(devices_under
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

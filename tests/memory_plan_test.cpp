@@ -13,7 +13,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TestVolume;
@@ -63,7 +63,7 @@ TEST_P(MemoryPlanOnDevice, PlanIsWhatIsBooked) {
                                  dims.z, volume->compressed.bits_per_block, slots));
         ocl::Device device(GetParam().device);
         const Renderer renderer(device, volume->compressed,
-                                GetParam().with({.max_size = size_,
+                                GetParam().with({.size = size_,
                                                  .cache_slots = slots,
                                                  .stream = place,
                                                  .with_kept_picture = slots == 8}));
@@ -87,10 +87,9 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
       SCOPED_TRACE(
           fmt::format("stream on {}, budget {}, least {}", to_string(place), budget, least));
       ocl::Device device(GetParam().device);
-      Renderer renderer(
-          device, volume.compressed,
-          GetParam().with({.max_size = size_, .memory_budget = budget, .stream = place}));
-      renderer.render({camera, kIsovalue, size_});
+      Renderer renderer(device, volume.compressed,
+                        GetParam().with({.size = size_, .memory_budget = budget, .stream = place}));
+      renderer.render({camera, kIsovalue});
       test::expect_same_hits(renderer.hits(), expected, size_.width);
       renderer.shade();
       expect_booked(device, renderer.memory_plan());
@@ -125,8 +124,8 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
     SCOPED_TRACE(fmt::format("budget {}, least {}, stream {}", budget, least, stream_bytes));
     ocl::Device device(GetParam().device);
     Renderer renderer(device, volume.compressed,
-                      GetParam().with({.max_size = size_, .memory_budget = budget}));
-    const FrameStats stats = renderer.render({camera, kIsovalue, size_});
+                      GetParam().with({.size = size_, .memory_budget = budget}));
+    const FrameStats stats = renderer.render({camera, kIsovalue});
     test::expect_same_hits(renderer.hits(), expected, size_.width);
     renderer.shade();
     expect_booked(device, renderer.memory_plan());
@@ -142,7 +141,7 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
   ocl::Device device(GetParam().device);
   EXPECT_THAT(refusal([&] {
                 Renderer(device, volume.compressed,
-                         GetParam().with({.max_size = size_, .memory_budget = least - 1}));
+                         GetParam().with({.size = size_, .memory_budget = least - 1}));
               }),
               HasSubstr(fmt::format("{} would do", least)));
 }
@@ -180,7 +179,7 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
   ocl::Device device(GetParam().device);
   const auto render_within = [&](std::uint64_t budget, std::uint32_t slots) {
     Renderer(device, volume.compressed,
-             GetParam().with({.max_size = size_, .memory_budget = budget, .cache_slots = slots}));
+             GetParam().with({.size = size_, .memory_budget = budget, .cache_slots = slots}));
   };
   EXPECT_THAT(refusal([&] { render_within(least - 1, 0); }),
               HasSubstr(fmt::format("{} would do", least)));
@@ -190,4 +189,4 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

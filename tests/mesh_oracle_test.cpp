@@ -9,7 +9,7 @@
 
 #include "tests/frame_scene.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::sample;
@@ -231,4 +231,4 @@ TEST_F(MeshOracleFrame, SeesHolesEvenInNoise) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,7 +7,7 @@
 #include "reference/watertight.hpp"
 
 int main() {
-  using namespace isowave;
+  using namespace isowave::core;
   std::uint64_t failed_cases = 0, leaks = 0;
   for (const StabilityCase &stability_case : stability_cases(600, 20231)) {
     const CaseResult result = run_case(stability_case, kDefaultSolver);

@@ -18,7 +18,7 @@
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::AllOf;
@@ -157,4 +157,4 @@ TEST_F(NpyTest, LeavesNothingBehindWhenItCannotWrite) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -16,7 +16,7 @@
 #include "core/base/error.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::AllOf;
@@ -224,4 +224,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, OclBufferOnDevice, testing::ValuesIn(devices_u
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "core/ocl/kernel.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::HasSubstr;
@@ -190,9 +190,10 @@ TEST_P(OclDeviceOnDevice, BuildErrorsNameFileAndLine) {
   // After two includes the numbers must still be those of the .cl file.
   EXPECT_THAT(in_kernel,
               HasSubstr(fmt::format("shared_types.cl:{}:",
-                                    line_of("shared_types.cl", "void shared_type_sizes"))));
-  EXPECT_THAT(in_header, HasSubstr(fmt::format("shared_types.h:{}:",
-                                               line_of("shared_types.h", "uint isovalue_index"))));
+                                    line_of("probes/shared_types.cl", "void shared_type_sizes"))));
+  EXPECT_THAT(in_header,
+              HasSubstr(fmt::format("shared_types.h:{}:",
+                                    line_of("portable/shared_types.h", "uint isovalue_index"))));
 }
 
 TEST_P(OclDeviceOnDevice, MisuseIsAnInvalidArgument) {
@@ -207,4 +208,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, OclDeviceOnDevice, testing::ValuesIn(devices_u
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -16,7 +16,7 @@
 #include "kernels_cl/portable/shared_types.h"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using ocl::In;
@@ -148,4 +148,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, OclKernelOnDevice, testing::ValuesIn(devices_u
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

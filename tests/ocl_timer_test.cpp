@@ -11,7 +11,7 @@
 #include "kernels_cl/portable/shared_types.h"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::Contains;
@@ -119,4 +119,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, OclTimerOnDevice, testing::ValuesIn(devices_un
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

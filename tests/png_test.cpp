@@ -16,7 +16,7 @@
 #include "core/base/error.hpp"
 #include "tests/volume_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::AllOf;
@@ -174,4 +174,4 @@ TEST_F(PngTest, LeavesNothingBehindWhenItCannotWrite) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "tests/run_program.hpp"
 #include "tests/zfp_trailer_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TemporaryFolder;
@@ -273,4 +273,4 @@ TEST_F(PyramidFile, TooManyLevelsAreRefusedAndNothingIsLeft) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

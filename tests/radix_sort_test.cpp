@@ -16,7 +16,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 enum class KeyKind { kRandom, kFewDistinct, kAllEqual, kSorted, kReversed, kHotBlock };
@@ -208,4 +208,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, RadixSortOnDevice, testing::ValuesIn(rankings_
                          ranking_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "core/view/frame.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 
-namespace isowave {
+namespace isowave::core {
 
 struct CameraCase {
   std::string name;
@@ -77,4 +77,4 @@ inline std::vector<uint> blocks_of_ray(const FrameParams &frame, uint pixel) {
   return blocks;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -15,7 +15,7 @@
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
 
-namespace isowave::test {
+namespace isowave::core::test {
 
 /// World space; t is the distance from the eye.
 struct OracleRay {
@@ -194,4 +194,4 @@ inline std::size_t expect_first_changes(const std::vector<HitRecord> &hits, cons
   return num_found;
 }
 
-}  // namespace isowave::test
+}  // namespace isowave::core::test

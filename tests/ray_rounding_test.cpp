@@ -9,7 +9,7 @@
 
 #include "tests/frame_scene.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 const test::TestVolume &sphere() {
@@ -50,4 +50,4 @@ TEST(RayRounding, SeesAHitThatIsOffItsRay) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -3,13 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <isowave/version.hpp>
 #include <regex>
 #include <sstream>
 
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 const std::filesystem::path kRoot =
@@ -33,15 +35,28 @@ std::vector<std::string> stage_stems() {
   return stems;
 }
 
+/// In the folder itself or in one of its rooms.
+bool exists_below(const std::filesystem::path &folder, const std::string &name) {
+  const auto is_it = [&](const std::filesystem::directory_entry &entry) {
+    return entry.path().filename() == name;
+  };
+  return std::ranges::any_of(std::filesystem::recursive_directory_iterator(folder), is_it);
+}
+
 TEST(Readme, EveryStageHasItsFiles) {
   const std::vector<std::string> stems = stage_stems();
   EXPECT_GE(stems.size(), 15u);
   for (const std::string &stem : stems) {
-    EXPECT_TRUE(exists(kRoot / "core" / (stem + ".hpp"))) << stem;
-    EXPECT_TRUE(exists(kRoot / "kernels_cl" / (stem + ".cl"))) << stem;
+    EXPECT_TRUE(exists_below(kRoot / "core", stem + ".hpp")) << stem;
+    EXPECT_TRUE(exists_below(kRoot / "kernels_cl", stem + ".cl")) << stem;
     EXPECT_TRUE(exists(kRoot / "tests" / (stem + "_test.cpp"))) << stem;
     EXPECT_TRUE(exists(kRoot / "bench" / (stem + "_bench.cpp"))) << stem;
   }
+}
+
+TEST(Readme, CitationIsOfThisVersion) {
+  EXPECT_THAT(test::read_file(kRoot / "CITATION.cff"),
+              testing::HasSubstr("\nversion: " + std::string(isowave::version()) + "\n"));
 }
 
 TEST(Readme, AutoIsTheSamePipelineEverywhere) {
@@ -61,4 +76,4 @@ TEST(Readme, AutoIsTheSamePipelineEverywhere) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::camera_along;
@@ -25,12 +25,12 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                       const std::vector<float> &isovalues, ImageSize size,
                       RendererOptions options = {}) {
     std::uint64_t hits = 0;
-    options.max_size = size;
+    options.size = size;
     Renderer renderer(device_, volume.compressed, options);
     for (const float isovalue : isovalues) {
       for (std::size_t view = 0; view < cameras.size(); ++view) {
         SCOPED_TRACE(fmt::format("isovalue {}, view {}", isovalue, view));
-        const FrameStats stats = renderer.render({cameras[view], isovalue, size});
+        const FrameStats stats = renderer.render({cameras[view], isovalue});
         const auto expected = twin_hits(volume, cameras[view], size, isovalue);
         expect_same_hits(renderer.hits(), expected, size.width);
         EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
@@ -127,20 +127,21 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
   const Camera camera = orbit_cameras(info, 1)[0];
   for (const TestVolume &volume :
        {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
-    Renderer renderer(device_, volume.compressed, {.max_size = kSmall});
+    Renderer renderer(device_, volume.compressed, {.size = kSmall});
     for (const double voxel_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
       SCOPED_TRACE(fmt::format("{} bits per block, value error {}",
                                volume.compressed.bits_per_block, voxel_error));
       const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
       for (std::size_t i = 0; i < voxels.size(); ++i)
         ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), voxel_error);
-      renderer.render({camera, 0.1f, kSmall, 0, voxel_error});
+      renderer.render({.camera = camera, .isovalue = 0.1f, .voxel_error = voxel_error});
       expect_same_hits(renderer.hits(),
                        render_scalar(make_frame_params(info, camera, kSmall, 0.1f), voxels),
                        kSmall.width);
     }
     for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
-      EXPECT_THROW(renderer.render({camera, 0.1f, kSmall, 0, bad}), Error);
+      EXPECT_THROW(renderer.render({.camera = camera, .isovalue = 0.1f, .voxel_error = bad}),
+                   Error);
   }
 }
 
@@ -150,13 +151,13 @@ TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
   std::vector<float> source(open()->info().num_voxels());
   open()->read_layers(0, open()->info().dims.z, source);
   const TestVolume volume(open()->info(), source, ErrorGoal{0, true});
-  Renderer renderer(device_, volume.compressed, {.max_size = kMedium});
+  Renderer renderer(device_, volume.compressed, {.size = kMedium});
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   for (const double voxel_error : {0.5, 4.0, 64.0}) {
     const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
     for (const float isovalue : {0.7f, 70.0f, 255.5f}) {
       SCOPED_TRACE(fmt::format("value error {}, isovalue {}", voxel_error, isovalue));
-      renderer.render({camera, isovalue, kMedium, 0, voxel_error});
+      renderer.render({.camera = camera, .isovalue = isovalue, .voxel_error = voxel_error});
       const FrameParams frame = make_frame_params(volume.info(), camera, kMedium, isovalue);
       expect_same_hits(renderer.hits(), render_scalar(frame, voxels), kMedium.width);
     }
@@ -339,7 +340,7 @@ TEST_P(RenderOnDevice, BadOptionsAreErrors) {
   const auto refused = [&](RendererOptions options) {
     EXPECT_THROW(Renderer(device_, volume.compressed, options), Error);
   };
-  const RendererOptions good{.max_size = kSmall};
+  const RendererOptions good{.size = kSmall};
   for (const std::uint32_t slots : {1u, 7u, 0x40000001u, 0xFFFFFFFFu}) {
     RendererOptions options = good;
     options.cache_slots = slots;
@@ -367,7 +368,7 @@ TEST_P(RenderOnDevice, BadOptionsAreErrors) {
                                {8, 8, 9},
                                {1, 1, 0xFFFFFFFFu}}) {
     SCOPED_TRACE(fmt::format("{}x{}, {} samples", size.width, size.height, size.samples));
-    refused({.max_size = size});
+    refused({.size = size});
   }
   EXPECT_EQ(device_.ledger().current(), 0u) << "nothing is left behind";
 }
@@ -375,19 +376,19 @@ TEST_P(RenderOnDevice, BadOptionsAreErrors) {
 TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed, {.max_size = kSmall});
-  EXPECT_THROW(renderer.render({camera, NAN, kSmall}), Error);
+  Renderer renderer(device_, volume.compressed, {.size = kSmall});
+  EXPECT_THROW(renderer.render({camera, NAN}), Error);
   for (const Camera &bad :
        {Camera{camera.eye, camera.eye, camera.up}, Camera{camera.eye, camera.at, {0, 0, 0}},
         Camera{camera.eye, camera.at, camera.at - camera.eye},
         Camera{camera.eye, camera.at, camera.up, 180.0},
         Camera{camera.eye, camera.at, camera.up, 0.0}, Camera{{NAN, 0, 0}, camera.at, camera.up},
         Camera{{1e9, 0, 0}, camera.at, camera.up}}) {
-    EXPECT_THROW(renderer.render({bad, 0.1f, kSmall}), Error);
+    EXPECT_THROW(renderer.render({bad, 0.1f}), Error);
   }
-  renderer.render({camera, 0.1f, kSmall});
+  renderer.render({camera, 0.1f});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, 0.1f), kSmall.width);
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -105,8 +105,8 @@ TEST_P(ResidentOnDevice, EqualsBothPipelines) {
   Resident resident(device_, volume.compressed, kMedium);
   resident.render(camera, 0.3f);
   for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
-    Renderer renderer(device_, volume.compressed, {.max_size = kMedium, .pipeline = pipeline});
-    renderer.render({camera, 0.3f, kMedium});
+    Renderer renderer(device_, volume.compressed, {.size = kMedium, .pipeline = pipeline});
+    renderer.render({camera, 0.3f});
     expect_same_hits(resident.hits(), renderer.hits(), kMedium.width);
   }
 }
@@ -122,4 +122,4 @@ TEST_P(ResidentOnDevice, SaysWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

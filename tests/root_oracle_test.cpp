@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 std::vector<float> sampled(std::array<std::uint32_t, 3> dims,
@@ -118,4 +118,4 @@ TEST(RootOracle, GradientIsTheFieldsDerivative) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

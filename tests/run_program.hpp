@@ -18,7 +18,7 @@
 #include <string_view>
 #include <vector>
 
-namespace isowave::test {
+namespace isowave::core::test {
 
 /// A fresh folder, removed with all it holds.
 class TemporaryFolder {
@@ -130,4 +130,4 @@ inline void expect_one_line_error(const std::string &arguments, std::string_view
   EXPECT_NE(result.err.find(text), std::string::npos) << arguments << "\n" << result.err;
 }
 
-}  // namespace isowave::test
+}  // namespace isowave::core::test

@@ -15,7 +15,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/ray_oracle.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::camera_along;
@@ -418,4 +418,4 @@ TEST(ScalarRenderer, ThreadsAndBadInput) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr uint kSentinel = 0xDEADBEEFu;
@@ -191,4 +191,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, ScanOnDevice, testing::ValuesIn(devices_under_
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TestVolume;
@@ -52,8 +52,8 @@ INSTANTIATE_TEST_SUITE_P(Devices, ShadeOnDevice, testing::ValuesIn(pipelines_und
 
 TEST_P(ShadeOnDevice, SmallPictureIsTheTwins) {
   constexpr ImageSize kSize{12, 8};
-  Renderer renderer(device_, volume_.compressed, GetParam().with({.max_size = kSize}));
-  renderer.render({camera_, 0.1f, kSize});
+  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = kSize}));
+  renderer.render({camera_, 0.1f});
   const FrameParams frame = make_frame_params(volume_.info(), camera_, kSize, 0.1f);
   for (const Appearance &appearance :
        {Appearance{}, Appearance{{0.2f, 0.4f, 1.0f}, {0, 0, 0}, 0.0f, 1.0f, 2.0f}}) {
@@ -72,8 +72,8 @@ TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
   for (const std::uint32_t samples : {2u, 3u}) {
     SCOPED_TRACE(fmt::format("{} x {} rays a pixel", samples, samples));
     const ImageSize size{7, 5, samples}, all_rays{7 * samples, 5 * samples};
-    Renderer renderer(device_, volume_.compressed, GetParam().with({.max_size = size}));
-    const FrameStats stats = renderer.render({camera_, 0.1f, size});
+    Renderer renderer(device_, volume_.compressed, GetParam().with({.size = size}));
+    const FrameStats stats = renderer.render({camera_, 0.1f});
     const auto expected_hits = test::twin_hits(volume_, camera_, all_rays, 0.1f);
     test::expect_same_hits(renderer.hits(), expected_hits, all_rays.width);
     EXPECT_EQ(stats.rays_hit, test::num_hits(expected_hits));
@@ -101,7 +101,7 @@ TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
 }
 
 TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
-  Renderer renderer(device_, volume_.compressed, GetParam().with({.max_size = {20, 14, 4}}));
+  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = {20, 14, 4}}));
   for (const ImageSize size : {ImageSize{20, 14, 4}, {40, 28, 2}, {80, 56}, {9, 7, 8}, {5, 4, 3}}) {
     SCOPED_TRACE(
         fmt::format("{}x{}, {} x {} rays", size.width, size.height, size.samples, size.samples));
@@ -115,29 +115,11 @@ TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
         got.pixels,
         shade_scalar(frame, make_shade_params(volume_.info(), {}), hits, size.samples).pixels);
   }
-  const std::vector<HitRecord> before = renderer.hits();
-  EXPECT_THAT(
-      [&] {
-        renderer.render({camera_, 0.1f, {20, 14, 5}});
-      },
-      ThrowsMessage<Error>(HasSubstr("made for 4480")))
-      << "more rays";
-  EXPECT_THROW(renderer.render({camera_, 0.1f, {1, 1, 0}}), Error);
-  EXPECT_THAT(
-      [&] {
-        renderer.render({camera_, 0.1f, {1, 1, 9}});
-      },
-      ThrowsMessage<Error>(HasSubstr("9 x 9 rays a pixel")));
-  test::expect_same_hits(renderer.hits(), before, 5 * 3);
-  EXPECT_EQ(renderer.shade().width, 5u) << "of the frame before the refused ones";
-}
-
-TEST_P(ShadeOnDevice, NothingIsShownBeforeTheFirstFrame) {
-  Renderer renderer(device_, volume_.compressed, GetParam().with({.max_size = {12, 8}}));
-  EXPECT_EQ(renderer.size().num_rays(), 0u);
-  EXPECT_THAT([&] { renderer.hits(); }, ThrowsMessage<Error>(HasSubstr("no frame")));
-  EXPECT_THAT([&] { renderer.shade(); }, ThrowsMessage<Error>(HasSubstr("no frame")));
+  const auto draw = [&](ImageSize size) { renderer.render({camera_, 0.1f, size}); };
+  EXPECT_THROW(draw({20, 14, 5}), Error) << "more rays";
+  EXPECT_THROW(draw({1, 1, 0}), Error);
+  EXPECT_THAT([&] { draw({1, 1, 9}); }, ThrowsMessage<Error>(HasSubstr("9 x 9 rays a pixel")));
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -11,7 +11,7 @@
 #include "kernels_cl/portable/shared_types_fields.h"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 class SharedTypesOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
@@ -81,4 +81,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, SharedTypesOnDevice, testing::ValuesIn(devices
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -15,7 +15,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// A cubic of one kind of trouble. Its values are at least 1e-6 or 0, so that no product becomes
@@ -102,10 +102,10 @@ TEST_P(SolveCellsOnDevice, FramesOfEverySolverEqualTheTwins) {
     if (is_llvmpipe(device_.info()) && name != "marmitt") continue;
     SCOPED_TRACE(name);
     RendererOptions options;
-    options.max_size = size;
+    options.size = size;
     options.solver = solver_from_string(name);
     Renderer renderer(device_, volume.compressed, options);
-    renderer.render({camera, 0.1f, size});
+    renderer.render({camera, 0.1f});
     test::expect_same_hits(renderer.hits(),
                            render_scalar(make_frame_params(volume.info(), camera, size, 0.1f),
                                          volume.voxels, options.solver),
@@ -123,4 +123,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, SolveCellsOnDevice, testing::ValuesIn(devices_
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

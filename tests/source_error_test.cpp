@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "core/base/error.hpp"
-#include "core/generate/generate.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/sources/generate.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_encode.hpp"
@@ -20,7 +20,7 @@
 #include "tests/run_program.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TemporaryFolder;
@@ -370,4 +370,4 @@ TEST_P(SourceErrorOnDevice, SmallErrorsAreTheHosts) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr uint kWidth = 16, kHeight = 12, kPixels = kWidth * kHeight;
@@ -72,4 +72,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, SpeculationOnDevice, testing::ValuesIn(devices
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

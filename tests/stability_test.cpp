@@ -7,7 +7,7 @@
 
 #include "reference/watertight.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr std::uint32_t kSeed = 20231;
@@ -75,4 +75,4 @@ TEST(Watertight, FindsTheLeaksOfALeakySolver) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

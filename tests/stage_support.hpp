@@ -22,7 +22,7 @@
 #include "kernels_cl/portable/shared_types.h"
 #include "kernels_cl/portable/shared_types_fields.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// std::mt19937, but its numbers are of 32 bits also by type.
 using Random =
@@ -145,4 +145,4 @@ inline std::vector<float> random_voxels(const glm::uvec3 &dims, float low, float
   return voxels;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

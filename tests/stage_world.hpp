@@ -14,7 +14,7 @@
 #include "kernels_cl/portable/block_grid.h"
 #include "tests/stage_support.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The blocks of a dual grid, by plain arithmetic.
 inline std::vector<uint> dual_grid_blocks(const FrameParams &frame, uint block_id) {
@@ -152,4 +152,4 @@ inline std::array<float, 8> cell_corners(const FrameParams &frame, const std::ve
   return w;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 constexpr glm::uvec3 kDims{3, 4, 5};
@@ -37,4 +37,4 @@ TEST(StallGuard, AnyProgressStartsAnew) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

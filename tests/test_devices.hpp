@@ -15,7 +15,7 @@
 
 #include "core/ocl/device.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace ocl {
 /// What GoogleTest prints as the parameter.
@@ -49,4 +49,4 @@ inline std::string device_test_name(const testing::TestParamInfo<ocl::DeviceInfo
   return name;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,7 +7,7 @@
 #include "core/stages/group.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct GroupingOnDevice {
   ocl::DeviceInfo device;
@@ -33,4 +33,4 @@ inline std::string grouping_test_name(const testing::TestParamInfo<GroupingOnDev
          std::string(to_string(info.param.grouping));
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

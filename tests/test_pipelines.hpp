@@ -7,7 +7,7 @@
 #include "core/render/renderer.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct PipelineOnDevice {
   ocl::DeviceInfo device;
@@ -54,4 +54,4 @@ inline std::string pipeline_test_name(const testing::TestParamInfo<PipelineOnDev
   return device_test_name({info.param.device, info.index}) + "_" + info.param.name;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

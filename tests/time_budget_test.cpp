@@ -12,7 +12,7 @@
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::expect_same_hits;
@@ -92,25 +92,14 @@ class TimeBudgetOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       : volume_({14, 15, 13}, test::gyroid_field(9), 16),
         camera_(orbit_cameras(volume_.info(), 1)[0]),
         device_(GetParam().device),
-        renderer_(
-            device_, volume_.compressed,
-            GetParam().with({.max_size = kSize, .cache_slots = 24, .with_kept_picture = true})),
-        frames_(renderer_, [this] {
-          ms_ += double(renderer_.size().num_pixels()) / kPixelsPerMs;
-          first_look_ = std::min(first_look_, ms_);
-          return ms_;
-        }) {}
-
-  FrameRequest request_of(ImageSize size) const { return {camera_, kIsovalue, size}; }
-
-  TimedFrame render(double budget) {
-    first_look_ = std::numeric_limits<double>::infinity();
-    return frames_.render(request_of(kSize), budget);
-  }
+        renderer_(device_, volume_.compressed,
+                  GetParam().with({.size = kSize, .cache_slots = 24, .with_kept_picture = true})),
+        frames_(renderer_,
+                [this] { return ms_ += double(renderer_.size().num_pixels()) / kPixelsPerMs; }) {}
 
   /// What the renderer draws without a budget.
   Hits picture_of(ImageSize size) {
-    renderer_.render(request_of(size));
+    renderer_.render({camera_, kIsovalue, size});
     return renderer_.hits();
   }
 
@@ -118,14 +107,14 @@ class TimeBudgetOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   Camera camera_;
   ocl::Device device_;
   Renderer renderer_;
-  double ms_ = 0, first_look_ = 0;
+  double ms_ = 0;
   TimedFrames frames_;
 };
 INSTANTIATE_TEST_SUITE_P(Devices, TimeBudgetOnDevice, testing::ValuesIn(pipelines_under_test()),
                          pipeline_test_name);
 
 TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheSmallestPicture) {
-  const TimedFrame frame = render(1e-6);
+  const TimedFrame frame = frames_.render({camera_, kIsovalue}, 1e-6);
   const Hits shown = renderer_.hits();
   ASSERT_EQ(frame.steps.size(), 1u);
   EXPECT_FALSE(frame.steps[0].cancelled) << "there must be a picture";
@@ -138,10 +127,10 @@ TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheSmallestPicture) {
 }
 
 TEST_P(TimeBudgetOnDevice, AmpleTimeGivesTheWholePicture) {
-  const TimedFrame frame = render(1e9);
+  const TimedFrame frame = frames_.render({camera_, kIsovalue}, 1e9);
   EXPECT_EQ(frame.steps.size(), 2u) << "nothing between the first and the full picture";
   EXPECT_TRUE(frame.complete);
-  EXPECT_NEAR(frame.stats.total_ms, ms_ - first_look_, 1e-6);
+  EXPECT_NEAR(frame.stats.total_ms, ms_ - kFullLook, 1e-6);
   EXPECT_FALSE(frame.stats.cancelled);
   expect_same_hits(renderer_.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
                    kSize.width);
@@ -154,10 +143,11 @@ TEST_P(TimeBudgetOnDevice, ThePictureBeforeShowsThrough) {
   for (double budget = 20; budget < 2e4; budget *= 1.5) {
     SCOPED_TRACE(fmt::format("budget {}", budget));
     renderer_.clear_cache();
-    const TimedFrame frame = render(budget);
+    const double begin = ms_ + double(renderer_.size().num_pixels()) / kPixelsPerMs;
+    const TimedFrame frame = frames_.render({camera_, kIsovalue}, budget);
     const Hits shown = renderer_.hits();
     ASSERT_FALSE(frame.steps.empty());
-    EXPECT_NEAR(frame.stats.total_ms, ms_ - first_look_, 1e-6);
+    EXPECT_NEAR(frame.stats.total_ms, ms_ - begin, 1e-6);
     Hits expected;
     ImageSize size;  // of the step before
     for (const TimedStep &step : frame.steps) {
@@ -196,7 +186,7 @@ TEST_P(TimeBudgetOnDevice, ThePictureBeforeShowsThrough) {
 TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
   for (double budget = 15; budget < 1000; budget *= 1.4) {
     renderer_.clear_cache();
-    const TimedFrame frame = render(budget);
+    const TimedFrame frame = frames_.render({camera_, kIsovalue}, budget);
     const double look = double(frame.steps.back().size.num_pixels()) / kPixelsPerMs;
     EXPECT_LE(frame.stats.total_ms, std::max(budget, frame.steps[0].ms) + 2 * look + kFullLook);
   }
@@ -206,14 +196,14 @@ TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
 TEST_P(TimeBudgetOnDevice, SeveralRaysAPixel) {
   constexpr ImageSize kNine{9, 7, 3};
   Renderer renderer(device_, volume_.compressed,
-                    GetParam().with({.max_size = kNine, .with_kept_picture = true}));
+                    GetParam().with({.size = kNine, .with_kept_picture = true}));
   TimedFrames frames(renderer);
-  const TimedFrame whole = frames.render(request_of(kNine), 1e9);
+  const TimedFrame whole = frames.render({camera_, kIsovalue}, 1e9);
   EXPECT_TRUE(whole.complete);
   EXPECT_EQ(whole.steps.back().size.samples, 3u);
   expect_same_hits(renderer.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
                    kSize.width);
-  const TimedFrame coarse = frames.render(request_of(kNine), 1e-6);
+  const TimedFrame coarse = frames.render({camera_, kIsovalue}, 1e-6);
   EXPECT_EQ(coarse.steps[0].size.width, 4u);
   EXPECT_EQ(coarse.steps[0].size.samples, 1u);
   expect_same_hits(renderer.hits(), enlarged(picture_of({4, 3}), {4, 3}, kSize), kSize.width);
@@ -224,23 +214,15 @@ TEST_P(TimeBudgetOnDevice, SeveralRaysAPixel) {
 
 TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
   for (const double budget : {0.0, -1.0, double(NAN), double(INFINITY)}) {
-    EXPECT_THAT([&] { render(budget); },
-                ThrowsMessage<Error>(HasSubstr("no picture can be drawn")));
+    EXPECT_THAT(
+        [&] {
+          frames_.render({camera_, kIsovalue}, budget);
+        },
+        ThrowsMessage<Error>(HasSubstr("no picture can be drawn")));
   }
-  EXPECT_THROW(frames_.render({camera_, NAN, kSize}, 1), Error);
-  EXPECT_THAT(
-      [&] {
-        frames_.render({camera_, kIsovalue, {1, 27 * 21}}, 1);
-      },
-      ThrowsMessage<Error>(HasSubstr("cannot be kept")));
-  FrameRequest watched = request_of(kSize);
-  watched.on_pass = [](const PassStats &) { return true; };
-  EXPECT_THAT([&] { frames_.render(watched, 1); }, ThrowsMessage<Error>(HasSubstr("on_pass")));
-  EXPECT_EQ(renderer_.size().width, 0u) << "nothing is drawn";
-  Renderer plain(device_, volume_.compressed, GetParam().with({.max_size = kSize}));
-  EXPECT_THROW(TimedFrames{plain}, Error);
-  plain.render(request_of(kSize));
-  EXPECT_THROW(plain.keep_picture(), Error);
+  EXPECT_THROW(frames_.render({camera_, NAN}, 1), Error);
+  Renderer plain(device_, volume_.compressed, GetParam().with({.size = kSize}));
+  EXPECT_THROW(TimedFrames{plain}, std::logic_error);
 }
 
 /// Coarse levels draw small pictures, the finest the full one.
@@ -252,13 +234,13 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
   for (const ocl::DeviceInfo &info : devices_under_test()) {
     ocl::Device device(info);
     Renderer renderer(device, volume,
-                      {.max_size = kSize, .with_levels = true, .with_kept_picture = true});
+                      {.size = kSize, .with_levels = true, .with_kept_picture = true});
     TimedFrames frames(renderer);
-    const TimedFrame coarse = frames.render({camera, 0.5f, kSize}, 1e-6);
+    const TimedFrame coarse = frames.render({camera, 0.5f}, 1e-6);
     ASSERT_EQ(coarse.steps.size(), 1u);
     EXPECT_EQ(coarse.steps[0].voxel_pixels, 1.0);
     EXPECT_GT(coarse.stats.first_level, 0u);
-    const TimedFrame fine = frames.render({camera, 0.5f, kSize}, 1e9);
+    const TimedFrame fine = frames.render({camera, 0.5f}, 1e9);
     EXPECT_TRUE(fine.complete);
     EXPECT_EQ(fine.stats.last_level, 0u);
     const std::vector<float> voxels = decode_with_libzfp(volume);
@@ -269,4 +251,4 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// Which blocks are selected, one entry per block.
@@ -308,4 +308,4 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
 INSTANTIATE_TEST_SUITE_P(Devices, TraverseOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -16,7 +16,7 @@
 #include "core/volume/volume.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave::test {
+namespace isowave::core::test {
 
 /// The voxels as T, in the byte order that is asked for.
 template <class T = std::uint8_t>
@@ -120,4 +120,4 @@ inline std::string error_of(const std::filesystem::path &path, const std::string
   return error_of(path);
 }
 
-}  // namespace isowave::test
+}  // namespace isowave::core::test

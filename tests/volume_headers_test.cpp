@@ -15,7 +15,7 @@
 #include "tests/run_program.hpp"
 #include "tests/volume_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::error_of;
@@ -676,4 +676,4 @@ TEST_F(NiftiFile, RefusedHeaders) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

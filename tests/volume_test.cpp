@@ -15,7 +15,7 @@
 #include "core/io/raw_reader.hpp"
 #include "tests/volume_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::gzip;
@@ -208,4 +208,4 @@ TEST(OpenVolume, UnknownOrMissingFiles) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

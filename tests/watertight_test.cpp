@@ -5,7 +5,7 @@
 #include "reference/watertight_device.hpp"
 #include "tests/test_devices.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 class WatertightOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
@@ -39,4 +39,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, WatertightOnDevice, testing::ValuesIn(devices_
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

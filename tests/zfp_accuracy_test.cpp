@@ -17,7 +17,7 @@
 #include "tests/stage_support.hpp"
 #include "tests/zfp_values.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::read_file;
@@ -383,4 +383,4 @@ TEST_F(DamagedErrorBoundFile, LyingLengthsAreRefused) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "tests/test_devices.hpp"
 #include "tests/zfp_values.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// Our decoder on the host: all blocks.
@@ -255,4 +255,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, ZfpDecodeOnDevice, testing::ValuesIn(devices_u
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

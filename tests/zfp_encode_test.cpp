@@ -20,7 +20,7 @@
 #include "tests/test_devices.hpp"
 #include "tests/zfp_values.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using testing::AllOf;
@@ -352,4 +352,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, CompressOnDevice, testing::ValuesIn(devices_un
                          device_test_name);
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

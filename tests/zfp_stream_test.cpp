@@ -16,7 +16,7 @@
 #include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using test::TemporaryFolder;
@@ -386,4 +386,4 @@ TEST(ZfpFile, NothingIsLeftWhenReadingFails) {
 }
 
 }  // namespace
-}  // namespace isowave
+}  // namespace isowave::core

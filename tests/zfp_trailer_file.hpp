@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-namespace isowave::test {
+namespace isowave::core::test {
 
 inline std::uint32_t crc_of(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -45,4 +45,4 @@ struct TrailerFile {
   std::string before, text;
 };
 
-}  // namespace isowave::test
+}  // namespace isowave::core::test

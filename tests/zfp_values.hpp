@@ -8,7 +8,7 @@
 
 #include "tests/stage_support.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 enum class ValueKind { kRandom, kSmooth, kConstant, kZero, kHuge, kTiny, kMixed };
 inline constexpr ValueKind kValueKinds[] = {
@@ -46,4 +46,4 @@ inline std::vector<float> make_voxels(ValueKind kind, const glm::uvec3 &dims, ui
   return voxels;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -14,7 +14,7 @@
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/zfp_codec.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -98,49 +98,48 @@ std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel
 
 }  // namespace
 
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &drawn,
-                    std::span<const HitRecord> hits) {
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
+                    std::span<const HitRecord> drawn) {
   const auto begin = std::chrono::steady_clock::now();
-  const Solver solver = renderer.options().solver;
-  if (!finds_all(solver)) {
+  if (const Solver solver = renderer.options().solver; !finds_all(solver)) {
     throw Error(
         "the error of frames drawn with solver {} has no bound, since it may miss a surface: take "
         "bernstein",
         to_string(solver));
   }
-  const ImageSize size = drawn.size;
-  if (hits.size() != size.num_rays())
-    throw Error("{} hits are not those of {} rays", hits.size(), size.num_rays());
+  const ImageSize size = renderer.size_of(request);
+  const Camera &camera = request.camera;
   Certificate certificate;
   const auto draw = [&](FieldBound bound) {
-    FrameRequest request = drawn;
-    request.bound = bound;
-    request.on_pass = {};
-    for (const PassStats &pass : renderer.render(request).passes)
+    FrameRequest of_bound = request;
+    of_bound.bound = bound;
+    of_bound.on_pass = {};
+    for (const PassStats &pass : renderer.render(of_bound).passes)
       certificate.decoded_blocks += pass.counts.decoded_count;
     return renderer.hits();
   };
   const std::vector<HitRecord> lower = draw(FieldBound::kLower), upper = draw(FieldBound::kUpper);
 
-  const bool with_levels = drawn.voxel_pixels > 0;
-  const std::vector<const CompressedVolume *> levels = levels_of(volume, with_levels);
+  const std::vector<const CompressedVolume *> levels =
+      levels_of(volume, renderer.options().with_levels);
   std::vector<ValueOffset> offsets;
   std::vector<double> voxel_errors;
   for (const CompressedVolume *level : levels) {
-    voxel_errors.push_back(voxel_error_of(drawn.voxel_error, voxel_errors.size()));
+    voxel_errors.push_back(voxel_error_of(request.voxel_error, voxel_errors.size()));
     offsets.push_back(value_offset({*level, level == &volume}, FieldBound::kUpper,
                                    plane_error(level->precision, voxel_errors.back()),
                                    volume.value_range));
   }
-  const std::vector<FrameParams> frames = make_level_frames(
-      level_infos(volume, with_levels), drawn.camera, size, drawn.isovalue, drawn.voxel_pixels);
+  const std::vector<FrameParams> frames =
+      make_level_frames(level_infos(volume, renderer.options().with_levels), camera, size,
+                        request.isovalue, request.voxel_pixels);
   std::size_t coarsest = levels.size() - 1;
   while (!draws(frames[coarsest])) --coarsest;
   const glm::dmat3 voxel = levels[coarsest]->info.index_to_world();
   const double cell_rounding =
       kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
-  const double pixel_at_1 = 2.0 * std::tan(glm::radians(drawn.camera.fovy_deg) / 2) / size.height;
-  certificate.bounds.assign(hits.size(), kNotCertain);
+  const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / size.height;
+  certificate.bounds.assign(drawn.size(), kNotCertain);
   constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks
   parallel_for((size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
     std::vector<BlockValues> values;
@@ -148,9 +147,9 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
       values.emplace_back(*levels[i], voxel_errors[i], offsets[i]);
     const auto first = static_cast<std::uint32_t>(part * kRows * size.ray_columns());
     const std::uint32_t end =
-        std::min(first + kRows * size.ray_columns(), static_cast<std::uint32_t>(hits.size()));
+        std::min(first + kRows * size.ray_columns(), static_cast<std::uint32_t>(drawn.size()));
     for (std::uint32_t pixel = first; pixel < end; ++pixel) {
-      const double t = double{hits[pixel].t},
+      const double t = double{drawn[pixel].t},
                    first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
                    last_t = double{std::max(lower[pixel].t, upper[pixel].t)};
       const std::array<double, 2> way = way_through(frames[0], pixel);
@@ -191,4 +190,4 @@ CertificateSummary summarize(const Certificate &certificate, double limit) {
   return summary;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

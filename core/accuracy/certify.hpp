@@ -3,7 +3,7 @@
 // compression, trilinear between its voxels.
 //
 // Where the decoded field is known to within a bound, the true surface lies between the surfaces of
-// the lower and of the upper bound (Renderer::draw_bound()): along a ray that begins outside of
+// the lower and of the upper bound (FrameRequest::bound): along a ray that begins outside of
 // both, or inside of both, the first crossing of the true field is not before the first crossing of
 // one of them, and not behind that of the other. Pixels where only one is met, where a ray begins
 // between them, or where one is met outside of the volume, which coarse levels reach a little out
@@ -15,7 +15,7 @@
 
 #include "core/render/renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct Certificate {
   /// Of each ray: the distance between the drawn and the true hit along it, at most [pixels: what a
@@ -26,13 +26,15 @@ struct Certificate {
   std::uint64_t decoded_blocks = 0;  ///< for them
 };
 
-/// Bounds the error of a frame. The renderer draws both bounds of the field: the hit buffer then
-/// holds the upper one's, and the cache their blocks. Waits.
-/// renderer: made with_bounds. volume: what it was made for.
-/// drawn: the request; its bound and on_pass are not used. hits: its hit buffer.
-/// errors: Error where the volume's error is not known, or where the solver may miss crossings.
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &drawn,
-                    std::span<const HitRecord> hits);
+/// Bounds the error of a frame.
+///
+/// renderer  made with_bounds; the last frame that it draws here is another
+/// volume    what the renderer was made for
+/// request   of the frame
+/// drawn     its hits
+/// Throws Error where the volume's error is not known, or where the solver may miss crossings.
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
+                    std::span<const HitRecord> drawn);
 
 /// What a certificate says of pixels that are not certain to miss.
 struct CertificateSummary {
@@ -45,4 +47,4 @@ struct CertificateSummary {
 /// limit: pixels.
 CertificateSummary summarize(const Certificate &certificate, double limit);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include "core/base/error.hpp"
 #include "core/view/detail.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -109,91 +109,64 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
   return options;
 }
 
-namespace {
-
-/// A smaller picture of the frame, on which details are tried out.
-class Trial {
- public:
-  Trial(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
-        double max_surface_error, std::vector<DetailChoice::Try> &tries)
-      : renderer_(renderer),
-        volume_(volume),
-        request_{.camera = request.camera, .isovalue = request.isovalue},
-        max_surface_error_(max_surface_error),
-        tries_(tries) {
-    const ImageSize size = request.size;
-    const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
-    request_.size = {std::max(size.width / pixels, 1u), size.height / pixels};
-    stride_ = double(size.height) / request_.size.height;
-  }
-  double stride() const { return stride_; }  ///< pixels of the frame for one of the picture
-
-  struct Drawn {
-    CertificateSummary summary;
-    std::vector<HitRecord> hits;
-  };
-  /// Adds one to the tries. The detail is that of the frame.
-  Drawn draw(const Detail &detail) {
-    const FrameRequest request =
-        with_detail(request_, {detail.voxel_pixels / stride_, detail.voxel_error});
-    renderer_.render(request);
-    std::vector<HitRecord> hits = renderer_.hits();
-    const CertificateSummary summary =
-        summarize(certify(renderer_, volume_, request, hits), max_surface_error_ / stride_);
-    const double all = std::max<double>(double(summary.num_pixels), 1);
-    tries_.push_back({detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
-    return {summary, std::move(hits)};
-  }
-
-  /// The first of descending numbers whose detail loses no more than kLostShare against `best`, or
-  /// 0. Nearly always, what suffices does so with any less, too: a bisection.
-  template <typename DetailOf>
-  double first_to_suffice(const std::vector<double> &numbers, double best,
-                          const DetailOf &detail_of) {
-    const auto found = std::ranges::partition_point(numbers, [&](double number) {
-      draw(detail_of(number));
-      return tries_.back().certified < best - kLostShare;
-    });
-    return found == numbers.end() ? 0.0 : *found;
-  }
-
- private:
-  Renderer &renderer_;
-  const CompressedVolume &volume_;
-  FrameRequest request_;
-  double max_surface_error_, stride_ = 1;
-  std::vector<DetailChoice::Try> &tries_;
-};
-
-}  // namespace
+FrameRequest with_detail(FrameRequest request, const Detail &detail) {
+  request.voxel_pixels = detail.voxel_pixels;
+  request.voxel_error = detail.voxel_error;
+  return request;
+}
 
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
                            const FrameRequest &request, double max_surface_error) {
   check_max_surface_error(max_surface_error);
-  renderer.check(request);
   const auto begin = std::chrono::steady_clock::now();
+  const ImageSize size = renderer.size_of(request);
+  check_image_size(size);
+  const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
+  const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
+  const double stride = double(size.height) / small.height;
   // Neither is known: certify() throws.
   const double error = known_voxel_error(volume).value_or(double{largest_bound(volume.bounds)});
   DetailChoice choice;
-  Trial trial(renderer, volume, request, max_surface_error, choice.tries);
-  const Trial::Drawn at_full_detail = trial.draw({});
-  choice.median = trial.stride() * at_full_detail.summary.median;
+  const auto try_out = [&](const Detail &detail) {
+    FrameRequest sample = with_detail(request, {detail.voxel_pixels / stride, detail.voxel_error});
+    sample.size = small;
+    sample.on_pass = {};
+    renderer.render(sample);
+    std::vector<HitRecord> hits = renderer.hits();
+    const CertificateSummary summary =
+        summarize(certify(renderer, volume, sample, hits), max_surface_error / stride);
+    const double all = std::max<double>(double(summary.num_pixels), 1);
+    choice.tries.push_back(
+        {detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
+    return std::pair(summary, std::move(hits));
+  };
+  const auto [at_full_detail, finest_hits] = try_out({});
+  choice.median = stride * at_full_detail.median;
   const double best = choice.tries.front().certified;
   choice.reachable = best >= 0.5;
   if (!choice.reachable) advise(volume, error, max_surface_error, choice);
+  const auto suffices = [&](const Detail &detail) {
+    try_out(detail);
+    return choice.tries.back().certified >= best - kLostShare;
+  };
+  // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with
+  // any less, too: a bisection.
+  const auto first_to_suffice = [&](const std::vector<double> &numbers, const auto &detail_of) {
+    const auto found = std::ranges::partition_point(
+        numbers, [&](double number) { return !suffices(detail_of(number)); });
+    return found == numbers.end() ? 0.0 : *found;
+  };
   if (choice.reachable && renderer.options().with_levels) {
-    const double coarsest =
-        trial.first_to_suffice(all_voxel_pixels(), best, [](double voxel_pixels) {
-          return Detail{voxel_pixels, 0};
-        });
+    const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
+      return Detail{voxel_pixels, 0};
+    });
     const std::vector<FrameParams> frames = make_level_frames(
-        level_infos(volume, true), request.camera, request.size, request.isovalue, coarsest);
-    if (blocks_share(at_full_detail.hits, frames) <= kMaxBlocksShare)
-      choice.detail.voxel_pixels = coarsest;
+        level_infos(volume, true), request.camera, size, request.isovalue, coarsest);
+    if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
   }
   if (choice.reachable && volume.rate() > kMinPlaneRate) {
     choice.detail.voxel_error =
-        trial.first_to_suffice(voxel_errors(volume, error), best, [&](double voxel_error) {
+        first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
           return Detail{choice.detail.voxel_pixels, voxel_error};
         });
   }
@@ -202,4 +175,4 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
   return choice;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

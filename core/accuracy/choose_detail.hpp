@@ -8,17 +8,12 @@
 
 #include "core/accuracy/certify.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 struct Detail {
   double voxel_pixels = 0;  ///< FrameRequest::voxel_pixels
   double voxel_error = 0;   ///< FrameRequest::voxel_error
 };
-inline FrameRequest with_detail(FrameRequest request, const Detail &detail) {
-  request.voxel_pixels = detail.voxel_pixels;
-  request.voxel_error = detail.voxel_error;
-  return request;
-}
 
 struct DetailChoice {
   Detail detail;
@@ -56,19 +51,25 @@ inline constexpr double kMinPlaneRate = 16;
 /// volume has.
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
 
-/// Chooses for one frame. Draws small pictures of the frame, every so many pixels, and their bounds
-/// (certify()); so the choice depends on data, camera and size, never on timings. Levels of detail
-/// first, then bit planes: the coarsest that lose no more than kLostShare; no levels that spare
-/// hardly any blocks (kMaxBlocksShare), nor planes of volumes of few bits (kMinPlaneRate). Full
-/// detail, where most pixels do not keep max_surface_error even so. Waits.
-/// renderer: made with_choices(). volume: what it was made for.
-/// request: camera, isovalue and size are used.
-/// max_surface_error: [pixels], above 0.
-/// errors: Error as certify().
+/// Chooses the detail of one frame.
+///
+/// renderer           made with_choices(); the last frame that it draws here is another
+/// volume             what the renderer was made for
+/// request            of the frame; its own voxel_pixels and voxel_error do not matter
+/// max_surface_error  that most pixels are to keep [pixels], above 0
+///
+/// Draws small pictures of the frame, every so many pixels, and their bounds (certify()); so the
+/// choice depends on data, camera and size, never on timings. Levels of detail first, then bit
+/// planes: the coarsest that lose no more than kLostShare; no levels that spare hardly any blocks
+/// (kMaxBlocksShare), nor planes of volumes of few bits (kMinPlaneRate). Full detail, where most
+/// pixels do not keep max_surface_error even so. Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
                            const FrameRequest &request, double max_surface_error);
+
+/// The request with this detail.
+FrameRequest with_detail(FrameRequest request, const Detail &detail);
 
 /// Throws Error unless it is finite and above 0.
 void check_max_surface_error(double max_surface_error);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,7 +7,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 /// Nearest rank: the smallest value that at least `percent` of all values do not exceed. Reorders
@@ -70,4 +70,4 @@ ColourComparison compare_colour(const Image8 &a, const Image8 &b) {
   return result;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

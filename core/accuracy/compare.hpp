@@ -8,7 +8,7 @@
 #include "core/io/npy.hpp"
 #include "core/io/png.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// |a - b| in world units: percentiles by nearest rank (a value that occurs), and the largest.
 struct DepthError {
@@ -44,4 +44,4 @@ DepthComparison compare_depth(const FloatImage &a, const FloatImage &b);
 /// Throws Error when the images differ in size or number of channels.
 ColourComparison compare_colour(const Image8 &a, const Image8 &b);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "core/accuracy/compare.hpp"
 #include "core/base/parallel_for.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -223,4 +223,4 @@ double Flip::error(const Image8 &test) const {
   return std::accumulate(sums.begin(), sums.end(), 0.0) / double(a.colors.size());
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 
 #include "core/io/png.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A 0.7 m wide screen of 3840 pixels, seen from 0.7 m.
 inline constexpr double kPixelsPerDegree = 67.0206;
@@ -29,4 +29,4 @@ class Flip {
   std::unique_ptr<const View> reference_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

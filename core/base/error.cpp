@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -60,4 +60,4 @@ std::string one_line(std::string_view text) {
   return result;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -3,12 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
 
-namespace isowave {
+#include "isowave/error.hpp"
+
+namespace isowave::core {
 
 /// Escapes, as \n, \t or \x1b, what would end a line or move a cursor, and bytes that are not
 /// UTF-8: names of files and strings from files may hold any.
@@ -17,9 +18,9 @@ std::string one_line(std::string_view text);
 /// Anything a user can cause or fix: a bad file, a missing device, a budget too small.
 /// what() is one line without a trailing newline (see one_line()); tools print it and exit with
 /// status 1.
-class Error : public std::runtime_error {
+class Error : public isowave::Error {
  public:
-  explicit Error(const std::string &message) : std::runtime_error(one_line(message)) {}
+  explicit Error(const std::string &message) : isowave::Error(one_line(message)) {}
 
   template <class... Args>
   explicit Error(fmt::format_string<Args...> format, Args &&...args)
@@ -37,4 +38,4 @@ class BuildError : public Error {
   std::string log_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-namespace isowave {
+namespace isowave::core {
 
 std::uint32_t thread_count(std::uint32_t requested) {
   return requested > 0 ? std::min(requested, kMaxThreads)
@@ -37,4 +37,4 @@ void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,
   if (first_error) std::rethrow_exception(first_error);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 
-namespace isowave {
+namespace isowave::core {
 
 inline constexpr std::uint32_t kMaxThreads = 1024;
 /// Threads used for `requested`: 0 means one per processor; never more than kMaxThreads.
@@ -17,4 +17,4 @@ std::uint32_t thread_count(std::uint32_t requested);
 void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,
                   const std::function<void(std::uint64_t item, std::uint32_t thread)> &body);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string>
 
-namespace isowave {
+namespace isowave::core {
 
 /// A positive number in six digits, never below it: a bound that is printed must hold, too.
 inline std::string printed_bound(double bound) {
@@ -16,4 +16,4 @@ inline std::string printed_bound(double bound) {
   return text;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <system_error>
 
-namespace isowave {
+namespace isowave::core {
 
 /// ASCII letters in lower case; other bytes as they are.
 inline std::string lower_case(std::string_view text) {
@@ -28,4 +28,4 @@ std::optional<Number> parse_all(std::string_view text) {
   return number;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
@@ -122,4 +122,4 @@ void AtomicFile::commit() {
   temporary_.clear();
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include <span>
 #include <string_view>
 
-namespace isowave {
+namespace isowave::core {
 
 /// What the name leads to: a file, or the name at which writing through symbolic links would make
 /// one. Throws Error where links go in circles.
@@ -53,4 +53,4 @@ class AtomicFile {
       false;  ///< the file has no name yet; temporary_ is the one that commit() will give it
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -6,7 +6,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 FileSource::FileSource(std::shared_ptr<const InputFile> file, std::uint64_t offset,
                        std::uint64_t size)
@@ -80,4 +80,4 @@ void InflateSource::end_stream() {
   }
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

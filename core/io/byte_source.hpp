@@ -12,7 +12,7 @@
 
 #include "core/io/input_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class ByteSource {
  public:
@@ -67,4 +67,4 @@ class InflateSource : public ByteSource {
 /// deflate cannot shrink data more than this: a bound on what a compressed file may unpack to.
 inline constexpr std::uint64_t kMaxDeflateRatio = 1032;
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 InputFile::InputFile(const std::filesystem::path &path, std::string what)
     : path_(path), what_(std::move(what)) {
@@ -52,4 +52,4 @@ void check_input_file(const std::filesystem::path &path) {
   InputFile{path};
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-namespace isowave {
+namespace isowave::core {
 
 /// A regular file, open for reading. Anything else is refused: reading a pipe would wait for
 /// whoever writes to it, and a device may never end.
@@ -41,4 +41,4 @@ class InputFile {
 /// Throws Error where InputFile(path) does.
 void check_input_file(const std::filesystem::path &path);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "core/base/text.hpp"
 #include "core/io/text_header.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -258,4 +258,4 @@ VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file
   return header;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

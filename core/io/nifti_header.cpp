@@ -11,7 +11,7 @@
 #include "core/base/error.hpp"
 #include "core/io/byte_source.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -273,4 +273,4 @@ VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, boo
   return header;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,9 +10,9 @@
 
 #include "core/io/volume_header.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Reads and judges the header, not the voxels. Throws Error.
 VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, bool is_gzipped);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -14,7 +14,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/byte_source.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 static_assert(std::endian::native == std::endian::little,
@@ -132,4 +132,4 @@ FloatImage read_npy(const std::filesystem::path &path) {
   return image;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-namespace isowave {
+namespace isowave::core {
 
 /// float32 [height][width], row 0 at the top. A depth image holds the distance from the eye in
 /// world units, and +inf where nothing is hit.
@@ -24,4 +24,4 @@ void write_npy(const FloatImage &image, const std::filesystem::path &path);
 /// says.
 FloatImage read_npy(const std::filesystem::path &path);
 
-}  // namespace isowave
+}  // namespace isowave::core

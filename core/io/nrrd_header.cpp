@@ -11,7 +11,7 @@
 #include "core/base/text.hpp"
 #include "core/io/text_header.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -415,4 +415,4 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   return header;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

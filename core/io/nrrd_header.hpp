@@ -10,9 +10,9 @@
 
 #include "core/io/volume_header.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Reads and judges the header, not the voxels. Throws Error.
 VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -14,7 +14,7 @@
 #include "core/io/nrrd_header.hpp"
 #include "core/io/raw_reader.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
@@ -62,4 +62,4 @@ std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrid
   return open_voxels(*header);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

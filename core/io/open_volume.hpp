@@ -7,7 +7,7 @@
 #include "core/io/raw_reader.hpp"
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Opens Open-SciVis raw (`NAME_XxYxZ_TYPE.raw`, `.raw.gz`), NRRD (.nrrd, .nhdr), MetaImage (.mha,
 /// .mhd) or NIfTI (.nii, .nii.gz), by its extension in any case. Reads and judges the whole header;
@@ -20,4 +20,4 @@ std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path,
 /// open_volume().
 std::filesystem::path voxel_file(const std::filesystem::path &path);
 
-}  // namespace isowave
+}  // namespace isowave::core

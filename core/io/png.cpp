@@ -13,7 +13,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/input_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 // libpng reports errors by longjmp. The functions that call setjmp hold no object with a
@@ -171,4 +171,4 @@ Image8 read_png(const std::filesystem::path &path) {
   return image;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-namespace isowave {
+namespace isowave::core {
 
 /// [height][width][channels] bytes, row 0 at the top; 3 channels are RGB, 4 are RGBA with straight
 /// alpha. sRGB.
@@ -25,4 +25,4 @@ void write_png(const Image8 &image, const std::filesystem::path &path);
 /// cannot hold).
 Image8 read_png(const std::filesystem::path &path);
 
-}  // namespace isowave
+}  // namespace isowave::core

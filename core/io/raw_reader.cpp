@@ -12,7 +12,7 @@
 #include "core/io/byte_source.hpp"
 #include "core/io/text_voxels.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 static_assert(std::endian::native == std::endian::little,
@@ -136,8 +136,8 @@ class RawReader : public VolumeReader {
   }
 
   [[noreturn]] void fail_size(std::string_view how, std::string_view at_least = "") const {
-    isowave::fail_size(info_, voxels_, how, fmt::format("{}", num_bytes(info_, voxels_)),
-                       fmt::format("{}{}", at_least, bytes_read_));
+    isowave::core::fail_size(info_, voxels_, how, fmt::format("{}", num_bytes(info_, voxels_)),
+                             fmt::format("{}{}", at_least, bytes_read_));
   }
 
   VoxelLayout voxels_;
@@ -297,4 +297,4 @@ std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &f
   return open_voxels(header);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

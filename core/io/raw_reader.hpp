@@ -13,7 +13,7 @@
 #include "core/io/volume_header.hpp"
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// What a raw file's name does not say, or says wrongly. Unset fields come from the name.
 struct RawOverrides {
@@ -49,4 +49,4 @@ std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header);
 std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file,
                                        bool is_gzipped, const RawOverrides &overrides);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,7 +7,7 @@
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -140,4 +140,4 @@ std::int64_t HeaderFields::integer(std::string_view name) const {
   return integers(name, 1).front();
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 
 #include "core/io/byte_source.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Without blanks, tabs and carriage returns at both ends.
 std::string_view trim(std::string_view text);
@@ -83,4 +83,4 @@ class HeaderFields {
   std::map<std::string, std::string, std::less<>> fields_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "core/base/error.hpp"
 #include "core/io/text_header.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -119,4 +119,4 @@ std::size_t NumberSource::read(std::span<std::byte> bytes) {
   return bytes.size();
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -11,7 +11,7 @@
 #include "core/io/byte_source.hpp"
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The characters of a file from byte `offset` on, one by one.
 class CharacterSource {
@@ -59,4 +59,4 @@ class NumberSource : public ByteSource {
   std::string word_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

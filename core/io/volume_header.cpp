@@ -5,7 +5,7 @@
 #include "core/base/error.hpp"
 #include "core/io/text_header.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &direction) {
   info.spacing[axis] = std::abs(spacing);
@@ -20,4 +20,4 @@ std::shared_ptr<const InputFile> open_data_file(const InputFile &header, const s
   return std::make_shared<const InputFile>(header.path().parent_path() / name, what);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

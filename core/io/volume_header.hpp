@@ -15,7 +15,7 @@
 #include "core/io/input_file.hpp"
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 enum class VoxelEncoding { kRaw, kGzip, kGzipOrZlib, kHex, kText };
 
@@ -52,4 +52,4 @@ void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &dire
 /// that names both.
 std::shared_ptr<const InputFile> open_data_file(const InputFile &header, const std::string &name);
 
-}  // namespace isowave
+}  // namespace isowave::core

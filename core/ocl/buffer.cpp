@@ -7,7 +7,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 namespace {
 
@@ -215,4 +215,4 @@ void RawBuffer::check_range(std::size_t count, std::size_t offset, std::size_t s
                                           count, offset, name_, size));
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -12,7 +12,7 @@
 
 #include "core/ocl/device.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 /// The untyped part of Buffer: allocation, transfers, checks. Messages name the buffer.
 /// A moved-from buffer holds nothing: size 0, no memory, not in the ledger.
@@ -129,4 +129,4 @@ class Buffer : public RawBuffer {
   }
 };
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -11,7 +11,7 @@
 #include "core/ocl/kernel_sources.hpp"
 #include "core/ocl/pocl_environment.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 namespace {
 
@@ -184,4 +184,4 @@ void Device::finish() {
   }
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -19,7 +19,7 @@
 #include "core/ocl/memory_ledger.hpp"
 #include "core/ocl/stage_timer.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
 std::string_view to_string(DeviceType type);
@@ -138,4 +138,4 @@ class Device {
 /// "CL_OUT_OF_RESOURCES (-5)".
 std::string error_name(cl_int code);
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -10,7 +10,7 @@
 #include "core/base/text.hpp"
 #include "core/ocl/pocl_environment.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 namespace {
 
@@ -234,4 +234,4 @@ DeviceInfo choose_device(std::string_view selector) {
   return pick_device(devices, selector, environment ? environment : "");
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

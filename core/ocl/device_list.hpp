@@ -6,7 +6,7 @@
 
 #include "core/ocl/device.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 /// The handle of a listed device. Throws Error when the list has changed since, so that it is gone.
 cl::Device device_handle(const DeviceInfo &info);
@@ -14,4 +14,4 @@ cl::Device device_handle(const DeviceInfo &info);
 /// True when `list`, words between spaces, holds `word`: an extension in CL_DEVICE_EXTENSIONS.
 bool has_word(std::string_view list, std::string_view word);
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

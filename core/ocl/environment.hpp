@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string>
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 /// The value of an environment variable; empty if there is none.
 inline std::string environment(const char *name) {
@@ -11,4 +11,4 @@ inline std::string environment(const char *name) {
   return value == nullptr ? "" : value;
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -4,7 +4,7 @@
 
 #include "core/ocl/device.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 namespace {
 
@@ -88,4 +88,4 @@ std::string error_name(cl_int code) {
   return fmt::format("{} ({})", name ? name : "unknown OpenCL error", code);
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

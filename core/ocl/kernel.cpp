@@ -6,7 +6,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 Range Range::strided(std::size_t max_count, std::size_t group_size, const Device &device,
                      std::size_t oversubscribe) {
@@ -76,4 +76,4 @@ void RawKernel::set_bytes(cl_uint index, std::size_t bytes, const void *data) {
   }
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

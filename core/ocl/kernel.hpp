@@ -18,7 +18,7 @@
 #include "core/ocl/buffer.hpp"
 #include "core/ocl/device.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 /// Parameter tags for buffers: `global const T *` and `global T *` (or `constant T *`) of the
 /// kernel.
@@ -117,4 +117,4 @@ class Kernel : public RawKernel {
   }
 };
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -6,7 +6,7 @@
 
 #include "core/ocl/environment.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 namespace {
 
@@ -83,4 +83,4 @@ bool KernelCache::has_new_kernels() const {
   return false;
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -7,7 +7,7 @@
 
 #include "core/ocl/device.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 class KernelCache {
  public:
@@ -24,4 +24,4 @@ class KernelCache {
   std::filesystem::file_time_type begin_;
 };
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

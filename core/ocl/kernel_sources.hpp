@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 struct KernelSource {
   std::string_view stem;  ///< "radix_sort" for kernels_cl/radix_sort.cl
@@ -13,4 +13,4 @@ struct KernelSource {
 
 std::span<const KernelSource> kernel_sources();
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

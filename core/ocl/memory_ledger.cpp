@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 void MemoryLedger::add(const std::string &name, std::uint64_t bytes) {
   Entry &entry = by_name_[name];  // first, since only this can throw
@@ -23,4 +23,4 @@ void MemoryLedger::remove(const std::string &name, std::uint64_t bytes) noexcept
   total_.current -= bytes;
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 class MemoryLedger {
  public:
@@ -25,4 +25,4 @@ class MemoryLedger {
   std::map<std::string, Entry> by_name_;
 };
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -4,7 +4,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 PinnedBuffer::PinnedBuffer(Device &device, std::string name, std::size_t count)
     : device_(device), name_(std::move(name)) {
@@ -31,4 +31,4 @@ PinnedBuffer::~PinnedBuffer() {
   }
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -10,7 +10,7 @@
 
 #include "core/ocl/device.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 /// 32-bit words. Booked in the device's ledger all the same: a driver may keep a copy on the
 /// device, and some devices share the host's memory.
@@ -32,4 +32,4 @@ class PinnedBuffer {
   std::span<std::uint32_t> words_;
 };
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

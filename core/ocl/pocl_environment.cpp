@@ -13,7 +13,7 @@
 
 #include "core/ocl/environment.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 namespace fs = std::filesystem;
 
@@ -133,4 +133,4 @@ std::string cache_trouble() {
   return state().trouble;
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 /// Sees to it that PoCL has such a folder: if the one it would take (POCL_CACHE_DIR,
 /// XDG_CACHE_HOME, HOME or /tmp) cannot be written to and POCL_CACHE_DIR is not set, sets
@@ -20,4 +20,4 @@ std::string cache_notice();
 /// "; PoCL needs ..." if there is no such folder, or nothing: the end of a message on what failed.
 std::string cache_trouble();
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

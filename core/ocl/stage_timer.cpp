@@ -3,7 +3,7 @@
 #include "core/base/error.hpp"
 #include "core/ocl/device.hpp"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 StageTimer::Stage::Stage(StageTimer &timer, std::string_view name) : timer_(timer) {
   if (timer_.source_ == TimerSource::kOff) return;
@@ -64,4 +64,4 @@ std::map<std::string, double> StageTimer::collect() {
   return std::exchange(milliseconds_, {});
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

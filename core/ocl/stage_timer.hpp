@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 enum class TimerSource { kOff, kEvents, kWallClock };
 
@@ -66,4 +66,4 @@ class StageTimer {
   std::map<std::string, double> milliseconds_;
 };
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl

@@ -1,5 +1,5 @@
 #pragma once
-// What a renderer is asked for, and what it says of it: one frame.
+// What a frame is asked for, and what drawing it has done.
 
 #include <cstdint>
 #include <functional>
@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "core/stages/device_counts.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/level_bounds.hpp"
+#include "kernels_cl/portable/shared_types.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// What one pass did: the counts of the device, and what follows from them.
 struct PassStats {
@@ -29,31 +29,8 @@ struct PassStats {
       stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
-/// Called after each pass, the last included; hits() and shade() show the picture so far. Return
-/// false to stop. With a callback, or with profiling, the host waits after each pass; without, it
-/// stays a pass ahead.
-using OnPass = std::function<bool(const PassStats &)>;
-
-/// One frame: what to draw, and how precisely. A value: to render it changes nothing but caches.
-struct FrameRequest {
-  Camera camera{};
-  float isovalue = 0;
-  ImageSize size{};
-  /// Distance between voxels of a coarser level of detail, at most [pixels], see
-  /// make_level_frames(); 0: the finest level draws all. Needs RendererOptions::with_levels.
-  double voxel_pixels = 0;
-  /// How far decoded voxels may be from the volume's [voxel values]: fewer bit planes of each block
-  /// are decoded (with_fewer_planes()), of coarser levels fewer still (voxel_error_of()); 0: all.
-  double voxel_error = 0;
-  /// Instead of the volume, the field that is nowhere above, or nowhere below what the volume's
-  /// voxels were before compression, trilinear between them: decoded values are lowered or raised
-  /// by the bound of their error. Needs RendererOptions::with_bounds.
-  FieldBound bound = FieldBound::kNone;
-  OnPass on_pass{};
-};
-
 struct FrameStats {
-  std::vector<PassStats> passes{};
+  std::vector<PassStats> passes;
   std::size_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
@@ -63,4 +40,35 @@ struct FrameStats {
       false;  ///< on_pass said so while rays were left; the hit buffer holds the picture so far
 };
 
-}  // namespace isowave
+/// Called after each pass, the last included; Renderer::hits() and shade() show the picture so far.
+/// Return false to stop. With a callback, or with profiling, the host waits after each pass;
+/// without, it stays a pass ahead.
+using OnPass = std::function<bool(const PassStats &)>;
+
+/// One frame: what to draw, and how precisely. The same request gives the same picture, bit for
+/// bit, whatever was drawn before.
+struct FrameRequest {
+  Camera camera{};
+  float isovalue = 0;
+  std::optional<ImageSize> size{};  ///< none: the renderer's largest
+  /// Voxels of a coarser level of detail may be so many pixels apart, see make_level_frames(); 0:
+  /// the finest level draws all.
+  double voxel_pixels = 0;
+  /// How far the voxels may be from the volume's: 0, not at all; more, and fewer bit planes of each
+  /// block are decoded (with_fewer_planes()), of coarser levels of detail fewer still
+  /// (voxel_error_of()).
+  double voxel_error = 0;
+  /// What is drawn: the volume, or the field that is nowhere above, or nowhere below what the
+  /// volume's voxels were before compression, trilinear between them: decoded values are lowered or
+  /// raised by the bound of their error.
+  FieldBound bound = FieldBound::kNone;
+  OnPass on_pass{};
+};
+
+/// The same request from another place.
+inline FrameRequest seen_from(const Camera &camera, FrameRequest request) {
+  request.camera = camera;
+  return request;
+}
+
+}  // namespace isowave::core

@@ -11,7 +11,7 @@
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/block_bound.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -280,4 +280,4 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
       budget, least->peak(), least->stream_bytes);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -11,7 +11,7 @@
 #include "core/render/pipeline.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Where the compressed volume is while frames are drawn.
 enum class StreamPlace {
@@ -74,4 +74,4 @@ MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 
-}  // namespace isowave
+}  // namespace isowave::core

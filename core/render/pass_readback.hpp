@@ -9,7 +9,7 @@
 #include "core/ocl/pinned_buffer.hpp"
 #include "core/stages/device_counts.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A queue of at most two read-backs in flight. Their memory is pinned: to any other, NVIDIA's
 /// driver copies by a detour that costs a cold 512^3 frame a fifth of its time (H100, README
@@ -63,4 +63,4 @@ class PassReadback {
   std::size_t next_ = 0, in_flight_ = 0;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

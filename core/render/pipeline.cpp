@@ -8,7 +8,7 @@
 #include "core/stages/speculation.hpp"
 #include "core/stages/traverse.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -141,4 +141,4 @@ std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
   return std::make_unique<RaysPipeline>(state, group_size, solver);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

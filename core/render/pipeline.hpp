@@ -21,7 +21,7 @@
 #include "core/stages/zfp_decode.hpp"
 #include "core/zfp/level_bounds.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 enum class PipelineKind {
   kAuto,  ///< kRays, which was faster in nearly all that was measured (README "Results")
@@ -79,4 +79,4 @@ std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
                                         std::uint32_t group_size, Solver solver, Grouping grouping,
                                         ClosestHit closest);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -1,12 +1,17 @@
 #include "core/render/renderer.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
 
 #include "core/base/error.hpp"
 #include "core/render/stall_guard.hpp"
+#include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
+#include "kernels_cl/portable/block_grid.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -16,6 +21,35 @@ constexpr std::uint32_t kSmallCache = 1u << 16;
 double ms_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
       .count();
+}
+
+FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
+                      const RendererOptions &options, const MemoryPlan &plan) {
+  const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.with_levels);
+  const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.with_levels));
+  const FrameParams ids = make_id_grid(grids), &last = grids.back();
+  const bool has_levels = volumes.size() > 1;
+  const auto buffers = std::make_shared<MacrocellBuffers>(
+      device, last.ranges_begin + block_count(last), last.masks_begin / 2 + num_macrocells(last),
+      options.with_bounds ? kNumFieldBounds : 1);
+  const std::uint64_t num_rays = options.size.num_rays();
+  const std::uint32_t most_requests =
+      BlockCache::capacity_for(plan.cache_slots, block_count(ids), num_rays);
+  std::vector<Level> levels;
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const CompressedVolume &level = *volumes[i];
+    DeviceStream stream =
+        plan.stream == StreamPlace::kHost
+            ? DeviceStream(device, level, OnHost{plan.window_blocks}, options.with_bounds)
+            : DeviceStream(device, level, options.largest_stream_part, options.with_bounds);
+    Macrocells macrocells(device, grids[i], stream, buffers);
+    ZfpDecode decode(device, most_requests, stream.defines(), has_levels);
+    levels.push_back({level.info, level.precision, LevelError(level, i == 0), std::move(stream),
+                      std::move(macrocells), std::move(decode)});
+  }
+  Wavefront rays(device, num_rays, options.pipeline == PipelineKind::kBlocks, volumes.size());
+  BlockCache cache(device, ids, plan.cache_slots, num_rays, options.group_size, has_levels);
+  return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
 /// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use
@@ -36,179 +70,24 @@ bool turned_over(const std::vector<PassStats> &passes, std::uint32_t most) {
 
 }  // namespace
 
-FrameStats Renderer::render(const FrameRequest &request) {
-  const auto begin = std::chrono::steady_clock::now();
-  Plan plan = plan_of(request);
-  const Uploads uploaded_before = uploads();
-  const bool in_step = request.on_pass || device_.timer().source() != ocl::TimerSource::kOff;
-  begin_frame(request, std::move(plan));
-  FrameStats stats{.first_level = state_.drawing.first, .last_level = state_.drawing.end - 1};
-  StallGuard guard(state_.levels[0].info.dims);
-  for (bool finished = false; !finished && !stats.cancelled;) {
-    pipeline_->enqueue_pass();
-    readback_.push(state_.rays.counts);
-    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
-      continue;  // read one pass behind: the device never waits for us
-    const PassStats pass = stats_of(readback_.pop());
-    stats.rays_hit += pass.counts.hit_count;
-    stats.passes.push_back(pass);
-    finished = pass.counts.next_active_count == 0;
-    stats.cancelled = request.on_pass && !request.on_pass(pass) && !finished;
-    guard.check(pass.counts);
-  }
-  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
-  // for it.
-  if (!stats.cancelled) end_frame(stats);
-  state_.rays.frame = state_.levels[0].frame;  // for shading
-  const Uploads uploaded = uploads();
-  stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
-  stats.uploaded_bytes = uploaded.bytes - uploaded_before.bytes;
-  stats.total_ms = ms_since(begin);
-  return stats;
-}
-
-/// What the request comes to, or Error where the renderer cannot draw it; changes nothing.
-Renderer::Plan Renderer::plan_of(const FrameRequest &request) const {
-  check_image_size(request.size);
-  if (request.size.num_rays() > state_.rays.num_rays) {
-    throw Error("a picture of {}x{} pixels has {} rays, and the renderer was made for {}",
-                request.size.width, request.size.height, request.size.num_rays(),
-                state_.rays.num_rays);
-  }
-  check_voxel_pixels(request.voxel_pixels);
-  if (request.voxel_pixels > 0 && !options_.with_levels) {
-    throw Error(
-        "{} pixels between voxels cannot be allowed: the renderer was made without levels of "
-        "detail",
-        request.voxel_pixels);
-  }
-  if (request.bound != FieldBound::kNone && !options_.with_bounds)
-    throw Error("no bound of the volume can be drawn: the renderer was made without bounds");
-  Plan plan;
-  std::vector<VolumeInfo> infos;
-  for (std::size_t i = 0; i < state_.levels.size(); ++i) {
-    infos.push_back(state_.levels[i].info);
-    plan.decoding.push_back(
-        decoding_of(state_.levels[i], i, request.voxel_error, request.bound, value_range_));
-  }
-  plan.levels = make_level_frames(infos, request.camera, request.size, request.isovalue,
-                                  request.voxel_pixels);
-  return plan;
-}
-
-void Renderer::begin_frame(const FrameRequest &request, Plan plan) {
-  readback_.drain();  // of what the frame before had enqueued beyond its last pass
-  drawn_ = {0, 0};
-  prepare_cache(request.bound, std::move(plan.decoding));
-  std::vector<FrameParams> &frames = plan.levels;
-  const auto first = std::ranges::find_if(frames, draws);
-  const auto end = std::find_if_not(first, frames.end(), draws);
-  state_.drawing = {static_cast<std::size_t>(first - frames.begin()),
-                    static_cast<std::size_t>(end - frames.begin())};
-  const bool has_bands = end - first > 1;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    Level &level = state_.levels[i];
-    FrameParams &frame = frames[i];
-    frame.max_spec_count = options_.max_speculation;
-    frame.per_ray_speculation = options_.per_ray_speculation;
-    frame.table_groups = state_.cache.table_groups;
-    if (draws(frame)) {
-      const auto stage = device_.timer().stage("macrocells");
-      level.macrocells.select(frame, level.range_error, &level.stream);
-      level.macrocells.set_index(frame);
-      level.macrocells.set_active_box(frame);
-      // Where there are several bands, a ray stands at a border wherever it crosses that.
-      if (!has_bands) set_screen_box(frame);
-    }
-    level.frame = frame;
-  }
-  level_frames_.assign(first, end);
-  state_.rays.frame = level_frames_.front();
-  state_.rays.num_level_frames = static_cast<std::uint32_t>(level_frames_.size());
-  if (state_.levels.size() > 1) state_.rays.level_frames.write_async(level_frames_);
-  if (cached_isovalue_.value_or(request.isovalue) != request.isovalue) {
-    const auto stage = device_.timer().stage("macrocells");
-    state_.cache.classify(state_.rays);
-  }
-  cached_isovalue_ = request.isovalue;
-  pipeline_->begin_frame();
-  drawn_ = request.size;
-}
-
-/// Empties the cache where its blocks are decoded otherwise than these are to be.
-void Renderer::prepare_cache(FieldBound bound, std::vector<LevelDecoding> decoding) {
-  // Each bound has macrocells of its own.
-  if (options_.with_bounds) state_.levels[0].macrocells.use(static_cast<std::size_t>(bound));
-  if (decoding == cached_decoding_) return;
-  cached_decoding_.clear();  // unknown, until the cache is empty
-  state_.cache.clear();
-  cached_isovalue_.reset();
-  for (std::size_t i = 0; i < decoding.size(); ++i) set_decoding(state_.levels[i], decoding[i]);
-  cached_decoding_ = std::move(decoding);
-}
-
-void Renderer::end_frame(const FrameStats &stats) {
-  pipeline_->end_frame();
-  if (turned_over(stats.passes,
-                  most_recycled(state_.cache.num_slots, device_.info().type, options_.stream)))
-    state_.cache.clear();
-}
-
-PassStats Renderer::stats_of(const PassCounts &counts) {
-  const double rays = static_cast<double>(drawn_.num_rays());
-  PassStats stats;
-  stats.counts = counts;
-  stats.counts.window_count = std::min(counts.window_count, counts.active_count);
-  const bool is_blocks = options_.pipeline == PipelineKind::kBlocks;
-  // Pipeline `rays` looks ahead at the end of a pass, for the rays that are left.
-  const uint rays_looking =
-      std::min(counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
-  if (rays_looking != 0) stats.n_spec = static_cast<double>(counts.ahead_count) / rays_looking;
-  if (is_blocks) stats.visible_blocks = counts.visible_count;
-  // A launch that is not needed costs more than a pass that finds slots missing now and then. The
-  // counts are a pass old: its requests have taken slots since, and the pass after it may have
-  // asked for as many.
-  const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
-  const std::uint32_t num_slots = state_.cache.num_slots;
-  state_.slots_are_scarce = num_slots < kSmallCache ||
-                            counts.free_count < std::max<std::uint64_t>(num_slots / 4, spoken_for);
-  stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
-  stats.utilization_percent = 100.0 * counts.granted_count / rays;
-  stats.stage_ms = device_.timer().collect();
-  return stats;
-}
-
-Renderer::Uploads Renderer::uploads() const {
-  Uploads sum;
-  for (const Level &level : state_.levels) {
-    if (const StreamWindow *window = level.stream.window.get()) {
-      sum.blocks += window->uploaded_blocks();
-      sum.bytes += window->uploaded_bytes();
-    }
-  }
-  return sum;
-}
-
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
                    const RendererOptions &options)
     : device_(device),
       setup_begin_(std::chrono::steady_clock::now()),
       compile_ms_before_(device.compile_ms()),
-      options_(checked_options(options, volume, device)),
-      plan_(plan_renderer(device, volume, options_)),
-      state_(make_frame_state(device, volume, options_, plan_)),
+      options_(checked(options, volume, device)),
+      plan_(make_plan(device, volume, options_)),
+      state_(make_state(device, volume, options_, plan_)),
       value_range_(volume.value_range),
+      size_(options_.size),
       pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
                               options_.grouping, options_.closest)),
-      shade_(device, options_.max_size.num_rays()),
+      shade_(device, options_.size.num_rays()),
       readback_(device) {
-  if (options_.with_kept_picture) kept_.emplace(device, halved(options_.max_size, 1));
+  if (options_.with_kept_picture) kept_.emplace(device, halved(options_.size, 1));
   options_.cache_slots = plan_.cache_slots;
   options_.stream = plan_.stream;
   options_.window_blocks = plan_.window_blocks;
-  for (std::size_t i = 0; i < state_.levels.size(); ++i)
-    cached_decoding_.push_back(
-        decoding_of(state_.levels[i], i, 0, FieldBound::kNone, value_range_));
   compile_kernels();
   device.timer().collect();  // what was launched so far belongs to no frame; waits
   device.finish();
@@ -242,21 +121,202 @@ void Renderer::compile_kernels() {
   rays.reset_counts();
 }
 
-void Renderer::keep_picture() {
-  kept().keep(state_.rays, drawn());
+FrameStats Renderer::render(const FrameRequest &request) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Uploads uploaded_before = uploads();
+  const OnPass &on_pass = request.on_pass;
+  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
+  FrameStats stats;
+  begin_frame(request);
+  stats.first_level = state_.drawing.first;
+  stats.last_level = state_.drawing.end - 1;
+  StallGuard guard(state_.levels[0].info.dims);
+  for (bool finished = false; !finished && !stats.cancelled;) {
+    pipeline_->enqueue_pass();
+    readback_.push(state_.rays.counts);
+    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
+      continue;  // read one pass behind: the device never waits for us
+    const PassStats pass = stats_of(readback_.pop());
+    stats.rays_hit += pass.counts.hit_count;
+    stats.passes.push_back(pass);
+    finished = pass.counts.next_active_count == 0;
+    stats.cancelled = on_pass && !on_pass(pass) && !finished;
+    guard.check(pass.counts);
+  }
+  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
+  // for it.
+  if (!stats.cancelled) {
+    pipeline_->end_frame();
+    if (turned_over(stats.passes,
+                    most_recycled(state_.cache.num_slots, device_.info().type, options_.stream)))
+      state_.cache.clear();
+  }
+  state_.rays.frame = state_.levels[0].frame;  // for shading
+  const Uploads uploaded = uploads();
+  stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
+  stats.uploaded_bytes = uploaded.bytes - uploaded_before.bytes;
+  stats.total_ms = ms_since(begin);
+  return stats;
+}
+
+/// Throws Error before anything has changed.
+void Renderer::check(const FrameRequest &request) const {
+  const ImageSize size = size_of(request);
+  check_image_size(size);
+  if (size.num_rays() > state_.rays.num_rays) {
+    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
+                size.width, size.height, state_.rays.num_rays);
+  }
+  check_voxel_pixels(request.voxel_pixels);
+  if (request.voxel_pixels > 0 && !options_.with_levels) {
+    throw Error("a renderer of the finest level alone cannot draw with {} pixels between voxels",
+                request.voxel_pixels);
+  }
+  if (request.bound != FieldBound::kNone && !options_.with_bounds)
+    throw Error("a renderer that was made without bounds cannot draw one");
+}
+
+void Renderer::begin_frame(const FrameRequest &request) {
+  check(request);
+  const float isovalue = request.isovalue;
+  const ImageSize size = size_of(request);
+  std::vector<VolumeInfo> infos;
+  for (const Level &level : state_.levels) infos.push_back(level.info);
+  std::vector<FrameParams> frames =
+      make_level_frames(infos, request.camera, size, isovalue, request.voxel_pixels);
+  const std::vector<DecodedValues> values = decoded_values(request);
+  readback_.drain();  // of what the frame before had enqueued beyond its last pass
+  decode_as(values, request.bound);
+  size_ = size;
+  const auto first = std::ranges::find_if(frames, draws);
+  const auto end = std::find_if_not(first, frames.end(), draws);
+  state_.drawing = {static_cast<std::size_t>(first - frames.begin()),
+                    static_cast<std::size_t>(end - frames.begin())};
+  const bool has_bands = end - first > 1;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    Level &level = state_.levels[i];
+    FrameParams &frame = frames[i];
+    frame.max_spec_count = options_.max_speculation;
+    frame.per_ray_speculation = options_.per_ray_speculation;
+    frame.table_groups = state_.cache.table_groups;
+    if (draws(frame)) {
+      const auto stage = device_.timer().stage("macrocells");
+      level.macrocells.select(frame, level.range_error, &level.stream);
+      level.macrocells.set_index(frame);
+      level.macrocells.set_active_box(frame);
+      // Where there are several bands, a ray stands at a border wherever it crosses that.
+      if (!has_bands) set_screen_box(frame);
+    }
+    level.frame = frame;
+  }
+  level_frames_.assign(first, end);
+  state_.rays.frame = level_frames_.front();
+  state_.rays.num_level_frames = static_cast<std::uint32_t>(level_frames_.size());
+  if (state_.levels.size() > 1) state_.rays.level_frames.write_async(level_frames_);
+  if (cached_isovalue_.value_or(isovalue) != isovalue) {
+    const auto stage = device_.timer().stage("macrocells");
+    state_.cache.classify(state_.rays);
+  }
+  cached_isovalue_ = isovalue;
+  pipeline_->begin_frame();
+}
+
+Renderer::Uploads Renderer::uploads() const {
+  Uploads sum;
+  for (const Level &level : state_.levels) {
+    if (const StreamWindow *window = level.stream.window.get()) {
+      sum.blocks += window->uploaded_blocks();
+      sum.bytes += window->uploaded_bytes();
+    }
+  }
+  return sum;
+}
+
+PassStats Renderer::stats_of(const PassCounts &counts) {
+  const double rays = static_cast<double>(size_.num_rays());
+  PassStats stats;
+  stats.counts = counts;
+  stats.counts.window_count = std::min(counts.window_count, counts.active_count);
+  const bool is_blocks = options_.pipeline == PipelineKind::kBlocks;
+  // Pipeline `rays` looks ahead at the end of a pass, for the rays that are left.
+  const uint rays_looking =
+      std::min(counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
+  if (rays_looking != 0) stats.n_spec = static_cast<double>(counts.ahead_count) / rays_looking;
+  if (is_blocks) stats.visible_blocks = counts.visible_count;
+  // A launch that is not needed costs more than a pass that finds slots missing now and then. The
+  // counts are a pass old: its requests have taken slots since, and the pass after it may have
+  // asked for as many.
+  const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
+  const std::uint32_t num_slots = state_.cache.num_slots;
+  state_.slots_are_scarce = num_slots < kSmallCache ||
+                            counts.free_count < std::max<std::uint64_t>(num_slots / 4, spoken_for);
+  stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
+  stats.utilization_percent = 100.0 * counts.granted_count / rays;
+  stats.stage_ms = device_.timer().collect();
+  return stats;
+}
+
+/// What the request makes of each level's blocks. Throws Error where the error is not known that a
+/// bound needs.
+std::vector<Renderer::DecodedValues> Renderer::decoded_values(const FrameRequest &request) const {
+  std::vector<DecodedValues> values;
+  for (const Level &level : state_.levels) {
+    const double voxel_error = voxel_error_of(request.voxel_error, values.size());
+    const BlockPrecision planes = with_fewer_planes(level.precision, voxel_error);
+    const double few_planes = plane_error(level.precision, voxel_error);
+    const ValueOffset offset = value_offset(level.error, request.bound, few_planes, value_range_);
+    StreamLayout layout = level.stream.layout;
+    layout.min_exponent = planes.min_exponent;
+    layout.whole_numbers = planes.whole_numbers ? 1 : 0;
+    layout.value_offset = offset.uniform;
+    layout.bound_unit = offset.unit;
+    values.push_back({layout, few_planes});
+  }
+  return values;
+}
+
+/// Has blocks decoded to these values, and forgets those of others.
+void Renderer::decode_as(const std::vector<DecodedValues> &values, FieldBound bound) {
+  if (options_.with_bounds) state_.levels[0].macrocells.use(static_cast<std::size_t>(bound));
+  bool changes = false;
+  for (std::size_t i = 0; i < state_.levels.size(); ++i) {
+    Level &level = state_.levels[i];
+    if (std::memcmp(&values[i].layout, &level.stream.layout, sizeof(StreamLayout)) == 0) continue;
+    changes = true;
+    level.stream.layout = values[i].layout;
+    level.range_error = values[i].range_error;
+  }
+  if (changes) clear_cache();
+}
+
+Camera Renderer::camera(std::span<const float> isovalues) {
+  const Level &finest = state_.levels[0];
+  state_.levels[0].macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
+  return surface_camera(state_.levels[0].macrocells, finest.info, isovalues, options_.size);
+}
+
+std::vector<HitRecord> Renderer::hits() const {
+  std::vector<HitRecord> hits(size_.num_rays());
+  state_.rays.hits.read(hits);
+  return hits;
+}
+
+Image8 Renderer::shade(const Appearance &appearance) {
+  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, size_.samples);
 }
 
 void Renderer::fill_from_kept() {
-  kept().show(state_.rays, false);
+  kept_.value().show(state_.rays, false);
   device_.finish();
 }
 
 void Renderer::enlarge_kept(const FrameRequest &request) {
   check(request);
+  const ImageSize size = size_of(request);
   state_.rays.frame =
-      make_frame_params(state_.levels[0].info, request.camera, request.size, request.isovalue);
-  kept().show(state_.rays, true);
-  drawn_ = request.size;
+      make_frame_params(state_.levels[0].info, request.camera, size, request.isovalue);
+  size_ = size;
+  kept_.value().show(state_.rays, true);
   device_.finish();
 }
 
@@ -266,24 +326,4 @@ void Renderer::clear_cache() {
   cached_isovalue_.reset();
 }
 
-KeptPicture &Renderer::kept() {
-  if (!kept_) throw Error("no picture can be kept: the renderer was made without one");
-  return *kept_;
-}
-
-ImageSize Renderer::drawn() const {
-  if (drawn_.num_rays() == 0) throw Error("there is no picture: no frame has been drawn");
-  return drawn_;
-}
-
-std::vector<HitRecord> Renderer::hits() const {
-  std::vector<HitRecord> hits(drawn().num_rays());
-  state_.rays.hits.read(hits);
-  return hits;
-}
-
-Image8 Renderer::shade(const Appearance &appearance) {
-  return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, drawn().samples);
-}
-
-}  // namespace isowave
+}  // namespace isowave::core

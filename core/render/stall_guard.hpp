@@ -8,7 +8,7 @@
 #include "core/base/error.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Watches the counts of a frame's passes. A pass that ends no ray and brings no block still takes
 /// the first of its rays on by a cell; so such passes in a row cannot be more than a ray has cells.
@@ -36,4 +36,4 @@ class StallGuard {
   std::uint64_t limit_, num_stalled_ = 0;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <stdexcept>
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -36,89 +37,75 @@ double TimedFrames::steady_clock_ms() {
 TimedFrames::TimedFrames(Renderer &renderer, Clock now)
     : renderer_(renderer), now_(std::move(now)) {
   if (!renderer.options().with_kept_picture)
-    throw Error("no frame can be drawn within a time: the renderer was made to keep no picture");
+    throw std::logic_error("the renderer keeps no picture");
 }
 
 TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
-  check(request, budget_ms);
+  check_time_budget(budget_ms);
   const double begin = now_();
+  const ImageSize full = renderer_.size_of(request);
+  check_image_size(full);
   TimedFrame frame;
   std::size_t step = kNumSteps - 1;
+  double step_begin = begin;
   for (;;) {
-    const StepTimes times = draw(request, step, begin + budget_ms, frame);
+    const FrameRequest of_step = request_of(request, step);
+    double pass_begin = step_begin, first_pass_ms = 0;
+    const bool may_be_cancelled = !frame.steps.empty();
+    FrameRequest in_time = of_step;
+    // Further passes have fewer rays, so the next one takes no longer than the last, mostly.
+    in_time.on_pass = [&](const PassStats &) {
+      const double now = now_(), pass_ms = now - pass_begin;
+      if (first_pass_ms == 0) first_pass_ms = pass_ms;
+      pass_begin = now;
+      return !may_be_cancelled || now + pass_ms - begin <= budget_ms;
+    };
+    const FrameStats stats = renderer_.render(in_time);
+    const bool whole = !stats.cancelled;
+    const double now = now_(), step_ms = now - step_begin;
+    frame.steps.push_back({*of_step.size, of_step.voxel_pixels, step_ms,
+                           stats.passes.back().completed_percent, stats.cancelled});
+    add(frame.stats, stats);
+    frame.complete = whole && step == 0;
+    last_ms_[step] = whole ? step_ms : 2 * step_ms;
+    if (!whole) renderer_.fill_from_kept();
     if (step == 0) break;
     renderer_.keep_picture();
-    if (frame.steps.back().cancelled) break;
-    const std::size_t next = next_step(step, times, begin + budget_ms - times.end);
+    const std::size_t next =
+        whole ? next_step(step, step_ms, first_pass_ms, budget_ms - (now - begin)) : step;
     if (next == step) break;
     step = next;
+    step_begin = now;
   }
   if (step != 0) renderer_.enlarge_kept(request);
   frame.stats.total_ms = now_() - begin;
   return frame;
 }
 
-void TimedFrames::check(const FrameRequest &request, double budget_ms) const {
-  check_time_budget(budget_ms);
-  renderer_.check(request);
-  if (request.on_pass)
-    throw Error("a frame within a time stops by the clock: leave out on_pass, or the time");
-  const ImageSize half = halved(request.size, 1), largest = halved(renderer_.options().max_size, 1);
-  if (half.num_rays() > largest.num_rays()) {
-    throw Error("half of {}x{} pixels cannot be kept: the renderer keeps a picture of {} rays",
-                request.size.width, request.size.height, largest.num_rays());
-  }
+/// The frame with fewer rays, and levels of detail that suffice for them.
+FrameRequest TimedFrames::request_of(const FrameRequest &request, std::size_t step) const {
+  const ImageSize full = renderer_.size_of(request);
+  const double scale = std::ldexp(1.0, static_cast<int>(step)) / full.samples;  // of its pixels
+  FrameRequest smaller = request;
+  smaller.size = halved(full, static_cast<unsigned>(step));
+  if (step != 0 && renderer_.options().with_levels)
+    smaller.voxel_pixels = std::max(1.0, request.voxel_pixels / scale);
+  return smaller;
 }
 
-/// The request with fewer rays, and voxels that are as far apart in pixels of the full size, but at
-/// least one of its own pixels.
-FrameRequest TimedFrames::of_step(FrameRequest request, std::size_t step) const {
-  if (step == 0) return request;
-  const double scale =
-      std::ldexp(1.0, static_cast<int>(step)) / request.size.samples;  // of its pixels
-  request.voxel_pixels =
-      renderer_.options().with_levels ? std::max(1.0, request.voxel_pixels / scale) : 0.0;
-  request.size = halved(request.size, static_cast<unsigned>(step));
-  return request;
-}
-
-/// Adds the step to the frame. The first is drawn whole, others until it is end_ms, and are then
-/// filled from what was kept.
-TimedFrames::StepTimes TimedFrames::draw(const FrameRequest &request, std::size_t step,
-                                         double end_ms, TimedFrame &frame) {
-  FrameRequest drawn = of_step(request, step);
-  const double begin = now_();
-  double pass_begin = begin, first_pass_ms = 0;
-  const bool may_be_cancelled = !frame.steps.empty();
-  // Further passes have fewer rays, so the next one takes no longer than the last, mostly.
-  drawn.on_pass = [&](const PassStats &) {
-    const double now = now_(), pass_ms = now - pass_begin;
-    if (first_pass_ms == 0) first_pass_ms = pass_ms;
-    pass_begin = now;
-    return !may_be_cancelled || now + pass_ms <= end_ms;
-  };
-  const FrameStats stats = renderer_.render(drawn);
-  const double end = now_(), step_ms = end - begin;
-  frame.steps.push_back({drawn.size, drawn.voxel_pixels, step_ms,
-                         stats.passes.back().completed_percent, stats.cancelled});
-  add(frame.stats, stats);
-  frame.complete = !stats.cancelled && step == 0;
-  last_ms_[step] = stats.cancelled ? 2 * step_ms : step_ms;
-  if (stats.cancelled) renderer_.fill_from_kept();
-  return {step_ms, first_pass_ms, end};
-}
-
-/// After a step that took so long: the step to draw in left_ms, or `step` where there is no time.
-std::size_t TimedFrames::next_step(std::size_t step, const StepTimes &times, double left_ms) const {
+/// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms,
+/// or `step` where there is no time.
+std::size_t TimedFrames::next_step(std::size_t step, double step_ms, double first_pass_ms,
+                                   double left_ms) const {
   std::size_t next = step;
-  double expected = times.step_ms;
+  double expected = step_ms;
   for (std::size_t finer = step; finer-- > 0;) {
     expected = last_ms_[finer] > 0 ? last_ms_[finer] : kGrowth * expected;
     if (expected <= left_ms) next = finer;
   }
   // Part of a better picture is better than none.
-  if (next == step && step > 0 && kGrowth * times.first_pass_ms <= left_ms) next = step - 1;
+  if (next == step && step > 0 && kGrowth * first_pass_ms <= left_ms) next = step - 1;
   return next;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 
 #include "core/render/renderer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A picture that was drawn on the way. Where it was cancelled, since time was over, and has no hit
 /// yet, the one before shows through.
@@ -28,22 +28,21 @@ struct TimedFrame {
 };
 
 /// Draws frames of a renderer made with_kept_picture, in steps: 1/8, 1/4, 1/2 of the rays along
-/// each axis, then all of them as requested. Pictures of fewer rays have one for each
-/// pixel. Where the renderer was made with_levels, smaller pictures use those whose voxels are at
+/// each axis, then all of them as the request says. Pictures of fewer rays have one for each
+/// pixel. Where the renderer has levels of detail, smaller pictures use those whose voxels are at
 /// most one of their pixels apart.
 class TimedFrames {
  public:
   using Clock = std::function<double()>;  ///< [ms]
 
-  /// renderer: outlives this. now: for tests.
-  /// errors: Error where it was not made with_kept_picture.
+  /// now: for tests. `renderer` must outlive this.
   explicit TimedFrames(Renderer &renderer, Clock now = steady_clock_ms);
 
   /// Draws the smallest picture, however long it takes, then the largest that is expected to be
   /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
-  /// in time is filled from the one before. The hit buffer holds a picture of request.size.
-  /// errors: Error, before anything is drawn, unless budget_ms is finite and above 0, the request
-  /// has no on_pass, and half of its picture can be kept; Error as Renderer::render().
+  /// in time is filled from the one before. The hit buffer holds a picture of the full size. The
+  /// request's on_pass is not called. Throws Error unless budget_ms is finite and above 0, and as
+  /// Renderer::render() does.
   TimedFrame render(const FrameRequest &request, double budget_ms);
 
   static double steady_clock_ms();
@@ -51,15 +50,9 @@ class TimedFrames {
  private:
   static constexpr std::size_t kNumSteps = 4;  ///< 1/8 to 1/1; steps count down to 0, all rays
 
-  struct StepTimes {
-    double step_ms = 0, first_pass_ms = 0;
-    double end = 0;  ///< by the clock [ms]
-  };
-
-  void check(const FrameRequest &request, double budget_ms) const;
-  FrameRequest of_step(FrameRequest request, std::size_t step) const;
-  StepTimes draw(const FrameRequest &request, std::size_t step, double end_ms, TimedFrame &frame);
-  std::size_t next_step(std::size_t step, const StepTimes &times, double left_ms) const;
+  FrameRequest request_of(const FrameRequest &request, std::size_t step) const;
+  std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms,
+                        double left_ms) const;
 
   Renderer &renderer_;
   Clock now_;
@@ -70,4 +63,4 @@ class TimedFrames {
 /// Throws Error unless it is finite and above 0.
 void check_time_budget(double budget_ms);
 
-}  // namespace isowave
+}  // namespace isowave::core

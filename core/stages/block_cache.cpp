@@ -5,7 +5,7 @@
 #include "core/base/error.hpp"
 #include "kernels_cl/portable/block_grid.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -105,4 +105,4 @@ void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {
           table, slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -6,7 +6,7 @@
 #include "core/stages/wavefront.hpp"
 #include "kernels_cl/portable/block_table.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The fewest slots that still draw every picture: one dual grid.
 inline constexpr std::uint32_t kMinCacheSlots = 8;
@@ -93,4 +93,4 @@ struct BlockCache {
       clear_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

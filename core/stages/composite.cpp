@@ -2,7 +2,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 std::string_view to_string(ClosestHit closest) {
   return closest == ClosestHit::kScan ? "scan" : "atomic-min";
@@ -26,4 +26,4 @@ void Composite::operator()(const BlockCache &cache, Wavefront &rays, Compaction 
              rays.next_active_ray_ids, ISO_COUNT_FIELD(next_active_count));
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,7 +7,7 @@
 #include "core/stages/scan.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class Composite {
  public:
@@ -25,4 +25,4 @@ class Composite {
       kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,11 +10,11 @@
 #include "core/ocl/device.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The `count_field` argument of kernels: which uint of PassCounts says how many entries there are.
 #define ISO_COUNT_FIELD(field) \
-  static_cast<std::uint32_t>(offsetof(::isowave::PassCounts, field) / sizeof(std::uint32_t))
+  static_cast<std::uint32_t>(offsetof(::isowave::core::PassCounts, field) / sizeof(std::uint32_t))
 
 using CountsBuffer = ocl::Buffer<PassCounts>;
 
@@ -29,4 +29,4 @@ inline ocl::Defines with_levels(ocl::Defines defines, bool levels) {
   return defines;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -103,4 +103,4 @@ void Group::ByCounting::operator()(const BlockCache &cache, Wavefront &rays,
           rays.pair_hits, rays.closest_pairs, groups.pair_ids, candidate_count);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "core/stages/radix_sort.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// How pairs are gathered. The picture has the same bits either way.
 enum class Grouping {
@@ -90,4 +90,4 @@ class Group {
   std::variant<ByRadix, ByCounting> gather_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace isowave {
+namespace isowave::core {
 
 InitialRays::InitialRays(ocl::Device &device, std::uint64_t num_rays)
     : range_(ocl::Range::strided(num_rays, ocl::kGroupSize, device)),
@@ -15,4 +15,4 @@ void InitialRays::operator()(Wavefront &rays, Compaction &compaction) {
              rays.next_active_ray_ids, ISO_COUNT_FIELD(next_active_count));
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

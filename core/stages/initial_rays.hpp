@@ -5,7 +5,7 @@
 #include "core/stages/scan.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class InitialRays {
  public:
@@ -22,4 +22,4 @@ class InitialRays {
       kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -1,6 +1,6 @@
 #include "core/stages/intersect.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -33,4 +33,4 @@ void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, W
   }
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include "core/stages/solvers.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class Intersect {
  public:
@@ -30,4 +30,4 @@ class Intersect {
       settle_doubts_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

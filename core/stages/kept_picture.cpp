@@ -1,6 +1,6 @@
 #include "core/stages/kept_picture.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 KeptPicture::KeptPicture(ocl::Device &device, ImageSize largest)
     : device_(device),
@@ -25,4 +25,4 @@ void KeptPicture::show(Wavefront &rays, bool everywhere) {
         size_.ray_rows(), hits_, everywhere ? 1u : 0u, rays.hits);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

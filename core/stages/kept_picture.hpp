@@ -8,7 +8,7 @@
 #include "core/stages/wavefront.hpp"
 #include "core/view/frame.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel. 0
 /// times: the picture itself.
@@ -39,4 +39,4 @@ class KeptPicture {
   ocl::Kernel<FrameParams, uint, uint, ocl::In<HitRecord>, uint, ocl::Out<HitRecord>> show_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

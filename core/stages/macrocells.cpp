@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -10,7 +11,7 @@
 #include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/block_grid.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -204,4 +205,30 @@ void Macrocells::set_active_box(FrameParams &frame) {
   }
 }
 
-}  // namespace isowave
+std::optional<BlockBox> Macrocells::active_blocks(const FrameParams &frame) const {
+  constexpr int kEdge = ISO_MACROCELL_BLOCKS;
+  const auto macrocells = [](std::uint32_t blocks) {
+    return (static_cast<int>(blocks) + kEdge - 1) / kEdge;
+  };
+  const glm::ivec3 dims(macrocells(frame.blocks_x), macrocells(frame.blocks_y),
+                        macrocells(frame.blocks_z));
+  std::vector<uint> bits(2 * num_macrocells(frame));
+  masks().read(bits, frame.masks_begin);
+  constexpr int kMost = std::numeric_limits<int>::max();
+  BlockBox box{glm::ivec3(kMost), glm::ivec3(0)};
+  for (std::size_t word = 0; word < bits.size(); ++word) {
+    const int macrocell = static_cast<int>(word / 2);
+    const glm::ivec3 first = kEdge * glm::ivec3(macrocell % dims.x, macrocell / dims.x % dims.y,
+                                                macrocell / dims.x / dims.y);
+    for (uint left = bits[word]; left != 0; left &= left - 1) {
+      const int bit = std::countr_zero(left) + (word % 2 == 0 ? 0 : 32);
+      const glm::ivec3 block = first + glm::ivec3(bit % 4, bit / 4 % 4, bit / 16);
+      box.begin = glm::min(box.begin, block);
+      box.end = glm::max(box.end, block + 1);
+    }
+  }
+  if (box.end.x == 0) return {};
+  return box;
+}
+
+}  // namespace isowave::core

@@ -13,7 +13,7 @@
 #include "core/stages/device_counts.hpp"
 #include "core/stream/device_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Of one level of detail or of several, one behind the other: FrameParams::ranges_begin,
 /// masks_begin.
@@ -30,6 +30,11 @@ struct MacrocellBuffers {
   ocl::Buffer<cl_ushort> ranges;
   std::vector<ocl::Buffer<uint>> masks;  ///< [selections]
   std::size_t selection = 0;             ///< the one in use, at all levels
+};
+
+/// Blocks from `begin` to before `end`.
+struct BlockBox {
+  glm::ivec3 begin, end;
 };
 
 class Macrocells {
@@ -52,6 +57,10 @@ class Macrocells {
   void set_index(FrameParams &frame) { frame.isovalue_index = selection().isovalue_index; }
   /// ... and its active box, for which the first call waits.
   void set_active_box(FrameParams &frame);
+
+  /// The blocks that own the active ones of the isovalue selected last: [begin, end) along x, y, z;
+  /// none: there is no active block. Waits.
+  std::optional<BlockBox> active_blocks(const FrameParams &frame) const;
 
   /// Takes other masks, of all levels that share the buffers, for select() and all that follows.
   void use(std::size_t selection) { buffers_->selection = selection; }
@@ -117,4 +126,4 @@ class Macrocells {
       masks_kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -1,6 +1,6 @@
 #include "core/stages/march.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -52,4 +52,4 @@ void March::request_ahead(const Macrocells &macrocells, BlockCache &cache, Wavef
       cache.requested_bits, cache.request_block_ids, cache.capacity, cache.state);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "core/stages/solvers.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class March {
  public:
@@ -57,4 +57,4 @@ class March {
   std::optional<Kernels> levels_;  ///< for all others
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

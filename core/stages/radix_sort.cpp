@@ -7,7 +7,7 @@
 
 #include "kernels_cl/portable/radix_sort.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -71,4 +71,4 @@ void RadixSort::operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, C
   }
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

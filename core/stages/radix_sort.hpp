@@ -4,7 +4,7 @@
 #include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Who ranks the pairs of a tile (radix_sort.cl). The result is the same.
 enum class RadixRanking {
@@ -47,4 +47,4 @@ class RadixSort {
       scatter_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -95,4 +95,4 @@ double Resident::render(const Camera &camera, float isovalue) {
       .count();
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -12,7 +12,7 @@
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class Resident {
  public:
@@ -53,4 +53,4 @@ class Resident {
       kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -43,4 +43,4 @@ void Compaction::operator()(const ocl::Buffer<uint> &mask, const ocl::Buffer<uin
   values_(range_, mask, values, counts, count_field, tile_offsets_, out);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -6,7 +6,7 @@
 #include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// values[i] becomes values[0] + ... + values[i-1], in one work-group: for tables of tiles, which
 /// are short.
@@ -46,4 +46,4 @@ class Compaction {
       values_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

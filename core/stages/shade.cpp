@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -82,4 +82,4 @@ Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32
   return rgb_image(columns, rows, packed);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

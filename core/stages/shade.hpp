@@ -9,11 +9,11 @@
 #include "core/stages/wavefront.hpp"
 #include "kernels_cl/portable/shade.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Colours are display values, [0,1].
 struct Appearance {
-  glm::vec3 surface{0.86f, 0.74f, 0.53f};
+  glm::vec3 surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   glm::vec3 background{1.0f, 1.0f, 1.0f};
   float ambient = 0.15f, diffuse = 0.75f, specular = 0.25f;
 };
@@ -43,4 +43,4 @@ class Shade {
   ocl::Kernel<FrameParams, ocl::In<ShadeParams>, uint, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

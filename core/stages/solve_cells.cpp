@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-namespace isowave {
+namespace isowave::core {
 
 SolveCells::SolveCells(ocl::Device &device, Solver solver)
     : device_(&device), kernel_(device, "solve_cells", "solve_cells", solver_defines(solver)) {}
@@ -14,4 +14,4 @@ void SolveCells::operator()(const ocl::Buffer<Cubic> &cubics, ocl::Buffer<float>
           static_cast<uint>(cubics.size()), roots);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include "core/ocl/kernel.hpp"
 #include "core/stages/solvers.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class SolveCells {
  public:
@@ -20,4 +20,4 @@ class SolveCells {
   ocl::Kernel<ocl::In<Cubic>, uint, ocl::Out<float>> kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

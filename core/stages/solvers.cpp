@@ -4,7 +4,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 std::string_view to_string(Solver solver) {
   return kSolverNames.at(static_cast<std::size_t>(solver.kind));
@@ -24,4 +24,4 @@ ocl::Defines solver_defines(Solver solver) {
           {"ISO_ROOT_STEPS", std::to_string(solver.max_steps)}};
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include "core/ocl/device.hpp"
 #include "kernels_cl/portable/solver.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The cheapest that passes the whole stability suite (README "Solvers").
 inline constexpr Solver kDefaultSolver{ISO_SOLVER_BERNSTEIN, 32};
@@ -31,4 +31,4 @@ inline bool finds_all(Solver solver) {
 /// others cost it nothing.
 ocl::Defines solver_defines(Solver solver);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class Speculation {
  public:
@@ -22,4 +22,4 @@ class Speculation {
   ocl::Kernel<FrameParams, ocl::Out<PassCounts>> begin_pass_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -1,6 +1,6 @@
 #include "core/stages/traverse.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 Traverse::Traverse(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size)
     : range_(ocl::Range::strided(num_rays, group_size, device)),
@@ -11,4 +11,4 @@ void Traverse::operator()(const Macrocells &macrocells, Wavefront &rays) {
           rays.ray_block_ids, rays.pair_block_ids, rays.closest_pairs);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -5,7 +5,7 @@
 #include "core/stages/macrocells.hpp"
 #include "core/stages/wavefront.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class Traverse {
  public:
@@ -23,4 +23,4 @@ class Traverse {
       kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

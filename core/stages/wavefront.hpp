@@ -8,7 +8,7 @@
 #include "core/stages/device_counts.hpp"
 #include "core/view/frame.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// How the closest of a ray's results is found (pipeline `blocks`). The picture has the same bits
 /// either way.
@@ -94,4 +94,4 @@ struct Wavefront {
       closest_pairs;  ///< [window_count] by active ray: its pair that decides (closest_pair.h)
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

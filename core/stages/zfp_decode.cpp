@@ -5,7 +5,7 @@
 
 #include "kernels_cl/portable/block_grid.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -82,4 +82,4 @@ std::size_t ZfpDecode::take_own(std::span<uint> block_ids, const FrameParams &fr
   return places.size();
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

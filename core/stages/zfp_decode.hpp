@@ -9,7 +9,7 @@
 #include "core/stages/wavefront.hpp"
 #include "core/stream/device_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 class ZfpDecode {
  public:
@@ -66,4 +66,4 @@ class ZfpDecode {
       kernel_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

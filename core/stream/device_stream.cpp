@@ -5,7 +5,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -112,4 +112,4 @@ bool DeviceStream::is_window(const ocl::Defines &defines) {
   return parts != defines.end() && parts->second == "0";
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

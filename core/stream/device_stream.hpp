@@ -12,7 +12,7 @@
 #include "core/stream/stream_window.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// OpenCL promises that a buffer may have a quarter of a device's memory.
 inline constexpr std::uint32_t kMaxStreamParts = 4;
@@ -74,4 +74,4 @@ class DeviceStream {
   bool indexed_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

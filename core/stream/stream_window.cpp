@@ -7,7 +7,7 @@
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -186,4 +186,4 @@ std::span<uint> StreamWindow::read_granted(const ocl::Buffer<PassCounts> &counts
   return std::span(granted_).first(counts_.decoded_count);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -14,7 +14,7 @@
 #include "core/zfp/zfp_stream.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
-namespace isowave {
+namespace isowave::core {
 
 class StreamWindow {
  public:
@@ -81,4 +81,4 @@ class StreamWindow {
   std::vector<uint> granted_;  ///< and the list here
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -12,7 +12,7 @@
 #include "core/base/error.hpp"
 #include "core/io/input_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace {
 
 using nlohmann::json;
@@ -142,9 +142,40 @@ CameraFile read_camera_file(const std::filesystem::path &path) {
   return file;
 }
 
+namespace {
+
+constexpr double kElevation = 20.0 * std::numbers::pi / 180.0, kFirstAzimuth = 0.3;
+constexpr double kFovyDeg = 60.0;
+
+/// From the point looked at, of length 1.
+glm::dvec3 towards_eye(double azimuth) {
+  return {std::cos(kElevation) * std::sin(azimuth), std::sin(kElevation),
+          std::cos(kElevation) * std::cos(azimuth)};
+}
+
+}  // namespace
+
+Camera camera_of_box(const VolumeInfo &info, const glm::dvec3 &begin, const glm::dvec3 &end,
+                     double aspect, double margin) {
+  const glm::dmat3 to_world = info.index_to_world();
+  const glm::dvec3 up(0.0, 1.0, 0.0), back = towards_eye(kFirstAzimuth);
+  const glm::dvec3 right = glm::normalize(glm::cross(up, back)), above = glm::cross(back, right);
+  const glm::dvec3 centre = info.origin + to_world * (0.5 * (begin + end));
+  const double tan_v = margin * std::tan(glm::radians(kFovyDeg) / 2), tan_u = aspect * tan_v;
+  // From so far that each corner is within the picture, or its mirror image on the other side.
+  double distance = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
+                          corner & 4 ? 0.5 : -0.5);
+    const glm::dvec3 at = to_world * (half * (end - begin));
+    const double nearer = glm::dot(at, back);
+    distance = std::max({distance, nearer + std::abs(glm::dot(at, right)) / tan_u,
+                         nearer + std::abs(glm::dot(at, above)) / tan_v});
+  }
+  return {centre + distance * back, centre, up, kFovyDeg};
+}
+
 std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
-  constexpr double kPi = std::numbers::pi;
-  const double elevation = 20.0 * kPi / 180.0;
   const glm::dmat3 index_to_world = info.index_to_world();
   const glm::dvec3 extent(info.dims - 1u);
   const glm::dvec3 centre = info.origin + index_to_world * (0.5 * extent);
@@ -155,12 +186,11 @@ std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
   std::vector<Camera> cameras;
   cameras.reserve(n);
   for (std::uint32_t k = 0; k < n; ++k) {
-    const double azimuth = 2.0 * kPi * k / n + 0.3;
-    const glm::dvec3 towards_eye(std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
-                                 std::cos(elevation) * std::cos(azimuth));
-    cameras.push_back({centre + distance * towards_eye, centre, {0.0, 1.0, 0.0}, 60.0});
+    const double azimuth = 2.0 * std::numbers::pi * k / n + kFirstAzimuth;
+    cameras.push_back(
+        {centre + distance * towards_eye(azimuth), centre, {0.0, 1.0, 0.0}, kFovyDeg});
   }
   return cameras;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

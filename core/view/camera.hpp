@@ -9,7 +9,7 @@
 
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A pinhole camera in world space. fovy is the full vertical angle.
 struct Camera {
@@ -32,9 +32,17 @@ CameraFile read_camera_file(const std::filesystem::path &path);
 /// Throws Error when the camera is degenerate (see read_camera_file); `what` names it.
 void check_camera(const Camera &camera, std::string_view what);
 
+/// A view of a box from the front right and above, where orbit_cameras() begins, in which it fills
+/// the picture to `margin` of it.
+///
+/// begin, end  corners of the box [voxels], index space
+/// aspect      width of the picture / its height
+Camera camera_of_box(const VolumeInfo &info, const glm::dvec3 &begin, const glm::dvec3 &end,
+                     double aspect, double margin = 0.95);
+
 /// n eyes about the world +y axis through the box centre: azimuth 2*pi*k/n + 0.3 (0 looks from +z;
 /// x grows with sin), elevation 20 degrees, distance 0.8 box diagonals from the box centre,
 /// fovy 60. The box spans index [0, dims-1] mapped to world.
 std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "core/base/error.hpp"
 #include "core/volume/pyramid.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -79,12 +79,9 @@ void check_voxel_pixels(double voxel_pixels) {
                 voxel_pixels);
 }
 
-void check_levels(const CompressedVolume &volume) {
-  if (volume.coarser_levels.empty() && max_levels(volume.info.dims) > 1) {
-    throw Error(
-        "the volume has no levels of detail, which more than 0 pixels between voxels need: convert "
-        "it with --levels");
-  }
+void check_has_levels(const CompressedVolume &volume) {
+  if (!volume.coarser_levels.empty() || max_levels(volume.info.dims) == 1) return;
+  throw Error("the volume has no levels of detail: convert it with --levels");
 }
 
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
@@ -128,4 +125,4 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   return frames;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -14,7 +14,7 @@
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// One frame for each level, the finest first: as make_frame_params() makes it, but with the
 /// level's band, begin_t to end_t, which is empty where it draws nothing, and block ids that count
@@ -50,7 +50,7 @@ inline bool draws(const FrameParams &frame) {
 
 /// Throws Error unless it is finite and at least 0.
 void check_voxel_pixels(double voxel_pixels);
-/// Throws Error where the volume could have levels of detail, and has none.
-void check_levels(const CompressedVolume &volume);
+/// Throws Error where a volume that could have levels of detail has none.
+void check_has_levels(const CompressedVolume &volume);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "kernels_cl/portable/block_grid.h"
 #include "kernels_cl/portable/grid_dda.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -219,4 +219,4 @@ std::vector<float> depth_of(const std::vector<HitRecord> &hits) {
   return depth;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

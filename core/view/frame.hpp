@@ -8,7 +8,7 @@
 #include "core/volume/volume.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// A picture, and the grid of its rays: that of a picture with samples times as many pixels along
 /// both axes. Frames and hit buffers count rays; the picture has the mean colour of each pixel's
@@ -66,4 +66,4 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
 /// Depth of each hit, world units, INFINITY where nothing is hit.
 std::vector<float> depth_of(const std::vector<HitRecord> &hits);
 
-}  // namespace isowave
+}  // namespace isowave::core

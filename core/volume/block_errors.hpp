@@ -13,7 +13,7 @@
 
 #include "kernels_cl/portable/block_bound.h"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The smallest float32 that is not below.
 inline float rounded_up(double error) {
@@ -93,4 +93,4 @@ class BlockErrors {
   std::vector<float> kept_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

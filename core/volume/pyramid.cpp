@@ -6,7 +6,7 @@
 
 #include "core/base/parallel_for.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -115,4 +115,4 @@ std::vector<float> downsample(const glm::uvec3 &dims, std::span<const float> vox
   return coarse;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

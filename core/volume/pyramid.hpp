@@ -18,7 +18,7 @@
 
 #include "core/volume/voxel_chunks.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 inline constexpr std::uint32_t kMaxLevels = 16;
 
@@ -57,4 +57,4 @@ class Downsampler {
 /// The voxels of the next coarser level of voxels [nz][ny][nx].
 std::vector<float> downsample(const glm::uvec3 &dims, std::span<const float> voxels);
 
-}  // namespace isowave
+}  // namespace isowave::core

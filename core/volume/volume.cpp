@@ -7,7 +7,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -86,4 +86,4 @@ void VolumeReader::read_exact_layers(std::uint32_t z_begin, std::uint32_t num_la
   std::ranges::copy(voxels, out.begin());
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-namespace isowave {
+namespace isowave::core {
 
 enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
 
@@ -90,4 +90,4 @@ class VolumeReader {
   VolumeInfo info_;
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

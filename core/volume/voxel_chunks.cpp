@@ -12,7 +12,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/volume/block_errors.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -274,4 +274,4 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
   return {{total.min + 0.0f, total.max + 0.0f}, {total.source_min + 0.0, total.source_max + 0.0}};
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 
 #include "core/volume/volume.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// done and total in voxel layers; called from the calling thread.
 using Progress = std::function<void(std::uint32_t done, std::uint32_t total)>;
@@ -82,4 +82,4 @@ struct ValueRange {
 /// after all of them were looked at; a bad grid; an unfit map_nan.
 ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -10,7 +10,7 @@
 #include "core/volume/block_errors.hpp"
 #include "kernels_cl/portable/block_bound.h"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -217,4 +217,4 @@ float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std:
   return offset.uniform + offset.unit * block_bound(bounds.codes[block]) * share;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

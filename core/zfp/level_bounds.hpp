@@ -13,7 +13,7 @@
 
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Measures, block by block, how far the field of the next coarser level is from a level's own: as
 /// it was made, and as it is decoded. The decoded one is compared with the fine level itself:
@@ -107,4 +107,4 @@ ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane
 float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
                       std::uint32_t voxel);
 
-}  // namespace isowave
+}  // namespace isowave::core

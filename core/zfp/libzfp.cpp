@@ -6,7 +6,7 @@
 
 #include "kernels_cl/portable/shared_types.h"
 
-namespace isowave {
+namespace isowave::core {
 
 static_assert(std::endian::native == std::endian::little,
               "zfp streams are read as little-endian words");
@@ -42,4 +42,4 @@ ZfpHeader make_zfp_header(const glm::uvec3 &dims, std::uint32_t bits_per_block,
   return header;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -8,7 +8,7 @@
 #include <glm/glm.hpp>
 #include <memory>
 
-namespace isowave {
+namespace isowave::core {
 
 using ZfpField = std::unique_ptr<zfp_field, decltype(&zfp_field_free)>;
 using ZfpStream = std::unique_ptr<zfp_stream, decltype(&zfp_stream_close)>;
@@ -24,4 +24,4 @@ ZfpHeader make_zfp_header(const glm::uvec3 &dims, std::uint32_t bits_per_block,
 /// its bit planes, as many as an error of 2^min_exponent needs. The caller sets its bit stream.
 ZfpStream make_zfp_stream(std::uint32_t bits_per_block, std::int32_t min_exponent = ZFP_MIN_EXP);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -12,7 +12,7 @@
 #include "core/base/printed_bound.hpp"
 #include "core/zfp/libzfp.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -344,4 +344,4 @@ void find_block_lengths(const CompressedVolume &volume, const std::string &what,
   }
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -9,7 +9,7 @@
 #include "core/volume/block_errors.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// The error that may be made.
 struct ErrorGoal {
@@ -100,4 +100,4 @@ class ErrorBoundCoder : public ChunkCoder {
 void find_block_lengths(const CompressedVolume &volume, const std::string &what,
                         const std::function<void(std::uint32_t bits, std::uint64_t count)> &take);
 
-}  // namespace isowave
+}  // namespace isowave::core

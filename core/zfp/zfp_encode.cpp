@@ -6,7 +6,7 @@
 
 #include "core/base/error.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -171,4 +171,4 @@ void LayerEncoder::hand_over(const Result &result, const Sink &sink) {
   sink(std::as_bytes(std::span<const uint>(result.words)));
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

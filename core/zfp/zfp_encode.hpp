@@ -12,7 +12,7 @@
 #include "core/volume/block_errors.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
-namespace isowave {
+namespace isowave::core {
 
 class ZfpEncode {
  public:
@@ -94,4 +94,4 @@ class LayerEncoder {
   bool in_flight_ = false;     ///< current_ is to come
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -7,10 +7,11 @@
 #include <new>
 #include <string>
 
+#include "core/base/error.hpp"
 #include "core/zfp/libzfp.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
@@ -123,4 +124,23 @@ std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) 
   });
 }
 
-}  // namespace isowave
+void write_zfp_file(const CompressedVolume &volume, const fs::path &path) {
+  if (volume.bits_per_block % 64 != 0) {
+    throw Error("{}: blocks of {} bits are no whole number of bits a voxel: copy the file instead",
+                path.string(), volume.bits_per_block);
+  }
+  ZfpFileWriter file(path, volume);
+  std::vector<std::uint32_t> words;
+  for (std::size_t i = 0; i <= volume.coarser_levels.size(); ++i) {
+    const CompressedVolume &level = i == 0 ? volume : volume.coarser_levels[i - 1];
+    const std::uint64_t num_words = (level.payload_bits() + 31) / 32;
+    for (std::uint64_t begin = 0; begin < num_words; begin += words.size()) {
+      words.resize(std::min<std::uint64_t>(kItemsAtOnce, num_words - begin));
+      level.read_words(32 * begin, words);
+      file.write(std::as_bytes(std::span(words)), i);
+    }
+  }
+  file.commit(volume);
+}
+
+}  // namespace isowave::core

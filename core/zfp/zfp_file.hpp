@@ -14,7 +14,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left
 /// behind without commit().
@@ -47,4 +47,4 @@ class ZfpFileWriter {
   std::deque<Part> parts_;  ///< the coarser ones only until they are joined to the first
 };
 
-}  // namespace isowave
+}  // namespace isowave::core

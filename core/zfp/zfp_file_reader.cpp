@@ -15,7 +15,7 @@
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
@@ -343,4 +343,4 @@ CompressedVolume read_zfp_file_info(const fs::path &path) {
   return ZfpFileReader(path).take_info();
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -24,7 +24,7 @@
 #include "core/zfp/zfp_encode.hpp"
 #include "core/zfp/zfp_file.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -292,7 +292,7 @@ std::uint64_t CompressedVolume::payload_bits() const {
 }
 
 std::uint64_t CompressedVolume::block_begin(std::uint32_t block_id) const {
-  return is_indexed() ? isowave::block_begin(index.data(), block_id)
+  return is_indexed() ? isowave::core::block_begin(index.data(), block_id)
                       : std::uint64_t{block_id} * bits_per_block;
 }
 
@@ -425,4 +425,4 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double vox
   return voxels;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -17,7 +17,7 @@
 #include "core/volume/voxel_chunks.hpp"
 #include "kernels_cl/portable/block_index.h"
 
-namespace isowave {
+namespace isowave::core {
 
 class InputFile;
 namespace ocl {
@@ -124,6 +124,10 @@ CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
 
+/// Writes a volume as compress_to_file() does. Throws Error: blocks of a fixed rate that is not a
+/// multiple of 1 bit a voxel (other writers' files), or the file cannot be written.
+void write_zfp_file(const CompressedVolume &volume, const std::filesystem::path &path);
+
 /// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full
 /// header (spacing 1 then). Throws Error in one line on a broken header, other types or modes,
 /// truncation, checksum mismatch.
@@ -141,4 +145,4 @@ CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 /// allows: see with_fewer_planes(). The ground truth of every decoder here.
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double voxel_error = 0);
 
-}  // namespace isowave
+}  // namespace isowave::core

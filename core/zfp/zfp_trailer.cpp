@@ -10,7 +10,7 @@
 #include "core/base/error.hpp"
 #include "kernels_cl/portable/block_bound.h"
 
-namespace isowave {
+namespace isowave::core {
 using nlohmann::json;
 
 namespace {
@@ -132,4 +132,4 @@ ZfpLayout apply_zfp_trailer(const std::string &text, CompressedVolume &volume) {
   }
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -11,7 +11,7 @@
 
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 inline constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2, kPyramidVersion = 4;
 inline constexpr std::uint32_t kBoundlessPyramidVersion =
@@ -45,4 +45,4 @@ std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &la
 /// number that no such volume has.
 ZfpLayout apply_zfp_trailer(const std::string &text, CompressedVolume &volume);
 
-}  // namespace isowave
+}  // namespace isowave::core

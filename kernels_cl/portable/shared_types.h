@@ -22,7 +22,7 @@
 #include <cmath>
 #include <cstdint>
 #define ISO_CHECK_SIZE(T, n) static_assert(sizeof(T) == (n), #T " layout changed")
-#define ISO_NAMESPACE_BEGIN namespace isowave {
+#define ISO_NAMESPACE_BEGIN namespace isowave::core {
 #define ISO_NAMESPACE_END }
 #define ISO_GLOBAL
 #define ISO_CONSTANT

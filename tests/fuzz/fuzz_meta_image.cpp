@@ -4,7 +4,7 @@
 
 #include "tests/fuzz/header_and_data.hpp"
 
-using namespace isowave;
+using namespace isowave::core;
 
 int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
   return fuzz::read_header_and_data(

@@ -3,7 +3,7 @@
 
 #include "tests/fuzz/fuzz_target.hpp"
 
-using namespace isowave;
+using namespace isowave::core;
 
 int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
   const std::string_view input = fuzz::text_of(data, size);

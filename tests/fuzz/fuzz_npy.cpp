@@ -3,7 +3,7 @@
 #include "core/io/npy.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
-using namespace isowave;
+using namespace isowave::core;
 
 int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
   const std::filesystem::path path = fuzz::put("image.npy", fuzz::text_of(data, size));

@@ -7,7 +7,7 @@
 #include "core/io/png.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
-using namespace isowave;
+using namespace isowave::core;
 
 namespace {
 

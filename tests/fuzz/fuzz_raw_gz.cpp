@@ -6,7 +6,7 @@
 
 #include "tests/fuzz/fuzz_target.hpp"
 
-using namespace isowave;
+using namespace isowave::core;
 
 namespace {
 

@@ -17,7 +17,7 @@
 #include "core/io/open_volume.hpp"
 #include "core/volume/volume.hpp"
 
-namespace isowave::fuzz {
+namespace isowave::core::fuzz {
 namespace fs = std::filesystem;
 
 namespace {
@@ -186,4 +186,4 @@ std::size_t replace(std::string_view bytes, std::uint8_t *data, std::size_t size
   return bytes.size();
 }
 
-}  // namespace isowave::fuzz
+}  // namespace isowave::core::fuzz

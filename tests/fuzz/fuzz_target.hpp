@@ -22,7 +22,7 @@ std::size_t LLVMFuzzerCustomMutator(std::uint8_t *data, std::size_t size, std::s
 std::size_t LLVMFuzzerMutate(std::uint8_t *data, std::size_t size, std::size_t max_size);
 }
 
-namespace isowave::fuzz {
+namespace isowave::core::fuzz {
 
 /// Ends the process, with `what` as the last line on stderr, unless `holds`.
 void demand(bool holds, std::string_view what);
@@ -67,4 +67,4 @@ inline std::string_view text_of(const std::uint8_t *data, std::size_t size) {
   return {reinterpret_cast<const char *>(data), size};
 }
 
-}  // namespace isowave::fuzz
+}  // namespace isowave::core::fuzz

@@ -15,7 +15,7 @@
 #include "tests/fuzz/fuzz_target.hpp"
 #include "tests/fuzz/zfp_parts.hpp"
 
-using namespace isowave;
+using namespace isowave::core;
 
 namespace {
 

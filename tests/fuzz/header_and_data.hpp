@@ -7,7 +7,7 @@
 
 #include "tests/fuzz/fuzz_target.hpp"
 
-namespace isowave::fuzz {
+namespace isowave::core::fuzz {
 
 /// What stands between header and voxels that lie in a file of their own. Headers call that
 /// `data.raw`, or `data.raw.gz`.
@@ -41,4 +41,4 @@ int read_header_and_data(std::string_view input, const std::string &attached_nam
   return 0;
 }
 
-}  // namespace isowave::fuzz
+}  // namespace isowave::core::fuzz

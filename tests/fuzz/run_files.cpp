@@ -17,7 +17,7 @@ int main(int argc, char **argv) {
   std::size_t num_files = 0;
   const auto run = [&num_files](const fs::path &path) {
     std::fprintf(stderr, "%s\n", path.c_str());  // the last line before a crash
-    const std::string bytes = isowave::fuzz::bytes_of(path);
+    const std::string bytes = isowave::core::fuzz::bytes_of(path);
     LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size());
     ++num_files;
   };

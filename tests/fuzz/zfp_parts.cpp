@@ -5,7 +5,7 @@
 
 #include "tests/fuzz/fuzz_target.hpp"
 
-namespace isowave::fuzz {
+namespace isowave::core::fuzz {
 
 using nlohmann::json;
 
@@ -103,4 +103,4 @@ std::string put_together(const ZfpParts &parts, bool fix_lengths) {
   return file.append(kMagic);
 }
 
-}  // namespace isowave::fuzz
+}  // namespace isowave::core::fuzz

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace isowave::fuzz {
+namespace isowave::core::fuzz {
 
 struct ZfpParts {
   std::string stream;         ///< header, payload and padding
@@ -26,4 +26,4 @@ std::optional<ZfpParts> take_apart(std::string_view file);
 /// JSON.
 std::string put_together(const ZfpParts &parts, bool fix_lengths);
 
-}  // namespace isowave::fuzz
+}  // namespace isowave::core::fuzz

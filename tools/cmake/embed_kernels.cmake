@@ -13,6 +13,7 @@ function(embed_kernels target)
     COMMAND ${CMAKE_COMMAND} -D "output=${generated}" -D "folder=${folder}" -D "kernels=${ARGN}" -P ${embed_kernels_script}
     DEPENDS ${ARGN} ${headers} ${embed_kernels_script}
     COMMENT "Embedding OpenCL kernels" VERBATIM)
-  add_library(${target} STATIC ${generated})
+  add_library(${target} OBJECT ${generated})
   target_link_libraries(${target} PRIVATE isowave_flags)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
 endfunction()

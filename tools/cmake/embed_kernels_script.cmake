@@ -61,7 +61,7 @@ endforeach()
 file(WRITE ${output} "// Made by tools/cmake/embed_kernels.cmake.
 #include \"core/ocl/kernel_sources.hpp\"
 
-namespace isowave::ocl {
+namespace isowave::core::ocl {
 
 std::span<const KernelSource> kernel_sources() {
   static constexpr KernelSource sources[] = {
@@ -69,5 +69,5 @@ ${table}  };
   return sources;
 }
 
-}  // namespace isowave::ocl
+}  // namespace isowave::core::ocl
 ")

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 nlohmann::ordered_json quantiles_json(const Quantiles &q) {
   return {{"p50", q.p50}, {"p99", q.p99}, {"max", q.max}};
@@ -37,4 +37,4 @@ nlohmann::ordered_json accuracy_json(const Accuracy &tally) {
           {"residual_voxels", quantiles_json(quantiles(tally.residual))}};
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -5,7 +5,7 @@
 #include "tools/isowave/bench_solvers.hpp"
 #include "tools/isowave/commands.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 void add_bench(CLI::App &app) {
   CLI::App *bench =
@@ -15,4 +15,4 @@ void add_bench(CLI::App &app) {
   add_bench_pareto(*bench);
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -27,7 +27,7 @@
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -191,15 +191,20 @@ Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const 
                   point.max_surface_error ? with_choices(options, volume) : options);
 }
 
-/// One view of the point. To be drawn once before it is measured: the first frame of an isovalue,
-/// or of a precision, does more.
 FrameRequest request_of(const ParetoSubject &subject, const Point &point, std::size_t view) {
-  return with_detail({subject.cameras[view], subject.isovalue, subject.size}, point.details[view]);
+  return with_detail({subject.cameras[view], subject.isovalue}, point.details[view]);
 }
 
-FrameStats draw_cold(Renderer &renderer, const FrameRequest &request) {
+/// Draws one view of the point once: the first frame of an isovalue, or of a precision, does more.
+void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point,
+             std::size_t view) {
+  renderer.render(request_of(subject, point, view));
+}
+
+FrameStats draw_cold(Renderer &renderer, const ParetoSubject &subject, const Point &point,
+                     std::size_t view) {
   renderer.clear_cache();
-  return renderer.render(request);
+  return renderer.render(request_of(subject, point, view));
 }
 
 /// Draws every view `rounds` times from an empty cache.
@@ -208,10 +213,9 @@ void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
   std::uint64_t decoded = 0;
   std::vector<View> views;
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
-    const FrameRequest request = request_of(subject, point, view);
-    renderer.render(request);
+    warm_up(renderer, subject, point, view);
     for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const FrameStats stats = draw_cold(renderer, request);
+      const FrameStats stats = draw_cold(renderer, subject, point, view);
       times.push_back(stats.total_ms);
       for (const PassStats &pass : stats.passes)
         decoded += round == 0 ? pass.counts.decoded_count : 0;
@@ -234,13 +238,11 @@ double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point
            others = make_renderer(device, subject, other);
   std::vector<double> ratios;
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
-    const FrameRequest request = request_of(subject, point, view),
-                       others_request = request_of(subject, other, view);
-    renderer.render(request);
-    others.render(others_request);
+    warm_up(renderer, subject, point, view);
+    warm_up(others, subject, other, view);
     for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const double ms = draw_cold(renderer, request).total_ms;
-      ratios.push_back(ms / draw_cold(others, others_request).total_ms);
+      const double ms = draw_cold(renderer, subject, point, view).total_ms;
+      ratios.push_back(ms / draw_cold(others, subject, other, view).total_ms);
     }
   }
   return quantiles(std::move(ratios)).p50;
@@ -277,9 +279,9 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   subject.cameras = orbit_cameras(info, options.views);
   subject.voxel = std::max({info.spacing.x, info.spacing.y, info.spacing.z});
   subject.value_range = double{finest.value_range[1]} - double{finest.value_range[0]};
-  Renderer renderer(device, finest, {.max_size = subject.size});
+  Renderer renderer(device, finest, {.size = subject.size});
   for (const Camera &camera : subject.cameras) {
-    renderer.render({camera, options.isovalue, subject.size});
+    renderer.render({camera, options.isovalue});
     subject.truth.emplace_back(view_of(renderer));
   }
   return subject;
@@ -396,8 +398,8 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
     Point point = any;
     point.max_surface_error = max_surface_error;
     for (const Camera &camera : subject.cameras) {
-      const DetailChoice choice = choose_detail(
-          renderer, stored.volume, {camera, subject.isovalue, subject.size}, max_surface_error);
+      const DetailChoice choice =
+          choose_detail(renderer, stored.volume, {camera, subject.isovalue}, max_surface_error);
       point.details.push_back(choice.detail);
       point.reachable.push_back(choice.reachable);
     }
@@ -537,4 +539,4 @@ void add_bench_pareto(CLI::App &bench) {
   command->callback([options] { run_bench_pareto(*options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -4,8 +4,8 @@
 
 #include <CLI/CLI.hpp>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 void add_bench_pareto(CLI::App &bench);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

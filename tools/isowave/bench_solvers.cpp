@@ -28,7 +28,7 @@
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -327,13 +327,13 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
         solver.max_steps != 1)
       continue;
     RendererOptions renderer_options;
-    renderer_options.max_size = {subject.frame.width, subject.frame.height};
+    renderer_options.size = {subject.frame.width, subject.frame.height};
     renderer_options.solver = solver;
     Run run{solver,
             std::make_unique<Renderer>(device, subject.volume, renderer_options),
             {},
             solver_json(solver)};
-    run.renderer->render({subject.camera, subject.isovalue, renderer_options.max_size});
+    run.renderer->render({subject.camera, subject.isovalue});
     run.entry.update(accuracy_json(judge_frame(oracle, subject.frame, run.renderer->hits())));
     if (!options.pictures.empty() && solver.max_steps != 1) {
       write_failure_picture(options, subject, oracle, solver, *run.renderer);
@@ -342,11 +342,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
   }
   for (std::uint32_t round = 0; round < options.rounds; ++round) {
     for (Run &run : runs)
-      run.ms.push_back(
-          run.renderer
-              ->render(
-                  {subject.camera, subject.isovalue, {subject.frame.width, subject.frame.height}})
-              .total_ms);
+      run.ms.push_back(run.renderer->render({subject.camera, subject.isovalue}).total_ms);
   }
   ordered_json entries = ordered_json::array();
   for (Run &run : runs) {
@@ -438,4 +434,4 @@ void add_bench_solvers(CLI::App &bench) {
   command->callback([command, options] { run_bench_solvers(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

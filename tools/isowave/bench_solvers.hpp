@@ -3,8 +3,8 @@
 
 #include <CLI/CLI.hpp>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 void add_bench_solvers(CLI::App &bench);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -1,11 +1,11 @@
 #pragma once
 // One function per subcommand, each in the file of its name. It adds the subcommand and its options
-// to `app`; CLI11 calls the action when the command line names it. Actions throw isowave::Error;
+// to `app`; CLI11 calls the action when the command line names it. Actions throw core::Error;
 // main prints it.
 
 #include <CLI/CLI.hpp>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 void add_devices(CLI::App &app);
 void add_info(CLI::App &app);
@@ -16,4 +16,4 @@ void add_compare(CLI::App &app);
 void add_verify(CLI::App &app);
 void add_bench(CLI::App &app);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

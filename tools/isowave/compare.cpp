@@ -16,7 +16,7 @@
 #include "core/io/input_file.hpp"
 #include "tools/isowave/commands.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 namespace {
 
 struct CompareArgs {
@@ -129,4 +129,4 @@ void add_compare(CLI::App &app) {
   command->callback([args] { run_compare(*args); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -43,4 +43,4 @@ void CompileReport::finish() {
   cache_ = ocl::KernelCache(device_.info());
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -4,7 +4,7 @@
 #include "core/ocl/device.hpp"
 #include "core/ocl/kernel_cache.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// On a terminal, shows the kernel that is being compiled. `device` must outlive this.
 class CompileReport {
@@ -25,4 +25,4 @@ class CompileReport {
   int num_kernels_ = 0;
 };
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

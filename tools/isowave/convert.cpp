@@ -18,7 +18,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -52,8 +52,7 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
-  compress.precision =
-      find_error_bound(options.path, overrides, options.compression, options.input);
+  compress.precision = find_precision(options.path, overrides, options.compression, options.input);
   compress.input.progress = make_progress_bar("compressing");
   const CompressedVolume volume = compress_to_file(*reader, compress, options.output);
   if (compiling) compiling->finish();
@@ -99,4 +98,4 @@ void add_convert(CLI::App &app) {
   command->callback([command, options] { run_convert(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

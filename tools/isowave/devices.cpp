@@ -17,7 +17,7 @@
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/render_stats.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -118,4 +118,4 @@ void add_devices(CLI::App &app) {
   command->callback([as_json] { run_devices(*as_json); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

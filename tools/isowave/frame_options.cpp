@@ -6,7 +6,7 @@
 #include "core/base/error.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 ImageSize parse_size(const std::string &text) {
   ImageSize size;
@@ -79,10 +79,12 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
       ->capture_default_str();
   command.add_option("--size", options.size, "picture size WxH [1280x720, or the camera file's]");
   CLI::Option *orbit =
-      command.add_option("--orbit", options.orbit, "draw N views around the volume [1]")
+      command
+          .add_option("--orbit", options.orbit,
+                      "draw N views around the whole volume [one view, which the surfaces fill]")
           ->check(CLI::Range(1u, 100000u));
   command.add_option("--cameras", options.cameras, "camera file (JSON)")->excludes(orbit);
   return isovalue;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -12,13 +12,13 @@
 #include "core/zfp/zfp_stream.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// Options as typed; read_views() and load_scene() check them.
 struct FrameOptions {
   CompressionOptions compression;  ///< of a volume that is not
   std::vector<float> isovalues;
-  double voxel_error = 0;     ///< FrameRequest::voxel_error
+  double voxel_error = 0;     ///< see FrameRequest::voxel_error
   std::string size;           ///< WxH
   std::uint32_t samples = 1;  ///< ImageSize::samples
   std::uint32_t orbit = 0;    ///< views; 0: one, or the camera file's
@@ -55,4 +55,4 @@ struct Scene {
 Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
                  const Views &views, ocl::Device *device = nullptr);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -1,6 +1,6 @@
 // isowave generate: writes a synthetic volume in the Open-SciVis naming.
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -75,4 +75,4 @@ void add_generate(CLI::App &app) {
   command->callback([command, options] { run_generate(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -19,7 +19,7 @@
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -162,4 +162,4 @@ void add_info(CLI::App &app) {
   command->callback([options] { run(*options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -6,14 +6,13 @@
 #include "tools/isowave/program.hpp"
 
 int main(int argc, char **argv) {
+  using namespace isowave::core::tools;
   CLI::App app{
       "Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on "
-      "OpenCL "
-      "devices."};
+      "OpenCL devices."};
   app.name("isowave");
-  app.set_version_flag("--version", "isowave 0.1.0");
+  app.set_version_flag("--version", program_name());
   app.require_subcommand(1);
-  using namespace isowave::tools;
   add_devices(app);
   add_info(app);
   add_generate(app);

@@ -16,7 +16,7 @@
 #include "core/volume/volume.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace fs = std::filesystem;
 
@@ -111,4 +111,4 @@ void Outputs::make_folder() const {
     throw Error("cannot make the folder {}: {}", new_folder_.string(), failure.message());
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 class Outputs {
  public:
@@ -36,4 +36,4 @@ class Outputs {
   std::filesystem::path new_folder_;  ///< to be made
 };
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -19,12 +19,14 @@
 #include <sstream>
 #include <system_error>
 
+#include "core/api/guarded.hpp"
 #include "core/base/error.hpp"
 #include "core/ocl/device.hpp"
 #include "core/ocl/pocl_environment.hpp"
+#include "isowave/version.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -52,44 +54,16 @@ std::string keep_log(const std::string &log) {
   return {};
 }
 
-std::string text_of(const std::filesystem::filesystem_error &error) {
-  return fmt::format("{}: {}", error.path1().string(), error.code().message());
-}
-
-/// Without the library's own number: "[json.exception.type_error.302] type must be ..."
-std::string text_of(const nlohmann::json::exception &error) {
-  const std::string_view text = error.what();
-  const std::size_t end = text.find("] ");
-  return std::string(end == std::string_view::npos ? text : text.substr(end + 2));
-}
-
-/// One line, to be called in a catch clause.
-std::string text_of_current_exception(const std::string &command) {
+/// One line, to be called in a catch clause. What a compiler of kernels said is kept in a file.
+std::string text_of_failure(const std::string &command) {
   try {
     throw;
   } catch (const BuildError &error) {
     const std::string name = error.log().empty() ? "" : keep_log(error.log());
     return error.what() +
            (name.empty() ? "" : fmt::format("; the compiler's whole log is {}", name));
-  } catch (const Error &error) {
-    return error.what();
-  } catch (const std::filesystem::filesystem_error &error) {
-    return text_of(error);
-  } catch (const std::bad_alloc &) {
-    return fmt::format("out of memory: {} needs more than there is", command);
-  } catch (const std::length_error &) {
-    return fmt::format("out of memory: {} needs more than a program can have", command);
-  } catch (const nlohmann::json::exception &error) {
-    return fmt::format("{} failed: JSON: {}", command, text_of(error));
-  } catch (const cl::Error &error) {
-    return fmt::format("{} failed in OpenCL: {}: {}", command, error.what(),
-                       ocl::error_name(error.err()));
-  } catch (const std::system_error &error) {
-    return fmt::format("{} failed: {}", command, error.code().message());
-  } catch (const std::exception &error) {
-    return error.what();
   } catch (...) {
-    return fmt::format("{} failed, and nothing says why", command);
+    return text_of_current_exception(command);
   }
 }
 
@@ -150,7 +124,7 @@ int run_program(CLI::App &app, int argc, char **argv) {
   } catch (const CLI::RequiredError &error) {
     message = text_of(error, app);
   } catch (...) {
-    message = text_of_current_exception(command_name(app));
+    message = text_of_failure(command_name(app));
   }
   if (const auto failure = finish_output()) message = failure;
   if (message) {
@@ -162,4 +136,8 @@ int run_program(CLI::App &app, int argc, char **argv) {
   return status;
 }
 
-}  // namespace isowave::tools
+std::string program_name() {
+  return fmt::format("isowave {}", version());
+}
+
+}  // namespace isowave::core::tools

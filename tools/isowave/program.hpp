@@ -3,8 +3,9 @@
 // one, options are strict.
 
 #include <CLI/CLI.hpp>
+#include <string>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// Parses the command line, which runs the callbacks of `app`, and returns the exit status.
 /// Everything that is thrown becomes one line on stderr and status 1; so does a standard output
@@ -12,4 +13,7 @@ namespace isowave::tools {
 /// status alone. Options are made strict first (strict_options.hpp).
 int run_program(CLI::App &app, int argc, char **argv);
 
-}  // namespace isowave::tools
+/// "isowave 0.1.0"
+std::string program_name();
+
+}  // namespace isowave::core::tools

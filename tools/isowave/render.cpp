@@ -15,6 +15,7 @@
 #include "core/base/error.hpp"
 #include "core/io/npy.hpp"
 #include "core/render/renderer.hpp"
+#include "core/render/surface_camera.hpp"
 #include "core/render/time_budget.hpp"
 #include "core/view/detail.hpp"
 #include "reference/twin.hpp"
@@ -22,12 +23,13 @@
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -78,9 +80,9 @@ fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArg
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  virtual FrameStats render(const FrameRequest &request) = 0;
-  /// Draws the frame once more, however long it takes.
-  virtual FrameStats refine(const FrameRequest &request) { return render(request); }
+  virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
+  /// Draws the last frame once more, however long it takes.
+  virtual FrameStats refine() { return {}; }
   virtual std::vector<HitRecord> hits() = 0;
   virtual Image8 shade() = 0;
   /// Prints what else is known of the frame drawn last, and adds it to its --stats: how far it may
@@ -97,19 +99,27 @@ class DeviceFrames : public FrameSource {
         appearance_(appearance),
         max_surface_error_(args.max_surface_error),
         time_budget_(args.time_budget) {
+    base_.voxel_pixels = args.voxel_pixels;
+    base_.voxel_error = args.frame.voxel_error;
     if (time_budget_) timed_frames_.emplace(renderer_);
   }
-  FrameStats render(const FrameRequest &request) override {
-    drawn_ = request;
-    if (max_surface_error_) {
-      choice_ = choose_detail(renderer_, volume_, request, *max_surface_error_);
-      drawn_ = with_detail(request, choice_.detail);
+  FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
+    request_ = seen_from(camera, base_);
+    request_.isovalue = isovalue;
+    if (timed_frames_) {
+      timed_ = timed_frames_->render(request_, *time_budget_);
+      return timed_.stats;
     }
-    if (!timed_frames_) return renderer_.render(drawn_);
-    timed_ = timed_frames_->render(drawn_, *time_budget_);
-    return timed_.stats;
+    if (max_surface_error_) {
+      choice_ = choose_detail(renderer_, volume_, request_, *max_surface_error_);
+      request_ = with_detail(request_, choice_.detail);
+    }
+    FrameRequest watched = request_;
+    watched.on_pass = on_pass;
+    return renderer_.render(watched);
   }
-  FrameStats refine(const FrameRequest &request) override { return renderer_.render(request); }
+  FrameStats refine() override { return renderer_.render(request_); }
+  Camera surface_camera(std::span<const float> isovalues) { return renderer_.camera(isovalues); }
   void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
     if (max_surface_error_) frame["error"] = bound_error(error_map);
     if (timed_frames_) frame["time_budget"] = timed_steps();
@@ -127,7 +137,8 @@ class DeviceFrames : public FrameSource {
   std::optional<TimedFrames> timed_frames_;
   Appearance appearance_;
   std::optional<double> max_surface_error_, time_budget_;
-  FrameRequest drawn_;
+  FrameRequest base_;     ///< of all frames
+  FrameRequest request_;  ///< of the last one, as it was drawn
   DetailChoice choice_;
   TimedFrame timed_;
 };
@@ -155,7 +166,7 @@ nlohmann::ordered_json detail_json(const Detail &detail) {
 }
 
 nlohmann::ordered_json DeviceFrames::bound_error(const fs::path &error_map) {
-  const Certificate certificate = certify(renderer_, volume_, drawn_, renderer_.hits());
+  const Certificate certificate = certify(renderer_, volume_, request_, renderer_.hits());
   const CertificateSummary summary = summarize(certificate, *max_surface_error_);
   const double certified = summary.num_pixels == 0
                                ? 100.0
@@ -175,7 +186,9 @@ nlohmann::ordered_json DeviceFrames::bound_error(const fs::path &error_map) {
                  choice_.advice);
   }
   if (!error_map.empty())
-    write_npy({drawn_.size.ray_columns(), drawn_.size.ray_rows(), certificate.bounds}, error_map);
+    write_npy({renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(),
+               certificate.bounds},
+              error_map);
   nlohmann::ordered_json tries = nlohmann::ordered_json::array();
   for (const DetailChoice::Try &each : choice_.tries) {
     tries.push_back(detail_json(each.detail));
@@ -203,10 +216,10 @@ class TwinFrames : public FrameSource {
         appearance_(appearance),
         solver_(args.renderer.solver),
         twin_(scene.volume, args.voxel_pixels, args.frame.voxel_error) {}
-  FrameStats render(const FrameRequest &request) override {
+  FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
-    frame_ = make_frame_params(scene_.volume.info, request.camera, request.size, request.isovalue);
-    hits_ = twin_.render(request.camera, request.size, request.isovalue, solver_);
+    frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
+    hits_ = twin_.render(camera, scene_.size, isovalue, solver_);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
@@ -256,10 +269,8 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
   for (const float isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
-      FrameRequest request{camera, isovalue, scene.size, options.voxel_pixels,
-                           options.frame.voxel_error};
-      request.on_pass = progress_writer(options, scene, frames, isovalue, view);
-      const FrameStats stats = frames.render(request);
+      const FrameStats stats =
+          frames.render(camera, isovalue, progress_writer(options, scene, frames, isovalue, view));
       write_outputs(options, scene, frames, isovalue, view);
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
@@ -267,7 +278,7 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
       frames.report(frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
                     result.back());
       if (!options.refined.empty()) {
-        const FrameStats refined = frames.refine(request);
+        const FrameStats refined = frames.refine();
         write_png(frames.shade(),
                   frame_path(options.refined, scene.cameras.size(), options, isovalue, view));
         fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.rays_hit),
@@ -285,7 +296,8 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
                                  {"isovalues", options.frame.isovalues},
                                  {"voxel_error", options.frame.voxel_error},
                                  {"reference", options.reference}};
-  json.update(renderer_options_json(options.renderer, options.voxel_pixels));
+  json.update(renderer_options_json(options.renderer));
+  json["voxel_pixels"] = options.voxel_pixels;
   return json;
 }
 
@@ -390,6 +402,13 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   check_choice(options);
 }
 
+/// The view that any device would take. Without a device, of the whole volume.
+Camera reference_camera(const RenderArgs &options, const Scene &scene) {
+  if (ocl::list_devices().empty()) return scene.cameras.front();
+  ocl::Device device(ocl::choose_device());
+  return surface_camera(device, scene.volume, options.frame.isovalues, scene.size);
+}
+
 void run_render(const CLI::App &command, RenderArgs options) {
   options.voxel_pixels = options.renderer_flags.voxel_pixels;
   check_options(command, options);
@@ -410,16 +429,16 @@ void run_render(const CLI::App &command, RenderArgs options) {
   // Whoever chooses has levels of detail to choose from.
   const bool chooses_levels = options.max_surface_error ||
                               (options.time_budget && options.renderer_flags.pipeline != "blocks");
-  if (chooses_levels) options.renderer_flags.voxel_pixels = 1;
-  want_levels(options.renderer_flags, options.frame.compression);
-  const Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
+  if (options.voxel_pixels > 0 || chooses_levels) want_levels(options.frame.compression);
+  Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
   outputs.make_folder();
-  if (chooses_levels && scene.volume.coarser_levels.empty())
-    options.renderer_flags.voxel_pixels = options.voxel_pixels;
+  wanted.with_levels = chooses_levels && !scene.volume.coarser_levels.empty();
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
-  nlohmann::ordered_json document = {{"program", "isowave 0.1.0"},
+  nlohmann::ordered_json document = {{"program", program_name()},
                                      {"volume", volume_json(options, scene.volume)}};
+  const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
   if (!device) {
+    if (fits_surface) scene.cameras = {reference_camera(options, scene)};
     TwinFrames frames(scene, appearance, options);
     document["options"] = options_json(options, scene);
     document["frames"] = draw_frames(options, scene, frames);
@@ -427,6 +446,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
     DeviceFrames frames(*device, scene, appearance, options);
     compiling->finish();
     options.renderer = frames.renderer().options();
+    if (fits_surface) scene.cameras = {frames.surface_camera(options.frame.isovalues)};
     if (options.verbose) print_plan(frames.renderer().memory_plan(), scene.volume);
     document["device"] = device_json(device->info());
     document["options"] = options_json(options, scene);
@@ -495,4 +515,4 @@ void add_render(CLI::App &app) {
   command->callback([command, options] { run_render(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -2,7 +2,7 @@
 
 #include "core/io/atomic_file.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -93,4 +93,4 @@ void write_json(const ordered_json &document, const std::string &path) {
   file.commit();
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

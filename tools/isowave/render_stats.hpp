@@ -7,7 +7,7 @@
 #include "core/render/renderer.hpp"
 #include "core/view/camera.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 inline constexpr int kChartsSchema =
     2;  ///< of the JSON of `isowave bench`; tools/charts refuses others
@@ -29,4 +29,4 @@ std::string json_text(const nlohmann::ordered_json &document);
 /// Writes the document whole or not at all. Throws Error.
 void write_json(const nlohmann::ordered_json &document, const std::string &path);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

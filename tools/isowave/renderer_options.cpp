@@ -1,10 +1,9 @@
 #include "tools/isowave/renderer_options.hpp"
 
 #include "core/base/error.hpp"
-#include "core/view/detail.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option("--pipeline", flags.pipeline,
@@ -62,7 +61,6 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
 void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
   if (flags.speculation == "off")
     refuse_options(app, {"--max-speculation"}, "--speculation off is 1");
-  check_voxel_pixels(flags.voxel_pixels);
   solver_from_string(flags.solver);
   grouping_from_string(flags.grouping);
   closest_hit_from_string(flags.closest);
@@ -70,9 +68,9 @@ void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
     refuse_options(app, {"--grouping", "--closest"}, "give --pipeline blocks, which alone has it");
 }
 
-RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize max_size) {
+RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) {
   RendererOptions options = flags.values;
-  options.max_size = max_size;
+  options.size = size;
   options.with_levels |= flags.voxel_pixels > 0;
   options.pipeline = flags.pipeline == "blocks" ? PipelineKind::kBlocks
                      : flags.pipeline == "rays" ? PipelineKind::kRays
@@ -90,7 +88,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize max_si
   return options;
 }
 
-nlohmann::ordered_json renderer_options_json(const RendererOptions &options, double voxel_pixels) {
+nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
   const char *speculation = options.max_speculation == 1  ? "off"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
@@ -98,7 +96,7 @@ nlohmann::ordered_json renderer_options_json(const RendererOptions &options, dou
           {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
           {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
           {"closest", to_string(options.closest)},      {"group_size", options.group_size},
-          {"stream", to_string(options.stream)},        {"voxel_pixels", voxel_pixels}};
+          {"stream", to_string(options.stream)}};
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -8,34 +8,32 @@
 #include "core/render/renderer.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 struct RendererFlags {
   std::string pipeline = "auto", speculation = "auto", solver{to_string(kDefaultSolver)};
   std::string grouping{to_string(kDefaultGrouping)}, closest{to_string(kDefaultClosestHit)},
       stream = "auto";
-  double voxel_pixels = 0;  ///< FrameRequest::voxel_pixels
   RendererOptions values;
+  double voxel_pixels = 0;  ///< FrameRequest::voxel_pixels
 };
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags);
 
-/// Asks for levels of detail of a volume that is compressed now, if they are to be drawn and nobody
-/// said how many.
-inline void want_levels(const RendererFlags &flags, CompressionOptions &compression) {
-  if (flags.voxel_pixels > 0 && !says_levels(compression)) compression.levels = 0;
+/// Asks for levels of detail of a volume that is compressed now, if nobody said how many.
+inline void want_levels(CompressionOptions &compression) {
+  if (!says_levels(compression)) compression.levels = 0;
 }
 
-/// Throws Error on names that there are not, numbers out of range, and on options without effect
-/// beside others.
+/// Throws Error on names that there are not, and on options without effect beside others.
 void check_renderer_options(const CLI::App &app, const RendererFlags &flags);
 
-/// For frames of at most that size, of flags.voxel_pixels. Throws Error on a solver, grouping or
-/// way to the closest hit that there is not.
-RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize max_size);
+/// Of frames with levels of detail where flags.voxel_pixels is not 0. Throws Error on a solver,
+/// grouping or way to the closest hit that there is not.
+RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
 /// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size,
-/// stream, voxel_pixels.
-nlohmann::ordered_json renderer_options_json(const RendererOptions &options, double voxel_pixels);
+/// stream.
+nlohmann::ordered_json renderer_options_json(const RendererOptions &options);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

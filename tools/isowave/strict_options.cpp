@@ -11,7 +11,7 @@
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -152,4 +152,4 @@ void refuse_options(const CLI::App &command, std::initializer_list<const char *>
   }
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// Makes every option of the program and its subcommands refuse, by name and in one line: an empty
 /// value; an option's name in the place of a value; for a number anything but a decimal one in its
@@ -37,4 +37,4 @@ CLI::Validator count_or_all();
 void refuse_options(const CLI::App &command, std::initializer_list<const char *> names,
                     std::string_view why);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -15,12 +15,13 @@
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/verify_errors.hpp"
 #include "tools/isowave/verify_frames.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -138,7 +139,7 @@ void run_verify(const CLI::App &command, VerifyArgs options) {
   check_options(command, options);
   const bool all = options.solvers.empty();
   if (all) options.solvers.assign(kSolverNames.begin(), kSolverNames.end());
-  ordered_json document = {{"program", "isowave 0.1.0"}, {"seed", options.seed}};
+  ordered_json document = {{"program", program_name()}, {"seed", options.seed}};
   std::uint64_t failures = 0;
   const std::string_view judged = all ? to_string(kDefaultSolver) : std::string_view{};
   if (options.frames.max_surface_error) {
@@ -192,4 +193,4 @@ void add_verify(CLI::App &app) {
   command->callback([command, options] { run_verify(*command, *options); });
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -10,7 +10,7 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/compile_report.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordered_json &document) {
   const double max_surface_error = *options.max_surface_error;
@@ -36,7 +36,7 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   std::vector<double> source(scene.volume.info.num_voxels());
   open_any_volume(options.input, to_overrides(options.volume))
       ->read_exact_layers(0, dims.z, source);
-  Renderer renderer(device, scene.volume, with_choices({.max_size = scene.size}, scene.volume));
+  Renderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
   compiling.finish();
   fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view",
              "px chosen", "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");
@@ -46,8 +46,8 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const DetailChoice choice =
-          choose_detail(renderer, scene.volume, {camera, isovalue, scene.size}, max_surface_error);
-      const FrameRequest request = with_detail({camera, isovalue, scene.size}, choice.detail);
+          choose_detail(renderer, scene.volume, {camera, isovalue}, max_surface_error);
+      const FrameRequest request = with_detail({camera, isovalue}, choice.detail);
       renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
       const Certificate certificate = certify(renderer, scene.volume, request, drawn);
@@ -83,4 +83,4 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   return exceeded;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

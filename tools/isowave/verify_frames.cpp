@@ -18,7 +18,7 @@
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/compile_report.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 namespace {
 
@@ -77,7 +77,7 @@ class FrameDrawer {
     device_ = std::make_unique<ocl::Device>(info);
     CompileReport compiling(*device_);
     RendererOptions options;
-    options.max_size = scene.size;
+    options.size = scene.size;
     options.solver = solver;
     options.with_shading = false;
     renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
@@ -86,7 +86,8 @@ class FrameDrawer {
 
   std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
     if (!renderer_) return render_scalar(frame, voxels_, solver_);
-    renderer_->render({scene_.cameras[view], frame.isovalue, scene_.size, 0, voxel_error_});
+    renderer_->render(
+        {.camera = scene_.cameras[view], .isovalue = frame.isovalue, .voxel_error = voxel_error_});
     return renderer_->hits();
   }
   std::string name() const { return device_ ? device_->info().name : "scalar reference"; }
@@ -206,4 +207,4 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
       "[frames: the scalar reference; leaks: as render]");
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -12,7 +12,7 @@
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 struct VerifyFramesOptions {
   std::string input;  ///< empty: no frames
@@ -34,4 +34,4 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
                             const std::vector<std::string> &solvers,
                             nlohmann::ordered_json &document);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -7,63 +7,15 @@
 
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
-#include "core/generate/generate.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
+#include "core/sources/generate.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/strict_options.hpp"
 
-namespace isowave::tools {
-
-namespace {
-
-constexpr std::string_view kGenerate = "generate:";
-
-GenerateOptions parse_generator(std::string_view text) {
-  const auto fail = [&] {
-    throw Error("'{}{}': write generate:FIELD_XxYxZ_TYPE or generate:FIELD_XxYxZ_TYPE:SEED",
-                kGenerate, text);
-  };
-  const std::size_t colon = text.find(':');
-  const std::optional<RawName> name = parse_raw_name(text.substr(0, colon));
-  if (!name) fail();
-  GenerateOptions options;
-  options.field = field_from_string(name->name);
-  options.dims = name->dims;
-  options.type = name->type;
-  if (colon != std::string_view::npos) {
-    const auto seed = parse_all<decltype(options.seed)>(text.substr(colon + 1));
-    if (!seed) fail();
-    options.seed = *seed;
-    if (options.field != Field::kMixingLayer)
-      throw Error("'{}{}': a seed is of mixing_layer's noise alone: leave it out", kGenerate, text);
-  }
-  return options;
-}
-
-/// Gives a generated volume the spacing asked for.
-class RespacedReader : public VolumeReader {
- public:
-  RespacedReader(std::unique_ptr<VolumeReader> source, const glm::dvec3 &spacing)
-      : source_(std::move(source)) {
-    info_ = source_->info();
-    info_.spacing = spacing;
-  }
-  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
-    source_->read_layers(z_begin, num_layers, out);
-  }
-  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
-                         std::span<double> out) override {
-    source_->read_exact_layers(z_begin, num_layers, out);
-  }
-
- private:
-  std::unique_ptr<VolumeReader> source_;
-};
-
-}  // namespace
+namespace isowave::core::tools {
 
 void add_volume_options(CLI::App &command, VolumeOptions &options) {
   command
@@ -93,21 +45,6 @@ RawOverrides to_overrides(const VolumeOptions &options) {
     throw Error("--spacing: need X Y Z, or one number for all, got 2 numbers");
   if (spacing.size() == 3) overrides.spacing = {spacing[0], spacing[1], spacing[2]};
   return overrides;
-}
-
-std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
-                                              const RawOverrides &overrides) {
-  if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
-  if (overrides.dims || overrides.type)
-    throw Error("{}: it says dims and type itself: leave --dims and --type", path);
-  std::unique_ptr<VolumeReader> reader =
-      open_generated(parse_generator(std::string_view(path).substr(kGenerate.size())));
-  if (!overrides.spacing) return reader;
-  return std::make_unique<RespacedReader>(std::move(reader), *overrides.spacing);
-}
-
-bool is_zfp_name(const std::string &path) {
-  return path.ends_with(".zfp");
 }
 
 void add_compression_options(CLI::App &command, CompressionOptions &options) {
@@ -149,61 +86,40 @@ bool says_levels(const CompressionOptions &options) {
   return !options.options.empty() && options.options.back()->count() > 0;
 }
 
-std::optional<BlockPrecision> find_error_bound(const std::string &path,
-                                               const RawOverrides &overrides,
-                                               const CompressionOptions &options,
-                                               InputOptions input) {
-  if (!options.bounded()) return {};
-  const auto check = [](const char *option, const std::optional<double> &tolerance) {
-    if (tolerance && !(*tolerance > 0)) throw Error("{} {}: must be above 0", option, *tolerance);
-  };
-  check("--tolerance", options.tolerance);
-  check("--tolerance-relative", options.relative_tolerance);
-  ErrorGoal goal{options.tolerance.value_or(0), options.exact};
-  if (options.relative_tolerance) {
-    ChunkCoder nothing;
-    input.progress = make_progress_bar("reading the value range");
-    const std::array<double, 2> range =
-        read_in_chunks(*open_any_volume(path, overrides), input, nothing).source;
-    if (range[0] == range[1])
-      throw Error("{}: all voxels are {}: there is no range that an error is relative to", path,
-                  range[0]);
-    goal.tolerance = *options.relative_tolerance * (range[1] - range[0]);
-    if (!(goal.tolerance > 0 && std::isfinite(goal.tolerance)))
-      throw Error(
-          "--tolerance-relative {}: of values from {} to {}, that is {}: need above 0 and finite",
-          *options.relative_tolerance, range[0], range[1], goal.tolerance);
-  }
-  input.progress = make_progress_bar("measuring errors");
-  return choose_precision(*open_any_volume(path, overrides), goal, input);
+namespace {
+
+Storage to_storage(const CompressionOptions &options) {
+  Storage storage;
+  storage.rate = options.rate;
+  storage.tolerance = options.tolerance;
+  storage.relative_tolerance = options.relative_tolerance;
+  storage.exact = options.exact;
+  storage.levels = options.levels;
+  storage.measure_error = options.measure_error;
+  storage.progress = make_progress_bar;
+  return storage;
+}
+
+}  // namespace
+
+std::optional<BlockPrecision> find_precision(const std::string &path, const RawOverrides &overrides,
+                                             const CompressionOptions &options,
+                                             const InputOptions &input) {
+  Storage storage = to_storage(options);
+  storage.map_nan = input.map_nan;
+  storage.num_threads = input.num_threads;
+  return core::find_precision([&] { return open_any_volume(path, overrides); }, path, storage);
 }
 
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device) {
   if (is_zfp_name(path)) {
-    if (overrides.dims || overrides.type)
-      throw Error("{}: --dims and --type are for raw files", path);
     refuse_compression(compression, path);
-    VolumeInfo info = read_zfp_file_info(path).info;
-    if (overrides.spacing) info.spacing = *overrides.spacing;
-    check_volume_info(info, path);
-    check_drawable(info, path);  // before an index of all blocks is built
-    CompressedVolume volume = open_zfp_file(path);
-    if (overrides.spacing) set_spacing(volume, *overrides.spacing);
-    return volume;
+    return open_compressed_volume(path, overrides);
   }
-  const std::unique_ptr<VolumeReader> reader = open_any_volume(path, overrides);
-  check_drawable(reader->info(), path);
-  CompressOptions options;
-  options.rate = compression.rate;
-  options.precision = find_error_bound(path, overrides, compression);
-  options.levels = compression.levels;
-  options.measure_error = compression.measure_error;
-  options.input.progress = make_progress_bar("compressing");
-  options.device = options.precision ? nullptr : device;
-  CompressedVolume volume = compress(*reader, options);
-  if (device) device->timer().collect();  // they belong to no frame
-  return volume;
+  Storage storage = to_storage(compression);
+  storage.device = device;
+  return compress_volume([&] { return open_any_volume(path, overrides); }, path, storage);
 }
 
 Progress make_progress_bar(std::string_view label) {
@@ -231,4 +147,4 @@ std::string with_commas(std::uint64_t number) {
   return text;
 }
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -10,11 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include "core/io/open_volume.hpp"
+#include "core/sources/load_volume.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave::tools {
+namespace isowave::core::tools {
 
 /// Options as typed; to_overrides() checks them.
 struct VolumeOptions {
@@ -50,23 +50,17 @@ void add_compression_options(CLI::App &command, CompressionOptions &options);
 void refuse_compression(const CompressionOptions &options, const std::string &path);
 /// Whether the command line says how many levels there are to be.
 bool says_levels(const CompressionOptions &options);
-/// The bound that was asked for, or none: the rate. Reads all of the volume, for a relative
+/// The precision that was asked for, or none: the rate. Reads all of the volume, for a relative
 /// tolerance twice. Throws Error: see choose_precision().
-std::optional<BlockPrecision> find_error_bound(const std::string &path,
-                                               const RawOverrides &overrides,
-                                               const CompressionOptions &options,
-                                               InputOptions input = {});
+std::optional<BlockPrecision> find_precision(const std::string &path, const RawOverrides &overrides,
+                                             const CompressionOptions &options,
+                                             const InputOptions &input = {});
 
-/// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
-std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
-                                              const RawOverrides &overrides);
-/// The help text of such an argument.
+/// The help text of an argument that open_any_volume() takes.
 inline constexpr const char *kVolumeHelp =
     "a volume: .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, or "
     "generate:FIELD_XxYxZ_TYPE[:SEED]";
 
-/// Whether the name ends in .zfp.
-bool is_zfp_name(const std::string &path);
 /// Opens a .zfp file (its spacing may be overridden; options of how to compress are refused), or
 /// compresses any other volume, at a rate on `device` where one is given. Clears that device's
 /// stage times. Throws Error also on what cannot be drawn.
@@ -80,4 +74,4 @@ Progress make_progress_bar(std::string_view label);
 /// 1,234,567
 std::string with_commas(std::uint64_t number);
 
-}  // namespace isowave::tools
+}  // namespace isowave::core::tools

@@ -1,4 +1,4 @@
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,11 +10,11 @@
 
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
-#include "core/generate/field_rows.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/raw_reader.hpp"
+#include "core/sources/field_rows.hpp"
 
-namespace isowave {
+namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
@@ -176,4 +176,4 @@ fs::path generate_to_file(const GenerateOptions &options, const fs::path &path,
   return target;
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

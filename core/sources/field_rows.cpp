@@ -1,4 +1,4 @@
-#include "core/generate/field_rows.hpp"
+#include "core/sources/field_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -92,4 +92,4 @@ std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims,
   throw std::invalid_argument("make_field_rows: unknown field");
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

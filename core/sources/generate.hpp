@@ -34,7 +34,7 @@
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 enum class Field { kSphere, kPlane, kSaddle, kMarschnerLobb, kGyroid, kMixingLayer, kShell };
 
@@ -65,4 +65,4 @@ std::filesystem::path generate_to_file(const GenerateOptions &options,
                                        const std::filesystem::path &path,
                                        const Progress &progress = {});
 
-}  // namespace isowave
+}  // namespace isowave::core

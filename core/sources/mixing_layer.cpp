@@ -16,9 +16,9 @@
 #include <cmath>
 #include <vector>
 
-#include "core/generate/field_rows.hpp"
+#include "core/sources/field_rows.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 namespace {
 
@@ -162,4 +162,4 @@ std::unique_ptr<FieldRows> make_mixing_layer(const glm::uvec3 &dims, std::uint64
   return std::make_unique<MixingLayer>(dims, seed);
 }
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -6,9 +6,9 @@
 #include <memory>
 #include <span>
 
-#include "core/generate/generate.hpp"
+#include "core/sources/generate.hpp"
 
-namespace isowave {
+namespace isowave::core {
 
 /// One field on one grid. evaluate() may be called from many threads at once.
 class FieldRows {
@@ -22,4 +22,4 @@ std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims, 
 /// mixing_layer, see mixing_layer.cpp.
 std::unique_ptr<FieldRows> make_mixing_layer(const glm::uvec3 &dims, std::uint64_t seed);
 
-}  // namespace isowave
+}  // namespace isowave::core

@@ -1,0 +1,19 @@
+#pragma once
+// Private to core/api: what is behind isowave::Device.
+
+#include <mutex>
+
+#include "core/ocl/device.hpp"
+#include "isowave/device.hpp"
+
+namespace isowave {
+
+struct Device::Implementation {
+  Implementation(const core::ocl::DeviceInfo &device_info, const DeviceOptions &options);
+
+  DeviceInfo info;
+  mutable std::mutex mutex;  ///< one thread at a time drives the device
+  core::ocl::Device device;
+};
+
+}  // namespace isowave

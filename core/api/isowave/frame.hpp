@@ -1,0 +1,118 @@
+#pragma once
+// What a frame is asked for, and what comes back.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isowave/camera.hpp"
+
+namespace isowave {
+
+/// What is drawn: the volume, or the field that is nowhere above, or nowhere below what its voxels
+/// were before compression.
+enum class FieldBound { kNone, kLower, kUpper };
+
+/// Colours are sRGB, 0 to 1.
+struct Appearance {
+  std::array<float, 3> surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
+  std::array<float, 3> background{1, 1, 1};
+  float ambient = 0.15f, diffuse = 0.75f, specular = 0.25f;  ///< of a headlight at the eye
+};
+
+/// The picture so far, for FrameRequest::on_pass.
+class Progress {
+ public:
+  virtual ~Progress() = default;
+  virtual std::uint32_t passes() const = 0;
+  virtual double completed_percent() const = 0;  ///< rays that have ended, of all
+  /// RGB [height][width][3], row 0 at the top. Takes a few milliseconds.
+  virtual std::vector<std::uint8_t> picture() const = 0;
+};
+
+/// One frame: what to draw, how precisely, and what is wanted of it. Rendering the same request
+/// again gives the same bits, whatever was drawn before, unless there is a time budget.
+struct FrameRequest {
+  Camera camera{};
+  float isovalue = 0;
+  ImageSize size{};
+  Appearance appearance{};
+
+  /// Voxels of a coarser level of detail may be so many pixels apart; 0: the finest level draws
+  /// all. Needs RendererOptions::with_levels.
+  double voxel_pixels = 0;
+  /// Decoded voxels may be off by so much from the compressed ones; 0: not at all [voxel values].
+  double voxel_error = 0;
+  FieldBound bound = FieldBound::kNone;  ///< needs RendererOptions::with_bounds
+  /// Instead: chooses voxel_pixels and voxel_error such that most pixels are within so many pixels
+  /// of the true surface, that of the volume before compression. Needs with_bounds.
+  std::optional<double> max_surface_error{};
+  /// Draws what can be drawn in this time: small pictures first. Needs with_time_budget.
+  std::optional<double> time_budget_ms{};
+
+  // What the frame brings to the host.
+  bool want_picture = true;
+  bool want_depth = false, want_normals = false, want_hits = false;
+  bool want_bounds = false;  ///< of the error of each pixel; needs RendererOptions::with_bounds
+
+  /// Called after each pass. Return false to stop; the frame is the picture so far.
+  std::function<bool(const Progress &)> on_pass{};
+};
+
+/// Where a ray first crosses the isosurface. The true crossing of the decoded field, not a sample.
+struct Hit {
+  float t = std::numeric_limits<float>::infinity();  ///< distance from the eye [world units]
+  std::uint32_t level = 0;                           ///< of detail; 0: the finest
+  std::array<std::uint32_t, 3> cell{};  ///< voxel at its lowest corner: it ends one further
+  std::array<float, 3> position{};      ///< in the cell, 0 to 1
+  std::array<float, 3> gradient{};      ///< of the field there [voxel value per voxel]
+};
+
+struct FrameStatistics {
+  std::uint32_t passes = 0;
+  std::uint64_t rays = 0, hits = 0;
+  std::uint64_t decoded_blocks = 0;               ///< of 4^3 voxels
+  std::uint64_t uploaded_bytes = 0;               ///< of a compressed volume that stays on the host
+  std::uint32_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
+  double total_ms = 0;     ///< wall clock, from camera to finished hits on the device
+  bool cancelled = false;  ///< by on_pass
+  bool complete = true;    ///< false: cancelled, or the time was over
+  std::map<std::string, double> stage_ms{};  ///< of a device with profiling
+};
+
+/// What was chosen to keep FrameRequest::max_surface_error.
+struct DetailChoice {
+  double voxel_pixels = 0, voxel_error = 0;
+  bool reachable = true;  ///< false: not with this volume; full detail was drawn
+  std::string advice{};   ///< what would help, where it is not reachable
+};
+
+/// A finished frame. Arrays that were not asked for are empty. Rays are [rows][columns], row 0 at
+/// the top: size.samples times as many as pixels along each axis.
+struct Frame {
+  ImageSize size{};
+  std::uint32_t rows = 0, columns = 0;  ///< of rays
+
+  std::vector<std::uint8_t> picture{};          ///< RGB [height][width][3]
+  std::vector<float> depth{};                   ///< [rows][columns] world units; infinity: no hit
+  std::vector<std::array<float, 3>> normals{};  ///< [rows][columns] world space, of length 1, away
+                                                ///< from larger values; 0 0 0: no hit
+  std::vector<Hit> hits{};                      ///< [rows][columns]
+  /// [rows][columns] how far the surface may be from the true one along the ray, at most [pixels];
+  /// infinity: nothing is certain.
+  std::vector<float> bounds{};
+
+  FrameStatistics statistics{};
+  std::optional<DetailChoice> detail{};  ///< where max_surface_error was given
+};
+
+/// Writes frame.picture. Throws Error: no picture, or it cannot be written.
+void save_png(const Frame &frame, const std::filesystem::path &path);
+
+}  // namespace isowave

@@ -1,0 +1,19 @@
+#pragma once
+// isowave: isosurfaces of volumes too large for the device that draws them, on any OpenCL device.
+//
+//   auto device = isowave::open_device();
+//   auto volume = isowave::open_volume("head.nrrd");
+//   isowave::Renderer renderer(device, volume);
+//   isowave::Frame frame = renderer.render({.camera = volume->camera(80), .isovalue = 80});
+//   isowave::save_png(frame, "head.png");
+//
+// What goes wrong is thrown as isowave::Error. Devices, volumes and renderers may be used from
+// several threads; see each.
+
+#include "isowave/camera.hpp"
+#include "isowave/device.hpp"
+#include "isowave/error.hpp"
+#include "isowave/frame.hpp"
+#include "isowave/renderer.hpp"
+#include "isowave/version.hpp"
+#include "isowave/volume.hpp"

@@ -1,0 +1,57 @@
+#pragma once
+// Draws frames of one volume on one device.
+
+#include <cstdint>
+#include <memory>
+
+#include "isowave/device.hpp"
+#include "isowave/frame.hpp"
+#include "isowave/volume.hpp"
+
+namespace isowave {
+
+/// What a renderer is made for. All its memory is taken when it is made.
+struct RendererOptions {
+  ImageSize largest{};              ///< picture: frames may have as many rays, in any shape
+  std::uint64_t memory_budget = 0;  ///< of device memory [bytes]; 0: three quarters of it
+  /// Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows.
+  std::uint32_t cache_blocks = 0;
+  bool with_levels = false;       ///< frames may use levels of detail
+  bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error
+  bool with_time_budget = false;  ///< frames may have a time budget
+};
+
+/// May be used from several threads: frames are drawn one after the other.
+class Renderer {
+ public:
+  /// Brings the compressed volume to the device, or what of it is needed where it does not fit, and
+  /// has the kernels compiled. Keeps device and volume alive. Throws Error: the memory does not
+  /// suffice (names what would), options out of range.
+  Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
+           const RendererOptions &options = {});
+  ~Renderer();
+  Renderer(Renderer &&) noexcept;
+  Renderer &operator=(Renderer &&) noexcept;
+
+  /// Draws a frame and waits for it. Decoded blocks are kept for further frames. Throws Error: a
+  /// request that the renderer was not made for, a degenerate camera, a NaN; further frames are
+  /// drawn as if it had not been.
+  Frame render(const FrameRequest &request);
+
+  /// A view from the front right and above in which the isosurface fills the picture; the volume,
+  /// where there is no surface.
+  Camera camera(float isovalue);
+
+  const std::shared_ptr<Device> &device() const;
+  const std::shared_ptr<const Volume> &volume() const;
+  std::uint64_t memory_bytes() const;  ///< of device memory that it holds
+  double setup_ms() const;             ///< wall clock of uploads, without compiling
+
+ private:
+  void release() noexcept;
+
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace isowave

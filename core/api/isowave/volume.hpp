@@ -1,0 +1,131 @@
+#pragma once
+// Compressed volumes: opened from files of many formats, or made from an array in memory.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <ranges>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "isowave/camera.hpp"
+
+namespace isowave {
+
+enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
+
+/// Where voxels are: world = origin + direction * (spacing * index), index (i,j,k) of a voxel.
+struct Grid {
+  std::array<std::uint32_t, 3> dims{};  ///< voxels along x, y, z: 2 to 65,536 each
+  Vector3 spacing{1, 1, 1};             ///< world units between voxels along x, y, z; above 0
+  Vector3 origin{0, 0, 0};              ///< world position of voxel (0,0,0)
+  /// Unit world direction of the index axes x, y, z.
+  std::array<Vector3, 3> direction{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+};
+
+/// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact; at 8 bits a
+/// voxel where none is given. Compression takes memory for the result and a few layers of voxels.
+struct Compression {
+  std::optional<std::uint32_t> rate{};         ///< bits per voxel, 1 to 32
+  std::optional<double> tolerance{};           ///< no voxel is off by more [voxel values]
+  std::optional<double> relative_tolerance{};  ///< the same, as a part of the range of values
+  bool exact = false;                          ///< integers below 2^24, kept as they are
+  bool measure_error = false;      ///< for Volume::max_voxel_error() also at a rate: decodes all
+  std::uint32_t levels = 1;        ///< of detail, the volume itself among them; 0: all it can have
+  std::optional<float> map_nan{};  ///< what replaces NaN and infinities; refused without
+  std::uint32_t num_threads = 0;   ///< 0: one per processor. The result is the same for any number
+  /// Called from the calling thread: what is done, and how much of it, 0 to 1.
+  std::function<void(std::string_view what, double done)> progress{};
+};
+
+/// What the name of a raw file does not say: `NAME_XxYxZ_TYPE.raw` or `.raw.gz` does.
+struct RawFile {
+  std::optional<std::array<std::uint32_t, 3>> dims{};
+  std::optional<VoxelType> type{};
+  std::optional<Vector3> spacing{};  ///< replaces that of any format
+};
+
+/// A compressed volume in memory or in a file. It cannot be changed, so any number of renderers and
+/// threads may share one.
+class Volume {
+ public:
+  ~Volume();
+  Volume(const Volume &) = delete;
+  Volume &operator=(const Volume &) = delete;
+
+  const Grid &grid() const;
+  VoxelType source_type() const;  ///< before compression
+  /// [least, largest] voxel of the source; infinite where a file does not say.
+  std::array<float, 2> value_range() const;
+  double bits_per_voxel() const;
+  std::uint64_t compressed_bytes() const;
+  /// Largest |decoded - source|, where it was measured.
+  std::optional<double> max_voxel_error() const;
+  std::uint32_t num_levels() const;  ///< of detail, the volume itself among them
+
+  /// Decodes all voxels: [nz][ny][nx].
+  std::vector<float> decode() const;
+  /// Writes a `.zfp` file to a temporary name and renames it. Throws Error.
+  void save(const std::filesystem::path &path) const;
+
+  struct Implementation;
+  explicit Volume(std::unique_ptr<const Implementation> implementation);
+  const Implementation &implementation() const { return *implementation_; }
+
+ private:
+  std::unique_ptr<const Implementation> implementation_;
+};
+
+/// Opens a volume.
+///
+/// path         .zfp: stays in the file, which must not change, and is read when it is needed.
+///              .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz: compressed into memory.
+///              generate:FIELD_XxYxZ_TYPE: a synthetic volume (`isowave generate --help`)
+/// compression  of what is not compressed yet; refused with a .zfp file
+/// Throws Error: no such file, a header that is not understood, a wrong size, NaN, a volume that
+/// cannot be drawn.
+std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
+                                          const Compression &compression = {},
+                                          const RawFile &raw = {});
+
+/// Compresses voxels in memory.
+///
+/// voxels  [nz][ny][nx] of `type`, x fastest; not needed afterwards
+/// Throws Error: a bad grid, NaN without map_nan, a tolerance that cannot be kept.
+std::shared_ptr<const Volume> compress(const void *voxels, VoxelType type, const Grid &grid,
+                                       const Compression &compression = {});
+
+/// Throws Error unless a number of voxels is that of the grid.
+void check_num_voxels(std::uint64_t num_voxels, const Grid &grid);
+
+/// The type of voxels T.
+template <class T>
+constexpr VoxelType voxel_type_of() {
+  static_assert(std::is_arithmetic_v<T> && !std::is_same_v<T, bool>,
+                "voxels are integers of up to 32 bits, float or double");
+  if constexpr (std::is_floating_point_v<T>) {
+    static_assert(sizeof(T) == 4 || sizeof(T) == 8);
+    return sizeof(T) == 4 ? VoxelType::kFloat32 : VoxelType::kFloat64;
+  } else {
+    static_assert(sizeof(T) <= 4, "integers of 64 bits: convert them to double");
+    constexpr bool kSigned = std::is_signed_v<T>;
+    if (sizeof(T) == 1) return kSigned ? VoxelType::kInt8 : VoxelType::kUint8;
+    if (sizeof(T) == 2) return kSigned ? VoxelType::kInt16 : VoxelType::kUint16;
+    return kSigned ? VoxelType::kInt32 : VoxelType::kUint32;
+  }
+}
+
+/// The same for std::vector, std::span, std::array...
+template <std::ranges::contiguous_range Voxels>
+std::shared_ptr<const Volume> compress(const Voxels &voxels, const Grid &grid,
+                                       const Compression &compression = {}) {
+  check_num_voxels(std::ranges::size(voxels), grid);
+  return compress(std::ranges::data(voxels), voxel_type_of<std::ranges::range_value_t<Voxels>>(),
+                  grid, compression);
+}
+
+}  // namespace isowave

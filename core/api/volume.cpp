@@ -1,0 +1,158 @@
+#include "isowave/volume.hpp"
+
+#include "core/api/convert.hpp"
+#include "core/api/guarded.hpp"
+#include "core/api/volume_implementation.hpp"
+#include "core/sources/load_volume.hpp"
+#include "core/sources/memory_reader.hpp"
+#include "core/view/frame.hpp"
+
+namespace isowave {
+
+namespace {
+
+using core::guarded;
+
+// The two enumerations have the same types in the same order.
+static_assert(static_cast<int>(VoxelType::kFloat64) == static_cast<int>(core::VoxelType::kFloat64));
+
+core::VoxelType core_type(VoxelType type) {
+  if (type < VoxelType::kUint8 || type > VoxelType::kFloat64)
+    throw core::Error("{} is no type of voxels", static_cast<int>(type));
+  return static_cast<core::VoxelType>(type);
+}
+
+core::VolumeInfo core_info(const Grid &grid, VoxelType type) {
+  core::VolumeInfo info;
+  info.dims = {grid.dims[0], grid.dims[1], grid.dims[2]};
+  info.spacing = to_glm(grid.spacing);
+  info.origin = to_glm(grid.origin);
+  for (int axis = 0; axis < 3; ++axis) info.direction[axis] = to_glm(grid.direction.at(axis));
+  info.type = core_type(type);
+  return info;
+}
+
+Grid public_grid(const core::VolumeInfo &info) {
+  Grid grid;
+  grid.dims = {info.dims.x, info.dims.y, info.dims.z};
+  grid.spacing = from_glm(info.spacing);
+  grid.origin = from_glm(info.origin);
+  for (int axis = 0; axis < 3; ++axis) grid.direction.at(axis) = from_glm(info.direction[axis]);
+  return grid;
+}
+
+bool is_default(const Compression &compression) {
+  return !compression.rate && !compression.tolerance && !compression.relative_tolerance &&
+         !compression.exact && !compression.measure_error && compression.levels == 1 &&
+         !compression.map_nan;
+}
+
+core::Storage to_storage(const Compression &compression) {
+  const int num_ways = int{compression.rate.has_value()} + int{compression.tolerance.has_value()} +
+                       int{compression.relative_tolerance.has_value()} + int{compression.exact};
+  if (num_ways > 1)
+    throw core::Error(
+        "compression by more than one of rate, tolerance, relative tolerance, exact: give one");
+  core::Storage storage;
+  storage.rate = compression.rate.value_or(storage.rate);
+  storage.tolerance = compression.tolerance;
+  storage.relative_tolerance = compression.relative_tolerance;
+  storage.exact = compression.exact;
+  storage.measure_error = compression.measure_error;
+  storage.levels = compression.levels;
+  storage.map_nan = compression.map_nan;
+  storage.num_threads = compression.num_threads;
+  if (compression.progress) {
+    storage.progress = [told = compression.progress](std::string_view step) -> core::Progress {
+      return [told, step = std::string(step)](std::uint32_t done, std::uint32_t total) {
+        told(step, double{1} * done / total);
+      };
+    };
+  }
+  return storage;
+}
+
+std::shared_ptr<const Volume> make_volume(core::CompressedVolume volume) {
+  return std::make_shared<const Volume>(
+      std::make_unique<const Volume::Implementation>(std::move(volume)));
+}
+
+}  // namespace
+
+Volume::Implementation::Implementation(core::CompressedVolume compressed)
+    : volume(std::move(compressed)), grid(public_grid(volume.info)) {}
+
+Volume::Volume(std::unique_ptr<const Implementation> implementation)
+    : implementation_(std::move(implementation)) {}
+Volume::~Volume() = default;
+
+const Grid &Volume::grid() const {
+  return implementation_->grid;
+}
+VoxelType Volume::source_type() const {
+  return static_cast<VoxelType>(implementation_->volume.info.type);
+}
+std::array<float, 2> Volume::value_range() const {
+  return implementation_->volume.value_range;
+}
+double Volume::bits_per_voxel() const {
+  return implementation_->volume.rate();
+}
+std::uint64_t Volume::compressed_bytes() const {
+  return (implementation_->volume.payload_bits() + 7) / 8;
+}
+std::optional<double> Volume::max_voxel_error() const {
+  return implementation_->volume.max_voxel_error;
+}
+std::uint32_t Volume::num_levels() const {
+  return static_cast<std::uint32_t>(implementation_->volume.coarser_levels.size() + 1);
+}
+
+std::vector<float> Volume::decode() const {
+  return guarded("decoding", [&] { return core::decode_with_libzfp(implementation_->volume); });
+}
+
+void Volume::save(const std::filesystem::path &path) const {
+  guarded("saving", [&] { core::write_zfp_file(implementation_->volume, path); });
+}
+
+std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
+                                          const Compression &compression, const RawFile &raw) {
+  const std::string name = path.string();
+  return guarded("opening a volume", [&] {
+    core::RawOverrides overrides;
+    if (raw.dims) overrides.dims = {(*raw.dims)[0], (*raw.dims)[1], (*raw.dims)[2]};
+    if (raw.type) overrides.type = core_type(*raw.type);
+    if (raw.spacing) overrides.spacing = to_glm(*raw.spacing);
+    if (core::is_zfp_name(name)) {
+      if (!is_default(compression))
+        throw core::Error("{}: is compressed already: leave out how to compress it", name);
+      return make_volume(core::open_compressed_volume(name, overrides));
+    }
+    return make_volume(core::compress_volume([&] { return core::open_any_volume(name, overrides); },
+                                             name, to_storage(compression)));
+  });
+}
+
+std::shared_ptr<const Volume> compress(const void *voxels, VoxelType type, const Grid &grid,
+                                       const Compression &compression) {
+  return guarded("compressing", [&] {
+    const core::VolumeInfo info = core_info(grid, type);
+    core::check_volume_info(info, "the array");
+    const std::span bytes(static_cast<const std::byte *>(voxels),
+                          info.num_voxels() * core::size_of(info.type));
+    return make_volume(
+        core::compress_volume([&] { return std::make_unique<core::MemoryReader>(info, bytes); },
+                              "the array", to_storage(compression)));
+  });
+}
+
+void check_num_voxels(std::uint64_t num_voxels, const Grid &grid) {
+  const std::uint64_t of_grid = std::uint64_t{grid.dims[0]} * grid.dims[1] * grid.dims[2];
+  if (num_voxels != of_grid) {
+    throw core::Error("an array of {} voxels is no grid of {}x{}x{}", num_voxels, grid.dims[0],
+                      grid.dims[1], grid.dims[2]);
+  }
+}
+
+}  // namespace isowave

@@ -1,0 +1,80 @@
+#include "core/render/renderer_options.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "core/base/error.hpp"
+#include "core/stages/kept_picture.hpp"
+#include "core/view/detail.hpp"
+
+namespace isowave::core {
+
+RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
+                        const ocl::Device &device) {
+  check_volume_info(volume.info, "the volume");
+  check_image_size(options.size);
+  if (options.with_levels) check_has_levels(volume);
+  if (options.with_levels && options.pipeline == PipelineKind::kBlocks)
+    throw Error(
+        "pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
+  const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
+  std::uint64_t num_ids = 0;  // see make_id_grid()
+  for (const CompressedVolume *level : levels_of(volume, options.with_levels))
+    num_ids += layer_ids * level->num_blocks().z;
+  if (num_ids >= ISO_MAX_BLOCK_IDS) {
+    throw Error("a volume of {} blocks cannot be drawn: block ids end at {}", num_ids,
+                ISO_MAX_BLOCK_IDS);
+  }
+  if (options.max_speculation < 1 || options.max_speculation > ISO_MAX_SPECULATION) {
+    throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
+                ISO_MAX_SPECULATION);
+  }
+  if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
+  const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
+  if (!std::has_single_bit(options.group_size) || options.group_size < 8 ||
+      options.group_size > largest) {
+    throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
+                options.group_size, device.info().name, largest);
+  }
+  if (options.window_blocks != 0 && options.window_blocks < kMinCacheSlots) {
+    throw Error("a window of {} blocks cannot be used: {} (one dual grid) and more can",
+                options.window_blocks, kMinCacheSlots);
+  }
+  if (options.largest_stream_part == 0) {
+    options.largest_stream_part = device.capabilities().largest_allocation;
+  }
+  return options;
+}
+
+MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
+                     const RendererOptions &options) {
+  const MemoryRequest request{
+      options.size.num_rays(), options.pipeline,
+      options.grouping,        options.group_size,
+      options.stream,          options.largest_stream_part,
+      options.window_blocks,   options.with_levels,
+      options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0};
+  const std::uint64_t budget = options.memory_budget != 0
+                                   ? options.memory_budget
+                                   : device.capabilities().global_memory / 4 * 3;
+  std::uint64_t num_blocks = 0;
+  for (const CompressedVolume *level : levels_of(volume, request.with_levels))
+    num_blocks += level->block_count();
+  if (options.cache_slots != 0) {
+    MemoryPlan plan = plan_with_slots(volume, request, budget, options.cache_slots);
+    if (options.memory_budget != 0 && plan.peak() > budget) {
+      throw Error(
+          "{} cache slots need {} bytes of device memory, more than the budget of {}: give one of "
+          "the two alone",
+          options.cache_slots, plan.peak(), budget);
+    }
+    return plan;
+  }
+  const std::uint64_t most =
+      options.memory_budget != 0 ? std::uint64_t{ISO_MAX_CACHE_SLOTS} : kAmpleCacheSlots;
+  return plan_within(
+      device, volume, request, budget,
+      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most)));
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,51 @@
+#pragma once
+// What a renderer is made for.
+
+#include <cstdint>
+
+#include "core/render/memory_plan.hpp"
+
+namespace isowave::core {
+
+/// Frames ask for the rest (FrameRequest).
+struct RendererOptions {
+  ImageSize size{};  ///< the largest picture: frames may have as many rays, in any shape
+  PipelineKind pipeline = PipelineKind::kAuto;
+  std::uint64_t memory_budget = 0;  ///< bound on all device memory [bytes]; 0: 3/4 of the device's
+  std::uint32_t cache_slots = 0;    ///< decoded blocks kept, at least 8; 0: as many as the budget
+                                    ///< allows, or kAmpleCacheSlots where there is none
+  std::uint32_t max_speculation =
+      64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
+  bool per_ray_speculation = true;  ///< each ray by what it has missed, not all alike
+  Solver solver = kDefaultSolver;   ///< root finder in a cell
+  std::uint32_t group_size = 64;    ///< work-items per work-group, a power of two in 8..256
+  /// How a pass's pairs are gathered by block.
+  Grouping grouping = kDefaultGrouping;
+  ClosestHit closest =
+      kDefaultClosestHit;  ///< how a ray's closest result is found (pipeline `blocks`)
+  StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+  /// Bytes of one of its at most four buffers; 0: what the device allows.
+  std::uint64_t largest_stream_part = 0;
+  /// Blocks uploaded at a time from a volume on the host, at least 8; 0: by the size of cache and
+  /// blocks.
+  std::uint32_t window_blocks = 0;
+  bool with_levels = false;        ///< frames may use the volume's levels of detail
+  bool with_bounds = false;        ///< frames may draw bounds of the volume
+  bool with_kept_picture = false;  ///< Renderer::keep_picture() will be called
+  bool with_shading = true;        ///< shade() will be called: else its kernel is built when it is
+};
+
+/// Slots (325 MiB with their share of the tables) that no budget was asked for are enough: a cold
+/// 720p frame of a 1024^3 volume touches about 400,000 blocks.
+inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
+
+/// The options with their defaults filled in, but for those that the memory plan decides. Throws
+/// Error where they are out of range, or ask for what volume or device do not have.
+RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
+                        const ocl::Device &device);
+
+/// All memory, before any is taken. Throws Error where it does not suffice.
+MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
+                     const RendererOptions &options);
+
+}  // namespace isowave::core

@@ -1,0 +1,145 @@
+#include "core/sources/load_volume.hpp"
+
+#include <array>
+#include <cmath>
+
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
+#include "core/io/raw_reader.hpp"
+#include "core/ocl/device.hpp"
+#include "core/sources/generate.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+constexpr std::string_view kGenerate = "generate:";
+
+GenerateOptions parse_generator(std::string_view text) {
+  const auto fail = [&] {
+    throw Error("'{}{}': write generate:FIELD_XxYxZ_TYPE or generate:FIELD_XxYxZ_TYPE:SEED",
+                kGenerate, text);
+  };
+  const std::size_t colon = text.find(':');
+  const std::optional<RawName> name = parse_raw_name(text.substr(0, colon));
+  if (!name) fail();
+  GenerateOptions options;
+  options.field = field_from_string(name->name);
+  options.dims = name->dims;
+  options.type = name->type;
+  if (colon != std::string_view::npos) {
+    const auto seed = parse_all<decltype(options.seed)>(text.substr(colon + 1));
+    if (!seed) fail();
+    options.seed = *seed;
+    if (options.field != Field::kMixingLayer)
+      throw Error("'{}{}': a seed is of mixing_layer's noise alone: leave it out", kGenerate, text);
+  }
+  return options;
+}
+
+/// Gives a generated volume the spacing asked for.
+class RespacedReader : public VolumeReader {
+ public:
+  RespacedReader(std::unique_ptr<VolumeReader> source, const glm::dvec3 &spacing)
+      : source_(std::move(source)) {
+    info_ = source_->info();
+    info_.spacing = spacing;
+  }
+  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
+    source_->read_layers(z_begin, num_layers, out);
+  }
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                         std::span<double> out) override {
+    source_->read_exact_layers(z_begin, num_layers, out);
+  }
+
+ private:
+  std::unique_ptr<VolumeReader> source_;
+};
+
+Progress step(const Storage &storage, std::string_view name) {
+  return storage.progress ? storage.progress(name) : Progress{};
+}
+
+/// [min, max] of the source's voxels, from which a relative tolerance follows.
+double absolute_tolerance(const OpenReader &open, std::string_view what, const Storage &storage,
+                          InputOptions input) {
+  ChunkCoder nothing;
+  input.progress = step(storage, "reading the value range");
+  const std::array<double, 2> range = read_in_chunks(*open(), input, nothing).source;
+  if (range[0] == range[1]) {
+    throw Error("{}: all voxels are {}: there is no range that an error is relative to", what,
+                range[0]);
+  }
+  const double tolerance = *storage.relative_tolerance * (range[1] - range[0]);
+  if (!(tolerance > 0 && std::isfinite(tolerance))) {
+    throw Error(
+        "a relative tolerance of {}: of values from {} to {}, that is {}: need above 0 and finite",
+        *storage.relative_tolerance, range[0], range[1], tolerance);
+  }
+  return tolerance;
+}
+
+}  // namespace
+
+std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string_view what,
+                                             const Storage &storage) {
+  if (!storage.bounded()) return {};
+  const auto check = [](const char *name, const std::optional<double> &tolerance) {
+    if (tolerance && !(*tolerance > 0))
+      throw Error("a {} of {}: must be above 0", name, *tolerance);
+  };
+  check("tolerance", storage.tolerance);
+  check("relative tolerance", storage.relative_tolerance);
+  InputOptions input{storage.map_nan, {}, storage.num_threads};
+  ErrorGoal goal{storage.tolerance.value_or(0), storage.exact};
+  if (storage.relative_tolerance) goal.tolerance = absolute_tolerance(open, what, storage, input);
+  input.progress = step(storage, "measuring errors");
+  return choose_precision(*open(), goal, input);
+}
+
+CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
+                                 const Storage &storage) {
+  const std::unique_ptr<VolumeReader> reader = open();
+  check_drawable(reader->info(), what);
+  CompressOptions options;
+  options.rate = storage.rate;
+  options.precision = find_precision(open, what, storage);
+  options.levels = storage.levels;
+  options.measure_error = storage.measure_error;
+  options.input = {storage.map_nan, step(storage, "compressing"), storage.num_threads};
+  options.device = options.precision ? nullptr : storage.device;
+  CompressedVolume volume = compress(*reader, options);
+  if (storage.device) storage.device->timer().collect();  // they belong to no frame
+  return volume;
+}
+
+bool is_zfp_name(std::string_view path) {
+  return path.ends_with(".zfp");
+}
+
+CompressedVolume open_compressed_volume(const std::string &path, const RawOverrides &overrides) {
+  if (overrides.dims || overrides.type) throw Error("{}: dims and type are for raw files", path);
+  VolumeInfo info = read_zfp_file_info(path).info;
+  if (overrides.spacing) info.spacing = *overrides.spacing;
+  check_volume_info(info, path);
+  check_drawable(info, path);  // before an index of all blocks is built
+  CompressedVolume volume = open_zfp_file(path);
+  if (overrides.spacing) set_spacing(volume, *overrides.spacing);
+  return volume;
+}
+
+std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
+                                              const RawOverrides &overrides) {
+  if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
+  if (overrides.dims || overrides.type)
+    throw Error("{}: it says dims and type itself: leave --dims and --type", path);
+  std::unique_ptr<VolumeReader> reader =
+      open_generated(parse_generator(std::string_view(path).substr(kGenerate.size())));
+  if (!overrides.spacing) return reader;
+  return std::make_unique<RespacedReader>(std::move(reader), *overrides.spacing);
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,54 @@
+#pragma once
+// A compressed volume from whatever a user names: a file of any format, or a synthetic volume.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/io/open_volume.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+/// How voxels are compressed: at a rate, or by one of tolerance, relative_tolerance and exact.
+struct Storage {
+  std::uint32_t rate = 8;                      ///< bits per voxel
+  std::optional<double> tolerance{};           ///< largest error of a voxel
+  std::optional<double> relative_tolerance{};  ///< the same, as a part of the range of values
+  bool exact = false;                          ///< none, of integers
+  std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
+  bool measure_error = false;                  ///< at a fixed rate, too
+  std::optional<float> map_nan{};              ///< see InputOptions
+  std::uint32_t num_threads = 0;               ///< see InputOptions
+  ocl::Device *device = nullptr;               ///< encodes at a fixed rate
+  /// Makes the progress of each step, which it is told: "compressing".
+  std::function<Progress(std::string_view step)> progress{};
+
+  bool bounded() const { return tolerance || relative_tolerance || exact; }
+};
+
+/// Opens a reader at the volume's front, each time it is called.
+using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
+
+/// The precision that was asked for, or none: the rate. Reads the whole volume, for a relative
+/// tolerance twice. Throws Error, which names the volume `what`: see choose_precision().
+std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string_view what,
+                                             const Storage &storage);
+/// Compresses into memory. Clears the stage times of storage.device. Throws Error also on what
+/// cannot be drawn.
+CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
+                                 const Storage &storage);
+
+/// Whether the name ends in .zfp.
+bool is_zfp_name(std::string_view path);
+/// Opens a `.zfp` file, whose spacing may be overridden; the payload stays in the file. Throws
+/// Error also on what cannot be drawn.
+CompressedVolume open_compressed_volume(const std::string &path, const RawOverrides &overrides);
+
+/// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
+std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
+                                              const RawOverrides &overrides);
+
+}  // namespace isowave::core

@@ -1,0 +1,411 @@
+// The front door: what users of the library include, and nothing else of core but what it is
+// compared with.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <isowave/isowave.hpp>
+#include <thread>
+
+#include "core/ocl/device.hpp"
+#include "tests/run_program.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+using testing::HasSubstr;
+namespace test = core::test;
+
+constexpr std::uint32_t kEdge = 21;  // not a multiple of 4
+
+/// 1 - |p| / sqrt(3) of positions in [-1, 1]^3: spheres.
+std::vector<float> sphere_voxels() {
+  std::vector<float> voxels;
+  for (std::uint32_t z = 0; z < kEdge; ++z) {
+    for (std::uint32_t y = 0; y < kEdge; ++y) {
+      for (std::uint32_t x = 0; x < kEdge; ++x) {
+        const auto at = [](std::uint32_t i) { return 2.0 * i / (kEdge - 1) - 1; };
+        const double radius = std::sqrt(at(x) * at(x) + at(y) * at(y) + at(z) * at(z));
+        voxels.push_back(static_cast<float>(1 - radius / std::sqrt(3.0)));
+      }
+    }
+  }
+  return voxels;
+}
+
+Grid sphere_grid() {
+  return {.dims = {kEdge, kEdge, kEdge}, .spacing = {1, 2, 1}, .origin = {5, 6, 7}};
+}
+
+std::shared_ptr<const Volume> sphere(const Compression &compression = {.rate = 16}) {
+  return compress(sphere_voxels(), sphere_grid(), compression);
+}
+
+FrameRequest small_request(Renderer &renderer) {
+  FrameRequest request;
+  request.camera = renderer.camera(0.6f);
+  request.isovalue = 0.6f;
+  request.size = {64, 48, 1};
+  request.want_depth = true;
+  return request;
+}
+
+template <class Call>
+std::string error_of(const Call &call) {
+  try {
+    call();
+  } catch (const Error &error) {
+    EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Api, VersionIsThePrograms) {
+  EXPECT_THAT(test::run_isowave("--version").out, HasSubstr(std::string(version())));
+}
+
+TEST(Api, VolumesSayWhatTheyAre) {
+  const auto volume = sphere({.rate = 16, .measure_error = true, .levels = 2});
+  EXPECT_EQ(volume->grid().dims, (std::array<std::uint32_t, 3>{kEdge, kEdge, kEdge}));
+  EXPECT_EQ(volume->grid().spacing, (Vector3{1, 2, 1}));
+  EXPECT_EQ(volume->grid().origin, (Vector3{5, 6, 7}));
+  EXPECT_EQ(volume->source_type(), VoxelType::kFloat32);
+  EXPECT_EQ(volume->num_levels(), 2u);
+  EXPECT_EQ(volume->bits_per_voxel(), 16.0);
+  const std::vector<float> voxels = sphere_voxels(), decoded = volume->decode();
+  ASSERT_EQ(decoded.size(), voxels.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < voxels.size(); ++i)
+    largest = std::max(largest, std::abs(double{voxels[i]} - double{decoded[i]}));
+  EXPECT_GT(largest, 0);
+  EXPECT_EQ(*volume->max_voxel_error(), largest);
+  EXPECT_EQ(volume->value_range()[0], *std::ranges::min_element(voxels));
+  EXPECT_EQ(volume->value_range()[1], *std::ranges::max_element(voxels));
+}
+
+TEST(Api, EveryVoxelTypeIsCompressed) {
+  const auto check = [](auto zero) {
+    using T = decltype(zero);
+    std::vector<T> voxels(5 * 4 * 3);
+    for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = static_cast<T>(i);
+    const bool is_integer = std::is_integral_v<T>;
+    const auto volume = compress(voxels, Grid{.dims = {5, 4, 3}},
+                                 is_integer ? Compression{.exact = true} : Compression{.rate = 32});
+    EXPECT_EQ(volume->source_type(), voxel_type_of<T>());
+    const std::vector<float> decoded = volume->decode();
+    for (std::size_t i = 0; i < voxels.size(); ++i)
+      EXPECT_NEAR(decoded[i], static_cast<double>(voxels[i]), is_integer ? 0 : 1e-3);
+  };
+  check(std::uint8_t{});
+  check(std::int8_t{});
+  check(std::uint16_t{});
+  check(std::int16_t{});
+  check(std::uint32_t{});
+  check(std::int32_t{});
+  check(float{});
+  check(double{});
+}
+
+TEST(Api, SavedFilesAreThoseOfConvert) {
+  const test::TemporaryFolder folder;
+  for (const Compression &compression :
+       {Compression{.rate = 8}, Compression{.tolerance = 0.01}, Compression{.rate = 4, .levels = 0},
+        Compression{.tolerance = 0.01, .levels = 3}}) {
+    const auto volume = sphere(compression);
+    volume->save(folder / "saved.zfp");
+    const auto opened = open_volume(folder / "saved.zfp");
+    EXPECT_EQ(opened->decode(), volume->decode());
+    EXPECT_EQ(opened->num_levels(), volume->num_levels());
+    EXPECT_EQ(opened->max_voxel_error(), volume->max_voxel_error());
+    EXPECT_EQ(opened->grid().origin, volume->grid().origin);
+    opened->save(folder / "again.zfp");
+    EXPECT_EQ(test::read_file(folder / "again.zfp"), test::read_file(folder / "saved.zfp"));
+  }
+  const std::string raw = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
+  open_volume(raw, {.tolerance = 0.5, .levels = 2})->save(folder / "library.zfp");
+  ASSERT_EQ(test::run_isowave("convert " + raw + " -o " + test::quoted(folder / "program.zfp") +
+                              " --tolerance 0.5 --levels 2")
+                .status,
+            0);
+  EXPECT_EQ(test::read_file(folder / "library.zfp"), test::read_file(folder / "program.zfp"));
+}
+
+TEST(Api, ProgressGoesFromNothingToAll) {
+  std::map<std::string, std::vector<double>> told;
+  Compression compression{.tolerance = 0.01};
+  compression.progress = [&](std::string_view what, double done) {
+    told[std::string(what)].push_back(done);
+  };
+  sphere(compression);
+  ASSERT_EQ(told.size(), 2u);
+  for (const auto &[what, done] : told) {
+    EXPECT_TRUE(std::ranges::is_sorted(done)) << what;
+    EXPECT_EQ(done.back(), 1.0) << what;
+  }
+}
+
+TEST(Api, WhatCannotBeCompressedIsAnError) {
+  const std::vector<float> voxels = sphere_voxels();
+  const Grid grid = sphere_grid();
+  EXPECT_THAT(error_of([&] {
+                compress(voxels, Grid{.dims = {kEdge, kEdge, kEdge + 1}});
+              }),
+              HasSubstr("9261 voxels"));
+  EXPECT_THAT(error_of([&] {
+                compress(std::vector<float>(2), Grid{.dims = {2, 1, 1}});
+              }),
+              HasSubstr("dims 2x1x1"));
+  EXPECT_THAT(error_of([&] { compress(voxels, grid, {.rate = 33}); }), HasSubstr("33"));
+  EXPECT_THAT(error_of([&] { compress(voxels, grid, {.rate = 8, .exact = true}); }),
+              HasSubstr("more than one"));
+  EXPECT_THAT(error_of([&] { compress(voxels, grid, {.exact = true}); }), HasSubstr("integer"));
+  EXPECT_THAT(error_of([&] { compress(voxels, grid, {.tolerance = -1}); }), HasSubstr("-1"));
+  std::vector<float> holes = voxels;
+  holes[17] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(error_of([&] { compress(holes, grid); }), HasSubstr("NaN"));
+  EXPECT_NO_THROW(compress(holes, grid, {.map_nan = 0.0f}));
+  Grid bad = grid;
+  bad.spacing[1] = 0;
+  EXPECT_THAT(error_of([&] { compress(voxels, bad); }), HasSubstr("spacing"));
+}
+
+TEST(Api, WhatCannotBeOpenedIsAnError) {
+  const test::TemporaryFolder folder;
+  EXPECT_THAT(error_of([&] { open_volume(folder / "none.nrrd"); }), HasSubstr("none.nrrd"));
+  EXPECT_THAT(error_of([&] { open_volume(folder / "none.zfp", {.rate = 4}); }),
+              HasSubstr("compressed already"));
+  EXPECT_THAT(error_of([&] { open_volume("generate:nothing_8x8x8_uint8"); }), HasSubstr("nothing"));
+  EXPECT_THAT(error_of([&] { open_device("no such device"); }), HasSubstr("no such device"));
+  EXPECT_THAT(error_of([&] { sphere()->save(folder / "no" / "such" / "folder.zfp"); }),
+              HasSubstr("folder.zfp"));
+  EXPECT_THAT(error_of([&] { save_png(Frame{}, folder / "a.png"); }), HasSubstr("no picture"));
+}
+
+class ApiOnDevice : public testing::TestWithParam<core::ocl::DeviceInfo> {
+ protected:
+  static std::string selector() { return std::to_string(GetParam().index); }
+};
+
+TEST_P(ApiOnDevice, SmallFramesAreThoseOfTheEngine) {
+  const auto volume = sphere();
+  Renderer renderer(open_device(selector()), volume, {.largest = {64, 48, 1}});
+  FrameRequest request = small_request(renderer);
+  request.want_hits = request.want_normals = true;
+  const Frame frame = renderer.render(request);
+  EXPECT_EQ(frame.picture.size(), 3u * 64 * 48);
+  ASSERT_EQ(frame.depth.size(), 64u * 48);
+  EXPECT_EQ(frame.statistics.rays, 64u * 48);
+  EXPECT_GT(frame.statistics.hits, 200u);
+  std::uint64_t num_hits = 0;
+  for (std::size_t i = 0; i < frame.depth.size(); ++i) {
+    const Hit &hit = frame.hits[i];
+    EXPECT_EQ(frame.depth[i], hit.t);
+    const std::array<float, 3> normal = frame.normals[i];
+    const float length = std::hypot(normal[0], normal[1], normal[2]);
+    if (std::isinf(hit.t)) {
+      EXPECT_EQ(length, 0);
+      continue;
+    }
+    ++num_hits;
+    EXPECT_NEAR(length, 1, 1e-6);
+    // The field falls from the centre outwards; the world stretches y.
+    const Vector3 centre = {5 + 0.5 * (kEdge - 1), 6 + 1.0 * (kEdge - 1), 7 + 0.5 * (kEdge - 1)};
+    Vector3 outwards{};
+    double cosine = 0, norm = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double spacing = volume->grid().spacing[axis];
+      const double world =
+          volume->grid().origin[axis] + spacing * (double{hit.position[axis]} + hit.cell[axis]);
+      outwards[axis] = (world - centre[axis]) / (spacing * spacing);
+      norm += outwards[axis] * outwards[axis];
+      cosine += outwards[axis] * double{normal[axis]};
+    }
+    EXPECT_GT(cosine / std::sqrt(norm), 0.98) << "pixel " << i;
+  }
+  EXPECT_EQ(frame.statistics.hits, num_hits);
+  EXPECT_TRUE(frame.statistics.complete);
+  EXPECT_EQ(renderer.render(request).depth, frame.depth);
+}
+
+/// From as near as it may: the box of the surface's blocks is in the picture, and fills it.
+TEST_P(ApiOnDevice, SmallSurfacesFillThePicture) {
+  for (const float isovalue : {0.3f, 0.6f, 0.9f, 5.0f}) {
+    Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}});
+    FrameRequest request = small_request(renderer);
+    request.isovalue = isovalue;
+    request.camera = renderer.camera(isovalue);
+    const Frame frame = renderer.render(request);
+    if (isovalue > 1) {
+      EXPECT_EQ(frame.statistics.hits, 0u) << "no surface";
+      continue;
+    }
+    std::size_t at_border = 0;
+    std::uint32_t first_row = 48, last_row = 0;
+    for (std::uint32_t i = 0; i < 64 * 48; ++i) {
+      if (std::isinf(frame.depth[i])) continue;
+      const std::uint32_t row = i / 64, column = i % 64;
+      at_border += row == 0 || row == 47 || column == 0 || column == 63;
+      first_row = std::min(first_row, row);
+      last_row = std::max(last_row, row);
+    }
+    EXPECT_EQ(at_border, 0u) << isovalue;
+    EXPECT_GT(last_row - first_row, isovalue < 0.8f ? 16u : 8u) << isovalue;
+  }
+}
+
+TEST_P(ApiOnDevice, SmallRequestsThatFailLeaveTheRendererAsItWas) {
+  Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}});
+  const FrameRequest good = small_request(renderer);
+  const std::vector<float> depth = renderer.render(good).depth;
+  const auto expect_error = [&](const char *text, const auto &change) {
+    FrameRequest bad = good;
+    change(bad);
+    EXPECT_THAT(error_of([&] { renderer.render(bad); }), HasSubstr(text));
+    EXPECT_EQ(renderer.render(good).depth, depth) << text;
+  };
+  expect_error("NaN", [](FrameRequest &r) { r.isovalue = std::nanf(""); });
+  expect_error("eye", [](FrameRequest &r) { r.camera.eye = r.camera.at; });
+  expect_error("rays", [](FrameRequest &r) { r.size = {65, 48, 1}; });
+  expect_error("rays a pixel", [](FrameRequest &r) { r.size.samples = 0; });
+  expect_error("level", [](FrameRequest &r) { r.voxel_pixels = 1; });
+  expect_error("bounds", [](FrameRequest &r) { r.bound = FieldBound::kLower; });
+  expect_error("with_bounds", [](FrameRequest &r) { r.want_bounds = true; });
+  expect_error("with_bounds", [](FrameRequest &r) { r.max_surface_error = 1; });
+  expect_error("with_time_budget", [](FrameRequest &r) { r.time_budget_ms = 100; });
+  expect_error("my own", [](FrameRequest &r) {
+    r.on_pass = [](const Progress &) -> bool { throw std::runtime_error("my own"); };
+  });
+}
+
+TEST_P(ApiOnDevice, SmallFramesKeepErrorsAndTimes) {
+  Renderer renderer(
+      open_device(selector()), sphere({.tolerance = 0.001, .levels = 2}),
+      {.largest = {64, 48, 1}, .with_levels = true, .with_bounds = true, .with_time_budget = true});
+  FrameRequest request = small_request(renderer);
+  request.max_surface_error = 0.5;
+  request.want_bounds = true;
+  const Frame bounded = renderer.render(request);
+  ASSERT_TRUE(bounded.detail);
+  EXPECT_TRUE(bounded.detail->reachable);
+  ASSERT_EQ(bounded.bounds.size(), bounded.depth.size());
+  request.max_surface_error.reset();
+  request.want_bounds = false;
+  const std::vector<float> depth = renderer.render(request).depth;
+  request.time_budget_ms = 1e6;
+  const Frame timed = renderer.render(request);
+  EXPECT_TRUE(timed.statistics.complete);
+  EXPECT_EQ(timed.depth, depth);
+}
+
+TEST_P(ApiOnDevice, SmallFramesCanBeWatchedAndStopped) {
+  Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}, .cache_blocks = 8});
+  FrameRequest request = small_request(renderer);
+  const std::vector<std::uint8_t> picture = renderer.render(request).picture;
+  std::uint32_t passes = 0;
+  std::vector<std::uint8_t> last;
+  request.on_pass = [&](const Progress &progress) {
+    EXPECT_EQ(progress.passes(), ++passes);
+    last = progress.picture();
+    return true;
+  };
+  const Frame watched = renderer.render(request);
+  EXPECT_EQ(watched.statistics.passes, passes);
+  EXPECT_GT(passes, 2u);
+  EXPECT_EQ(last, picture);
+  request.on_pass = [](const Progress &progress) { return progress.passes() < 2; };
+  const Frame stopped = renderer.render(request);
+  EXPECT_TRUE(stopped.statistics.cancelled);
+  EXPECT_FALSE(stopped.statistics.complete);
+  EXPECT_NE(stopped.picture, picture);
+  request.on_pass = {};
+  EXPECT_EQ(renderer.render(request).picture, picture);
+}
+
+TEST_P(ApiOnDevice, SmallRenderersKeepWhatTheyNeed) {
+  std::optional<Renderer> renderer;
+  {
+    const auto device = open_device(selector());
+    renderer.emplace(device, sphere(), RendererOptions{.largest = {64, 48, 1}});
+  }
+  const FrameRequest request = small_request(*renderer);
+  const std::vector<float> depth = renderer->render(request).depth;
+  const auto device = renderer->device();
+  const std::uint64_t held = device->memory_in_use();
+  EXPECT_GE(held, renderer->memory_bytes());
+  Renderer moved = std::move(*renderer);
+  renderer.reset();
+  EXPECT_EQ(moved.render(request).depth, depth);
+  moved = Renderer(device, sphere(), {.largest = {64, 48, 1}, .cache_blocks = 64});
+  EXPECT_EQ(moved.render(request).depth, depth);
+  EXPECT_LT(device->memory_in_use(), held);
+}
+
+TEST_P(ApiOnDevice, SmallBudgetsThatDoNotSufficeAreAnError) {
+  const auto device = open_device(selector());
+  EXPECT_THAT(error_of([&] { Renderer(device, sphere(), {.memory_budget = 1000}); }),
+              HasSubstr("1000"));
+  EXPECT_EQ(device->memory_in_use(), 0u);
+  EXPECT_THAT(error_of([&] { Renderer(nullptr, sphere()); }), HasSubstr("device"));
+  EXPECT_THAT(error_of([&] {
+                Renderer(device, sphere(), {.largest = {0, 48, 1}});
+              }),
+              HasSubstr("0 x 48"));
+}
+
+/// Renders from `num_threads` threads at once, each with a renderer of its own.
+void expect_same_frames(const std::function<std::shared_ptr<Device>()> &device, int num_threads) {
+  const auto volume = sphere();
+  Renderer alone(device(), volume, {.largest = {64, 48, 1}});
+  const FrameRequest request = small_request(alone);
+  const std::vector<float> depth = alone.render(request).depth;
+  std::atomic<int> num_equal = 0;
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < num_threads; ++i) {
+    threads.emplace_back([&] {
+      Renderer renderer(device(), volume, {.largest = {64, 48, 1}, .cache_blocks = 64});
+      for (int frame = 0; frame < 3; ++frame) num_equal += renderer.render(request).depth == depth;
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(num_equal, 3 * num_threads);
+}
+
+TEST_P(ApiOnDevice, ThreadsShareADevice) {
+  const auto device = open_device(selector());
+  expect_same_frames([&] { return device; }, 4);
+}
+
+TEST_P(ApiOnDevice, ThreadsHaveDevicesOfTheirOwn) {
+  expect_same_frames([] { return open_device(selector()); }, 3);
+}
+
+TEST_P(ApiOnDevice, ThreadsShareARenderer) {
+  Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}});
+  FrameRequest near = small_request(renderer), far = near;
+  for (double &x : far.camera.eye) x *= 2;
+  const std::vector<float> near_depth = renderer.render(near).depth;
+  const std::vector<float> far_depth = renderer.render(far).depth;
+  EXPECT_NE(near_depth, far_depth);
+  std::atomic<int> num_equal = 0;
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([&, i] {
+      for (int frame = 0; frame < 5; ++frame)
+        num_equal +=
+            renderer.render(i % 2 == 0 ? near : far).depth == (i % 2 == 0 ? near_depth : far_depth);
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(num_equal, 20);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, ApiOnDevice, testing::ValuesIn(core::devices_under_test()),
+                         core::device_test_name);
+
+}  // namespace
+}  // namespace isowave

@@ -1,0 +1,18 @@
+# What `cmake --install` installs: library, headers and CMake package of isowave::isowave, and the program where it is built.
+include(CMakePackageConfigHelpers)
+
+set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/isowave)
+install(TARGETS isowave_library EXPORT isowaveTargets
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/api/isowave DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library
+        FILES_MATCHING PATTERN *.hpp)
+install(EXPORT isowaveTargets NAMESPACE isowave:: DESTINATION ${package_folder} COMPONENT library)
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/isowaveConfig.cmake.in
+                              ${PROJECT_BINARY_DIR}/isowaveConfig.cmake INSTALL_DESTINATION ${package_folder})
+# Before 1.0, minor versions may break what users wrote.
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/isowaveConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/isowaveConfig.cmake ${PROJECT_BINARY_DIR}/isowaveConfigVersion.cmake
+        DESTINATION ${package_folder} COMPONENT library)
+if(ISOWAVE_BUILD_PROGRAM)
+  install(TARGETS isowave COMPONENT program)
+endif()
