@@ -1,14 +1,13 @@
 #include "reference/scalar_renderer.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <glm/glm.hpp>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
+#include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
@@ -134,19 +133,11 @@ template <class TracePixel>
 std::vector<HitRecord> trace_pixels(const FrameParams &frame, unsigned threads,
                                     TracePixel trace_pixel) {
   std::vector<HitRecord> hits(std::size_t{frame.width} * frame.height);
-  std::atomic<std::uint32_t> next_row{0};
-  const auto trace_rows = [&] {
-    for (std::uint32_t row = next_row++; row < frame.height; row = next_row++) {
-      for (std::uint32_t pixel = row * frame.width; pixel < (row + 1) * frame.width; ++pixel)
-        hits[pixel] = trace_pixel(pixel);
-    }
-  };
-  std::vector<std::jthread> pool;
-  const unsigned num_threads =
-      threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
-  for (unsigned i = 1; i < num_threads; ++i) pool.emplace_back(trace_rows);
-  trace_rows();
-  pool.clear();
+  parallel_for(frame.height, threads, [&](std::uint64_t row, std::uint32_t) {
+    const auto first = static_cast<std::uint32_t>(row * frame.width);
+    for (std::uint32_t pixel = first; pixel < first + frame.width; ++pixel)
+      hits[pixel] = trace_pixel(pixel);
+  });
   return hits;
 }
 

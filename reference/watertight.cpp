@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <thread>
 
+#include "core/base/parallel_for.hpp"
 #include "reference/closed_surfaces.hpp"
 #include "reference/random.hpp"
 #include "reference/scalar_renderer.hpp"
@@ -63,25 +63,18 @@ WatertightResult run_surface(const ClosedSurface &surface, std::uint64_t num_ray
   constexpr std::uint64_t kBatch =
       1 << 14;  // one random stream each, so that threads do not change the rays
   const std::uint64_t num_batches = (num_rays + kBatch - 1) / kBatch;
-  std::atomic<std::uint64_t> next_batch{0}, leaks{0};
-  const auto work = [&] {
-    for (std::uint64_t batch = next_batch++; batch < num_batches; batch = next_batch++) {
-      Random random(seed * 0x9E3779B97F4A7C15u + batch);
-      for (std::uint64_t i = batch * kBatch; i < std::min(num_rays, (batch + 1) * kBatch); ++i) {
-        const Shot shot = random_shot(levels, random);
-        const HitRecord hit =
-            bands == RayBands::kOne
-                ? trace_scalar(levels.frames[0], levels.voxels[0], solver, shot.rays[0])
-                : trace_scalar_levels(shot.frames, levels.voxels, solver, shot.rays);
-        if (!std::isfinite(hit.t) || hit.t > shot.latest) ++leaks;
-      }
+  std::atomic<std::uint64_t> leaks{0};
+  parallel_for(num_batches, 0, [&](std::uint64_t batch, std::uint32_t) {
+    Random random(seed * 0x9E3779B97F4A7C15u + batch);
+    for (std::uint64_t i = batch * kBatch; i < std::min(num_rays, (batch + 1) * kBatch); ++i) {
+      const Shot shot = random_shot(levels, random);
+      const HitRecord hit =
+          bands == RayBands::kOne
+              ? trace_scalar(levels.frames[0], levels.voxels[0], solver, shot.rays[0])
+              : trace_scalar_levels(shot.frames, levels.voxels, solver, shot.rays);
+      if (!std::isfinite(hit.t) || hit.t > shot.latest) ++leaks;
     }
-  };
-  std::vector<std::jthread> pool;
-  for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
-    pool.emplace_back(work);
-  work();
-  pool.clear();
+  });
   return {surface.name + std::string(bands == RayBands::kLevels ? ", levels" : ""), num_rays,
           leaks};
 }

@@ -1,11 +1,11 @@
 #include "core/base/parallel_for.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
-#include <atomic>
-#include <exception>
-#include <mutex>
 #include <thread>
-#include <vector>
 
 namespace isowave::core {
 
@@ -16,25 +16,14 @@ std::uint32_t thread_count(std::uint32_t requested) {
 
 void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,
                   const std::function<void(std::uint64_t item, std::uint32_t thread)> &body) {
-  std::atomic<std::uint64_t> next{0};
-  std::mutex mutex;
-  std::exception_ptr first_error;
-  const auto work = [&](std::uint32_t thread) {
-    try {
-      for (std::uint64_t item; (item = next.fetch_add(1)) < num_items;) body(item, thread);
-    } catch (...) {
-      next.store(num_items);
-      const std::lock_guard lock(mutex);
-      if (!first_error) first_error = std::current_exception();
-    }
-  };
-  const auto count = std::uint32_t(std::min<std::uint64_t>(thread_count(num_threads), num_items));
-  {
-    std::vector<std::jthread> threads;
-    for (std::uint32_t thread = 1; thread < count; ++thread) threads.emplace_back(work, thread);
-    work(0);
-  }
-  if (first_error) std::rethrow_exception(first_error);
+  // An arena of its own, so that a thread's number is below the count whoever calls.
+  tbb::task_arena arena(static_cast<int>(thread_count(num_threads)));
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, num_items), [&](const auto &range) {
+      const auto thread = static_cast<std::uint32_t>(tbb::this_task_arena::current_thread_index());
+      for (std::uint64_t item = range.begin(); item < range.end(); ++item) body(item, thread);
+    });
+  });
 }
 
 }  // namespace isowave::core
