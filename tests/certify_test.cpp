@@ -597,5 +597,54 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
     EXPECT_THROW(choose_detail(renderer, scene.volume, {camera, 0.3f}, bad), Error);
 }
 
+TEST_P(CertifyOnDevice, HitsOfAnotherPictureAreRefused) {
+  const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
+  const FrameRequest request{orbit_cameras(scene.volume.info, 1)[0], 0.3f, kSmall};
+  Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true}),
+      plain(device_, scene.volume, {.size = kSmall});
+  renderer.render(request);
+  const std::vector<HitRecord> hits = renderer.hits();
+  EXPECT_THAT([&] { certify(renderer, scene.volume, request, std::span(hits).first(9)); },
+              ThrowsMessage<Error>(HasSubstr("9 hits are not those of 96 rays")));
+  expect_same_hits(renderer.hits(), hits, kSmall.width);
+  EXPECT_THAT([&] { certify(plain, scene.volume, request, hits); },
+              ThrowsMessage<Error>(HasSubstr("without bounds")));
+}
+
+/// Whatever kind of frame comes between, and wherever it ends: the next is right.
+TEST_P(CertifyOnDevice, RequestsOfAllKindsInAnyOrder) {
+  const Scene scene({30, 27, 33}, test::gyroid_field(10), {.rate = 8});
+  const std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
+  Renderer renderer(
+      device_, scene.volume,
+      {.size = kMedium, .cache_slots = 100, .with_levels = true, .with_bounds = true});
+  const FieldBound bounds[] = {FieldBound::kNone, FieldBound::kUpper, FieldBound::kLower};
+  for (int i = 0; i < 24; ++i) {
+    SCOPED_TRACE(fmt::format("request {}", i));
+    const ImageSize size = i % 5 == 0 ? kSmall : kMedium;
+    const FrameRequest request{.camera = cameras[i % 2],
+                               .isovalue = i % 3 == 0 ? 0.4f : 0.2f,
+                               .size = size,
+                               .voxel_pixels = i % 4 < 2 ? 0.0 : 3.0,
+                               .voxel_error = i % 7 < 3 ? 0.05 : 0.0,
+                               .bound = bounds[i / 2 % 3]};
+    FrameRequest broken = request;
+    broken.bound = bounds[i % 3];
+    broken.voxel_error = 0.2;
+    broken.on_pass = [](const PassStats &) -> bool { throw std::runtime_error("enough"); };
+    if (i % 2 == 0) {
+      EXPECT_THROW(renderer.render(broken), std::runtime_error);
+    } else {
+      broken.isovalue = NAN;
+      EXPECT_THROW(renderer.render(broken), Error);
+    }
+    renderer.render(request);
+    expect_same_hits(renderer.hits(),
+                     Twin(scene.volume, request.voxel_pixels, request.voxel_error, request.bound)
+                         .render(request.camera, size, request.isovalue),
+                     size.width);
+  }
+}
+
 }  // namespace
 }  // namespace isowave::core

@@ -121,5 +121,12 @@ TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
   EXPECT_THAT([&] { draw({1, 1, 9}); }, ThrowsMessage<Error>(HasSubstr("9 x 9 rays a pixel")));
 }
 
+TEST_P(ShadeOnDevice, NothingIsShownBeforeTheFirstFrame) {
+  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = {12, 8}}));
+  EXPECT_THROW(renderer.render({camera_, NAN}), Error);
+  EXPECT_THAT([&] { renderer.hits(); }, ThrowsMessage<Error>(HasSubstr("no frame")));
+  EXPECT_THAT([&] { renderer.shade(); }, ThrowsMessage<Error>(HasSubstr("no frame")));
+}
+
 }  // namespace
 }  // namespace isowave::core

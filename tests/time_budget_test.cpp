@@ -221,8 +221,17 @@ TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
         ThrowsMessage<Error>(HasSubstr("no picture can be drawn")));
   }
   EXPECT_THROW(frames_.render({camera_, NAN}, 1), Error);
+  EXPECT_THAT(
+      [&] {
+        frames_.render({camera_, kIsovalue, ImageSize{1, 27 * 21}}, 1);
+      },
+      ThrowsMessage<Error>(HasSubstr("cannot be kept")));
+  EXPECT_THAT([&] { renderer_.hits(); }, ThrowsMessage<Error>(HasSubstr("no frame")))
+      << "nothing was drawn";
   Renderer plain(device_, volume_.compressed, GetParam().with({.size = kSize}));
-  EXPECT_THROW(TimedFrames{plain}, std::logic_error);
+  EXPECT_THROW(TimedFrames{plain}, Error);
+  plain.render({camera_, kIsovalue});
+  EXPECT_THROW(plain.keep_picture(), Error);
 }
 
 /// Coarse levels draw small pictures, the finest the full one.

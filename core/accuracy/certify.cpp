@@ -107,7 +107,10 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
         "bernstein",
         to_string(solver));
   }
+  renderer.check(request);
   const ImageSize size = renderer.size_of(request);
+  if (drawn.size() != size.num_rays())
+    throw Error("{} hits are not those of {} rays", drawn.size(), size.num_rays());
   const Camera &camera = request.camera;
   Certificate certificate;
   const auto draw = [&](FieldBound bound) {

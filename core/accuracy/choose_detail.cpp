@@ -119,8 +119,8 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
                            const FrameRequest &request, double max_surface_error) {
   check_max_surface_error(max_surface_error);
   const auto begin = std::chrono::steady_clock::now();
+  renderer.check(request);
   const ImageSize size = renderer.size_of(request);
-  check_image_size(size);
   const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
   const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
   const double stride = double(size.height) / small.height;

@@ -70,6 +70,44 @@ bool turned_over(const std::vector<PassStats> &passes, std::uint32_t most) {
 
 }  // namespace
 
+FrameStats Renderer::render(const FrameRequest &request) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Uploads uploaded_before = uploads();
+  const OnPass &on_pass = request.on_pass;
+  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
+  FrameStats stats;
+  begin_frame(request);
+  stats.first_level = state_.drawing.first;
+  stats.last_level = state_.drawing.end - 1;
+  StallGuard guard(state_.levels[0].info.dims);
+  for (bool finished = false; !finished && !stats.cancelled;) {
+    pipeline_->enqueue_pass();
+    readback_.push(state_.rays.counts);
+    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
+      continue;  // read one pass behind: the device never waits for us
+    const PassStats pass = stats_of(readback_.pop());
+    stats.rays_hit += pass.counts.hit_count;
+    stats.passes.push_back(pass);
+    finished = pass.counts.next_active_count == 0;
+    stats.cancelled = on_pass && !on_pass(pass) && !finished;
+    guard.check(pass.counts);
+  }
+  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
+  // for it.
+  if (!stats.cancelled) {
+    pipeline_->end_frame();
+    if (turned_over(stats.passes,
+                    most_recycled(state_.cache.num_slots, device_.info().type, options_.stream)))
+      state_.cache.clear();
+  }
+  state_.rays.frame = state_.levels[0].frame;  // for shading
+  const Uploads uploaded = uploads();
+  stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
+  stats.uploaded_bytes = uploaded.bytes - uploaded_before.bytes;
+  stats.total_ms = ms_since(begin);
+  return stats;
+}
+
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
                    const RendererOptions &options)
     : device_(device),
@@ -121,44 +159,6 @@ void Renderer::compile_kernels() {
   rays.reset_counts();
 }
 
-FrameStats Renderer::render(const FrameRequest &request) {
-  const auto begin = std::chrono::steady_clock::now();
-  const Uploads uploaded_before = uploads();
-  const OnPass &on_pass = request.on_pass;
-  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
-  FrameStats stats;
-  begin_frame(request);
-  stats.first_level = state_.drawing.first;
-  stats.last_level = state_.drawing.end - 1;
-  StallGuard guard(state_.levels[0].info.dims);
-  for (bool finished = false; !finished && !stats.cancelled;) {
-    pipeline_->enqueue_pass();
-    readback_.push(state_.rays.counts);
-    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
-      continue;  // read one pass behind: the device never waits for us
-    const PassStats pass = stats_of(readback_.pop());
-    stats.rays_hit += pass.counts.hit_count;
-    stats.passes.push_back(pass);
-    finished = pass.counts.next_active_count == 0;
-    stats.cancelled = on_pass && !on_pass(pass) && !finished;
-    guard.check(pass.counts);
-  }
-  // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
-  // for it.
-  if (!stats.cancelled) {
-    pipeline_->end_frame();
-    if (turned_over(stats.passes,
-                    most_recycled(state_.cache.num_slots, device_.info().type, options_.stream)))
-      state_.cache.clear();
-  }
-  state_.rays.frame = state_.levels[0].frame;  // for shading
-  const Uploads uploaded = uploads();
-  stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
-  stats.uploaded_bytes = uploaded.bytes - uploaded_before.bytes;
-  stats.total_ms = ms_since(begin);
-  return stats;
-}
-
 /// Throws Error before anything has changed.
 void Renderer::check(const FrameRequest &request) const {
   const ImageSize size = size_of(request);
@@ -187,6 +187,7 @@ void Renderer::begin_frame(const FrameRequest &request) {
   const std::vector<DecodedValues> values = decoded_values(request);
   readback_.drain();  // of what the frame before had enqueued beyond its last pass
   decode_as(values, request.bound);
+  has_picture_ = false;
   size_ = size;
   const auto first = std::ranges::find_if(frames, draws);
   const auto end = std::find_if_not(first, frames.end(), draws);
@@ -219,6 +220,7 @@ void Renderer::begin_frame(const FrameRequest &request) {
   }
   cached_isovalue_ = isovalue;
   pipeline_->begin_frame();
+  has_picture_ = true;
 }
 
 Renderer::Uploads Renderer::uploads() const {
@@ -295,18 +297,35 @@ Camera Renderer::camera(std::span<const float> isovalues) {
   return surface_camera(state_.levels[0].macrocells, finest.info, isovalues, options_.size);
 }
 
+void Renderer::check_has_picture() const {
+  if (!has_picture_) throw Error("there is no picture: no frame has been drawn");
+}
+
 std::vector<HitRecord> Renderer::hits() const {
+  check_has_picture();
   std::vector<HitRecord> hits(size_.num_rays());
   state_.rays.hits.read(hits);
   return hits;
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {
+  check_has_picture();
   return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, size_.samples);
 }
 
+KeptPicture &Renderer::kept() {
+  if (!kept_) throw Error("no picture can be kept: the renderer was made without one");
+  return *kept_;
+}
+
+void Renderer::keep_picture() {
+  KeptPicture &into = kept();
+  check_has_picture();
+  into.keep(state_.rays, size_);
+}
+
 void Renderer::fill_from_kept() {
-  kept_.value().show(state_.rays, false);
+  kept().show(state_.rays, false);
   device_.finish();
 }
 
@@ -316,7 +335,7 @@ void Renderer::enlarge_kept(const FrameRequest &request) {
   state_.rays.frame =
       make_frame_params(state_.levels[0].info, request.camera, size, request.isovalue);
   size_ = size;
-  kept_.value().show(state_.rays, true);
+  kept().show(state_.rays, true);
   device_.finish();
 }
 

@@ -39,21 +39,24 @@ class Renderer {
   /// frame is drawn as if this had not been.
   FrameStats render(const FrameRequest &request);
 
+  /// Throws Error where the renderer was not made for the request: size, levels of detail, bounds.
+  void check(const FrameRequest &request) const;
+
   /// A view in which isosurfaces fill the largest picture, see surface_camera(). Waits. Throws
   /// Error: NaN.
   Camera camera(std::span<const float> isovalues);
 
   /// The hit buffer of the last frame, [size.ray_rows()][size.ray_columns()], row 0 at the top.
-  /// Waits.
+  /// Waits. Throws Error where no frame was drawn.
   std::vector<HitRecord> hits() const;
-  /// The picture of the hit buffer. Waits.
+  /// The picture of the hit buffer. Waits. Throws Error where no frame was drawn.
   Image8 shade(const Appearance &appearance = {});
 
   /// For pictures of one frame with more and more pixels (core/render/time_budget.hpp). Needs
-  /// options().with_kept_picture.
+  /// options().with_kept_picture, or else throws Error.
   /// Puts the last frame's picture aside: of at most half the pixels that the renderer was made
   /// for, along each axis, rounded up (halved()).
-  void keep_picture() { kept_.value().keep(state_.rays, size_); }
+  void keep_picture();
   /// Where the last frame has no hit, it shows the kept picture's, as after rendering was
   /// cancelled. Waits.
   void fill_from_kept();
@@ -87,7 +90,8 @@ class Renderer {
   };
 
   void compile_kernels();
-  void check(const FrameRequest &request) const;
+  void check_has_picture() const;
+  KeptPicture &kept();
   void begin_frame(const FrameRequest &request);
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
   void decode_as(const std::vector<DecodedValues> &values, FieldBound bound);
@@ -106,6 +110,7 @@ class Renderer {
   std::vector<FrameParams> level_frames_;  ///< of the levels of detail that draw the frame at work
   std::array<float, 2> value_range_;       ///< of the volume before compression
   ImageSize size_;                         ///< of the frame at work, or the last
+  bool has_picture_ = false;               ///< the hit buffer has the frame's hits so far
   std::optional<float>
       cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty
   std::unique_ptr<Pipeline> pipeline_;

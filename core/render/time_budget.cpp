@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <stdexcept>
 
 #include "core/base/error.hpp"
 
@@ -37,14 +36,13 @@ double TimedFrames::steady_clock_ms() {
 TimedFrames::TimedFrames(Renderer &renderer, Clock now)
     : renderer_(renderer), now_(std::move(now)) {
   if (!renderer.options().with_kept_picture)
-    throw std::logic_error("the renderer keeps no picture");
+    throw Error("no frame can be drawn within a time: the renderer was made to keep no picture");
 }
 
 TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
   check_time_budget(budget_ms);
   const double begin = now_();
-  const ImageSize full = renderer_.size_of(request);
-  check_image_size(full);
+  check(request);
   TimedFrame frame;
   std::size_t step = kNumSteps - 1;
   double step_begin = begin;
@@ -80,6 +78,17 @@ TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
   if (step != 0) renderer_.enlarge_kept(request);
   frame.stats.total_ms = now_() - begin;
   return frame;
+}
+
+/// Throws Error before anything is drawn.
+void TimedFrames::check(const FrameRequest &request) const {
+  renderer_.check(request);
+  const ImageSize full = renderer_.size_of(request);
+  const std::uint64_t most = halved(renderer_.options().size, 1).num_rays();
+  if (halved(full, 1).num_rays() > most) {
+    throw Error("half of {}x{} pixels cannot be kept: the renderer keeps a picture of {} rays",
+                full.width, full.height, most);
+  }
 }
 
 /// The frame with fewer rays, and levels of detail that suffice for them.

@@ -35,14 +35,15 @@ class TimedFrames {
  public:
   using Clock = std::function<double()>;  ///< [ms]
 
-  /// now: for tests. `renderer` must outlive this.
+  /// now: for tests. `renderer` must outlive this. Throws Error where it was made to keep no
+  /// picture.
   explicit TimedFrames(Renderer &renderer, Clock now = steady_clock_ms);
 
   /// Draws the smallest picture, however long it takes, then the largest that is expected to be
   /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
   /// in time is filled from the one before. The hit buffer holds a picture of the full size. The
-  /// request's on_pass is not called. Throws Error unless budget_ms is finite and above 0, and as
-  /// Renderer::render() does.
+  /// request's on_pass is not called. Throws Error unless budget_ms is finite and above 0, where
+  /// half of the picture is larger than what the renderer keeps, and as Renderer::render() does.
   TimedFrame render(const FrameRequest &request, double budget_ms);
 
   static double steady_clock_ms();
@@ -50,6 +51,7 @@ class TimedFrames {
  private:
   static constexpr std::size_t kNumSteps = 4;  ///< 1/8 to 1/1; steps count down to 0, all rays
 
+  void check(const FrameRequest &request) const;
   FrameRequest request_of(const FrameRequest &request, std::size_t step) const;
   std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms,
                         double left_ms) const;
