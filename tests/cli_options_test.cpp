@@ -155,7 +155,7 @@ TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   expect_one_line_error(kRender + "--grouping radix", "--grouping: ");
   expect_one_line_error(kRender + "--pipeline rays --closest scan", "--closest: ");
   expect_one_line_error(kRender + "--speculation off --max-speculation 8", "--max-speculation: ");
-  expect_one_line_error(kRender + "--color '#102030'", "--color: ");
+  expect_one_line_error(kRender + "--color '#102030' --depth a.npy", "--color: ");
   expect_one_line_error("verify --isovalue 80", "give a VOLUME");
   expect_one_line_error("verify " + kNucleon + " -i 80 --rays 100", "--rays: ");
   expect_one_line_error("verify " + kNucleon, "give --isovalue");

@@ -521,11 +521,6 @@ void add_render(CLI::App &app) {
       ->capture_default_str();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
-  add_renderer_options(*command, options->renderer_flags);
-  command->add_flag(
-      "--reference", options->reference,
-      "use the scalar C++ reference instead of a device; options of how a device draws are "
-      "then without effect");
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
@@ -556,6 +551,11 @@ void add_render(CLI::App &app) {
   command->add_flag("--verbose", options->verbose, "print the plan of the device's memory");
   command->add_option("--progress-dir", options->progress_dir,
                       "folder for the picture after every pass");
+  add_renderer_options(*command, options->renderer_flags);
+  command->add_flag(
+      "--reference", options->reference,
+      "use the scalar C++ reference instead of a device; options of how a device draws are "
+      "then without effect");
   command->get_option("--orbit")->description(
       "draw N views around the whole volume [one, which the surfaces fill]");
   group_render_options(*command);

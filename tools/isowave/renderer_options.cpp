@@ -6,24 +6,6 @@
 namespace isowave::core::tools {
 
 void add_renderer_options(CLI::App &app, RendererFlags &flags) {
-  app.add_option("--pipeline", flags.pipeline,
-                 "arrangement of the passes: blocks (the paper's), rays, or auto (rays, which was "
-                 "faster in "
-                 "nearly all "
-                 "that was measured)")
-      ->check(CLI::IsMember({"auto", "blocks", "rays"}))
-      ->capture_default_str();
-  app.add_option(
-         "--speculation", flags.speculation,
-         "blocks a ray looks ahead: off (1), global (W*H / active rays), per-ray (twice as many "
-         "after every "
-         "miss; in pipeline blocks no more than global), or auto: per-ray in pipeline rays, global "
-         "in blocks")
-      ->check(CLI::IsMember({"auto", "off", "global", "per-ray"}))
-      ->capture_default_str();
-  app.add_option("--max-speculation", flags.values.max_speculation,
-                 "most blocks a ray looks ahead, 1..64")
-      ->capture_default_str();
   app.add_option(
          "--memory-budget", flags.values.memory_budget,
          "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB (1024^3); "
@@ -45,6 +27,24 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
                  "draw far parts by coarser levels of detail, whose voxels are at most so many "
                  "pixels apart; "
                  "0: all by the finest")
+      ->capture_default_str();
+  app.add_option("--pipeline", flags.pipeline,
+                 "arrangement of the passes: blocks (the paper's), rays, or auto (rays, which was "
+                 "faster in "
+                 "nearly all "
+                 "that was measured)")
+      ->check(CLI::IsMember({"auto", "blocks", "rays"}))
+      ->capture_default_str();
+  app.add_option(
+         "--speculation", flags.speculation,
+         "blocks a ray looks ahead: off (1), global (W*H / active rays), per-ray (twice as many "
+         "after every "
+         "miss; in pipeline blocks no more than global), or auto: per-ray in pipeline rays, global "
+         "in blocks")
+      ->check(CLI::IsMember({"auto", "off", "global", "per-ray"}))
+      ->capture_default_str();
+  app.add_option("--max-speculation", flags.values.max_speculation,
+                 "most blocks a ray looks ahead, 1..64")
       ->capture_default_str();
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
