@@ -9,7 +9,7 @@ trap 'rm -f "$log"' EXIT
 unset ISOWAVE_DEVICE RUSTICL_ENABLE # Oclgrind's library takes the loader's place: it is the only device
 
 status=0
-oclgrind --build-options '-cl-opt-disable -DISO_CHECK_RACES=1' --data-races --uninitialized --max-surface-errors 100000 "$@" 2> "$log" ||
+oclgrind --build-options '-cl-opt-disable -DISO_CHECK_RACES=1' --data-races --uninitialized --max-errors 100000 "$@" 2> "$log" ||
   status=$?
 cat "$log" >&2
 if grep -q '^[[:space:]]*Kernel: ' "$log"; then
