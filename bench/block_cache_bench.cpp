@@ -25,9 +25,11 @@ class CacheInput {
                                static_cast<std::uint32_t>(key_bits), 0),
               make_block_pairs(distribution, num_pairs, kNumVisible,
                                static_cast<std::uint32_t>(key_bits), 1)},
-        rays_(device, num_pairs),
-        cache_(device, cube_params(static_cast<std::uint32_t>(key_bits)),
-               static_cast<std::uint32_t>(num_needed()), num_pairs, kGroupSize) {
+        rays_(device, {num_pairs}),
+        cache_(device,
+               BlockCache::limits_for(cube_params(static_cast<std::uint32_t>(key_bits)),
+                                      static_cast<std::uint32_t>(num_needed()), num_pairs),
+               kGroupSize) {
     FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
     params.table_groups = cache_.table_groups;
     rays_.frame = params;

@@ -19,9 +19,10 @@ struct GroupInput {
       : num_slots(1u << slot_bits),
         pairs(
             make_block_pairs(distribution, num_pairs, std::size_t{1} << visible_bits, kKeyBits, 0)),
-        rays(device, num_pairs),
-        cache(device, cube_params(kKeyBits), num_slots, num_pairs, kGroupSize),
-        group(device, num_pairs, num_slots, kGroupSize, how) {
+        rays(device, {num_pairs}),
+        cache(device, BlockCache::limits_for(cube_params(kKeyBits), num_slots, num_pairs),
+              kGroupSize),
+        group(device, {num_pairs, num_slots, kGroupSize, how}) {
     FrameParams params = cube_params(kKeyBits);
     params.table_groups = cache.table_groups;
     rays.frame = params;

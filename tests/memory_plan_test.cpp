@@ -28,7 +28,7 @@ class MemoryPlanOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   /// What the renderer's device has booked is what the plan says, buffer by buffer.
   static void expect_booked(ocl::Device &device, const MemoryPlan &plan) {
     std::map<std::string, std::uint64_t> planned, booked;
-    for (const MemoryPlan::Buffer &buffer : plan.buffers) planned[buffer.name] += buffer.bytes;
+    for (const ocl::BufferSize &buffer : plan.buffers) planned[buffer.name] += buffer.bytes();
     for (const auto &[name, entry] : device.ledger().by_name()) {
       if (entry.current != 0) booked[name] = entry.current;
     }

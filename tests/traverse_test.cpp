@@ -271,7 +271,7 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
   const DeviceStream stream(device_, volume);
   FrameParams frame = case_frame(dims, camera_cases(dims)[0], {40, 30}, 3.0f);
-  Wavefront rays(device_, 40 * 30);
+  Wavefront rays(device_, {40 * 30});
   Macrocells macrocells(device_, frame, stream);
   macrocells.select(frame);
   macrocells.set_active_box(frame);
