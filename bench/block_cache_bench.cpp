@@ -19,7 +19,7 @@ constexpr std::size_t kNumVisible = 1u << 14;
 /// Two sets of pairs that fill the cache in turn.
 class CacheInput {
  public:
-  CacheInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t key_bits,
+  CacheInput(ocl::Device &device, std::uint64_t num_pairs, std::int64_t key_bits,
              Distribution distribution)
       : sets_{make_block_pairs(distribution, num_pairs, kNumVisible,
                                static_cast<std::uint32_t>(key_bits), 0),

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t kKeyBits = 18;  // blocks of 256^3 voxels
 
 struct GroupInput {
-  GroupInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t slot_bits,
+  GroupInput(ocl::Device &device, std::uint64_t num_pairs, std::int64_t slot_bits,
              std::int64_t visible_bits, Distribution distribution, Grouping how)
       : num_slots(1u << slot_bits),
         pairs(

@@ -29,8 +29,10 @@ struct MarchWorld {
         frame(make_frame_params(volume.info(), camera, size, kIsovalue)),
         stream(device, volume.compressed),
         macrocells(device, frame, stream),
-        rays(device, size.num_rays(), false),
-        cache(device, frame, static_cast<uint>(block_count(frame)), size.num_rays(), kGroupSize),
+        rays(device, {.num_rays = size.num_rays(), .with_pairs = false}),
+        cache(device,
+              BlockCache::limits_for(frame, static_cast<uint>(block_count(frame)), size.num_rays()),
+              kGroupSize),
         decode(device, cache.capacity, stream.defines()),
         march(device, size.num_rays(), kGroupSize, kDefaultSolver) {
     macrocells.select(frame);

@@ -188,5 +188,28 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
   EXPECT_EQ(device.ledger().peak(), 0u) << "refused before any memory was taken";
 }
 
+class MemoryPlanOfLevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
+INSTANTIATE_TEST_SUITE_P(Devices, MemoryPlanOfLevelsOnDevice,
+                         testing::ValuesIn(devices_under_test()), device_test_name);
+
+/// Where scratch for the ranges of the last level is what the most memory is taken with, nothing
+/// but what is needed by then is there.
+TEST_P(MemoryPlanOfLevelsOnDevice, PeakOfSetupIsPlanned) {
+  const glm::uvec3 dims(128, 128, 8);
+  ArrayReader reader(test::grid_info(dims), test::sample(dims, test::noise_field(3)));
+  const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 2});
+  ocl::Device device(GetParam());
+  const Renderer renderer(device, volume,
+                          {.size = {9, 7},
+                           .cache_slots = 8,
+                           .stream = StreamPlace::kHost,
+                           .window_blocks = 1024,
+                           .with_levels = true});
+  const MemoryPlan &plan = renderer.memory_plan();
+  EXPECT_GT(plan.setup_bytes, plan.total()) << "else this scene tests nothing";
+  EXPECT_EQ(device.ledger().peak(), plan.setup_bytes);
+  EXPECT_EQ(device.ledger().current(), plan.total());
+}
+
 }  // namespace
 }  // namespace isowave::core

@@ -85,7 +85,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// The kernel itself, since masks that no isovalue makes are wanted.
   struct Stages {
     Stages(ocl::Device &device, std::uint64_t pixels, uint group_size)
-        : rays(device, pixels),
+        : rays(device, {pixels}),
           compaction(device, pixels, 8),
           initial_rays(device, pixels),
           range(ocl::Range::strided(pixels, group_size, device)),
