@@ -30,7 +30,7 @@ namespace isowave::core::bench {
 
 namespace {
 
-/// The pixel's ray (design: README "Spaces and cameras").
+/// The pixel's ray (core/view/README.md).
 struct PixelRays {
   PixelRays(const Camera &camera, ImageSize size) : eye(camera.eye) {
     const glm::dvec3 fwd = glm::normalize(camera.at - camera.eye);

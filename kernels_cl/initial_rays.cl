@@ -2,6 +2,7 @@
 #define ISO_FOUND global
 #include "device/block_walk.h"
 #include "portable/cell_intersect.h"
+#include "portable/window.h"
 
 /// One entry per pixel [height * width]: no hit yet, the first block of the ray, whether it meets
 /// any that may be active. ray_ids[i] = i, for the compaction that follows. Grid-stride.
@@ -12,11 +13,10 @@ kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
   if (get_global_id(0) == 0) {
     counts->last_frame_pass = counts->frame_pass;
     counts->frame_pass = counts->pass + 1;
-    counts->window_count = counts->ray_count =
-        frame->width * frame->height; /* the first pass is for all */
+    counts->ray_count = frame_rays(frame);
+    counts->window_count = first_window(frame);
   }
-  for (uint pixel = get_global_id(0); pixel < frame->width * frame->height;
-       pixel += get_global_size(0)) {
+  for (uint pixel = get_global_id(0); pixel < frame_rays(frame); pixel += get_global_size(0)) {
     const Ray ray = make_ray(frame, pixel);
     const uint block_id = first_block(frame, &ray);
     hits[pixel] = no_hit();

@@ -1,9 +1,9 @@
 /// scan.cl -- exclusive prefix sum and stream compaction (Sec. 3.6, 4.2).
 /// Counts live on the device: `counts` are the uints of PassCounts, `count_field` says which of
-/// them is the number of entries. (A cast from the struct is what Mesa rusticl gets wrong: README
-/// "Devices".) Compaction = compact_count -> scan_exclusive of the tile sums -> compact_values. A
-/// tile is ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles. No group ever
-/// waits for another one.
+/// them is the number of entries. (A cast from the struct is what Mesa rusticl gets wrong:
+/// README.md of this folder.) Compaction = compact_count -> scan_exclusive of the tile sums ->
+/// compact_values. A tile is ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles.
+/// No group ever waits for another one.
 #include "device/work_group.h"
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)

@@ -191,7 +191,7 @@ class ApiOnDevice : public testing::TestWithParam<core::ocl::DeviceInfo> {
   static std::string selector() { return std::to_string(GetParam().index); }
 };
 
-TEST_P(ApiOnDevice, SmallFramesAreThoseOfTheEngine) {
+TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
   const auto volume = sphere();
   Renderer renderer(open_device(selector()), volume, {.largest = {64, 48, 1}});
   FrameRequest request = small_request(renderer);
@@ -233,7 +233,7 @@ TEST_P(ApiOnDevice, SmallFramesAreThoseOfTheEngine) {
 }
 
 /// From as near as it may: the box of the surface's blocks is in the picture, and fills it.
-TEST_P(ApiOnDevice, SmallSurfacesFillThePicture) {
+TEST_P(ApiOnDevice, SurfacesFillThePicture) {
   for (const float isovalue : {0.3f, 0.6f, 0.9f, 5.0f}) {
     Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}});
     FrameRequest request = small_request(renderer);
@@ -258,7 +258,7 @@ TEST_P(ApiOnDevice, SmallSurfacesFillThePicture) {
   }
 }
 
-TEST_P(ApiOnDevice, SmallRequestsThatFailLeaveTheRendererAsItWas) {
+TEST_P(ApiOnDevice, RequestsThatFailLeaveTheRendererAsItWas) {
   Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}});
   const FrameRequest good = small_request(renderer);
   const std::vector<float> depth = renderer.render(good).depth;
@@ -282,7 +282,7 @@ TEST_P(ApiOnDevice, SmallRequestsThatFailLeaveTheRendererAsItWas) {
   });
 }
 
-TEST_P(ApiOnDevice, SmallFramesKeepErrorsAndTimes) {
+TEST_P(ApiOnDevice, FramesKeepErrorsAndTimes) {
   Renderer renderer(
       open_device(selector()), sphere({.tolerance = 0.001, .levels = 2}),
       {.largest = {64, 48, 1}, .with_levels = true, .with_bounds = true, .with_time_budget = true});
@@ -302,7 +302,7 @@ TEST_P(ApiOnDevice, SmallFramesKeepErrorsAndTimes) {
   EXPECT_EQ(timed.depth, depth);
 }
 
-TEST_P(ApiOnDevice, SmallFramesCanBeWatchedAndStopped) {
+TEST_P(ApiOnDevice, FramesCanBeWatchedAndStopped) {
   Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}, .cache_blocks = 8});
   FrameRequest request = small_request(renderer);
   const std::vector<std::uint8_t> picture = renderer.render(request).picture;
@@ -326,7 +326,7 @@ TEST_P(ApiOnDevice, SmallFramesCanBeWatchedAndStopped) {
   EXPECT_EQ(renderer.render(request).picture, picture);
 }
 
-TEST_P(ApiOnDevice, SmallRenderersKeepWhatTheyNeed) {
+TEST_P(ApiOnDevice, RenderersKeepWhatTheyNeed) {
   std::optional<Renderer> renderer;
   {
     const auto device = open_device(selector());
@@ -345,7 +345,7 @@ TEST_P(ApiOnDevice, SmallRenderersKeepWhatTheyNeed) {
   EXPECT_LT(device->memory_in_use(), held);
 }
 
-TEST_P(ApiOnDevice, SmallBudgetsThatDoNotSufficeAreAnError) {
+TEST_P(ApiOnDevice, BudgetsThatDoNotSufficeAreAnError) {
   const auto device = open_device(selector());
   EXPECT_THAT(error_of([&] { Renderer(device, sphere(), {.memory_budget = 1000}); }),
               HasSubstr("1000"));

@@ -308,7 +308,7 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
 }
 
 TEST_P(CertifyOnDevice, RealVolumes) {
-  for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "nucleon_41x41x41_uint8.raw.gz"}) {
+  for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "head_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
     Renderer renderer(device_, scene.volume,
                       {.size = kMedium, .with_levels = true, .with_bounds = true});
@@ -326,7 +326,7 @@ TEST_P(CertifyOnDevice, RealVolumes) {
 
 /// From so far that most of an error is what t loses in float32.
 TEST_P(CertifyOnDevice, FarAway) {
-  const Scene scene("nucleon_41x41x41_uint8.raw.gz",
+  const Scene scene("head_41x41x41_uint8.raw.gz",
                     {.precision = BlockPrecision{.min_exponent = -16, .max_voxel_error = 0x1p-16}});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye = camera.at + 700.0 * (camera.eye - camera.at);

@@ -78,7 +78,7 @@ ISOWAVE=$program "$top/tools/size-table" "$top/tests/data" >"$work/sizes"
 import gzip, pathlib, re, sys
 equal, exact = [{row.split("|")[1].strip(): [cell.strip() for cell in row.split("|")[2:-1]] for row in table.splitlines()[2:]}
                 for table in open(sys.argv[1]).read().split("\n\n")]
-assert set(equal) == set(exact) == {"fuel", "nucleon"}, (equal, exact)
+assert set(equal) == set(exact) == {"fuel", "head"}, (equal, exact)
 for name, cells in equal.items():
     for cell in cells:
         fixed, bounded = [int(n.replace(",", "")) for n in re.search(r": ([\d,]+) / ([\d,]+) ", cell).groups()]

@@ -22,8 +22,8 @@ using test::run_isowave;
 using test::TemporaryFolder;
 using test::write_file;
 
-const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
-const std::string kRender = "render " + kNucleon + " -i 80 --size 16x12 ";
+const std::string kHead = ISOWAVE_TEST_DATA "/head_41x41x41_uint8.raw.gz";
+const std::string kRender = "render " + kHead + " -i 80 --size 16x12 ";
 
 /// Status 1 and one line that begins with the program's name and says `text`; what was printed
 /// before does not matter.
@@ -63,7 +63,7 @@ TEST(CliOptions, EmptyValuesAreRefused) {
   expect_one_line_error("render '' -i 80", "VOLUME: the value is empty");
   expect_one_line_error(kRender + "--depth= --stats x", "--depth: the value is empty");
   expect_one_line_error(kRender + "-o --depth x", "a value is missing before --depth");
-  expect_one_line_error("bench pareto " + kNucleon + " -i 80 --storage exact,,rate:2", "is empty");
+  expect_one_line_error("bench pareto " + kHead + " -i 80 --storage exact,,rate:2", "is empty");
   expect_one_line_error("compare '' ''", "the value is empty");
 }
 
@@ -72,7 +72,7 @@ TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
                             "-1GB", "1.5GB", "1XB", " 1GB "})
     expect_one_line_error(kRender + "--memory-budget '" + value + "'", "--memory-budget: ");
   for (const char *value : {"inf", "-inf", "nan", "1e39", "1e400", "0x10", "1,5", "80x", " 80"})
-    expect_one_line_error("render " + kNucleon + " -i '" + value + "'", "--isovalue: ");
+    expect_one_line_error("render " + kHead + " -i '" + value + "'", "--isovalue: ");
   for (const char *value : {"-1", "18446744073709551616", "1e3", "0x10", "+1", "1.0"})
     expect_one_line_error("generate mixing_layer --dims 8 --seed '" + std::string(value) + "'",
                           "--seed: ");
@@ -80,22 +80,22 @@ TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
                              "--time-budget", "--tolerance", "--spacing"})
     expect_one_line_error(kRender + option + " inf", option);
   for (const char *value : {"0", "-1"}) {
-    expect_one_line_error("convert " + kNucleon + " -o a.zfp --tolerance " + value,
+    expect_one_line_error("convert " + kHead + " -o a.zfp --tolerance " + value,
                           std::string("a tolerance of ") + value + ": must be above 0");
-    expect_one_line_error("convert " + kNucleon + " -o a.zfp --tolerance-relative " + value,
+    expect_one_line_error("convert " + kHead + " -o a.zfp --tolerance-relative " + value,
                           std::string("a relative tolerance of ") + value + ": must be above 0");
   }
-  expect_one_line_error("convert " + kNucleon + " -o a.zfp --tolerance-relative 1e308",
+  expect_one_line_error("convert " + kHead + " -o a.zfp --tolerance-relative 1e308",
                         "a relative tolerance of 1e+308");
   expect_one_line_error(kRender + "--levels 0", "--levels: ");
   expect_one_line_error(kRender + "--levels -1", "--levels: ");
   expect_one_line_error(kRender + "--orbit 99999999999", "--orbit");
   expect_one_line_error("verify --rays 0", "--rays");
   expect_one_line_error("verify --watertight 0", "--watertight");
-  expect_one_line_error("convert " + kNucleon + " --map-nan 1e39 -o a.zfp", "--map-nan");
-  expect_one_line_error("bench pareto " + kNucleon + " -i 80 --storage rate:-1", "--storage");
-  expect_one_line_error("bench pareto " + kNucleon + " -i 80 --storage tolerance:nan", "--storage");
-  expect_one_line_error("bench solvers " + kNucleon + ":1e39", "VOLUME:ISOVALUE");
+  expect_one_line_error("convert " + kHead + " --map-nan 1e39 -o a.zfp", "--map-nan");
+  expect_one_line_error("bench pareto " + kHead + " -i 80 --storage rate:-1", "--storage");
+  expect_one_line_error("bench pareto " + kHead + " -i 80 --storage tolerance:nan", "--storage");
+  expect_one_line_error("bench solvers " + kHead + ":1e39", "VOLUME:ISOVALUE");
   const TemporaryFolder folder;
   ASSERT_EQ(run_isowave("generate sphere --dims 010 -o " + quoted(folder.path())).status, 0);
   EXPECT_TRUE(fs::exists(folder / "sphere_10x10x10_uint8.raw")) << "decimal, not octal";
@@ -109,8 +109,8 @@ TEST(CliOptions, SpacingsAndPlacesThatFloatsCannotHoldAreRefused) {
   expect_failure(run_isowave(kRender + "--spacing 1 1 1e11"), "float32");
   const TemporaryFolder folder;
   const std::string zfp = quoted(folder / "n.zfp");
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " -o " + zfp).status, 0);
-  for (const std::string &volume : {kNucleon, zfp}) {
+  ASSERT_EQ(run_isowave("convert " + kHead + " -o " + zfp).status, 0);
+  for (const std::string &volume : {kHead, zfp}) {
     for (const char *spacing : {"0", "-1", "1 1 0"})
       expect_one_line_error("info " + volume + " --spacing " + spacing,
                             "each must be finite and above 0");
@@ -127,7 +127,7 @@ TEST(CliOptions, SpacingsAndPlacesThatFloatsCannotHoldAreRefused) {
   const auto camera = [&](const std::string &eye, const std::string &up) {
     write_file(folder / "c.json", R"({"width":8,"height":8,"fovy_deg":50,"cameras":[{"eye":)" +
                                       eye + R"(,"at":[0,0,0],"up":)" + up + "}]}");
-    return run_isowave("render " + kNucleon + " -i 1 --reference --cameras " +
+    return run_isowave("render " + kHead + " -i 1 --reference --cameras " +
                        quoted(folder / "c.json"));
   };
   expect_failure(camera("[1e160,0,0]", "[0,1,0]"), "too large");
@@ -141,7 +141,7 @@ TEST(CliOptions, SpacingsAndPlacesThatFloatsCannotHoldAreRefused) {
 TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   const TemporaryFolder folder;
   const std::string zfp = quoted(folder / "n.zfp");
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 1 -o " + zfp).status, 0);
+  ASSERT_EQ(run_isowave("convert " + kHead + " --rate 1 -o " + zfp).status, 0);
   for (const char *option :
        {"--exact", "--rate 8", "--tolerance 1", "--tolerance-relative 0.1", "--levels 1"}) {
     const std::string name = std::string(option).substr(0, std::string(option).find(' '));
@@ -157,16 +157,15 @@ TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   expect_one_line_error(kRender + "--speculation off --max-speculation 8", "--max-speculation: ");
   expect_one_line_error(kRender + "--color '#102030' --depth a.npy", "--color: ");
   expect_one_line_error("verify --isovalue 80", "give a VOLUME");
-  expect_one_line_error("verify " + kNucleon + " -i 80 --rays 100", "--rays: ");
-  expect_one_line_error("verify " + kNucleon, "give --isovalue");
-  expect_one_line_error("verify " + kNucleon + " -i 80 --levels 2", "--levels: ");
+  expect_one_line_error("verify " + kHead + " -i 80 --rays 100", "--rays: ");
+  expect_one_line_error("verify " + kHead, "give --isovalue");
+  expect_one_line_error("verify " + kHead + " -i 80 --levels 2", "--levels: ");
   expect_one_line_error("generate sphere --dims 8 --seed 3", "--seed: ");
   expect_one_line_error("info generate:sphere_8x8x8_uint8:3",
                         "a seed is of mixing_layer's noise alone");
   expect_one_line_error(kRender + "--no-stage-times", "--no-stage-times: ");
-  expect_one_line_error(
-      "convert " + kNucleon + " --exact --no-verify -o " + quoted(folder / "a.zfp"),
-      "--no-verify: ");
+  expect_one_line_error("convert " + kHead + " --exact --no-verify -o " + quoted(folder / "a.zfp"),
+                        "--no-verify: ");
 }
 
 TEST(CliOptions, PipesAreNotWaitedFor) {
@@ -176,7 +175,7 @@ TEST(CliOptions, PipesAreNotWaitedFor) {
     const std::string pipe = quoted(folder / name);
     for (const std::string &arguments :
          {"info " + pipe, "render " + pipe + " -i 80",
-          "render " + kNucleon + " -i 80 --cameras " + pipe, "compare " + pipe + " " + pipe,
+          "render " + kHead + " -i 80 --cameras " + pipe, "compare " + pipe + " " + pipe,
           "convert " + pipe + " -o " + quoted(folder / "a.zfp")}) {
       const auto result = run_command("timeout 20 " + isowave_program() + " " + arguments);
       EXPECT_EQ(result.status, 1) << arguments;
@@ -189,10 +188,10 @@ TEST(CliOptions, PipesAreNotWaitedFor) {
 TEST(CliOptions, AStandardOutputThatFailsIsAnError) {
   const TemporaryFolder folder;
   for (const std::string &arguments :
-       {"info " + kNucleon, "info --json " + kNucleon, std::string("--help"),
-        std::string("--version"), std::string("render --help"), std::string("devices"),
-        kRender + "--reference", "generate sphere --dims 8 -o " + quoted(folder / "s.raw"),
-        "convert " + kNucleon + " -o " + quoted(folder / "n.zfp")}) {
+       {"info " + kHead, "info --json " + kHead, std::string("--help"), std::string("--version"),
+        std::string("render --help"), std::string("devices"), kRender + "--reference",
+        "generate sphere --dims 8 -o " + quoted(folder / "s.raw"),
+        "convert " + kHead + " -o " + quoted(folder / "n.zfp")}) {
     for (const char *where : {" >/dev/full", " >&-"}) {
       SCOPED_TRACE(arguments + where);
       expect_failure(run_command(isowave_program() + " " + arguments + where), "standard output");

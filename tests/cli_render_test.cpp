@@ -19,7 +19,7 @@ using test::run_isowave;
 using test::TemporaryFolder;
 using test::write_file;
 
-const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
+const std::string kHead = ISOWAVE_TEST_DATA "/head_41x41x41_uint8.raw.gz";
 const std::string kGyroid = "generate:gyroid_20x21x22_uint8";
 
 std::set<std::string> names_in(const std::filesystem::path &folder) {
@@ -45,7 +45,7 @@ std::string camera_file(const char *dims = "[41,41,41]") {
 /// same bits.
 TEST(CliRender, MemoryBudget) {
   const TemporaryFolder folder;
-  const std::string command = kNucleon + " --isovalue 80 --size 64x48 --device cpu";
+  const std::string command = kHead + " --isovalue 80 --size 64x48 --device cpu";
   const auto refused = run_isowave("render " + command + " --memory-budget 1KB");
   EXPECT_EQ(refused.status, 1);
   const std::string saying = "a memory budget of 1000 bytes is too small: ";
@@ -64,7 +64,7 @@ TEST(CliRender, MemoryBudget) {
 TEST(CliRender, StreamOnTheHost) {
   const TemporaryFolder folder;
   const std::string file = quoted(folder / "n.zfp");
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 32 -o " + file).status, 0);
+  ASSERT_EQ(run_isowave("convert " + kHead + " --rate 32 -o " + file).status, 0);
   const std::uint64_t stream_bytes = 11 * 11 * 11 * 256;
   const std::string command = file + " --isovalue 80 --size 40x30 --device cpu";
   const auto outputs = [&](const std::string &name) {
@@ -111,7 +111,7 @@ TEST(CliRender, StreamOnTheHost) {
 
 TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   const TemporaryFolder folder;
-  const auto run = render(kNucleon + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") +
+  const auto run = render(kHead + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") +
                           " --depth " + quoted(folder / "a.npy") + " --stats " +
                           quoted(folder / "a.json") + " --progress-dir " +
                           quoted(folder / "passes") + " --max-speculation 2 --pipeline blocks");
@@ -183,8 +183,8 @@ TEST(CliRender, ReferenceIsTheSamePicture) {
            quoted(folder / (name + ".png")) + " --depth " + quoted(folder / (name + ".npy")) +
            " --stats " + quoted(folder / (name + ".json"));
   };
-  render(kNucleon + outputs("device") + " --speculation off --cache-slots 300 --no-stage-times");
-  const auto reference = render(kNucleon + outputs("twin") + " --reference");
+  render(kHead + outputs("device") + " --speculation off --cache-slots 300 --no-stage-times");
+  const auto reference = render(kHead + outputs("twin") + " --reference");
   EXPECT_EQ(reference.out.find("device"), std::string::npos) << reference.out;
   for (const char *frame : {"_iso60_view0", "_iso60_view1", "_iso150_view0", "_iso150_view1"}) {
     for (const char *extension : {".png", ".npy"}) {
@@ -222,55 +222,52 @@ TEST(CliRender, CameraFileGivesViewsAndSize) {
   const TemporaryFolder folder;
   write_file(folder / "c.json", camera_file());
   const std::string cameras = " --cameras " + quoted(folder / "c.json") + " -i 80 ";
-  render(kNucleon + cameras + "--depth " + quoted(folder / "a.npy"));
+  render(kHead + cameras + "--depth " + quoted(folder / "a.npy"));
   const FloatImage first = read_npy(folder / "a_iso80_view0.npy");
   EXPECT_EQ(first.width, 40u);
   EXPECT_EQ(first.height, 30u);
   EXPECT_NE(first.pixels, read_npy(folder / "a_iso80_view1.npy").pixels);
-  render(kNucleon + cameras + "--size 20x10 --depth " +
-         quoted(folder / "b.npy"));  // the option wins
+  render(kHead + cameras + "--size 20x10 --depth " + quoted(folder / "b.npy"));  // the option wins
   EXPECT_EQ(read_npy(folder / "b_iso80_view1.npy").width, 20u);
 }
 
 TEST(CliRender, ZfpFilesAndCompressionOnTheFlyAreTheSame) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 5 -o " + quoted(folder / "n.zfp")).status,
-            0);
+  ASSERT_EQ(run_isowave("convert " + kHead + " --rate 5 -o " + quoted(folder / "n.zfp")).status, 0);
   render(quoted(folder / "n.zfp") + " -i 80 --size 32x32 --depth " + quoted(folder / "a.npy"));
-  render(kNucleon + " --rate 5 -i 80 --size 32x32 --depth " + quoted(folder / "b.npy"));
-  render(kNucleon + " --rate 4 -i 80 --size 32x32 --depth " + quoted(folder / "c.npy"));
+  render(kHead + " --rate 5 -i 80 --size 32x32 --depth " + quoted(folder / "b.npy"));
+  render(kHead + " --rate 4 -i 80 --size 32x32 --depth " + quoted(folder / "c.npy"));
   EXPECT_EQ(test::read_file(folder / "a.npy"), test::read_file(folder / "b.npy"));
   EXPECT_NE(test::read_file(folder / "a.npy"), test::read_file(folder / "c.npy"));
 }
 
 TEST(CliRender, ErrorsInsteadOfARate) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --exact -o " + quoted(folder / "n.zfp")).status,
-            0);
+  ASSERT_EQ(run_isowave("convert " + kHead + " --exact -o " + quoted(folder / "n.zfp")).status, 0);
   const auto depth = [&](const std::string &arguments) {
     render(arguments + " -i 80.5 --size 32x32 --depth " + quoted(folder / "a.npy"));
     return test::read_file(folder / "a.npy");
   };
   const std::string exact = depth(quoted(folder / "n.zfp"));
-  EXPECT_EQ(depth(kNucleon + " --exact"), exact);
-  EXPECT_EQ(depth(kNucleon + " --rate 32"), exact) << "as good as no compression";
+  EXPECT_EQ(depth(kHead + " --exact"), exact);
+  EXPECT_EQ(depth(kHead + " --rate 32"), exact) << "as good as no compression";
   EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --voxel-error 0.1"), exact)
       << "less than what was left out";
   const std::string coarse = depth(quoted(folder / "n.zfp") + " --voxel-error 20");
   EXPECT_NE(coarse, exact);
   EXPECT_EQ(depth(quoted(folder / "n.zfp") + " --voxel-error 20 --reference"), coarse);
-  EXPECT_NE(depth(kNucleon + " --tolerance-relative 0.05"), exact);
+  EXPECT_NE(depth(kHead + " --tolerance-relative 0.05"), exact);
   test::expect_one_line_error(
-      "render " + kNucleon + " -i 80 --voxel-error -1 --depth " + quoted(folder / "b.npy"),
+      "render " + kHead + " -i 80 --voxel-error -1 --depth " + quoted(folder / "b.npy"),
       "value error of -1");
   test::expect_one_line_error(
-      "render " + kNucleon + " -i 80 --rate 4 --exact --depth " + quoted(folder / "b.npy"), "rate");
+      "render " + kHead + " -i 80 --rate 4 --exact --depth " + quoted(folder / "b.npy"), "rate");
 }
 
 TEST(CliRender, LevelsOfDetail) {
   const TemporaryFolder folder;
   const std::string file = quoted(folder / "n.zfp");
-  const auto converted = run_isowave("convert " + kNucleon + " --rate 16 --levels all -o " + file);
+  const auto converted = run_isowave("convert " + kHead + " --rate 16 --levels all -o " + file);
   ASSERT_EQ(converted.status, 0) << converted.err;
   EXPECT_NE(converted.out.find("level of detail 21x21x21"), std::string::npos) << converted.out;
   const json info = json::parse(run_isowave("info --json " + file).out);
@@ -290,24 +287,23 @@ TEST(CliRender, LevelsOfDetail) {
   EXPECT_EQ(stats["options"]["voxel_pixels"], 1.5);
   EXPECT_NE(coarse, finest);
   EXPECT_EQ(depth(file + " --voxel-pixels 1.5 --reference"), coarse);
-  EXPECT_EQ(depth(kNucleon + " --rate 16 --voxel-pixels 1.5"), coarse)
+  EXPECT_EQ(depth(kHead + " --rate 16 --voxel-pixels 1.5"), coarse)
       << "levels are made when they are needed";
   EXPECT_EQ(depth(file + " --voxel-pixels 0"), finest);
 
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 4 -o " + file).status, 0);
+  ASSERT_EQ(run_isowave("convert " + kHead + " --rate 4 -o " + file).status, 0);
   const std::string refused =
       "render " + file + " -i 80 --reference --depth " + quoted(folder / "b.npy");
   test::expect_one_line_error(refused + " --voxel-pixels 1", "no levels of detail");
   test::expect_one_line_error(refused + " --voxel-pixels -1", "a distance of -1 pixels");
-  test::expect_one_line_error("convert " + kNucleon + " --levels 9 -o " + file,
-                              "9 levels of detail");
-  test::expect_one_line_error("convert " + kNucleon + " --levels some -o " + file, "--levels");
+  test::expect_one_line_error("convert " + kHead + " --levels 9 -o " + file, "9 levels of detail");
+  test::expect_one_line_error("convert " + kHead + " --levels some -o " + file, "--levels");
 }
 
 TEST(CliRender, MaxError) {
   const TemporaryFolder folder;
   const std::string file = quoted(folder / "n.zfp"), map = quoted(folder / "e.npy");
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 16 --levels all -o " + file).status, 0);
+  ASSERT_EQ(run_isowave("convert " + kHead + " --rate 16 --levels all -o " + file).status, 0);
   const auto error_of = [&](const std::string &arguments) {
     const auto run = render(arguments + " -i 80 --size 64x48 --no-stage-times --error-map " + map +
                             " --stats " + quoted(folder / "a.json"));
@@ -324,9 +320,9 @@ TEST(CliRender, MaxError) {
   EXPECT_EQ(
       std::ranges::count_if(bounds.pixels, [](float bound) { return bound > 0 && bound <= 0.5f; }),
       error["certified"].get<int>());
-  EXPECT_EQ(error_of(kNucleon + " --rate 16 --max-surface-error 0.5")["chosen"], error["chosen"])
+  EXPECT_EQ(error_of(kHead + " --rate 16 --max-surface-error 0.5")["chosen"], error["chosen"])
       << "a volume that is compressed now";
-  const json out_of_reach = error_of(kNucleon + " --rate 2 --max-surface-error 0.001");
+  const json out_of_reach = error_of(kHead + " --rate 2 --max-surface-error 0.001");
   EXPECT_FALSE(out_of_reach["reachable"].get<bool>());
   EXPECT_EQ(out_of_reach["chosen"], json({{"voxel_pixels", 0.0}, {"voxel_error", 0.0}}));
 
@@ -342,7 +338,7 @@ TEST(CliRender, MaxError) {
 
 TEST(CliRender, TimeBudget) {
   const TemporaryFolder folder;
-  const std::string scene = kNucleon + " -i 80 --size 64x48 ";
+  const std::string scene = kHead + " -i 80 --size 64x48 ";
   const auto picture = [&](const std::string &name) { return quoted(folder / (name + ".png")); };
   ASSERT_EQ(render(scene + "-o " + picture("plain")).status, 0);
   const auto run =
@@ -394,7 +390,7 @@ TEST(CliRender, NegativeAndFractionalIsovalues) {
 
 TEST(CliRender, SeveralRaysAPixel) {
   const TemporaryFolder folder;
-  const std::string frame = kNucleon + " -i 80 --size 40x30 --samples 3 ";
+  const std::string frame = kHead + " -i 80 --size 40x30 --samples 3 ";
   render(frame + "-o " + quoted(folder / "a.png") + " --depth " + quoted(folder / "a.npy") +
          " --stats " + quoted(folder / "a.json"));
   const Image8 picture = read_png(folder / "a.png");
@@ -402,7 +398,7 @@ TEST(CliRender, SeveralRaysAPixel) {
   EXPECT_EQ(picture.height, 30u);
   render(frame + "--reference -o " + quoted(folder / "r.png"));
   EXPECT_EQ(read_png(folder / "r.png").pixels, picture.pixels);
-  render(kNucleon + " -i 80 --size 120x90 --depth " + quoted(folder / "b.npy"));
+  render(kHead + " -i 80 --size 120x90 --depth " + quoted(folder / "b.npy"));
   EXPECT_EQ(read_npy(folder / "a.npy").width, 120u);
   EXPECT_EQ(read_npy(folder / "a.npy").pixels, read_npy(folder / "b.npy").pixels)
       << "depth is each ray's";
@@ -479,8 +475,7 @@ TEST(CliRender, BadCameraFilesAreOneLine) {
   const TemporaryFolder out;
   const auto with = [&](const std::string &text) {
     write_file(folder / "c.json", text);
-    return kNucleon + " -i 80 --cameras " + quoted(folder / "c.json") + " -o " +
-           quoted(out / "a.png");
+    return kHead + " -i 80 --cameras " + quoted(folder / "c.json") + " -o " + quoted(out / "a.png");
   };
   expect_refused(with(camera_file("[41,41,42]")), "41x41x42");
   expect_refused(with(camera_file()) + " --spacing 1 1 2", "spacing");
@@ -490,7 +485,7 @@ TEST(CliRender, BadCameraFilesAreOneLine) {
                  "camera 0");
   expect_refused(with(R"({"fovy_deg":60,"cameras":[{"eye":[1e9,0,0],"at":[0,0,0],"up":[0,1,0]}]})"),
                  "eye");
-  expect_refused(kNucleon + " -i 80 --cameras " + quoted(folder / "none.json"), "none.json");
+  expect_refused(kHead + " -i 80 --cameras " + quoted(folder / "none.json"), "none.json");
   EXPECT_EQ(out.num_files(), 0u);
 }
 

@@ -19,12 +19,12 @@ using test::run_isowave;
 using test::TemporaryFolder;
 using test::write_file;
 
-const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
+const std::string kHead = ISOWAVE_TEST_DATA "/head_41x41x41_uint8.raw.gz";
 
 TEST(CliVerify, JudgesFramesByEveryOracle) {
   const TemporaryFolder folder;
   const auto run = run_isowave(fmt::format("verify {} --isovalue 100 --size 64x48 --json '{}'",
-                                           kNucleon, (folder / "v.json").string()));
+                                           kHead, (folder / "v.json").string()));
   EXPECT_EQ(run.status, 0) << run.out << run.err;
   const json document = json::parse(test::read_file(folder / "v.json"));
   std::set<std::string> oracles;
@@ -39,7 +39,7 @@ TEST(CliVerify, JudgesFramesByEveryOracle) {
 }
 
 TEST(CliVerify, JudgesADevicesFramesByTheOraclesAskedFor) {
-  const auto run = run_isowave("verify --oracle cells --oracle mesh " + kNucleon +
+  const auto run = run_isowave("verify --oracle cells --oracle mesh " + kHead +
                                " --isovalue 100 --size 64x48 --device 0");
   EXPECT_EQ(run.status, 0) << run.out << run.err;
   EXPECT_NE(run.out.find("device 0: "), std::string::npos) << run.out;
@@ -53,8 +53,8 @@ TEST(CliVerify, NamesViewsOutOfEmbreesReach) {
   write_file(folder / "far.json",
              R"({"dims":[41,41,41],"spacing":[1,1,1],"width":32,"height":24,"fovy_deg":0.05,
     "cameras":[{"eye":[20,20,100000],"at":[20,20,20],"up":[0,1,0]}]})");
-  const std::string arguments = fmt::format("verify {} --isovalue 100 --cameras '{}'", kNucleon,
-                                            (folder / "far.json").string());
+  const std::string arguments =
+      fmt::format("verify {} --isovalue 100 --cameras '{}'", kHead, (folder / "far.json").string());
   const auto run = run_isowave(arguments);
   EXPECT_EQ(run.status, 0) << run.out << run.err;
   EXPECT_NE(run.out.find("left out: the eye is 100000 voxels"), std::string::npos) << run.out;
@@ -66,7 +66,7 @@ TEST(CliVerify, NamesViewsOutOfEmbreesReach) {
 TEST(CliVerify, JudgesBoundsOfErrors) {
   const TemporaryFolder folder;
   const auto run = run_isowave(
-      "verify " + kNucleon +
+      "verify " + kHead +
       " -i 80 --orbit 2 --size 64x48 --rate 8 --max-surface-error 2 --device cpu --json " +
       quoted(folder / "v.json"));
   EXPECT_EQ(run.status, 0) << run.err;
@@ -78,7 +78,7 @@ TEST(CliVerify, JudgesBoundsOfErrors) {
     EXPECT_GT(frame["misses"], 0);
     EXPECT_GE(frame["slack"]["p50"], 1.0);
   }
-  const std::string command = "verify " + kNucleon + " -i 80 --max-surface-error ";
+  const std::string command = "verify " + kHead + " -i 80 --max-surface-error ";
   test::expect_one_line_error(command + "0", "an error of 0 pixels");
   test::expect_one_line_error(command + "1 --oracle cells", "leave out --oracle");
   test::expect_one_line_error(command + "1 --solver linear", "the default solver");
@@ -109,7 +109,7 @@ TEST(CliVerify, TracesRaysAtClosedSurfacesByTwinAndDevice) {
 
 TEST(CliVerify, RefusesWhatItCannotDo) {
   test::expect_one_line_error("verify --oracle cells", "give a VOLUME");
-  EXPECT_NE(run_isowave("verify " + kNucleon + " --isovalue 100 --oracle nobody").status, 0);
+  EXPECT_NE(run_isowave("verify " + kHead + " --isovalue 100 --oracle nobody").status, 0);
 }
 
 }  // namespace

@@ -18,12 +18,12 @@ using test::run_isowave;
 using test::TemporaryFolder;
 using test::write_file;
 
-const std::string kNucleon = ISOWAVE_TEST_DATA "/nucleon_41x41x41_uint8.raw.gz";
+const std::string kHead = ISOWAVE_TEST_DATA "/head_41x41x41_uint8.raw.gz";
 
 TEST(Cli, ConvertAndInfo) {
   const TemporaryFolder folder;
   const std::string zfp = quoted(folder / "n.zfp");
-  const auto convert = run_isowave("convert " + kNucleon + " --rate 4 --spacing 1 2 3 -o " + zfp);
+  const auto convert = run_isowave("convert " + kHead + " --rate 4 --spacing 1 2 3 -o " + zfp);
   EXPECT_EQ(convert.status, 0) << convert.err;
   EXPECT_EQ(convert.err, "") << "quiet in a pipe";
   EXPECT_EQ(std::count(convert.out.begin(), convert.out.end(), '\n'), 1) << convert.out;
@@ -38,20 +38,20 @@ TEST(Cli, ConvertAndInfo) {
   EXPECT_EQ(json["type"], "uint8");
   EXPECT_EQ(json["rate"], 4.0);
   EXPECT_EQ(json["block_count"], 11 * 11 * 11);
-  EXPECT_EQ(json["value_range"], (std::array{0, 249}));
+  EXPECT_EQ(json["value_range"], (std::array{0, 228}));
   EXPECT_GT(json["max_voxel_error"], 0.0);
   EXPECT_EQ(json["file_bytes"], std::filesystem::file_size(folder / "n.zfp"));
 
-  const auto text = run_isowave("info " + kNucleon);
+  const auto text = run_isowave("info " + kHead);
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find("value_range    0.0 249.0"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("value_range    0.0 228.0"), std::string::npos) << text.out;
 }
 
 TEST(Cli, ConvertWithinAnError) {
   const TemporaryFolder folder;
   const std::string zfp = quoted(folder / "n.zfp");
   const auto info_of = [&](const std::string &options) {
-    const auto convert = run_isowave("convert " + kNucleon + " " + options + " -o " + zfp);
+    const auto convert = run_isowave("convert " + kHead + " " + options + " -o " + zfp);
     EXPECT_EQ(convert.status, 0) << convert.err;
     EXPECT_EQ(convert.err, "") << "quiet in a pipe";
     const auto info = run_isowave("info --json " + zfp);
@@ -63,7 +63,7 @@ TEST(Cli, ConvertWithinAnError) {
   EXPECT_LE(absolute["max_voxel_error"], 2.49);
   EXPECT_GT(absolute["max_voxel_error"], 0.0);
   EXPECT_EQ(absolute["exact"], false);
-  EXPECT_EQ(info_of("--tolerance-relative 0.01"), absolute) << "of a range from 0 to 249";
+  EXPECT_EQ(info_of("--tolerance-relative 0.01"), absolute) << "of a range from 0 to 228";
   const auto exact = info_of("--exact");
   EXPECT_EQ(exact["max_voxel_error"], 0.0);
   EXPECT_EQ(exact["exact"], true);
@@ -73,10 +73,10 @@ TEST(Cli, ConvertWithinAnError) {
   EXPECT_EQ(render.status, 0) << render.err;
 
   const std::string to = " -o " + quoted(folder / "a.zfp");
-  expect_one_line_error("convert " + kNucleon + " --tolerance 0" + to, "above 0");
-  expect_one_line_error("convert " + kNucleon + " --tolerance 1 --exact" + to, "xact");
-  expect_one_line_error("convert " + kNucleon + " --tolerance 1 --rate 8" + to, "rate");
-  expect_one_line_error("convert " + kNucleon + " --exact --device cpu" + to, "fixed rate only");
+  expect_one_line_error("convert " + kHead + " --tolerance 0" + to, "above 0");
+  expect_one_line_error("convert " + kHead + " --tolerance 1 --exact" + to, "xact");
+  expect_one_line_error("convert " + kHead + " --tolerance 1 --rate 8" + to, "rate");
+  expect_one_line_error("convert " + kHead + " --exact --device cpu" + to, "fixed rate only");
   expect_one_line_error("convert generate:sphere_8x8x8_float32 --exact" + to, "float32");
   write_file(folder / "c_4x4x4_uint8.raw", std::string(64, 'x'));
   expect_one_line_error(
@@ -88,14 +88,14 @@ TEST(Cli, ConvertWithinAnError) {
 TEST(Cli, ConvertOnADeviceWritesTheSameFile) {
   const TemporaryFolder folder;
   const std::string host = quoted(folder / "host.zfp"), device = quoted(folder / "device.zfp");
-  const auto on_host = run_isowave("convert " + kNucleon + " --rate 5 -o " + host);
+  const auto on_host = run_isowave("convert " + kHead + " --rate 5 -o " + host);
   ASSERT_EQ(on_host.status, 0) << on_host.err;
-  const auto on_device = run_isowave("convert " + kNucleon + " --rate 5 --device cpu -o " + device);
+  const auto on_device = run_isowave("convert " + kHead + " --rate 5 --device cpu -o " + device);
   ASSERT_EQ(on_device.status, 0) << on_device.err;
   EXPECT_EQ(on_device.err, "");
   EXPECT_EQ(test::read_file(folder / "device.zfp"), test::read_file(folder / "host.zfp"));
   expect_one_line_error(
-      "convert " + kNucleon + " --device no_such_device -o " + quoted(folder / "a.zfp"),
+      "convert " + kHead + " --device no_such_device -o " + quoted(folder / "a.zfp"),
       "no_such_device");
   EXPECT_EQ(folder.num_files(), 2u);
 }
@@ -173,8 +173,7 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
 
 TEST(Cli, DamagedZfpFilesAreOneLine) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_isowave("convert " + kNucleon + " --rate 1 -o " + quoted(folder / "a.zfp")).status,
-            0);
+  ASSERT_EQ(run_isowave("convert " + kHead + " --rate 1 -o " + quoted(folder / "a.zfp")).status, 0);
   const std::string right = test::read_file(folder / "a.zfp");
   const auto damaged = [&](std::size_t byte) {
     std::string wrong = right;
@@ -195,10 +194,10 @@ TEST(Cli, DamagedZfpFilesAreOneLine) {
 
 TEST(Cli, UnwritableOutputIsOneLine) {
   const TemporaryFolder folder;
-  expect_one_line_error("convert " + kNucleon + " -o " + quoted(folder / "missing" / "a.zfp"),
+  expect_one_line_error("convert " + kHead + " -o " + quoted(folder / "missing" / "a.zfp"),
                         "cannot write");
   std::filesystem::create_directory(folder / "folder.zfp");
-  expect_one_line_error("convert " + kNucleon + " -o " + quoted(folder / "folder.zfp"),
+  expect_one_line_error("convert " + kHead + " -o " + quoted(folder / "folder.zfp"),
                         "not a regular file");
   expect_one_line_error("generate sphere --dims 8 -o /dev/full", "/dev/full");
   EXPECT_EQ(folder.num_files(), 1u);

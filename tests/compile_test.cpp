@@ -107,15 +107,18 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
         {.camera = cameras_[0], .isovalue = 0.1f, .voxel_pixels = options.with_levels ? 2.0 : 0.0});
     return stems_of(device);
   };
-  EXPECT_THAT(stems({.size = kSize}),
-              ElementsAre("block_cache", "macrocells", "march", "zfp_decode"));
+  EXPECT_THAT(stems({.size = kSize}), ElementsAre("block_cache", "macrocells", "march",
+                                                  "request_ahead", "start_rays", "zfp_decode"));
   EXPECT_THAT(stems({.size = kSize}, true),
-              ElementsAre("block_cache", "macrocells", "march", "shade", "zfp_decode"));
+              ElementsAre("block_cache", "macrocells", "march", "request_ahead", "shade",
+                          "start_rays", "zfp_decode"));
   EXPECT_THAT(stems({.size = kSize, .with_kept_picture = true}),
-              ElementsAre("block_cache", "kept_picture", "macrocells", "march", "zfp_decode"));
+              ElementsAre("block_cache", "kept_picture", "macrocells", "march", "request_ahead",
+                          "start_rays", "zfp_decode"));
   // One for frames that the finest level draws alone, one for others.
   EXPECT_THAT(stems({.size = kSize, .with_levels = true}),
-              ElementsAre("block_cache", "macrocells", "march x2", "zfp_decode"));
+              ElementsAre("block_cache", "macrocells", "march x2", "request_ahead x2",
+                          "start_rays x2", "zfp_decode"));
   // Where one work-group scans alone, a GPU gives it more work-items.
   const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";
   EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks}),

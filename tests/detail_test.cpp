@@ -389,8 +389,7 @@ TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
 /// What levels of detail are for where voxels are smaller than pixels: fewer blocks, and a better
 /// picture with the rays that they pay for.
 TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
-  const auto reader =
-      open_volume(std::string(ISOWAVE_TEST_DATA) + "/nucleon_41x41x41_uint8.raw.gz");
+  const auto reader = open_volume(std::string(ISOWAVE_TEST_DATA) + "/head_41x41x41_uint8.raw.gz");
   const CompressedVolume volume = compress(*reader, CompressOptions{.rate = 16, .levels = 0});
   const Camera camera = orbit_cameras(volume.info, 1)[0];
   struct Picture {
@@ -401,7 +400,7 @@ TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
     Renderer renderer(device_, volume, {.size = size, .with_levels = true});
     Picture picture;
     const FrameStats stats =
-        renderer.render({.camera = camera, .isovalue = 80, .voxel_pixels = voxel_pixels});
+        renderer.render({.camera = camera, .isovalue = 30, .voxel_pixels = voxel_pixels});
     for (const PassStats &pass : stats.passes) picture.decoded += pass.counts.decoded_count;
     picture.image = renderer.shade();
     return picture;
@@ -439,7 +438,7 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
 
 // ---- what it is for
 
-/// Not so of every volume (README "Levels of detail"): where a pixel is covered in part, one ray is
+/// Not so of every volume (bench/README.md): where a pixel is covered in part, one ray is
 /// as wrong at any level.
 TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
   const glm::uvec3 dims(128, 128, 128);

@@ -9,6 +9,8 @@
 #include <map>
 #include <set>
 
+#include "core/stages/request_ahead.hpp"
+#include "core/stages/start_rays.hpp"
 #include "core/stages/zfp_decode.hpp"
 #include "kernels_cl/portable/touched_blocks.h"
 #include "tests/frame_scene.hpp"
@@ -34,7 +36,9 @@ struct MarchWorld {
               BlockCache::limits_for(frame, static_cast<uint>(block_count(frame)), size.num_rays()),
               kGroupSize),
         decode(device, cache.capacity, stream.defines()),
-        march(device, size.num_rays(), kGroupSize, kDefaultSolver) {
+        start_rays(device, size.num_rays(), kGroupSize),
+        march(device, size.num_rays(), kGroupSize, kDefaultSolver),
+        request_ahead(device, size.num_rays(), kGroupSize) {
     macrocells.select(frame);
     macrocells.set_index(frame);
     macrocells.set_active_box(frame);
@@ -101,7 +105,9 @@ struct MarchWorld {
   Wavefront rays;
   BlockCache cache;
   ZfpDecode decode;
+  StartRays start_rays;
   March march;
+  RequestAhead request_ahead;
   std::vector<std::vector<uint>> active_blocks;  ///< by pixel, in ray order
 };
 
@@ -114,7 +120,7 @@ class MarchOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const Camera camera = orbit_cameras(volume.info(), 1).front();
     MarchWorld world(device_, volume, camera, size, spec_count);
     Wavefront &rays = world.rays;
-    world.march.start_rays(world.macrocells, rays);
+    world.start_rays(world.macrocells, rays);
     const std::map<uint, uint> first = world.first_blocks();
     ASSERT_EQ(world.waiting(), first);
     for (const HitRecord &hit : rays.hits.read()) ASSERT_EQ(hit.t, INFINITY);
@@ -123,7 +129,7 @@ class MarchOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     world.march(world.macrocells, world.cache, rays);
     EXPECT_EQ(world.waiting(), first) << "nothing is cached: all wait where they stand";
     EXPECT_EQ(world.counts().hit_count, 0u);
-    world.march.request_ahead(world.macrocells, world.cache, rays);
+    world.request_ahead(world.macrocells, world.cache, rays);
     EXPECT_EQ(world.requests(), touched_ahead(world, first, spec_count));
 
     std::uint64_t num_hits = 0;
@@ -132,7 +138,7 @@ class MarchOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       rays.open_pass();
       world.provide();
       world.march(world.macrocells, world.cache, rays);
-      world.march.request_ahead(world.macrocells, world.cache, rays);
+      world.request_ahead(world.macrocells, world.cache, rays);
       num_hits += world.counts().hit_count;
     }
     const std::vector<HitRecord> expected = test::twin_hits(volume, camera, size, kIsovalue);

@@ -92,8 +92,8 @@ TEST_P(RenderOnDevice, SmallNothingToHit) {
 
 // ---- real and synthetic volumes
 
-TEST_P(RenderOnDevice, Nucleon) {
-  const TestVolume volume = read_volume("nucleon_41x41x41_uint8.raw.gz", 8);
+TEST_P(RenderOnDevice, Head) {
+  const TestVolume volume = read_volume("head_41x41x41_uint8.raw.gz", 8);
   EXPECT_GT(check(volume, {20, 80, 128.5f, 200}, kMedium), 1000u);
 }
 
@@ -321,7 +321,7 @@ TEST_P(RenderOnDevice, FlippedAndTurnedAxes) {
 TEST_P(RenderOnDevice, TinyAndHugeValues) {
   for (const int k : {-95, -60, 60, 120}) {
     // Products of values of 2^-95 and positions in a cell are denormal, which OpenCL lets a device
-    // flush (README "Devices"): no bits to compare there. llvmpipe is the one that does.
+    // flush (kernels_cl/README.md): no bits to compare there. llvmpipe is the one that does.
     if (k == -95 && !GetParam().capabilities.denormals) continue;
     SCOPED_TRACE(fmt::format("times 2^{}", k));
     const auto voxels = test::sample(

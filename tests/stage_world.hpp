@@ -116,7 +116,7 @@ struct StageWorld {
                       : std::numeric_limits<float>::quiet_NaN();
       }
     }
-    cache.values.write(values);  // whole: see README "Devices", Oclgrind
+    cache.values.write(values);  // whole: see kernels_cl/README.md, Oclgrind
   }
 
   FrameParams frame;

@@ -123,7 +123,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       std::vector<uint> entries =
           active;  // each looks ahead by its own number, where the frame says so
       for (uint &entry : entries) entry |= entry % 7 << ISO_RAY_AHEAD_SHIFT;
-      entries.resize(rays.num_rays);  // whole: see README "Devices", Oclgrind
+      entries.resize(rays.num_rays);  // whole: see kernels_cl/README.md, Oclgrind
       rays.active_ray_ids.write(entries);
       rays.closest_pairs.fill(0);
       PassCounts counts = distinct_counts();

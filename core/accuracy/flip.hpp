@@ -1,5 +1,6 @@
 #pragma once
-// How different two pictures look to somebody who flips between them: LDR-FLIP (README [13]).
+// How different two pictures look to somebody who flips between them: LDR-FLIP (core/README.md
+// [13]).
 
 #include <memory>
 

@@ -44,7 +44,7 @@ std::string_view kernel_text(std::string_view stem) {
   throw std::invalid_argument(fmt::format("no kernel file '{}.cl' is part of this program", stem));
 }
 
-/// Bits agree between devices only under these options (README "Arithmetic").
+/// Bits agree between devices only under these options (kernels_cl/README.md).
 std::string build_options(const DeviceInfo &device, Defines defines) {
   std::string options = "-cl-std=CL1.2";
   if (device.capabilities.correctly_rounded_divide)

@@ -12,8 +12,7 @@
 namespace isowave::core {
 
 /// A queue of at most two read-backs in flight. Their memory is pinned: to any other, NVIDIA's
-/// driver copies by a detour that costs a cold 512^3 frame a fifth of its time (H100, README
-/// "Results").
+/// driver copies by a detour that costs a cold 512^3 frame a fifth of its time (H100).
 class PassReadback {
  public:
   static constexpr std::size_t kMaxInFlight = 2;

@@ -5,7 +5,9 @@
 #include "core/stages/initial_rays.hpp"
 #include "core/stages/intersect.hpp"
 #include "core/stages/march.hpp"
+#include "core/stages/request_ahead.hpp"
 #include "core/stages/speculation.hpp"
+#include "core/stages/start_rays.hpp"
 #include "core/stages/traverse.hpp"
 
 namespace isowave::core {
@@ -75,12 +77,14 @@ class RaysPipeline : public Pipeline {
  public:
   RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
       : state_(state),
-        march_(state.device, state.rays.num_rays, group_size, solver, state.levels.size() > 1) {}
+        start_rays_(state.device, state.rays.num_rays, group_size, has_levels(state)),
+        march_(state.device, state.rays.num_rays, group_size, solver, has_levels(state)),
+        request_ahead_(state.device, state.rays.num_rays, group_size, has_levels(state)) {}
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("start_rays");
     if (unanswered_) state_.rays.forget_rays();
-    march_.start_rays(macrocells(), state_.rays);
+    start_rays_(macrocells(), state_.rays);
   }
 
   void enqueue_pass() override {
@@ -92,7 +96,7 @@ class RaysPipeline : public Pipeline {
       march_(macrocells(), state_.cache, rays);
     }
     const auto stage = state_.device.timer().stage("request");
-    march_.request_ahead(macrocells(), state_.cache, rays);
+    request_ahead_(macrocells(), state_.cache, rays);
     unanswered_ = true;
     asked_ = state_.drawing;
   }
@@ -100,10 +104,13 @@ class RaysPipeline : public Pipeline {
   void end_frame() override { unanswered_ = false; }
 
  private:
+  static bool has_levels(const FrameState &state) { return state.levels.size() > 1; }
   const Macrocells &macrocells() const { return state_.levels[0].macrocells; }
 
   FrameState &state_;
+  StartRays start_rays_;
   March march_;
+  RequestAhead request_ahead_;
   bool unanswered_ = false;  ///< the last pass may have asked for blocks, and left rays
   LevelRange asked_;         ///< of these levels
 };

@@ -24,7 +24,7 @@
 namespace isowave::core {
 
 enum class PipelineKind {
-  kAuto,  ///< kRays, which was faster in nearly all that was measured (README "Results")
+  kAuto,  ///< kRays, which was faster in nearly all that was measured (bench/README.md)
   kBlocks,
   kRays
 };

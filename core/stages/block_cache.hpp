@@ -37,7 +37,7 @@ struct BlockCache {
              bool levels = false);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones.
-  /// Out: counts.requested_count. Asynchronous. (Pipeline `rays` asks by March::request_ahead.)
+  /// Out: counts.requested_count. Asynchronous. (Pipeline `rays` asks by RequestAhead.)
   void request(Wavefront &rays);
   /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the
   /// free ones, but none that the pass uses; the block served first gets what it takes. asked: the

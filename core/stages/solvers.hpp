@@ -10,7 +10,7 @@
 
 namespace isowave::core {
 
-/// The cheapest that passes the whole stability suite (README "Solvers").
+/// The cheapest that passes the whole stability suite (reference/README.md).
 inline constexpr Solver kDefaultSolver{ISO_SOLVER_BERNSTEIN, 32};
 
 inline constexpr std::array<std::string_view, 4> kSolverNames{"linear", "marmitt", "analytic",

@@ -43,7 +43,6 @@ struct Wavefront {
   void reset_counts() {
     PassCounts start{};
     start.ray_count = static_cast<uint>(num_rays);
-    start.window_count = start.ray_count;
     start.pass = 1;
     counts.write({&start, 1});
     previous_counts.write({&start, 1});

@@ -1,5 +1,5 @@
 #pragma once
-// The `.zfp` file, which README describes byte by byte ("File format"): zfp's header and stream,
+// The `.zfp` file, which README.md of this folder describes byte by byte: zfp's header and stream,
 // and behind them index, bounds, levels of detail and trailer (zfp_trailer.hpp). The functions that
 // read it are declared in zfp_stream.hpp.
 

@@ -1,5 +1,5 @@
 #pragma once
-// The end of a `.zfp` file: JSON text and footer. README describes them ("File format").
+// The end of a `.zfp` file: JSON text and footer. README.md of this folder describes them.
 
 #include <array>
 #include <cstddef>

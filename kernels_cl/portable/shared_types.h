@@ -101,29 +101,6 @@ typedef struct FrameParams {
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 176);
 
-/// How many of the active rays take part in the next pass, after one in which `asked` rays asked
-/// for `requested` blocks and got `granted`. Not in the paper. Where blocks were missing, about as
-/// many as can be served: otherwise all would hold on to parts of their dual grids, none would get
-/// the rest, and only the ray that is served first would move. Else a quarter more.
-ISO_INLINE uint next_window(uint asked, uint requested, uint granted) {
-  uint window = asked + asked / 4 + 1;
-  if (requested > granted) {
-    window = (uint)((ulong)asked * granted / requested);
-    if (window < asked / 4)
-      window = asked / 4; /* nothing was freed, perhaps, since the host took slots for ample */
-    if (window == 0) window = 1;
-  }
-  return window;
-}
-
-/// Most blocks that a ray looks ahead while only num_rays take part: for all together as many as
-/// there are slots, but for each one. Not in the paper. What rays look at in vain costs slots whose
-/// blocks other rays would read.
-ISO_INLINE uint scarce_speculation(const FrameParams *frame, uint num_rays) {
-  const uint each = 4 * frame->table_groups / (num_rays + 1);
-  return each < 1 ? 1 : each;
-}
-
 /// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31
 /// (march.cl).
 #define ISO_RAY_PIXEL 0x0FFFFFFFu

@@ -1,6 +1,6 @@
 #pragma once
 // A .zfp file of ours taken apart, so that a mutation reaches what checksums and compression guard
-// (README "File format", core/zfp/zfp_file.hpp). Made from the description of the format, not from
+// (core/zfp/README.md, core/zfp/zfp_file.hpp). Made from the description of the format, not from
 // its reader.
 
 #include <cstdint>

@@ -77,7 +77,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
                                                 : PipelineKind::kAuto;
   if (flags.speculation == "off") options.max_speculation = 1;
   // Measured: pipeline blocks needs twice the passes with it, and is no faster for decoding less
-  // (README "Results").
+  // (bench/README.md).
   options.per_ray_speculation =
       flags.speculation == "per-ray" ||
       (flags.speculation == "auto" && options.pipeline != PipelineKind::kBlocks);

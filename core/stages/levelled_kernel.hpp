@@ -1,0 +1,31 @@
+#pragma once
+// A kernel in two versions: for frames that the finest level of detail draws alone, and for others.
+
+#include <optional>
+
+#include "core/ocl/kernel.hpp"
+#include "core/stages/wavefront.hpp"
+
+namespace isowave::core {
+
+template <class... Params>
+class LevelledKernel {
+ public:
+  /// stem: of the file, and the kernel's name. levels: frames may have several levels of detail.
+  LevelledKernel(ocl::Device &device, const char *stem, const ocl::Defines &defines, bool levels)
+      : finest_(device, stem, stem, defines) {
+    if (levels) levels_.emplace(device, stem, stem, with_levels(defines, true));
+  }
+
+  /// The version for the frame at work.
+  ocl::Kernel<Params...> &of(const Wavefront &rays) {
+    return levels_ && (rays.num_level_frames > 1 || rays.frame.id_begin_z != 0) ? *levels_
+                                                                                : finest_;
+  }
+
+ private:
+  ocl::Kernel<Params...> finest_;  ///< a tenth faster
+  std::optional<ocl::Kernel<Params...>> levels_;
+};
+
+}  // namespace isowave::core

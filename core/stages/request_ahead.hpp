@@ -1,0 +1,34 @@
+#pragma once
+// Pipeline `rays`: rays that wait -> list of the blocks that they need next (Sec. 3.3, 3.4, 4;
+// kernels_cl/request_ahead.cl).
+
+#include "core/stages/block_cache.hpp"
+#include "core/stages/levelled_kernel.hpp"
+#include "core/stages/macrocells.hpp"
+
+namespace isowave::core {
+
+class RequestAhead {
+ public:
+  /// levels: frames may have several levels of detail.
+  RequestAhead(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
+               bool levels = false);
+
+  /// The rays that wait ask for blocks, as far as they are in the pass's window. Asynchronous.
+  ///
+  /// macrocells  of any level of detail, since levels share what is used of them
+  /// In          rays.next_active_ray_ids, ray_block_ids; counts.next_active_count, active_count,
+  ///             window_count
+  /// Out         the cache's requests, and the block that it must serve; counts.requested_count,
+  ///             spec_count, pair_count, ahead_count
+  void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
+
+ private:
+  ocl::Range range_;
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>,
+                 ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
+                 ocl::Out<uint>, uint, ocl::Out<CacheState>>
+      kernel_;
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,32 @@
+#pragma once
+// Pipeline `rays`: camera -> the pixels whose rays meet an active block (Sec. 3.2, 3.3;
+// kernels_cl/start_rays.cl).
+
+#include "core/stages/levelled_kernel.hpp"
+#include "core/stages/macrocells.hpp"
+
+namespace isowave::core {
+
+class StartRays {
+ public:
+  /// levels: frames may have several levels of detail.
+  StartRays(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
+            bool levels = false);
+
+  /// Begins a frame. Asynchronous.
+  ///
+  /// macrocells  of any level of detail, since levels share what is used of them
+  /// In          rays.counts: next_active_count is 0
+  /// Out         rays.hits: none; next_active_ray_ids and ray_block_ids of the rays that meet an
+  ///             active block; counts.next_active_count: how many they are
+  void operator()(const Macrocells &macrocells, Wavefront &rays);
+
+ private:
+  ocl::Range range_;
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
+                 ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>,
+                 ocl::Out<HitRecord>>
+      kernel_;
+};
+
+}  // namespace isowave::core

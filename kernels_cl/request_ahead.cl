@@ -1,0 +1,139 @@
+/// request_ahead.cl -- pipeline `rays`: each ray that waits asks for the block that it stands at
+/// and its next candidates (Sec. 3.3, 3.4, 4).
+#define ISO_FOUND local
+#include "device/block_requests.h"
+#include "device/level_borders.h"
+#include "device/ray_lanes.h"
+#include "portable/touched_blocks.h"
+#include "portable/window.h"
+
+#define ISO_REQUEST_STAGING 256u  ///< requests that a work-group collects before it writes them out
+
+/// The request list, and where a work-group collects what it will add to it.
+typedef struct Requests {
+  global uint *bits, *block_ids;
+  uint capacity;
+  volatile global uint *count;
+  local uint *staged;
+  volatile local uint *num_staged;
+} Requests;
+
+/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the
+/// others. In steps for all corners, so that a GPU waits for memory twice, not sixteen times. Most
+/// have been asked for by another ray: their bits tell, and cost neither a search in the table nor
+/// an atomic, for whose result one would wait.
+ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
+                                global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
+                                Requests requests) {
+  BlockEntry entries[8];
+  uint missing = touched; /* of the corners: nobody is known to have asked for them */
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    const uint word = (touched >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
+    const uint bits = ISO_CHECK_RACES ? atomic_or(&requests.bits[word], 0u) : requests.bits[word];
+    missing &= ~((uint)((bits & request_bit(frame, x, y, z)) != 0) << corner);
+  }
+  if (missing == 0) return;
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
+      slot_stamps[entries[corner].slot] = stamp;
+      missing &= ~(1u << corner);
+    }
+  }
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    if ((missing >> corner & 1u) != 0 && mark_request(frame, requests.bits, x, y, z)) {
+      const uint block_id = block_id_at(frame, x, y, z), place = atomic_inc(requests.num_staged);
+      if (place < ISO_REQUEST_STAGING) {
+        requests.staged[place] = block_id;
+      } else {
+        list_request(frame, requests.block_ids, requests.capacity, requests.bits,
+                     atomic_inc(requests.count), block_id);
+      }
+    }
+  }
+}
+
+/// Of the rays that wait, active_ray_ids [counts->next_active_count], the first
+/// counts->window_count ask for the blocks that they touch in their next active blocks: N_Spec of
+/// them (Sec. 4), or their own number of frame->per_ray_speculation. Out: request_block_ids
+/// [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over
+/// the rays; when these are few, each has more work-items, which share its blocks out among them.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,
+    global const uint *active_ray_ids, global const uint *ray_block_ids, global uint *slot_stamps,
+    global uint *requested_bits, global uint *request_block_ids, uint capacity,
+    global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
+  local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+  local uint num_staged, list_begin, group_pairs, group_ahead;
+  const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
+                             staged,         &num_staged};
+  const uint item = get_local_id(0), num_waiting = counts->next_active_count;
+  const uint num_rays = rays_in_window(counts->window_count, num_waiting);
+  const uint lanes = lanes_per_ray(num_rays);
+  const uint stamp = needed_stamp(counts->pass);
+  const uint spec_count = speculation_count(frame, num_waiting);
+  /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more.
+     With the number of those that wait, which is fewer, decoding takes longer than the passes that
+     it saves. */
+  const uint least = speculation_count(frame, counts->active_count) / 2;
+  const uint most = most_ahead(frame, counts->window_count, num_rays);
+  uint num_pairs = 0, num_ahead = 0;
+  if (get_global_id(0) == 0) counts->spec_count = spec_count;
+  if (item == 0) num_staged = group_pairs = group_ahead = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays * lanes;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    const uint i = (begin + item) / lanes, lane = (begin + item) % lanes;
+    if (i < num_rays) {
+      const uint entry = active_ray_ids[i], pixel = entry & ISO_RAY_PIXEL;
+      const uint state =
+          ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
+      uint next = ISO_LEVELS ? state & ISO_RAY_BLOCK : state,
+           side = ISO_LEVELS ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
+      ISO_FRAME_OF(level, next);
+      const LastPlanes last = last_planes(level);
+      const Ray ray = make_ray(level, pixel);
+      const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
+      const uint ahead = min(frame->per_ray_speculation ? max(own, least) : spec_count, most);
+      if (lane == 0) num_ahead += ahead;
+      for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
+        const uint num_found =
+            find_blocks_from(level, macrocell_masks, &ray, side, &next,
+                             min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
+        side = ISO_SIDE_UNKNOWN;
+        for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
+          const uint block_id = found[at * ISO_GROUP_SIZE + item];
+          const BlockCoords b = block_coords(level, block_id);
+          const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
+          request_touched(level, table, slot_stamps, stamp, b, touched, requests);
+          ++num_pairs;
+          if (i == 0 && asked + at == 0) {
+            cache->first_block_id = block_id;
+            cache->first_touched = touched;
+          }
+        }
+        asked += num_found;
+      }
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (item == 0) list_begin = atomic_add(requests.count, min(num_staged, ISO_REQUEST_STAGING));
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint j = item; j < min(num_staged, ISO_REQUEST_STAGING); j += ISO_GROUP_SIZE) {
+      list_request(frame, request_block_ids, capacity, requested_bits, list_begin + j, staged[j]);
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (item == 0) num_staged = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+  if (num_pairs != 0) atomic_add(&group_pairs, num_pairs);
+  if (num_ahead != 0) atomic_add(&group_ahead, num_ahead);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0 && group_pairs != 0) atomic_add(&counts->pair_count, group_pairs);
+  if (item == 0 && group_ahead != 0) atomic_add(&counts->ahead_count, group_ahead);
+}

@@ -1,0 +1,82 @@
+/// start_rays.cl -- pipeline `rays`: begins a frame with the rays that meet an active block
+/// (Sec. 3.2, 3.3). A kernel of its own, since it is so much leaner than march that far more of its
+/// work-items fit a device at a time.
+#define ISO_FOUND local
+#include "device/block_cells.h"
+#include "device/level_borders.h"
+#include "device/work_group.h"
+#include "portable/window.h"
+
+#define ISO_HIT_WORDS ((uint)(sizeof(HitRecord) / sizeof(uint)))
+
+/// hits [count] = no_hit(), by a work-group. Seen as words, in fours, of which neighbours write
+/// neighbours: records are 36 bytes long, so that the nine stores of each would be scattered.
+ISO_INLINE void clear_hits(global uint *words, uint count) {
+  const uint num_words = ISO_HIT_WORDS * count;
+  for (uint i = 4 * get_local_id(0); i < num_words; i += 4 * ISO_GROUP_SIZE) {
+    const uint4 at = i % ISO_HIT_WORDS + (uint4)(0, 1, 2, 3);
+    const uint4 field =
+        select(at, at - ISO_HIT_WORDS, at >= ISO_HIT_WORDS); /* t; block_id and cell; zeros */
+    const uint4 ids = select((uint4)(0), (uint4)(ISO_INVALID_ID), field < 3);
+    const uint4 words_of_none = select(ids, as_uint4((float4)(INFINITY)), field == 0);
+    if (i + 4 <= num_words) {
+      vstore4(words_of_none, 0, words + i);
+    } else { /* the image's last few */
+      words[i] = words_of_none.x;
+      if (i + 1 < num_words) words[i + 1] = words_of_none.y;
+      if (i + 2 < num_words) words[i + 2] = words_of_none.z;
+    }
+  }
+}
+
+/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids
+/// [counts->next_active_count]: of the frame's screen box, the pixels whose rays meet an active
+/// block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass,
+/// next_active_count 0 before; *next: of the first pass of this frame. frames [num_frames]: with
+/// levels of detail, those that draw, the finest first; frame_params is the first of them. ranges:
+/// of their blocks. Groups stride over the tiles.
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    global const uint *macrocell_masks, global const ushort *ranges, global PassCounts *counts,
+    global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global uint *hit_words) {
+  const FrameParams *frame = &frame_params;
+  local uint found[ISO_GROUP_SIZE], counters[2];
+  const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
+                        frame->screen_end_y};
+  const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
+  if (get_global_id(0) == 0) {
+    next->last_frame_pass = counts->frame_pass;
+    next->frame_pass = next->pass;
+  }
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < frame_rays(frame);
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    clear_hits(hit_words + begin * ISO_HIT_WORDS,
+               min((uint)ISO_GROUP_SIZE, frame_rays(frame) - begin));
+    barrier(CLK_LOCAL_MEM_FENCE); /* or each of a CPU's work-items, one by one, would go through all
+                                     memory */
+  }
+  if (item == 0) counters[0] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    const uint pixel =
+        begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
+    uint num_found = 0, log_ahead = ISO_FIRST_LOG_AHEAD;
+    if (pixel != ISO_INVALID_ID) {
+      const Ray ray = make_ray(frame, pixel);
+      uint block_id = first_block(frame, &ray);
+      if (block_id != ISO_INVALID_ID)
+        num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
+      if (ISO_LEVELS && num_found == 0) {
+        log_ahead = ISO_BORDER_LOG_AHEAD;
+        found[item] = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0,
+                                    ISO_SIDE_UNKNOWN, found + item);
+        num_found = found[item] != ISO_INVALID_ID;
+      }
+      if (num_found != 0) ray_block_ids[pixel] = found[item];
+    }
+    append_entry(num_found != 0, pixel | log_ahead << ISO_RAY_AHEAD_SHIFT, counters,
+                 &counts->next_active_count, next_active_ray_ids);
+  }
+}
