@@ -181,9 +181,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
       const BlockCoords b = block_coords(frame, block_id);
       const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-      /* What rays of several levels of detail touch is within their own. */
-      const uint exists =
-          ISO_LEVELS ? 1u : (uint)(dual_grid_block(frame, b, corner) != ISO_INVALID_ID);
+      const uint exists = (uint)exists_where_touched(frame, b, corner);
       if ((cache->first_touched >> corner & exists) != 0) {
         const uint slot = cached_slot(frame, table, x, y, z);
         if (slot != ISO_BLOCK_ABSENT) {

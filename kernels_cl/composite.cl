@@ -3,6 +3,7 @@
 #include "device/cached_cell.h"
 #include "device/closest_pair.h"
 #include "portable/cell_intersect.h"
+#include "portable/ray_state.h"
 
 /// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block
 /// without slots; ray_active_mask [active_count] = 1 where it goes on. active_ray_ids: a ray that
@@ -18,15 +19,16 @@ kernel void composite(const FrameParams frame_params, global PassCounts *counts,
   const uint active_count = counts->active_count, spec_count = counts->spec_count,
              window = counts->window_count;
   for (uint a = get_global_id(0); a < active_count; a += get_global_size(0)) {
-    const uint entry = active_ray_ids[a], ray_id = entry & ISO_RAY_PIXEL;
+    const RayEntry entry = unpack_entry(active_ray_ids[a]);
+    const uint ray_id = entry.pixel;
     uint goes_on =
         ray_block_ids[ray_id] != ISO_INVALID_ID; /* also for rays outside the window: untouched */
     if (a < window) {
       const uint pair = closest_pair(closest_pairs, pair_block_ids, pair_hits, a, spec_count);
       if (pair == ISO_INVALID_ID ||
           (pair_hits[pair].cell == ISO_NOT_TESTED && pair != a * spec_count)) {
-        const uint ahead = min((entry >> ISO_RAY_AHEAD_SHIFT) + 1, ISO_RAY_AHEAD_MAX);
-        if (frame->per_ray_speculation) active_ray_ids[a] = ray_id | ahead << ISO_RAY_AHEAD_SHIFT;
+        if (frame->per_ray_speculation)
+          active_ray_ids[a] = pack_entry(ray_id, further_ahead(entry.log_ahead), 0);
       }
       if (pair != ISO_INVALID_ID) {
         const uint block_id = pair_block_ids[pair];

@@ -5,7 +5,7 @@
 #include "portable/window.h"
 
 /// One entry per pixel [height * width]: no hit yet, the first block of the ray, whether it meets
-/// any that may be active. ray_ids[i] = i, for the compaction that follows. Grid-stride.
+/// any that may be active. ray_ids: its entry, for the compaction that follows. Grid-stride.
 kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
                          global uint *ray_block_ids, global uint *ray_ids,
                          global uint *ray_active_mask, global PassCounts *counts) {
@@ -21,7 +21,7 @@ kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
     const uint block_id = first_block(frame, &ray);
     hits[pixel] = no_hit();
     ray_block_ids[pixel] = block_id;
-    ray_ids[pixel] = pixel;
+    ray_ids[pixel] = pack_entry(pixel, 0, 0);
     ray_active_mask[pixel] = block_id != ISO_INVALID_ID;
   }
 }

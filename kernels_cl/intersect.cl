@@ -3,6 +3,7 @@
 #include "device/cached_cell.h"
 #include "device/closest_pair.h"
 #include "portable/cell_intersect.h"
+#include "portable/ray_state.h"
 
 /// The first change of inside in the cells of block b, or ISO_IN_DOUBT + the cell at which the walk
 /// came into doubt. dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
@@ -78,7 +79,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
     barrier(CLK_LOCAL_MEM_FENCE);
     for (uint i = begin + get_local_id(0); i < end; i += ISO_GROUP_SIZE) {
       const uint pair = pair_ids[i];
-      const Ray ray = make_ray(frame, active_ray_ids[pair / spec_count] & ISO_RAY_PIXEL);
+      const Ray ray = make_ray(frame, unpack_entry(active_ray_ids[pair / spec_count]).pixel);
       const PairHit hit = intersect_block(&ray, b, last, dual_grid);
       pair_hits[pair] = hit;
       if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, pair, spec_count);
@@ -101,7 +102,8 @@ kernel void settle_doubts(const FrameParams frame_params, global const PassCount
   for (uint i = get_global_id(0); i < counts->granted_count; i += get_global_size(0)) {
     const uint pair = pair_ids[i], start = pair_hits[pair].cell;
     if (start >= ISO_IN_DOUBT) {
-      const Ray ray = make_ray(frame, active_ray_ids[pair / counts->spec_count] & ISO_RAY_PIXEL);
+      const Ray ray =
+          make_ray(frame, unpack_entry(active_ray_ids[pair / counts->spec_count]).pixel);
       const BlockCoords b = block_coords(frame, pair_block_ids[pair]);
       const int x = (int)(4 * b.x + (start & 3)), y = (int)(4 * b.y + (start >> 2 & 3)),
                 z = (int)(4 * b.z + (start >> 4 & 3));

@@ -67,14 +67,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint i = (begin + item) / lanes, lane = item % lanes;
     const int is_ray = i < num_rays;
-    const uint entry = is_ray ? active_ray_ids[i] : 0, pixel = entry & ISO_RAY_PIXEL;
-    const uint state = is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID;
-    const uint from = ISO_LEVELS && is_ray ? state & ISO_RAY_BLOCK : state;
-    const uint side = ISO_LEVELS && is_ray ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
+    const RayEntry entry = unpack_entry(is_ray ? active_ray_ids[i] : 0);
+    const uint pixel = entry.pixel;
+    const RayStand stand = read_stand(is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID);
+    const uint from = stand.block_id;
     ISO_FRAME_OF(level, from);
     const LastPlanes last = last_planes(level);
     const Ray ray = make_ray(level, pixel);
-    uint next = from, at = lane, more = 1, waits_as = 0, decides_at = 0;
+    uint next = from, at = lane, more = 1, waits_at = 0, decides_at = 0;
     int result = ISO_RAY_LEFT, going = is_ray, gone = 0, first = 1;
     BlockChange change;
     while (more != 0) {
@@ -89,23 +89,22 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
           next = block_behind(level, &ray, block_coords(level, from), last);
         } else {
           num_found =
-              find_blocks_from(level, macrocell_masks, &ray, first ? side : ISO_SIDE_UNKNOWN, &next,
-                               ISO_BLOCKS_AT_ONCE, found + item);
+              find_blocks_from(level, macrocell_masks, &ray, first ? stand.side : ISO_SIDE_UNKNOWN,
+                               &next, ISO_BLOCKS_AT_ONCE, found + item);
         }
         for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
           const int stands_here = first && at == 0;
-          const int may_end = ISO_LEVELS && next == ISO_INVALID_ID && at + 1 == num_found;
+          const int may_end = next == ISO_INVALID_ID && at + 1 == num_found;
           result = march_block(level, table, inside, cache_values, &ray,
                                block_coords(level, found[at * ISO_GROUP_SIZE + item]), last,
-                               slots + item, slot_stamps, stamp,
-                               stands_here && (entry & ISO_RAY_IN_DOUBT) != 0,
-                               stands_here ? side : ISO_SIDE_UNKNOWN, may_end, &change);
+                               slots + item, slot_stamps, stamp, stands_here && entry.in_doubt != 0,
+                               stands_here ? stand.side : ISO_SIDE_UNKNOWN, may_end, &change);
           if (result == ISO_RAY_LEFT) {
             ++num_passed;
           } else {
             atomic_min(&deciding[item / lanes], at);
             decides_at = at;
-            waits_as = found[at * ISO_GROUP_SIZE + item];
+            waits_at = found[at * ISO_GROUP_SIZE + item];
           }
         }
       }
@@ -130,25 +129,21 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       ++num_blocks;
     }
     int waits = result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS;
-    uint log_ahead = entry >> ISO_RAY_AHEAD_SHIFT & 7u;
-    if (waits) {
-      if (waits_as != from) log_ahead = min(log_ahead + 1, ISO_RAY_AHEAD_MAX);
-      ray_block_ids[pixel] = ISO_LEVELS && waits_as == from ? state : waits_as;
+    uint log_ahead = entry.log_ahead;
+    if (waits && waits_at != from) {
+      log_ahead = further_ahead(log_ahead);
+      ray_block_ids[pixel] = waits_at;
     }
-    if (ISO_LEVELS && (result >= ISO_RAY_ENDS || (gone && lane == 0))) {
-      const uint left_on = result == ISO_RAY_ENDS       ? ISO_SIDE_OUTSIDE
-                           : result == ISO_RAY_ENDS + 1 ? ISO_SIDE_INSIDE
-                                                        : ISO_SIDE_UNKNOWN;
-      const uint behind = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel,
-                                        level_of(frames, num_frames, from), left_on, found + item);
+    if (leaves_band(result, gone && lane == 0)) {
+      const uint behind =
+          cross_borders(frames, num_frames, macrocell_masks, ranges, pixel,
+                        level_of(frames, num_frames, from), leaves_on(result), found + item);
       waits = behind != ISO_INVALID_ID;
       if (waits) ray_block_ids[pixel] = behind;
       log_ahead = ISO_BORDER_LOG_AHEAD;
     }
-    append_entry(waits,
-                 pixel | log_ahead << ISO_RAY_AHEAD_SHIFT |
-                     (result == ISO_RAY_DOUBT ? ISO_RAY_IN_DOUBT : 0u),
-                 counters, &counts->next_active_count, next_active_ray_ids);
+    append_entry(waits, pack_entry(pixel, log_ahead, result == ISO_RAY_DOUBT ? 1u : 0u), counters,
+                 &counts->next_active_count, next_active_ray_ids);
   }
   if (num_hits != 0) atomic_add(&group_hits, num_hits);
   if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);

@@ -91,15 +91,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint i = (begin + item) / lanes, lane = (begin + item) % lanes;
     if (i < num_rays) {
-      const uint entry = active_ray_ids[i], pixel = entry & ISO_RAY_PIXEL;
-      const uint state =
-          ray_block_ids[pixel]; /* it stands at an active block, or where it has a side */
-      uint next = ISO_LEVELS ? state & ISO_RAY_BLOCK : state,
-           side = ISO_LEVELS ? state >> ISO_RAY_SIDE_SHIFT : ISO_SIDE_UNKNOWN;
+      const RayEntry entry = unpack_entry(active_ray_ids[i]);
+      /* At an active block, or where it has a side. */
+      const RayStand stand = read_stand(ray_block_ids[entry.pixel]);
+      uint next = stand.block_id, side = stand.side;
       ISO_FRAME_OF(level, next);
       const LastPlanes last = last_planes(level);
-      const Ray ray = make_ray(level, pixel);
-      const uint own = min(1u << (entry >> ISO_RAY_AHEAD_SHIFT & 7u), frame->max_spec_count);
+      const Ray ray = make_ray(level, entry.pixel);
+      const uint own = min(own_ahead(entry), frame->max_spec_count);
       const uint ahead = min(frame->per_ray_speculation ? max(own, least) : spec_count, most);
       if (lane == 0) num_ahead += ahead;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {

@@ -62,21 +62,21 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint pixel =
         begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
-    uint num_found = 0, log_ahead = ISO_FIRST_LOG_AHEAD;
+    uint stand = ISO_INVALID_ID, log_ahead = ISO_FIRST_LOG_AHEAD;
     if (pixel != ISO_INVALID_ID) {
       const Ray ray = make_ray(frame, pixel);
       uint block_id = first_block(frame, &ray);
-      if (block_id != ISO_INVALID_ID)
-        num_found = find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1);
-      if (ISO_LEVELS && num_found == 0) {
+      if (block_id != ISO_INVALID_ID &&
+          find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1) != 0) {
+        stand = found[item];
+      } else {
+        stand = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0,
+                              ISO_SIDE_UNKNOWN, found + item);
         log_ahead = ISO_BORDER_LOG_AHEAD;
-        found[item] = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0,
-                                    ISO_SIDE_UNKNOWN, found + item);
-        num_found = found[item] != ISO_INVALID_ID;
       }
-      if (num_found != 0) ray_block_ids[pixel] = found[item];
+      if (stand != ISO_INVALID_ID) ray_block_ids[pixel] = stand;
     }
-    append_entry(num_found != 0, pixel | log_ahead << ISO_RAY_AHEAD_SHIFT, counters,
+    append_entry(stand != ISO_INVALID_ID, pack_entry(pixel, log_ahead, 0), counters,
                  &counts->next_active_count, next_active_ray_ids);
   }
 }

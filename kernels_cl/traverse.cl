@@ -20,10 +20,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
   if (get_local_id(0) == 0) group_pairs = group_ahead = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
-    const uint entry = active_ray_ids[a], ray_id = entry & ISO_RAY_PIXEL;
-    const uint ahead = frame->per_ray_speculation
-                           ? min(1u << (entry >> ISO_RAY_AHEAD_SHIFT), spec_count)
-                           : spec_count;
+    const RayEntry entry = unpack_entry(active_ray_ids[a]);
+    const uint ray_id = entry.pixel;
+    const uint ahead = frame->per_ray_speculation ? min(own_ahead(entry), spec_count) : spec_count;
     const Ray ray = make_ray(frame, ray_id);
     uint block_id = ray_block_ids[ray_id];
     const uint found = find_blocks(frame, macrocell_masks, &ray, &block_id, ahead,

@@ -1,14 +1,10 @@
 /// zfp_decode.cl -- decodes the pass's new blocks into their cache slots (Sec. 3.5).
 #include "device/block_stream.h"
+#include "device/level_requests.h"
 #include "portable/block_grid.h"
 #include "portable/shared_types.h"
 
 #define ISO_STAGED_VALUES 16u  ///< of each block that go to the cache together: 64 bytes
-
-/// The request that is number i of this launch's.
-ISO_INLINE uint place_of(global const uint *places, uint i) {
-  return ISO_LEVELS ? ISO_STREAM_PARTS == 0 ? places[i] : i : i;
-}
 
 /// One work-item decodes one block; the work-group stores them together, so that neighbouring
 /// work-items write neighbouring values. The block of request i goes to slot slots[i]: cache_values
@@ -27,8 +23,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     global const uint *slots, global float *cache_values, global ulong *inside) {
   local float
       staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
-  local uint to_slots[ISO_LEVELS ? ISO_GROUP_SIZE
-                                 : 1]; /* ISO_BLOCK_ABSENT: that of another level's block */
+  local uint to_slots[ISO_LEVEL_SLOTS];
   const float isovalue = frame_params.isovalue == 0.0f ? -0.0f : frame_params.isovalue;
   const uint count = min(counts->decoded_count, end), item = get_local_id(0);
   for (uint begin = first + get_group_id(0) * ISO_GROUP_SIZE; begin < count;
@@ -36,15 +31,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     const uint num_blocks = min(count - begin, (uint)ISO_GROUP_SIZE);
     float values[ISO_BLOCK_VOXELS];
     const uint request = item < num_blocks ? place_of(places, begin + item) : 0;
-    uint block_id = item < num_blocks ? block_ids[request] : ISO_INVALID_ID;
-    int is_next = 0;
-    if (ISO_LEVELS && item < num_blocks) {
-      const uint id = block_id;
-      block_id = level_block_of(&frame_params, id);
-      is_next = block_id == ISO_INVALID_ID;
-      if (is_next) block_id = level_block_of(&next_frame, id);
-    }
-    if (ISO_LEVELS) to_slots[item] = block_id == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : slots[request];
+    int is_next;
+    const uint block_id =
+        served_block(&frame_params, &next_frame,
+                     item < num_blocks ? block_ids[request] : ISO_INVALID_ID, &is_next);
+    tell_slot(to_slots, item, block_id, slots, request);
     if (block_id != ISO_INVALID_ID) {
       uint outside_low = 0, outside_high = 0;
       decode_block(is_next ? next_words : part_0, is_next ? next_words : part_1,
@@ -70,8 +61,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
       barrier(CLK_LOCAL_MEM_FENCE);
       for (uint i = item; i < num_blocks * ISO_STAGED_VALUES; i += ISO_GROUP_SIZE) {
         const uint block = i / ISO_STAGED_VALUES, v = i % ISO_STAGED_VALUES;
-        const uint slot = ISO_LEVELS ? to_slots[block] : slots[begin + block];
-        if (!ISO_LEVELS || slot != ISO_BLOCK_ABSENT)
+        const uint slot = told_slot(to_slots, slots, begin, block);
+        if (is_served(slot))
           cache_values[slot * ISO_BLOCK_VOXELS + part + v] =
               staged[block * (ISO_STAGED_VALUES + 1) + v];
       }

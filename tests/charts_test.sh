@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Small runs of `isowave bench solvers`, `isowave bench pareto`, tools/size-table, tools/detail-table and `frame_bench --budgets`,
-# and tools/charts of them and of what is no such file.
+# Small runs of `isowave bench solvers`, `isowave bench pareto`, tools/size-table,
+# tools/detail-table and `frame_bench --budgets`, and tools/charts of them and of what is no such
+# file.
 #   charts_test.sh PROGRAM [FRAME_BENCH]
 set -euo pipefail
 program=$1 frame_bench=${2-}

@@ -31,8 +31,8 @@ row() {
   grep -E "^$1 +$2\$" out >/dev/null || fail "no row '$1 $2' in: $(cat out)"
 }
 
-# Files of both kinds. google FILE NAME=MS,MS.. [NAME=MS~SPREAD%] [NAME=failed]; frames FILE MS,MS,MS (the rounds) GROUP_MS
-# [FLOOR_MS or null]
+# Files of both kinds. google FILE NAME=MS,MS.. [NAME=MS~SPREAD%] [NAME=failed]; frames FILE
+# MS,MS,MS (the rounds) GROUP_MS [FLOOR_MS or null]
 cat >write.py <<'END'
 import json, statistics, sys
 kind, path, *rest = sys.argv[1:]

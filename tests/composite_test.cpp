@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/ray_state.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/stage_world.hpp"
@@ -72,7 +73,7 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     world.rays.ray_block_ids.write(states);
     world.rays.pair_hits.write(results);
     std::vector<uint> entries = active;  // some rays look ahead already
-    for (uint &entry : entries) entry |= random() % (ISO_RAY_AHEAD_MAX + 1) << ISO_RAY_AHEAD_SHIFT;
+    for (uint &entry : entries) entry = pack_entry(entry, random() % (ISO_MAX_LOG_AHEAD + 1), 0);
     world.set_active(entries);
     world.begin_pass(pairs, spec_count);
     if (how == ClosestHit::kAtomicMin) offer_results(world, pairs, results, spec_count);
@@ -98,9 +99,9 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         }
         break;
       }
-      uint ahead = entries[a] >> ISO_RAY_AHEAD_SHIFT;
-      if (per_ray && moves) ahead = std::min(ahead + 1, ISO_RAY_AHEAD_MAX);
-      if (goes_on) next.push_back(active[a] | ahead << ISO_RAY_AHEAD_SHIFT);
+      uint ahead = unpack_entry(entries[a]).log_ahead;
+      if (per_ray && moves) ahead = std::min(ahead + 1, ISO_MAX_LOG_AHEAD);
+      if (goes_on) next.push_back(pack_entry(active[a], ahead, 0));
     }
     expected_counts.next_active_count = static_cast<uint>(next.size());
     expect_counts(world.rays.counts, expected_counts);

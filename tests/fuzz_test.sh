@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Some runs of tools/fuzz, and one of a program that does not draw the twin's bits, which it must find.
+# Some runs of tools/fuzz, and one of a program that does not draw the twin's bits, which it must
+# find.
 #   fuzz_test.sh PROGRAM
 set -euo pipefail
 program=$1

@@ -12,6 +12,7 @@
 #include "core/stages/request_ahead.hpp"
 #include "core/stages/start_rays.hpp"
 #include "core/stages/zfp_decode.hpp"
+#include "kernels_cl/portable/ray_state.h"
 #include "kernels_cl/portable/touched_blocks.h"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_cases.hpp"
@@ -71,7 +72,7 @@ struct MarchWorld {
     const std::vector<uint> blocks = rays.ray_block_ids.read();
     std::map<uint, uint> waiting;
     for (const uint entry : entries)
-      waiting.emplace(entry & ISO_RAY_PIXEL, blocks[entry & ISO_RAY_PIXEL]);
+      waiting.emplace(unpack_entry(entry).pixel, blocks[unpack_entry(entry).pixel]);
     EXPECT_EQ(waiting.size(), entries.size()) << "a ray is listed twice";
     return waiting;
   }

@@ -1,6 +1,7 @@
-# Planted bugs. A mutant is the scalar twin built from a copy of the portable headers with one line changed; its test
-# succeeds when the stability suite or the watertight test notices. A device mutant is the program of the watertight test of devices
-# with a changed copy of all kernels; its test succeeds when each pipeline that has the bug leaks. A change that no longer applies stops the
+# Planted bugs. A mutant is the scalar twin built from a copy of the portable headers with one line
+# changed; its test succeeds when the stability suite or the watertight test notices. A device
+# mutant is the program of the watertight test of devices with a changed copy of all kernels; its
+# test succeeds when each pipeline that has the bug leaks. A change that no longer applies stops the
 # configuring.
 
 add_library(mutant_main OBJECT mutant_main.cpp)
@@ -8,8 +9,8 @@ target_link_libraries(mutant_main PRIVATE isowave_reference)
 target_compile_options(mutant_main PRIVATE -w $<$<CONFIG:Release>:-O1>)  # what a bug leaves unused is no matter
 target_precompile_headers(mutant_main PRIVATE <CL/opencl.hpp> <algorithm> <fmt/format.h> <glm/glm.hpp> <thread> <vector>)
 
-# copy_with_bug(<name> <pattern> <file> <line as it stands> <line with the bug>): files of kernels_cl into
-# mutants/<name>/kernels_cl.
+# copy_with_bug(<name> <pattern> <file> <line as it stands> <line with the bug>): files of
+# kernels_cl into mutants/<name>/kernels_cl.
 function(copy_with_bug name pattern file from to)
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name}/kernels_cl)
   file(COPY ${PROJECT_SOURCE_DIR}/kernels_cl/ DESTINATION ${folder} FILES_MATCHING REGEX ${pattern})

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# package_test.sh <build folder> <source folder> <program>: the installed package serves a project outside of the tree, and
-# so does the source folder within another project. Neither needs what only the program and the tests do.
+# package_test.sh <build folder> <source folder> <program>: the installed package serves a project
+# outside of the tree, and so does the source folder within another project. Neither needs what only
+# the program and the tests do.
 set -euo pipefail
 build=$1 source=$2 program=$3
 work=$(mktemp -d)

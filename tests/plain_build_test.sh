@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# plain_build_test.sh <source folder>: every file compiles by itself, without precompiled headers, so each includes what it
-# uses.
+# plain_build_test.sh <source folder>: every file compiles by itself, without precompiled headers,
+# so each includes what it uses.
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

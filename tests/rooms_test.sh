@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# rooms_test.sh <source folder>: the table of core/README.md names every room of core/, and no room includes a header of
-# a room below it in the table. kernels_cl/portable includes nothing but itself.
+# rooms_test.sh <source folder>: the table of core/README.md names every room of core/, and no room
+# includes a header of a room below it in the table. kernels_cl/portable includes nothing but
+# itself.
 set -euo pipefail
 cd "$1"
 

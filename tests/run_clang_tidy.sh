@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# run_clang_tidy.sh BUILD FILE...: checks FILEs, or all that is in a folder, against the root .clang-tidy, as many at once as there are processors.
-# BUILD holds compile_commands.json, made for g++: its precompiled header (which clang cannot read) and its warning
-# flags (the compiler's job) are taken out of a copy first.
+# run_clang_tidy.sh BUILD FILE...: checks FILEs, or all that is in a folder, against the root
+# .clang-tidy, as many at once as there are processors. BUILD holds compile_commands.json, made for
+# g++: its precompiled header (which clang cannot read) and its warning flags (the compiler's job)
+# are taken out of a copy first.
 set -euo pipefail
 
 build=$1

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# run_under_oclgrind.sh PROGRAM ARGUMENT...: runs a GoogleTest program on the Oclgrind simulator with its race and
-# uninitialised-memory checks on, and fails when it reports anything. Reports are read from its standard error: the file of its
-# --log is begun anew by every OpenCL context, and so by every test.
+# run_under_oclgrind.sh PROGRAM ARGUMENT...: runs a GoogleTest program on the Oclgrind simulator
+# with its race and uninitialised-memory checks on, and fails when it reports anything. Reports are
+# read from its standard error: the file of its --log is begun anew by every OpenCL context, and so
+# by every test.
 set -euo pipefail
 
 log=$(mktemp)

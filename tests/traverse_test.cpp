@@ -13,6 +13,7 @@
 #include "core/stages/initial_rays.hpp"
 #include "core/stages/zfp_decode.hpp"
 #include "kernels_cl/portable/grid_dda.h"
+#include "kernels_cl/portable/ray_state.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
@@ -122,7 +123,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       pairs.fill(0xABCDEF01u);
       std::vector<uint> entries =
           active;  // each looks ahead by its own number, where the frame says so
-      for (uint &entry : entries) entry |= entry % 7 << ISO_RAY_AHEAD_SHIFT;
+      for (uint &entry : entries) entry = pack_entry(entry, entry % 7, 0);
       entries.resize(rays.num_rays);  // whole: see kernels_cl/README.md, Oclgrind
       rays.active_ray_ids.write(entries);
       rays.closest_pairs.fill(0);

@@ -16,9 +16,10 @@
 namespace isowave::core {
 namespace {
 
-// libpng reports errors by longjmp. The functions that call setjmp hold no object with a
-// destructor, return false, and leave the message in Message; their callers own everything and
-// throw.
+// Written by libpng's simplified interface, which reads other pixels than are in files with gamma,
+// and wants memory for all that a header asks for. So reading takes the other one, which reports
+// errors by longjmp. The functions that call setjmp hold no object with a destructor, return false,
+// and leave the message in Message; their callers own everything and throw.
 
 constexpr std::size_t kSignatureBytes = 8;
 
@@ -34,18 +35,6 @@ void on_error(png_structp png, png_const_charp text) {
 
 void on_warning(png_structp, png_const_charp) {}
 
-struct Writer {
-  Message message;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
-  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
-  Writer() {
-    if (info == nullptr) throw std::bad_alloc();
-  }
-  Writer(const Writer &) = delete;
-  Writer &operator=(const Writer &) = delete;
-  ~Writer() { png_destroy_write_struct(&png, &info); }
-};
-
 struct Reader {
   Message message;
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
@@ -57,22 +46,6 @@ struct Reader {
   Reader &operator=(const Reader &) = delete;
   ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
 };
-
-bool write_image(Writer &writer, std::FILE *file, const Image8 &image) {
-  png_structp png = writer.png;
-  if (setjmp(png_jmpbuf(png)) != 0) return false;
-  png_init_io(png, file);
-  png_set_IHDR(png, writer.info, image.width, image.height, 8,
-               image.channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB,
-               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  png_set_sRGB(png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
-  png_write_info(png, writer.info);
-  const std::size_t row_bytes = std::size_t(image.width) * image.channels;
-  for (std::size_t y = 0; y < image.height; ++y)
-    png_write_row(png, image.pixels.data() + y * row_bytes);
-  png_write_end(png, writer.info);
-  return true;
-}
 
 /// Reads everything before the pixels and asks for 8-bit RGB or RGBA. Texts, profiles and such are
 /// passed over: they may be large, once they are unpacked.
@@ -135,9 +108,15 @@ void write_png(const Image8 &image, const std::filesystem::path &path) {
     throw std::invalid_argument("write_png: pixels is not width * height * channels long");
   }
   AtomicFile out(path);
-  Writer writer;
-  if (!write_image(writer, out.stream(), image)) {
-    throw Error("{}: cannot write the PNG: {}", path.string(), writer.message.text);
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  png.width = image.width;
+  png.height = image.height;
+  png.format = image.channels == 4 ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
+  constexpr int kAsItIs = 0, kRowsFollowEachOther = 0;
+  if (png_image_write_to_stdio(&png, out.stream(), kAsItIs, image.pixels.data(),
+                               kRowsFollowEachOther, nullptr) == 0) {
+    throw Error("{}: cannot write the PNG: {}", path.string(), png.message);
   }
   out.commit();
 }

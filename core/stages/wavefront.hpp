@@ -69,12 +69,13 @@ struct Wavefront {
   ocl::Buffer<FrameParams>
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;
-  CountsBuffer counts;               ///< [1] of the pass at work
-  CountsBuffer previous_counts;      ///< [1] of the pass before (pipeline `rays`)
-  CountsBuffer next_counts;          ///< [1] of the next pass, opened by this one (pipeline `rays`)
-  ocl::Buffer<HitRecord> hits;       ///< [R] by pixel: the picture so far
-  ocl::Buffer<uint> ray_block_ids;   ///< [R] by pixel: the block a ray goes on from (R_BID)
-  ocl::Buffer<uint> active_ray_ids;  ///< [active_count] rays at work: ISO_RAY_PIXEL, flags (R_ID)
+  CountsBuffer counts;              ///< [1] of the pass at work
+  CountsBuffer previous_counts;     ///< [1] of the pass before (pipeline `rays`)
+  CountsBuffer next_counts;         ///< [1] of the next pass, opened by this one (pipeline `rays`)
+  ocl::Buffer<HitRecord> hits;      ///< [R] by pixel: the picture so far
+  ocl::Buffer<uint> ray_block_ids;  ///< [R] by pixel: where a ray goes on from: RayStand (R_BID)
+  ocl::Buffer<uint>
+      active_ray_ids;  ///< [active_count] rays at work: RayEntry of ray_state.h (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
   ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
   ocl::Buffer<uint> pair_block_ids;  ///< [window_count * spec_count] blocks asked for, in ray order

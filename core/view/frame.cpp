@@ -8,6 +8,7 @@
 #include "core/base/error.hpp"
 #include "kernels_cl/portable/block_grid.h"
 #include "kernels_cl/portable/grid_dda.h"
+#include "kernels_cl/portable/ray_state.h"
 
 namespace isowave::core {
 
@@ -63,7 +64,7 @@ FrameParams make_grid_params(const VolumeInfo &info) {
 }
 
 void check_image_size(ImageSize size) {
-  constexpr std::uint64_t kMaxRays = 1u << 28;
+  constexpr std::uint64_t kMaxRays = ISO_MAX_RAYS;
   if (size.samples < 1 || size.samples > ImageSize::kMaxSamples) {
     throw Error("{} x {} rays a pixel cannot be drawn: 1 to {} along each axis can", size.samples,
                 size.samples, ImageSize::kMaxSamples);

@@ -15,8 +15,7 @@ ISO_INLINE void open_requests(global CacheState *cache) {
 /// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks,
 /// with several levels of detail as those of one whose blocks have their ids.
 ISO_INLINE uint request_word(const FrameParams *frame, uint x, uint y, uint z) {
-  const uint coarse_x = ((ISO_LEVELS ? frame->id_blocks_x : frame->blocks_x) + 3) / 4,
-             coarse_y = ((ISO_LEVELS ? frame->id_blocks_y : frame->blocks_y) + 3) / 4;
+  const uint coarse_x = (id_blocks_x(frame) + 3) / 4, coarse_y = (id_blocks_y(frame) + 3) / 4;
   const uint layer = id_layer(frame, z);
   return 2 * ((x >> 2) + coarse_x * ((y >> 2) + coarse_y * (layer >> 2))) + (layer >> 1 & 1);
 }

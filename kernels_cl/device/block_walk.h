@@ -6,6 +6,7 @@
 #ifndef ISOWAVE_BLOCK_WALK_H
 #define ISOWAVE_BLOCK_WALK_H
 
+#include "level_band.h"
 #include "portable/block_grid.h"
 #include "portable/grid_dda.h"
 
@@ -17,10 +18,6 @@
 #else
 #define ISO_BLOCKS_AT_ONCE 16u
 #endif
-
-ISO_INLINE uint masks_begin(const FrameParams *frame) {
-  return ISO_LEVELS ? frame->masks_begin : 0u;
-}
 
 ISO_INLINE int is_active(const FrameParams *frame, global const uint *macrocell_masks,
                          BlockCoords b) {
@@ -40,11 +37,6 @@ ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayE
   const int y = locate(ray->y, 1, e, 4, by, min(by + ISO_MACROCELL_BLOCKS - 1, (last.y - 1) / 4));
   const int z = locate(ray->z, 2, e, 4, bz, min(bz + ISO_MACROCELL_BLOCKS - 1, (last.z - 1) / 4));
   return walk_from(ray, x, y, z, 4, last);
-}
-
-/// Is `exit` beyond the band of the ray that this level of detail draws?
-ISO_INLINE int ends_band(const FrameParams *frame, RayEvent exit) {
-  return ISO_LEVELS && !event_before(exit, border_event(frame->end_t));
 }
 
 /// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active
@@ -109,8 +101,7 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
 ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
   const LastPlanes last = last_planes(frame);
   LastPlanes begin, end;
-  RayEvent enter = border_event(ISO_LEVELS ? frame->begin_t : 0.0f),
-           exit = border_event(ISO_LEVELS ? frame->end_t : INFINITY);
+  RayEvent enter = band_begin(frame), exit = band_end(frame);
   begin.x = 4 * frame->active_begin_x;
   begin.y = 4 * frame->active_begin_y;
   begin.z = 4 * frame->active_begin_z;

@@ -41,16 +41,18 @@ ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t
   return 1;
 }
 
-/// Where a ray goes on that leaves the band of frames[level]: its next block, and its side if it
-/// stands there for that; or ISO_INVALID_ID. side: on which it left, or else the border is in a
-/// block that is as a whole on one. Where the block behind the border is not as a whole on that
-/// side, the ray stands there; else at the next active block, in this band or one behind. ranges:
-/// of all levels' blocks. found [1]: scratch.
+/// Where a ray stands that leaves the band of frames[level], or ISO_INVALID_ID: there is nothing
+/// for it behind. Where the block behind the border is not as a whole on the ray's side, the ray
+/// stands there, with its side; else at the next active block, in this band or one behind.
+///
+/// side    on which it left; unknown: the border is in a block that is as a whole on one
+/// ranges  of all levels' blocks
+/// found   [1] scratch
 ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
                               global const uint *macrocell_masks, global const ushort *ranges,
                               uint pixel, uint level, uint side, local uint *found) {
-  uint state = ISO_INVALID_ID;
-  for (; level + 1 < num_frames && state == ISO_INVALID_ID; ++level) {
+  uint stand = ISO_INVALID_ID;
+  for (; ISO_LEVELS && level + 1 < num_frames && stand == ISO_INVALID_ID; ++level) {
     const FrameParams behind = frames[level + 1];
     const Ray ray = make_ray(&behind, pixel);
     BlockCoords b;
@@ -64,16 +66,16 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
     }
     if (is_at_border && side != ISO_SIDE_UNKNOWN &&
         side_of_block(&behind, macrocell_masks, ranges, b) != side) {
-      state = block_id_at(&behind, b.x, b.y, b.z) | side << ISO_RAY_SIDE_SHIFT;
+      stand = pack_stand(block_id_at(&behind, b.x, b.y, b.z), side);
     } else {
       uint block_id = first_block(&behind, &ray);
       if (block_id != ISO_INVALID_ID &&
           find_blocks(&behind, macrocell_masks, &ray, &block_id, 1, found, 1) != 0)
-        state = found[0];
+        stand = found[0];
     }
     side = ISO_SIDE_UNKNOWN;
   }
-  return state;
+  return stand;
 }
 
 /// `frame`: that of the level which has block block_id, as a copy of the work-item's own.
@@ -92,7 +94,7 @@ ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *ma
                                  const Ray *ray, uint side, uint *block_id, uint wanted,
                                  local uint *found) {
   uint first = 0;
-  if (side != ISO_SIDE_UNKNOWN) {
+  if (has_side(side)) {
     found[0] = *block_id;
     first = 1;
     *block_id = block_behind(frame, ray, block_coords(frame, *block_id), last_planes(frame));

@@ -9,11 +9,12 @@
 #include "portable/cell_intersect.h"
 
 /// What became of a ray.
-#define ISO_RAY_LEFT 0   ///< it left the volume
-#define ISO_RAY_HIT 1    ///< equal to what isolate() returns, as is
-#define ISO_RAY_DOUBT 2  ///< the next march settles it
-#define ISO_RAY_WAITS 3  ///< for a block that is not cached
-#define ISO_RAY_ENDS 4   ///< its band ends here; + 1: inside
+#define ISO_RAY_LEFT 0          ///< it left the block, or the volume
+#define ISO_RAY_HIT 1           ///< equal to what isolate() returns, as is
+#define ISO_RAY_DOUBT 2         ///< the next march settles it
+#define ISO_RAY_WAITS 3         ///< for a block that is not cached
+#define ISO_RAY_ENDS_OUTSIDE 4  ///< its band ends here
+#define ISO_RAY_ENDS_INSIDE 5
 #if ISO_RAY_DOUBT != ISO_DOUBTFUL
 #error "a result of isolate() must stand for itself"
 #endif
@@ -34,6 +35,10 @@ typedef struct BlockChange {
   int at_border;  ///< it is where the cell is entered: a level of detail has another opinion than
                   ///< the one before
 } BlockChange;
+
+ISO_INLINE int changes_at_border(const BlockChange *found) {
+  return ISO_LEVELS && found->at_border;
+}
 
 /// The cells of a block that have voxels of any of those corners.
 ISO_INLINE ulong cells_of_corners(uint corners) {
@@ -81,19 +86,8 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
   return cells;
 }
 
-/// Where the ray's band begins, if it has not entered the region before.
-ISO_INLINE RayEvent band_entry(const FrameParams *frame, RayEvent entry) {
-  const RayEvent begin = border_event(ISO_LEVELS ? frame->begin_t : 0.0f);
-  return ISO_LEVELS && event_before(entry, begin) ? begin : entry;
-}
-
-/// Where it ends, if it does before the ray leaves the region.
-ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
-  return ends_band(frame, exit) ? border_event(frame->end_t) : exit;
-}
-
 /// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT,
-/// ISO_RAY_WAITS where a block of the dual grid is not cached, or how ISO_RAY_ENDS. slots: this
+/// ISO_RAY_WAITS where a block of the dual grid is not cached, or how its band ends. slots: this
 /// work-item's place for eight, ISO_GROUP_SIZE apart. If b is cached, its slot's stamp becomes
 /// `stamp`. precise: settle doubts on the spot. side: where the ray was before the border at which
 /// its band begins in this block. may_end: its band may end in this one.
@@ -110,7 +104,7 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
   slot_stamps[slots[0]] = stamp; /* for all of the dual grid: see last_use() in block_cache.cl */
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const int ends = may_end && ends_band(frame, walk_exit(&block, ray));
-  if (cells == 0 && side == ISO_SIDE_UNKNOWN && !ends) return ISO_RAY_LEFT;
+  if (cells == 0 && !has_side(side) && !ends) return ISO_RAY_LEFT;
   found->enter = band_entry(frame, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
   found->cell = enter_block(ray, b, found->enter, last);
   found->at_border = 0;
@@ -118,8 +112,8 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
     const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
     const RayEvent cell_exit = walk_exit(&found->cell, ray);
     const int ends_here = ends && ends_band(frame, cell_exit);
-    const RayEvent exit = ends_here ? border_event(frame->end_t) : cell_exit;
-    if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0 || side != ISO_SIDE_UNKNOWN || ends_here) {
+    const RayEvent exit = ends_here ? band_end(frame) : cell_exit;
+    if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0 || has_side(side) || ends_here) {
       if ((cell_blocks(x, y, z) & ~have) != 0) {
         result = ISO_RAY_WAITS;
       } else {
@@ -130,18 +124,19 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
                                           (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
                              frame->isovalue;
         }
-        if (ISO_LEVELS && side != ISO_SIDE_UNKNOWN)
+        if (has_side(side))
           found->at_border = inside_at(ray, found->w, found->enter, found->cell.x, found->cell.y,
                                        found->cell.z, 0) != (side == ISO_SIDE_INSIDE);
-        result = found->at_border ? ISO_RAY_HIT
+        result = changes_at_border(found) ? ISO_RAY_HIT
                  : precise
                      ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
                                       found->cell.z, found->enter, exit, &found->change)
                      : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
                                                found->cell.z, found->enter, exit, &found->change);
         if (result == ISO_RAY_LEFT && ends_here)
-          result = ISO_RAY_ENDS +
-                   inside_at(ray, found->w, exit, found->cell.x, found->cell.y, found->cell.z, 1);
+          result = inside_at(ray, found->w, exit, found->cell.x, found->cell.y, found->cell.z, 1)
+                       ? ISO_RAY_ENDS_INSIDE
+                       : ISO_RAY_ENDS_OUTSIDE;
       }
     }
     if (result == ISO_RAY_LEFT) {
@@ -154,11 +149,22 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
   return result;
 }
 
+/// Does a ray with this result leave its band? gone: there is no active block left for it there.
+ISO_INLINE int leaves_band(int result, int gone) {
+  return ISO_LEVELS && (gone || result == ISO_RAY_ENDS_OUTSIDE || result == ISO_RAY_ENDS_INSIDE);
+}
+
+/// On which side it leaves.
+ISO_INLINE uint leaves_on(int result) {
+  return result == ISO_RAY_ENDS_OUTSIDE  ? ISO_SIDE_OUTSIDE
+         : result == ISO_RAY_ENDS_INSIDE ? ISO_SIDE_INSIDE
+                                         : ISO_SIDE_UNKNOWN;
+}
+
 ISO_INLINE HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  const float s = ISO_LEVELS && found->at_border
-                      ? 0.0f
-                      : refine(solver, found->change.cubic, found->change.bracket);
+  const float s =
+      changes_at_border(found) ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);
   return make_hit(frame, ray, found->w, found->cell.x, found->cell.y, found->cell.z, found->enter,
                   band_exit(frame, walk_exit(&found->cell, ray)), s);
 }

@@ -31,25 +31,34 @@ ISO_INLINE uint level_block_of(const FrameParams *frame, uint block_id) {
                              : ISO_INVALID_ID; /* finer: z has wrapped around */
 }
 
-/// Layer z of a level among those of all levels.
+/// The grid in which ids of blocks count: that of all levels of detail, one behind the other along
+/// z, or of the only one.
+ISO_INLINE uint id_blocks_x(const FrameParams *frame) {
+  return ISO_LEVELS ? frame->id_blocks_x : frame->blocks_x;
+}
+ISO_INLINE uint id_blocks_y(const FrameParams *frame) {
+  return ISO_LEVELS ? frame->id_blocks_y : frame->blocks_y;
+}
+/// Layer z of a level in that grid, and back.
 ISO_INLINE uint id_layer(const FrameParams *frame, uint z) {
   return z + (ISO_LEVELS ? frame->id_begin_z : 0u);
+}
+ISO_INLINE uint layer_of_id(const FrameParams *frame, uint layer) {
+  return layer - (ISO_LEVELS ? frame->id_begin_z : 0u);
 }
 
 /// Wraps around for blocks of finer levels than the frame's, and block_table.h takes that back.
 ISO_INLINE BlockCoords block_coords(const FrameParams *frame, uint block_id) {
-  const uint blocks_x = ISO_LEVELS ? frame->id_blocks_x : frame->blocks_x,
-             blocks_y = ISO_LEVELS ? frame->id_blocks_y : frame->blocks_y;
+  const uint blocks_x = id_blocks_x(frame), blocks_y = id_blocks_y(frame);
   BlockCoords b;
   b.x = block_id % blocks_x;
   b.y = block_id / blocks_x % blocks_y;
-  b.z = block_id / blocks_x / blocks_y - (ISO_LEVELS ? frame->id_begin_z : 0u);
+  b.z = layer_of_id(frame, block_id / blocks_x / blocks_y);
   return b;
 }
 
 ISO_INLINE uint block_id_at(const FrameParams *frame, uint x, uint y, uint z) {
-  return ISO_LEVELS ? x + frame->id_blocks_x * (y + frame->id_blocks_y * id_layer(frame, z))
-                    : level_block_at(frame, x, y, z);
+  return x + id_blocks_x(frame) * (y + id_blocks_y(frame) * id_layer(frame, z));
 }
 
 /// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. Always the
@@ -69,6 +78,12 @@ ISO_INLINE uint dual_grid_block(const FrameParams *frame, BlockCoords b, uint co
   return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z
              ? block_id_at(frame, x, y, z)
              : ISO_INVALID_ID;
+}
+
+/// Is there such a block, where a ray has touched it? Rays of several levels of detail touch only
+/// blocks of their own, which another level's frame does not know.
+ISO_INLINE int exists_where_touched(const FrameParams *frame, BlockCoords b, uint corner) {
+  return ISO_LEVELS || dual_grid_block(frame, b, corner) != ISO_INVALID_ID;
 }
 
 ISO_NAMESPACE_END

@@ -101,24 +101,6 @@ typedef struct FrameParams {
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 176);
 
-/// An entry of the active rays: pixel | log2 of the ray's own look-ahead << 28 | in doubt << 31
-/// (march.cl).
-#define ISO_RAY_PIXEL 0x0FFFFFFFu
-#define ISO_RAY_AHEAD_SHIFT 28u
-#define ISO_RAY_AHEAD_MAX 6u
-#define ISO_FIRST_LOG_AHEAD 2u  ///< of a new ray
-#define ISO_BORDER_LOG_AHEAD \
-  3u  ///< of one that crosses a border of levels (README "Levels of detail")
-#define ISO_RAY_IN_DOUBT 0x80000000u
-
-/// With levels of detail, above a ray's block id, when it stands behind a border: the side it was
-/// on there.
-#define ISO_RAY_BLOCK 0x3FFFFFFFu
-#define ISO_RAY_SIDE_SHIFT 30u
-#define ISO_SIDE_UNKNOWN 0u
-#define ISO_SIDE_OUTSIDE 1u
-#define ISO_SIDE_INSIDE 2u
-
 #define ISO_NO_HIT 64u  ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED \
   65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass

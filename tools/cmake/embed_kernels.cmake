@@ -1,6 +1,7 @@
-# embed_kernels(<target> <file.cl>...) makes an object library that holds every kernel file, joined with the headers it
-# includes, as one string each. Before each part stands `#line 1 "name"`, so a device compiler's message names the
-# file and line that a reader can open. Nothing is read at run time; core/ocl/kernel_sources.hpp declares the lookup.
+# embed_kernels(<target> <file.cl>...) makes an object library that holds every kernel file, joined
+# with the headers it includes, as one string each. Before each part stands `#line 1 "name"`, so a
+# device compiler's message names the file and line that a reader can open. Nothing is read at run
+# time; core/ocl/kernel_sources.hpp declares the lookup.
 
 set(embed_kernels_script ${CMAKE_CURRENT_LIST_DIR}/embed_kernels_script.cmake)
 

@@ -1,8 +1,8 @@
 # Run by embed_kernels(): -D output=<file.cpp> -D folder=<kernels_cl> -D kernels=<a.cl;b.cl>.
 cmake_minimum_required(VERSION 3.25)  # a script has no policies of its own
 
-# Appends `file` to `result` with each `#include "x.h"` replaced, the first time, by that header's text. As a compiler with
-# -I<folder> does, looks beside the file first, then in the folder.
+# Appends `file` to `result` with each `#include "x.h"` replaced, the first time, by that header's
+# text. As a compiler with -I<folder> does, looks beside the file first, then in the folder.
 function(expand file)
   file(RELATIVE_PATH name ${folder} ${file})
   get_filename_component(beside ${file} DIRECTORY)
@@ -46,7 +46,8 @@ foreach(kernel IN LISTS kernels)
   string(REPLACE "@OPEN@" "[" result "${result}")
   string(REPLACE "@CLOSE@" "]" result "${result}")
   string(REPLACE "@SEMICOLON@" ";" result "${result}")
-  # Compilers limit the length of one literal (C++ promises 65,536 characters): adjacent pieces are joined.
+  # Compilers limit the length of one literal (C++ promises 65,536 characters): adjacent pieces are
+  # joined.
   string(LENGTH "${result}" length)
   set(pieces "")
   set(begin 0)

@@ -1,4 +1,5 @@
-# What `cmake --install` installs: library, headers and CMake package of isowave::isowave, and the program where it is built.
+# What `cmake --install` installs: library, headers and CMake package of isowave::isowave, and the
+# program where it is built.
 include(CMakePackageConfigHelpers)
 
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/isowave)
