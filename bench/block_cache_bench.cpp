@@ -19,15 +19,17 @@ constexpr std::size_t kNumVisible = 1u << 14;
 /// Two sets of pairs that fill the cache in turn.
 class CacheInput {
  public:
-  CacheInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t key_bits,
+  CacheInput(ocl::Device &device, std::uint64_t num_pairs, std::int64_t key_bits,
              Distribution distribution)
       : sets_{make_block_pairs(distribution, num_pairs, kNumVisible,
                                static_cast<std::uint32_t>(key_bits), 0),
               make_block_pairs(distribution, num_pairs, kNumVisible,
                                static_cast<std::uint32_t>(key_bits), 1)},
-        rays_(device, num_pairs),
-        cache_(device, cube_params(static_cast<std::uint32_t>(key_bits)),
-               static_cast<std::uint32_t>(num_needed()), num_pairs, kGroupSize) {
+        rays_(device, {num_pairs}),
+        cache_(device,
+               BlockCache::limits_for(cube_params(static_cast<std::uint32_t>(key_bits)),
+                                      static_cast<std::uint32_t>(num_needed()), num_pairs),
+               kGroupSize) {
     FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
     params.table_groups = cache_.table_groups;
     rays_.frame = params;

@@ -18,15 +18,16 @@ std::uint32_t slots_of(const CompressedVolume &volume, const FrameSetup &setup) 
 FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const FrameSetup &setup)
     : params(make_frame_params(volume.info, setup.camera, setup.size, setup.isovalue)),
       stream(device, volume),
-      rays(device, setup.size.num_pixels()),
+      rays(device, {setup.size.num_pixels()}),
       macrocells(device, params, stream),
-      cache(device, params, slots_of(volume, setup), rays.num_rays, kGroupSize),
+      cache(device, BlockCache::limits_for(params, slots_of(volume, setup), rays.num_rays),
+            kGroupSize),
       compaction(device, rays.num_rays, kGroupSize),
       initial_rays(device, rays.num_rays),
       speculation(device),
       traverse(device, rays.num_rays, kGroupSize),
       zfp_decode(device, cache.num_slots),
-      group(device, rays.num_rays, cache.num_slots, kGroupSize),
+      group(device, {rays.num_rays, cache.num_slots, kGroupSize}),
       intersect(device, rays.num_rays, kGroupSize),
       composite(device, rays.num_rays) {
   params.max_spec_count = setup.max_speculation;

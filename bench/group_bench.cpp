@@ -14,14 +14,15 @@ namespace {
 constexpr std::uint32_t kKeyBits = 18;  // blocks of 256^3 voxels
 
 struct GroupInput {
-  GroupInput(ocl::Device &device, std::int64_t num_pairs, std::int64_t slot_bits,
+  GroupInput(ocl::Device &device, std::uint64_t num_pairs, std::int64_t slot_bits,
              std::int64_t visible_bits, Distribution distribution, Grouping how)
       : num_slots(1u << slot_bits),
         pairs(
             make_block_pairs(distribution, num_pairs, std::size_t{1} << visible_bits, kKeyBits, 0)),
-        rays(device, num_pairs),
-        cache(device, cube_params(kKeyBits), num_slots, num_pairs, kGroupSize),
-        group(device, num_pairs, num_slots, kGroupSize, how) {
+        rays(device, {num_pairs}),
+        cache(device, BlockCache::limits_for(cube_params(kKeyBits), num_slots, num_pairs),
+              kGroupSize),
+        group(device, {num_pairs, num_slots, kGroupSize, how}) {
     FrameParams params = cube_params(kKeyBits);
     params.table_groups = cache.table_groups;
     rays.frame = params;

@@ -329,10 +329,10 @@ TEST_P(BlockCacheOnDevice, PassesWithoutRequestsChangeNothing) {
 
 TEST_P(BlockCacheOnDevice, TooFewOrTooManySlotsAreRefused) {
   const FrameParams frame = plain_frame(kDims, 100);
-  EXPECT_THROW(BlockCache(device_, frame, 7, 100, 64), Error);
-  EXPECT_THROW(BlockCache(device_, frame, 0, 100, 64), Error);
+  EXPECT_THROW(BlockCache(device_, BlockCache::limits_for(frame, 7, 100), 64), Error);
+  EXPECT_THROW(BlockCache(device_, BlockCache::limits_for(frame, 0, 100), 64), Error);
   /* In kernels, 64 * slot must not overflow. */
-  EXPECT_THAT([&] { BlockCache(device_, frame, (1u << 26) + 1, 100, 64); },
+  EXPECT_THAT([&] { BlockCache(device_, BlockCache::limits_for(frame, (1u << 26) + 1, 100), 64); },
               testing::ThrowsMessage<Error>(testing::HasSubstr("slots cannot be used")));
 }
 

@@ -37,7 +37,7 @@ class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
     const FrameParams frame = plain_frame(kDims, num_pixels);
     const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
     StageWorld world(device_, frame, num_slots, group_size);
-    Group group(device_, num_pixels, num_slots, group_size, grouping_);
+    Group group(device_, {num_pixels, num_slots, group_size, grouping_});
     Tally tally;
     for (uint pass = 0; pass < num_passes; ++pass) {
       SCOPED_TRACE(fmt::format("pass {}", pass));
@@ -140,7 +140,7 @@ TEST_P(GroupOnDevice, OneMissingBlockIsEnoughToWait) {
   for (uint trial = 0; trial < 12; ++trial) {
     SCOPED_TRACE(fmt::format("trial {}, seed 40", trial));
     StageWorld world(device_, frame, 8 * 7 * 6, 64);
-    Group group(device_, 8 * 7 * 6, 8 * 7 * 6, 64, grouping_);
+    Group group(device_, {8 * 7 * 6, 8 * 7 * 6, 64, grouping_});
     std::vector<uint> some;
     std::ranges::copy_if(all, std::back_inserter(some), [&](uint) { return random() % 5 == 0; });
     world.begin_pass(some, 1);
@@ -173,7 +173,7 @@ TEST_P(GroupOnDevice, MoreVisibleBlocksThanOneSweepTakes) {
   constexpr uint kNumBlocks = 20 * 20 * 20, kNumPixels = 2 * kNumBlocks + 5;
   const FrameParams frame = plain_frame({80, 80, 80}, kNumPixels);
   StageWorld world(device_, frame, kNumBlocks, 8);
-  Group group(device_, kNumPixels, kNumBlocks, 8, grouping_);
+  Group group(device_, {kNumPixels, kNumBlocks, 8, grouping_});
   std::vector<uint> pairs(kNumPixels);
   Random random(50);
   Tally tally;
@@ -195,7 +195,7 @@ TEST_P(GroupOnDevice, MoreVisibleBlocksThanOneSweepTakes) {
 TEST_P(GroupOnDevice, NoPairs) {
   const FrameParams frame = plain_frame(kDims, 10);
   StageWorld world(device_, frame, 8, 64);
-  Group group(device_, 10, 8, 64, grouping_);
+  Group group(device_, {10, 8, 64, grouping_});
   world.begin_pass(std::vector<uint>(10, ISO_INVALID_ID), 1);
   group(world.cache, world.rays);
   EXPECT_EQ(world.counts().granted_count, 0u);

@@ -229,7 +229,7 @@ TEST_P(HostStreamOnDevice, SplitFramesAreTheTwins) {
         GetParam().with(
             {.size = kMedium, .cache_slots = 300, .largest_stream_part = part_blocks * 64 + 72}));
     EXPECT_EQ(
-        std::ranges::count(renderer.memory_plan().buffers, "zfp stream", &MemoryPlan::Buffer::name),
+        std::ranges::count(renderer.memory_plan().buffers, "zfp stream", &ocl::BufferSize::name),
         parts);
     renderer.render({camera, kIsovalue});
     expect_same_hits(renderer.hits(), expected, kMedium.width);

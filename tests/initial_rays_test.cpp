@@ -19,7 +19,7 @@ class InitialRaysOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   void expect_first_blocks(const glm::uvec3 &dims, ImageSize size) {
     const uint num_pixels = static_cast<uint>(size.num_pixels());
-    Wavefront rays(device_, num_pixels);
+    Wavefront rays(device_, {num_pixels});
     Compaction compaction(device_, num_pixels, 64);
     InitialRays initial_rays(device_, num_pixels);
     for (const CameraCase &c : camera_cases(dims)) {

@@ -132,7 +132,7 @@ ClosedForm closed_form(const FrameParams &frame, Field field, const Ray &ray) {
 struct Stages {
   Stages(ocl::Device &device, const FrameParams &frame, uint num_slots, uint group_size)
       : world(device, frame, num_slots, group_size),
-        group(device, world.rays.num_rays, num_slots, group_size),
+        group(device, {world.rays.num_rays, num_slots, group_size}),
         intersect(device, world.rays.num_rays, group_size) {}
 
   StageWorld world;

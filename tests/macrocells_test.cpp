@@ -352,8 +352,9 @@ TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
   };
   Macrocells macrocells(
       device_, grid_frame(dims), stream,
-      std::make_shared<MacrocellBuffers>(device_, volume.block_count(),
-                                         num_macrocells(grid_frame(dims)), kNumFieldBounds));
+      std::make_shared<MacrocellBuffers>(
+          device_, MacrocellBuffers::Limits{volume.block_count(), num_macrocells(grid_frame(dims)),
+                                            kNumFieldBounds}));
   const float first = sphere_voxels(dims)[1000], other = sphere_voxels(dims)[5000];
   const auto expected = alone(first, 0), wider = alone(first, 0.2), another = alone(other, 0);
   EXPECT_NE(expected, wider);

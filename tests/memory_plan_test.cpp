@@ -28,7 +28,7 @@ class MemoryPlanOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   /// What the renderer's device has booked is what the plan says, buffer by buffer.
   static void expect_booked(ocl::Device &device, const MemoryPlan &plan) {
     std::map<std::string, std::uint64_t> planned, booked;
-    for (const MemoryPlan::Buffer &buffer : plan.buffers) planned[buffer.name] += buffer.bytes;
+    for (const ocl::BufferSize &buffer : plan.buffers) planned[buffer.name] += buffer.bytes();
     for (const auto &[name, entry] : device.ledger().by_name()) {
       if (entry.current != 0) booked[name] = entry.current;
     }
@@ -186,6 +186,29 @@ TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) 
   EXPECT_THAT(refusal([&] { render_within(1, 0); }), HasSubstr(fmt::format("{} would do", least)));
   EXPECT_THAT(refusal([&] { render_within(least, 9); }), HasSubstr("more than the budget"));
   EXPECT_EQ(device.ledger().peak(), 0u) << "refused before any memory was taken";
+}
+
+class MemoryPlanOfLevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
+INSTANTIATE_TEST_SUITE_P(Devices, MemoryPlanOfLevelsOnDevice,
+                         testing::ValuesIn(devices_under_test()), device_test_name);
+
+/// Where scratch for the ranges of the last level is what the most memory is taken with, nothing
+/// but what is needed by then is there.
+TEST_P(MemoryPlanOfLevelsOnDevice, PeakOfSetupIsPlanned) {
+  const glm::uvec3 dims(128, 128, 8);
+  ArrayReader reader(test::grid_info(dims), test::sample(dims, test::noise_field(3)));
+  const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 2});
+  ocl::Device device(GetParam());
+  const Renderer renderer(device, volume,
+                          {.size = {9, 7},
+                           .cache_slots = 8,
+                           .stream = StreamPlace::kHost,
+                           .window_blocks = 1024,
+                           .with_levels = true});
+  const MemoryPlan &plan = renderer.memory_plan();
+  EXPECT_GT(plan.setup_bytes, plan.total()) << "else this scene tests nothing";
+  EXPECT_EQ(device.ledger().peak(), plan.setup_bytes);
+  EXPECT_EQ(device.ledger().current(), plan.total());
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ class SpeculationOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 };
 
 TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
-  Wavefront rays(device_, kPixels);
+  Wavefront rays(device_, {kPixels});
   rays.frame.width = kWidth;
   rays.frame.height = kHeight;
   for (const uint most : {1u, 7u, 64u}) {
@@ -58,7 +58,7 @@ TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
 }
 
 TEST_P(SpeculationOnDevice, SmallRaysLeftBecomeActive) {
-  Wavefront rays(device_, kPixels);
+  Wavefront rays(device_, {kPixels});
   rays.frame.width = kWidth;
   rays.frame.height = kHeight;
   rays.frame.max_spec_count = 64;

@@ -36,8 +36,8 @@ inline std::vector<uint> dual_grid_blocks(const FrameParams &frame, uint block_i
 struct StageWorld {
   StageWorld(ocl::Device &device, const FrameParams &frame_params, uint num_slots, uint group_size)
       : frame(frame_params),
-        rays(device, frame.width * frame.height),
-        cache(device, frame, num_slots, rays.num_rays, group_size),
+        rays(device, {frame.width * frame.height}),
+        cache(device, BlockCache::limits_for(frame, num_slots, rays.num_rays), group_size),
         compaction(device, rays.num_rays, group_size) {
     set_frame(frame_params);
     std::vector<uint> ids(rays.num_rays);

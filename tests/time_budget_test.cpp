@@ -58,8 +58,8 @@ TEST_P(KeptPictureOnDevice, SmallPicturesCoverLargerOnes) {
     const ImageSize small = halved(full, 1);
     SCOPED_TRACE(
         fmt::format("{} x {} of {} x {}", small.width, small.height, full.width, full.height));
-    Wavefront rays(device, full.num_pixels(), false);
-    KeptPicture kept(device, small);
+    Wavefront rays(device, {.num_rays = full.num_pixels(), .with_pairs = false});
+    KeptPicture kept(device, small.num_rays());
     Hits before(small.num_pixels()), now(full.num_pixels());
     for (std::size_t i = 0; i < before.size(); ++i) before[i].t = float(i);
     for (std::size_t i = 0; i < now.size(); ++i) now[i].t = i % 3 == 0 ? 1000.0f : INFINITY;

@@ -86,7 +86,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// The kernel itself, since masks that no isovalue makes are wanted.
   struct Stages {
     Stages(ocl::Device &device, std::uint64_t pixels, uint group_size)
-        : rays(device, pixels),
+        : rays(device, {pixels}),
           compaction(device, pixels, 8),
           initial_rays(device, pixels),
           range(ocl::Range::strided(pixels, group_size, device)),
@@ -272,7 +272,7 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
   const DeviceStream stream(device_, volume);
   FrameParams frame = case_frame(dims, camera_cases(dims)[0], {40, 30}, 3.0f);
-  Wavefront rays(device_, 40 * 30);
+  Wavefront rays(device_, {40 * 30});
   Macrocells macrocells(device_, frame, stream);
   macrocells.select(frame);
   macrocells.set_active_box(frame);

@@ -209,6 +209,12 @@ void RawBuffer::copy_bytes(const RawBuffer &from, std::size_t bytes) {
   }
 }
 
+std::size_t RawBuffer::checked_bytes(const BufferSize &size, std::size_t element_bytes) {
+  if (size.element_bytes == element_bytes) return bytes_of(size.count, element_bytes);
+  throw std::invalid_argument(fmt::format("buffer '{}' has elements of {} bytes, not {}", size.name,
+                                          element_bytes, size.element_bytes));
+}
+
 void RawBuffer::check_range(std::size_t count, std::size_t offset, std::size_t size) const {
   if (offset <= size && count <= size - offset) return;
   throw std::invalid_argument(fmt::format("{} elements from {} on do not fit buffer '{}' of {}",

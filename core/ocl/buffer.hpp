@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/ocl/buffer_sizes.hpp"
 #include "core/ocl/device.hpp"
 
 namespace isowave::core::ocl {
@@ -44,6 +45,8 @@ class RawBuffer {
                   std::size_t offset);
   void copy_bytes(const RawBuffer &from, std::size_t bytes);
   void check_range(std::size_t count, std::size_t offset, std::size_t size) const;
+  /// Its elements' bytes. Throws std::invalid_argument unless elements have element_bytes each.
+  static std::size_t checked_bytes(const BufferSize &size, std::size_t element_bytes);
   /// count * element_bytes; SIZE_MAX, which no device has, instead of an overflow.
   static std::size_t bytes_of(std::size_t count, std::size_t element_bytes) {
     return count > SIZE_MAX / element_bytes ? SIZE_MAX : count * element_bytes;
@@ -65,6 +68,9 @@ class Buffer : public RawBuffer {
  public:
   Buffer(Device &device, std::string name, std::size_t count)
       : RawBuffer(device, std::move(name), bytes_of(count, sizeof(T))) {}
+  /// Throws std::invalid_argument where the size is that of elements of another size.
+  Buffer(Device &device, const BufferSize &size)
+      : RawBuffer(device, size.name, checked_bytes(size, sizeof(T))) {}
   /// Holds a copy of `data`. Waits.
   Buffer(Device &device, std::string name, std::span<const T> data)
       : Buffer(device, std::move(name), data.size()) {

@@ -1,19 +1,22 @@
 #include "core/ocl/pinned_buffer.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "core/base/error.hpp"
 
 namespace isowave::core::ocl {
 
-PinnedBuffer::PinnedBuffer(Device &device, std::string name, std::size_t count)
-    : device_(device), name_(std::move(name)) {
-  const std::size_t bytes = count * sizeof(std::uint32_t);
+PinnedBuffer::PinnedBuffer(Device &device, const BufferSize &size)
+    : device_(device), name_(size.name) {
+  if (size.element_bytes != sizeof(std::uint32_t))
+    throw std::invalid_argument(fmt::format("buffer '{}' is not of 32-bit words", name_));
+  const std::size_t bytes = size.bytes();
   try {
     mem_ = cl::Buffer(device.context(), CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, bytes);
     void *mapped =
         device.queue().enqueueMapBuffer(mem_, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE, 0, bytes);
-    words_ = {static_cast<std::uint32_t *>(mapped), count};
+    words_ = {static_cast<std::uint32_t *>(mapped), size.count};
     device.ledger().add(name_, bytes);
   } catch (const cl::Error &error) {
     throw Error("device '{}' cannot allocate {} bytes for '{}': {}: {}", device.info().name, bytes,

@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "core/ocl/buffer_sizes.hpp"
 #include "core/ocl/device.hpp"
 
 namespace isowave::core::ocl {
@@ -16,8 +17,9 @@ namespace isowave::core::ocl {
 /// device, and some devices share the host's memory.
 class PinnedBuffer {
  public:
-  /// `count` is not 0. Throws Error when there is no such memory.
-  PinnedBuffer(Device &device, std::string name, std::size_t count);
+  /// size: of 32-bit words, not 0 of them. Throws Error when there is no such memory,
+  /// std::invalid_argument: elements of another size.
+  PinnedBuffer(Device &device, const BufferSize &size);
   /// No transfer from or to the words may be under way.
   ~PinnedBuffer();
   PinnedBuffer(const PinnedBuffer &) = delete;

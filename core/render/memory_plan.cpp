@@ -2,22 +2,18 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <optional>
+#include <vector>
 
 #include "core/base/error.hpp"
 #include "core/render/pass_readback.hpp"
+#include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
 #include "core/view/detail.hpp"
-#include "kernels_cl/portable/block_bound.h"
 
 namespace isowave::core {
 
 namespace {
-
-std::uint64_t ceil_div(std::uint64_t count, std::uint64_t size) {
-  return (count + size - 1) / size;
-}
 
 /// Bytes of compressed blocks that one half of a window holds: enough for a transfer at full speed,
 /// little enough that the first is soon under way.
@@ -36,29 +32,11 @@ std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequ
   return static_cast<std::uint32_t>(std::max<std::uint64_t>(wanted, kMinCacheSlots));
 }
 
-/// Of the volume and those of its levels of detail that are on the device.
-std::vector<FrameParams> grids_of(const CompressedVolume &volume, const MemoryRequest &request) {
-  return make_level_grids(level_infos(volume, request.with_levels));
-}
-
-void add_index(MemoryPlan &plan, std::uint64_t words) {
-  if (words == 0) return;
-  plan.buffers.push_back({"block index", sizeof(uint) * words});
-  plan.stream_bytes += plan.buffers.back().bytes;
-}
-
-void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
-  const std::uint64_t bounds = request.with_bounds ? bound_words(volume) : 0;
-  if (plan.stream == StreamPlace::kHost) {
-    const std::uint64_t bytes = sizeof(uint) * StreamWindow::half_words(volume, plan.window_blocks);
-    for (const char *name :
-         {"stream window", "stream window", "stream staging", "stream staging"}) {
-      plan.buffers.push_back({name, bytes});
-    }
-    plan.stream_bytes += 4 * bytes;
-    add_index(plan, bounds);
-    return;
-  }
+/// Of one level of detail, or of the volume itself.
+ocl::BufferSizes stream_sizes(const MemoryPlan &plan, const CompressedVolume &volume,
+                              const MemoryRequest &request) {
+  if (plan.stream == StreamPlace::kHost)
+    return DeviceStream::sizes(volume, OnHost{plan.window_blocks}, request.with_bounds);
   const std::uint64_t largest = request.largest_stream_part != 0
                                     ? request.largest_stream_part
                                     : std::numeric_limits<std::uint64_t>::max();
@@ -68,28 +46,36 @@ void add_stream(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRe
         "the compressed volume of {} bytes does not fit {} buffers of {}: leave it on the host",
         volume.word_count() * sizeof(uint), kMaxStreamParts, largest);
   }
-  for (const std::uint64_t words : split.words) {
-    plan.buffers.push_back({"zfp stream", words * sizeof(uint)});
-    plan.stream_bytes += words * sizeof(uint);
-  }
-  add_index(plan, (volume.is_indexed() ? block_index_words(volume.block_count()) : 0) + bounds);
-}
-
-/// Of macrocells: see MacrocellBuffers.
-std::size_t num_selections(const MemoryRequest &request) {
-  return request.with_bounds ? kNumFieldBounds : 1;
+  return DeviceStream::sizes(volume, split, request.with_bounds);
 }
 
 /// What the volume, or one of its levels of detail, needs for itself.
 void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
-  add_stream(plan, volume, request);
-  plan.buffers.insert(plan.buffers.end(),
-                      {{"macrocell ranges", 2 * num_macrocells(make_grid_params(volume.info))},
-                       {"active limits", 4 * std::uint64_t{ISO_BOUND_CODES}}});
-  for (std::size_t i = 0; i < num_selections(request); ++i)
-    plan.buffers.push_back({"active box", 6 * sizeof(int)});
+  const ocl::BufferSizes stream = stream_sizes(plan, volume, request);
+  plan.stream_bytes += stream.bytes();
+  plan.buffers.add(stream).add(Macrocells::sizes(num_macrocells(make_grid_params(volume.info)),
+                                                 plan.limits.macrocells.num_selections));
   plan.setup_bytes = std::max(plan.setup_bytes,
                               plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
+}
+
+RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &request,
+                         std::uint32_t cache_slots) {
+  const std::uint64_t rays = request.num_rays;
+  const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, request.with_levels));
+  const FrameParams &last = grids.back();  // the others' ranges and masks lie before its
+  return {.macrocells = {.num_blocks = last.ranges_begin + block_count(last),
+                         .num_macrocells = last.masks_begin / 2 + num_macrocells(last),
+                         .num_selections = request.with_bounds ? kNumFieldBounds : 1},
+          .rays = {.num_rays = rays,
+                   .with_pairs = request.pipeline == PipelineKind::kBlocks,
+                   .num_levels = grids.size()},
+          .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays),
+          .pairs = {.num_rays = rays,
+                    .num_slots = cache_slots,
+                    .group_size = request.group_size,
+                    .grouping = request.grouping},
+          .kept_rays = request.kept_rays};
 }
 
 bool fits_parts(const CompressedVolume &volume, const MemoryRequest &request) {
@@ -100,33 +86,6 @@ bool fits_parts(const CompressedVolume &volume, const MemoryRequest &request) {
 MemoryRequest with_stream(MemoryRequest request, StreamPlace place) {
   request.stream = place;
   return request;
-}
-
-/// Of what pipeline `blocks` needs beside the rays.
-void add_pairs(MemoryPlan &plan, const MemoryRequest &request) {
-  const std::uint64_t rays = request.num_rays;
-  const std::uint64_t visible = std::min<std::uint64_t>(rays, plan.cache_slots);
-  const std::uint64_t scan_tile = std::uint64_t{request.group_size} * ISO_SCAN_ITEMS;
-  plan.buffers.insert(plan.buffers.end(), {{"mask", 4 * rays},
-                                           {"pair block ids", 4 * rays},
-                                           {"pair hits", sizeof(PairHit) * rays},
-                                           {"closest pairs", 4 * rays},
-                                           {"scan tile sums", 4 * ceil_div(rays, scan_tile)},
-                                           {"grouped pair ids", 4 * rays},
-                                           {"cache slots of pairs", 4 * rays},
-                                           {"block rays", sizeof(BlockRays) * visible}});
-  if (request.grouping == Grouping::kRadix) {
-    plan.buffers.insert(plan.buffers.end(),
-                        {{"sort keys, other half", 4 * rays},
-                         {"sort values, other half", 4 * rays},
-                         {"sort digit table", 4 * RadixSort::table_size(rays, request.group_size)},
-                         {"group tile sums", 4 * ceil_div(rays, scan_tile)}});
-  } else {
-    plan.buffers.insert(plan.buffers.end(),
-                        {{"pairs by slot", 4 * std::uint64_t{plan.cache_slots}},
-                         {"pair offsets by slot", 4 * std::uint64_t{plan.cache_slots}},
-                         {"group candidates", 4}});
-  }
 }
 
 }  // namespace
@@ -142,73 +101,27 @@ StreamPlace stream_place_from_string(std::string_view name) {
   throw Error("the compressed volume cannot be on '{}': auto, device, host", name);
 }
 
-std::uint64_t MemoryPlan::total() const {
-  return std::accumulate(
-      buffers.begin(), buffers.end(), std::uint64_t{0},
-      [](std::uint64_t sum, const Buffer &buffer) { return sum + buffer.bytes; });
-}
-
-std::uint64_t MemoryPlan::peak() const {
-  return std::max(total(), setup_bytes);
-}
-
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots) {
-  const std::uint64_t rays = request.num_rays, slots = cache_slots;
-  const std::vector<FrameParams> grids = grids_of(volume, request);
-  const FrameParams ids = make_id_grid(grids);
-  const std::uint64_t listed = BlockCache::capacity_for(cache_slots, block_count(ids), rays);
   MemoryPlan plan;
+  plan.limits = limits_of(volume, request, cache_slots);
   plan.cache_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
   if (plan.stream == StreamPlace::kHost)
-    plan.window_blocks = window_blocks_for(volume, request, plan.cache_slots);
-  const FrameParams &last = grids.back();  // the others' ranges and masks lie before its
-  plan.buffers = {{"block ranges", 2 * (last.ranges_begin + block_count(last))}};
-  for (std::size_t i = 0; i < num_selections(request); ++i)
-    plan.buffers.push_back({"macrocell masks", 4 * (last.masks_begin + 2 * num_macrocells(last))});
-  for (const CompressedVolume *level : levels_of(volume, request.with_levels))
-    add_level(plan, *level, request);
-  plan.buffers.insert(plan.buffers.end(),
-                      {{"pass counts", sizeof(PassCounts)},
-                       {"pass counts, previous", sizeof(PassCounts)},
-                       {"pass counts, next", sizeof(PassCounts)},
-                       {"pass counts, read back", PassReadback::kMaxInFlight * sizeof(PassCounts)},
-                       {"level frames", sizeof(FrameParams) * grids.size()},
-                       {"hits", sizeof(HitRecord) * rays},
-                       {"ray states", 4 * rays},
-                       {"active ray ids", 4 * rays},
-                       {"active ray ids, next", 4 * rays}});
-  if (request.pipeline == PipelineKind::kBlocks) {
-    add_pairs(plan, request);
-  } else {  // the pairs' arrays are empty: OpenCL has no buffers of 0 bytes
-    plan.buffers.insert(
-        plan.buffers.end(),
-        {{"mask", 1}, {"pair block ids", 1}, {"pair hits", 1}, {"closest pairs", 1}});
-  }
-  plan.buffers.insert(
-      plan.buffers.end(),
-      {{"block table", 8 * sizeof(BlockEntry) * BlockCache::table_groups_for(cache_slots)},
-       {"block cache", ISO_BLOCK_VOXELS * sizeof(float) * slots},
-       {"voxels inside", 8 * slots},
-       {"cache slot blocks", 4 * slots},
-       {"cache slot stamps", 4 * slots},
-       {"free slots", 4 * slots},
-       {"requested blocks", 8 * num_macrocells(ids)},
-       {"block requests", 4 * listed},
-       {"decode slots", 4 * listed},
-       {"slot ranks", slots},
-       {"cells of cached blocks", 8 * slots},
-       {"eviction ranks", 4 * std::uint64_t{ISO_EVICTION_RANKS}},
-       {"cache state", sizeof(CacheState)},
-       {"shading", sizeof(ShadeParams)},
-       {"framebuffer", 4 * rays}});
-  if (grids.size() > 1 && plan.stream == StreamPlace::kHost) {
-    for (std::size_t i = 0; i < grids.size(); ++i)
-      plan.buffers.push_back({"decode places", 4 * listed});
-  }
-  if (request.kept_rays != 0)
-    plan.buffers.push_back({"kept hits", sizeof(HitRecord) * request.kept_rays});
+    plan.window_blocks = window_blocks_for(volume, request, cache_slots);
+  const RendererLimits &limits = plan.limits;
+  plan.buffers = MacrocellBuffers::sizes(limits.macrocells);
+  const std::vector<const CompressedVolume *> levels = levels_of(volume, request.with_levels);
+  for (const CompressedVolume *level : levels) add_level(plan, *level, request);
+  for (std::size_t i = 0; i < levels.size(); ++i)
+    plan.buffers.add(ZfpDecode::sizes(limits.cache.max_requests(),
+                                      plan.stream == StreamPlace::kHost, levels.size() > 1));
+  plan.buffers.add(Wavefront::sizes(limits.rays))
+      .add(BlockCache::sizes(limits.cache))
+      .add(pipeline_sizes(request.pipeline, limits.pairs))
+      .add(Shade::sizes(request.num_rays))
+      .add(PassReadback::sizes());
+  if (limits.kept_rays != 0) plan.buffers.add(KeptPicture::sizes(limits.kept_rays));
   return plan;
 }
 

@@ -1,12 +1,13 @@
 #pragma once
-// Every device buffer of a renderer, computed before any of them is made: what a memory budget is
-// held to.
+// Every device buffer of a renderer, added up before any of them is made: what a memory budget is
+// held to. How large they are is up to their owners, which say so by sizes().
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
 
+#include "core/ocl/buffer_sizes.hpp"
 #include "core/ocl/device.hpp"
 #include "core/render/pipeline.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -38,12 +39,19 @@ struct MemoryRequest {
   std::uint64_t kept_rays = 0;      ///< of KeptPicture
 };
 
+/// What the lengths of a renderer's buffers depend on, beside its compressed volume: the plan adds
+/// up the sizes() of these, and the renderer constructs from the same.
+struct RendererLimits {
+  MacrocellBuffers::Limits macrocells{};
+  Wavefront::Limits rays{};
+  BlockCache::Limits cache{};
+  Group::Limits pairs{};
+  std::uint64_t kept_rays = 0;  ///< of KeptPicture; 0: there is none
+};
+
 struct MemoryPlan {
-  struct Buffer {
-    std::string name;  ///< as in the device's MemoryLedger
-    std::uint64_t bytes = 0;
-  };
-  std::vector<Buffer> buffers;  ///< that live as long as the renderer
+  RendererLimits limits{};
+  ocl::BufferSizes buffers;  ///< that live as long as the renderer
   std::uint64_t setup_bytes =
       0;  ///< all that exists while the value ranges are built, scratch included
   std::uint32_t cache_slots = 0;
@@ -52,13 +60,13 @@ struct MemoryPlan {
   std::uint64_t stream_bytes = 0;             ///< of the buffers for the compressed volume
   std::string reason;  ///< for the place: "the compressed volume of 10 bytes ..."
 
-  std::uint64_t total() const;  ///< bytes of buffers
-  std::uint64_t peak() const;   ///< bytes: the most that ever exists
+  std::uint64_t total() const { return buffers.bytes(); }
+  /// Bytes: the most that ever exists.
+  std::uint64_t peak() const { return std::max(total(), setup_bytes); }
 };
 
 /// The plan with so many cache slots and the stream where request.stream says, on the device for
-/// kAuto. The one place that knows all sizes; tests compare it with what is booked. Throws Error
-/// where the stream does not fit four buffers on the device.
+/// kAuto. Throws Error where the stream does not fit four buffers on the device.
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots);
 

@@ -17,8 +17,10 @@ class PassReadback {
  public:
   static constexpr std::size_t kMaxInFlight = 2;
 
-  explicit PassReadback(ocl::Device &device)
-      : memory_(device, "pass counts, read back", kMaxInFlight * kWords) {}
+  static ocl::BufferSizes sizes() {
+    return {ocl::buffer_size<uint>("pass counts, read back", kMaxInFlight * kWords)};
+  }
+  explicit PassReadback(ocl::Device &device) : memory_(device, sizes()["pass counts, read back"]) {}
   PassReadback(const PassReadback &) = delete;
   PassReadback &operator=(const PassReadback &) = delete;
   ~PassReadback() {

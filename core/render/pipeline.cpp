@@ -16,17 +16,19 @@ namespace {
 
 class BlocksPipeline : public Pipeline {
  public:
-  BlocksPipeline(FrameState &state, std::uint32_t group_size, Solver solver, Grouping grouping,
-                 ClosestHit closest)
+  BlocksPipeline(FrameState &state, const Group::Limits &limits, Solver solver, ClosestHit closest)
       : state_(state),
-        compaction_(state.device, state.rays.num_rays, group_size),
-        initial_rays_(state.device, state.rays.num_rays),
+        compaction_(state.device, limits.num_rays, limits.group_size),
+        initial_rays_(state.device, limits.num_rays),
         speculation_(state.device),
-        traverse_(state.device, state.rays.num_rays, group_size),
-        group_(state.device, state.rays.num_rays, state.cache.num_slots, group_size, grouping,
-               closest),
-        intersect_(state.device, state.rays.num_rays, group_size, solver, closest),
-        composite_(state.device, state.rays.num_rays, closest) {}
+        traverse_(state.device, limits.num_rays, limits.group_size),
+        group_(state.device, limits, closest),
+        intersect_(state.device, limits.num_rays, limits.group_size, solver, closest),
+        composite_(state.device, limits.num_rays, closest) {}
+
+  static ocl::BufferSizes sizes(const Group::Limits &limits) {
+    return Compaction::sizes(limits.num_rays, limits.group_size).add(Group::sizes(limits));
+  }
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("initial_rays");
@@ -119,6 +121,10 @@ std::string_view to_string(PipelineKind kind) {
   return kind == PipelineKind::kBlocks ? "blocks" : "rays";
 }
 
+ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits) {
+  return kind == PipelineKind::kBlocks ? BlocksPipeline::sizes(limits) : ocl::BufferSizes();
+}
+
 void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
   {
     const auto stage = device.timer().stage("cache");
@@ -141,11 +147,11 @@ void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
-                                        std::uint32_t group_size, Solver solver, Grouping grouping,
+                                        const Group::Limits &limits, Solver solver,
                                         ClosestHit closest) {
   if (kind == PipelineKind::kBlocks)
-    return std::make_unique<BlocksPipeline>(state, group_size, solver, grouping, closest);
-  return std::make_unique<RaysPipeline>(state, group_size, solver);
+    return std::make_unique<BlocksPipeline>(state, limits, solver, closest);
+  return std::make_unique<RaysPipeline>(state, limits.group_size, solver);
 }
 
 }  // namespace isowave::core

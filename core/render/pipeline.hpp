@@ -74,9 +74,12 @@ class Pipeline {
   virtual void end_frame() {}
 };
 
+/// The buffers of a pipeline beside those of FrameState. limits: of its Group, if it has one.
+ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits);
+
 /// `state` must outlive the pipeline.
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
-                                        std::uint32_t group_size, Solver solver, Grouping grouping,
+                                        const Group::Limits &limits, Solver solver,
                                         ClosestHit closest);
 
 }  // namespace isowave::core

@@ -28,28 +28,27 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
                       const RendererOptions &options, const MemoryPlan &plan) {
   const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.with_levels);
   const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.with_levels));
-  const FrameParams ids = make_id_grid(grids), &last = grids.back();
+  const RendererLimits &limits = plan.limits;
   const bool has_levels = volumes.size() > 1;
-  const auto buffers = std::make_shared<MacrocellBuffers>(
-      device, last.ranges_begin + block_count(last), last.masks_begin / 2 + num_macrocells(last),
-      options.with_bounds ? kNumFieldBounds : 1);
-  const std::uint64_t num_rays = options.size.num_rays();
-  const std::uint32_t most_requests =
-      BlockCache::capacity_for(plan.cache_slots, block_count(ids), num_rays);
+  const auto buffers = std::make_shared<MacrocellBuffers>(device, limits.macrocells);
+  std::vector<DeviceStream> streams;
+  std::vector<Macrocells> macrocells;  // of all levels before any decoder, see plan.setup_bytes
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    streams.push_back(
+        plan.stream == StreamPlace::kHost
+            ? DeviceStream(device, *volumes[i], OnHost{plan.window_blocks}, options.with_bounds)
+            : DeviceStream(device, *volumes[i], options.largest_stream_part, options.with_bounds));
+    macrocells.emplace_back(device, grids[i], streams.back(), buffers);
+  }
   std::vector<Level> levels;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const CompressedVolume &level = *volumes[i];
-    DeviceStream stream =
-        plan.stream == StreamPlace::kHost
-            ? DeviceStream(device, level, OnHost{plan.window_blocks}, options.with_bounds)
-            : DeviceStream(device, level, options.largest_stream_part, options.with_bounds);
-    Macrocells macrocells(device, grids[i], stream, buffers);
-    ZfpDecode decode(device, most_requests, stream.defines(), has_levels);
-    levels.push_back({level.info, level.precision, LevelError(level, i == 0), std::move(stream),
-                      std::move(macrocells), std::move(decode)});
+    ZfpDecode decode(device, limits.cache.max_requests(), streams[i].defines(), has_levels);
+    levels.push_back({level.info, level.precision, LevelError(level, i == 0), std::move(streams[i]),
+                      std::move(macrocells[i]), std::move(decode)});
   }
-  Wavefront rays(device, num_rays, options.pipeline == PipelineKind::kBlocks, volumes.size());
-  BlockCache cache(device, ids, plan.cache_slots, num_rays, options.group_size, has_levels);
+  Wavefront rays(device, limits.rays);
+  BlockCache cache(device, limits.cache, options.group_size, has_levels);
   return {device, std::move(levels), std::move(rays), std::move(cache)};
 }
 
@@ -119,11 +118,11 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       state_(make_state(device, volume, options_, plan_)),
       value_range_(volume.value_range),
       size_(options_.size),
-      pipeline_(make_pipeline(options_.pipeline, state_, options_.group_size, options_.solver,
-                              options_.grouping, options_.closest)),
+      pipeline_(make_pipeline(options_.pipeline, state_, plan_.limits.pairs, options_.solver,
+                              options_.closest)),
       shade_(device, options_.size.num_rays()),
       readback_(device) {
-  if (options_.with_kept_picture) kept_.emplace(device, halved(options_.size, 1));
+  if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
   options_.cache_slots = plan_.cache_slots;
   options_.stream = plan_.stream;
   options_.window_blocks = plan_.window_blocks;

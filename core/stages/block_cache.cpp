@@ -20,58 +20,74 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
   return num_slots;
 }
 
-}  // namespace
-
-/// Twice as many entries as slots, an eighth of them with evicted blocks' keys at most before the
-/// table is rebuilt (H100, 512^3, 65,536 slots: frames take 1.26 ms; with a quarter, 1.45); not a
-/// multiple of 3, so that ISO_TABLE_STEP reaches every entry.
-std::uint32_t BlockCache::table_groups_for(std::uint32_t num_slots) {
+/// Entries / 8 of the table: twice as many entries as slots, an eighth of them with evicted blocks'
+/// keys at most before the table is rebuilt (H100, 512^3, 65,536 slots: frames take 1.26 ms; with a
+/// quarter, 1.45); not a multiple of 3, so that ISO_TABLE_STEP reaches every entry.
+std::uint32_t table_groups_for(std::uint32_t num_slots) {
   const std::uint32_t groups = num_slots / 4 + 1;
   return groups % 3 == 0 ? groups + 1 : groups;
 }
 
-/// No more than can be granted; a ray's block asks for at most 8, and a block is listed once.
-std::uint32_t BlockCache::capacity_for(std::uint32_t num_slots, std::uint64_t num_blocks,
-                                       std::uint64_t num_rays) {
+}  // namespace
+
+std::uint32_t BlockCache::Limits::max_requests() const {
   return static_cast<std::uint32_t>(
       std::min<std::uint64_t>({num_slots, num_blocks, 8 * ISO_MAX_SPECULATION * num_rays}));
 }
 
-BlockCache::BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t slots,
-                       std::uint64_t num_rays, std::uint32_t group_size, bool levels)
-    : num_slots(checked_slots(slots)),
-      table_groups(table_groups_for(slots)),
-      capacity(capacity_for(slots, block_count(grid), num_rays)),
-      table(device, "block table", 8 * std::size_t{table_groups}),
-      values(device, "block cache", std::size_t{slots} * ISO_BLOCK_VOXELS),
-      inside(device, "voxels inside", slots),
-      slot_block_ids(device, "cache slot blocks", slots),
-      slot_stamps(device, "cache slot stamps", slots),
-      requested_bits(device, "requested blocks", 2 * num_macrocells(grid)),
-      request_block_ids(device, "block requests", capacity),
-      decode_slots(device, "decode slots", capacity),
-      state(device, "cache state", 1),
+ocl::BufferSizes BlockCache::sizes(const Limits &limits) {
+  const std::uint64_t slots = limits.num_slots, requests = limits.max_requests();
+  return {ocl::buffer_size<BlockEntry>("block table",
+                                       8 * std::uint64_t{table_groups_for(limits.num_slots)}),
+          ocl::buffer_size<float>("block cache", ISO_BLOCK_VOXELS * slots),
+          ocl::buffer_size<ulong>("voxels inside", slots),
+          ocl::buffer_size<uint>("cache slot blocks", slots),
+          ocl::buffer_size<uint>("cache slot stamps", slots),
+          ocl::buffer_size<uint>("free slots", slots),
+          ocl::buffer_size<uint>("requested blocks", 2 * limits.num_macrocells),
+          ocl::buffer_size<uint>("block requests", requests),
+          ocl::buffer_size<uint>("decode slots", requests),
+          ocl::buffer_size<uchar>("slot ranks", slots),
+          ocl::buffer_size<ulong>("cells of cached blocks", slots),
+          ocl::buffer_size<uint>("eviction ranks", ISO_EVICTION_RANKS),
+          ocl::buffer_size<CacheState>("cache state", 1)};
+}
+
+BlockCache::BlockCache(ocl::Device &device, const Limits &limits, std::uint32_t group_size,
+                       bool levels)
+    : BlockCache(device, limits, sizes(limits), group_size,
+                 with_levels(group_defines(group_size), levels)) {}
+
+BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
+                       std::uint32_t group_size, const ocl::Defines &defines)
+    : num_slots(checked_slots(limits.num_slots)),
+      table_groups(table_groups_for(num_slots)),
+      capacity(limits.max_requests()),
+      table(device, sizes["block table"]),
+      values(device, sizes["block cache"]),
+      inside(device, sizes["voxels inside"]),
+      slot_block_ids(device, sizes["cache slot blocks"]),
+      slot_stamps(device, sizes["cache slot stamps"]),
+      requested_bits(device, sizes["requested blocks"]),
+      request_block_ids(device, sizes["block requests"]),
+      decode_slots(device, sizes["decode slots"]),
+      state(device, sizes["cache state"]),
       group_size_(group_size),
-      pairs_range_(ocl::Range::strided(num_rays, group_size, device)),
-      slots_range_(ocl::Range::strided(slots, group_size, device)),
+      pairs_range_(ocl::Range::strided(limits.num_rays, group_size, device)),
+      slots_range_(ocl::Range::strided(num_slots, group_size, device)),
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
-      free_slots_(device, "free slots", slots),
-      slot_ranks_(device, "slot ranks", slots),
-      slot_changing_(device, "cells of cached blocks", slots),
-      rank_histogram_(device, "eviction ranks", ISO_EVICTION_RANKS),
-      request_(device, "block_cache", "cache_request",
-               with_levels(group_defines(group_size), levels)),
-      rank_(device, "block_cache", "cache_rank", with_levels(group_defines(group_size), levels)),
-      select_(device, "block_cache", "cache_select",
-              with_levels(group_defines(group_size), levels)),
-      evict_(device, "block_cache", "cache_evict", with_levels(group_defines(group_size), levels)),
-      rebuild_(device, "block_cache", "cache_rebuild",
-               with_levels(group_defines(group_size), levels)),
-      classify_(device, "block_cache", "cache_classify",
-                with_levels(group_defines(group_size), levels)),
-      assign_(device, "block_cache", "cache_assign",
-              with_levels(group_defines(group_size), levels)),
-      clear_(device, "block_cache", "cache_clear", with_levels(group_defines(group_size), levels)) {
+      free_slots_(device, sizes["free slots"]),
+      slot_ranks_(device, sizes["slot ranks"]),
+      slot_changing_(device, sizes["cells of cached blocks"]),
+      rank_histogram_(device, sizes["eviction ranks"]),
+      request_(device, "block_cache", "cache_request", defines),
+      rank_(device, "block_cache", "cache_rank", defines),
+      select_(device, "block_cache", "cache_select", defines),
+      evict_(device, "block_cache", "cache_evict", defines),
+      rebuild_(device, "block_cache", "cache_rebuild", defines),
+      classify_(device, "block_cache", "cache_classify", defines),
+      assign_(device, "block_cache", "cache_assign", defines),
+      clear_(device, "block_cache", "cache_clear", defines) {
   clear();
 }
 

@@ -13,11 +13,28 @@ inline constexpr std::uint32_t kMinCacheSlots = 8;
 
 /// What the stages of one pass read of the cache, and add to its requests.
 struct BlockCache {
-  /// num_slots is at least kMinCacheSlots; num_rays bounds a pass's pairs. `grid`: its blocks are
-  /// used, those of the finest level where frames may have several levels of detail. Throws Error
-  /// when there are too few slots, or more than ISO_MAX_CACHE_SLOTS.
-  BlockCache(ocl::Device &device, const FrameParams &grid, std::uint32_t num_slots,
-             std::uint64_t num_rays, std::uint32_t group_size, bool levels = false);
+  /// What the lengths of its buffers depend on.
+  struct Limits {
+    std::uint32_t num_slots = kMinCacheSlots;  ///< at least that many
+    std::uint64_t num_rays = 0;                ///< bounds a pass's pairs
+    std::uint64_t num_blocks = 0;              ///< ids of blocks, those of all levels of detail
+    std::uint64_t num_macrocells = 0;          ///< that have them
+
+    /// The most requests that are listed: no more than can be granted; a ray's block asks for at
+    /// most 8, and a block is listed once.
+    std::uint32_t max_requests() const;
+  };
+  /// For the blocks of `grid`, or, of several levels of detail, of make_id_grid().
+  static Limits limits_for(const FrameParams &grid, std::uint32_t num_slots,
+                           std::uint64_t num_rays) {
+    return {num_slots, num_rays, block_count(grid), core::num_macrocells(grid)};
+  }
+  static ocl::BufferSizes sizes(const Limits &limits);
+
+  /// levels: frames may have several levels of detail. Throws Error when there are too few slots,
+  /// or more than ISO_MAX_CACHE_SLOTS.
+  BlockCache(ocl::Device &device, const Limits &limits, std::uint32_t group_size,
+             bool levels = false);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones.
   /// Out: counts.requested_count. Asynchronous. (Pipeline `rays` asks by RequestAhead.)
@@ -36,12 +53,6 @@ struct BlockCache {
   /// Forgets every block: the next pass finds the cache as it was made. Asynchronous.
   void clear();
 
-  /// Entries / 8 of the table for so many slots.
-  static std::uint32_t table_groups_for(std::uint32_t num_slots);
-  /// The most requests that are listed.
-  static std::uint32_t capacity_for(std::uint32_t num_slots, std::uint64_t num_blocks,
-                                    std::uint64_t num_rays);
-
   std::uint32_t num_slots;
   std::uint32_t table_groups;     ///< FrameParams::table_groups
   std::uint32_t capacity;         ///< of the request list: requests beyond it are dropped
@@ -58,6 +69,9 @@ struct BlockCache {
   ocl::Buffer<CacheState> state;        ///< [1]
 
  private:
+  BlockCache(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
+             std::uint32_t group_size, const ocl::Defines &defines);
+
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
   ocl::Buffer<uint> free_slots_;

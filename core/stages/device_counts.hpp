@@ -23,6 +23,12 @@ inline ocl::Defines group_defines(std::uint32_t group_size) {
   return {{"ISO_GROUP_SIZE", std::to_string(group_size) + "u"}};
 }
 
+/// Tiles of group_size * items entries that hold `count`.
+inline std::uint64_t num_tiles(std::uint64_t count, std::uint32_t group_size, std::uint32_t items) {
+  const std::uint64_t tile = std::uint64_t{group_size} * items;
+  return (count + tile - 1) / tile;
+}
+
 /// For kernels of frames that may be drawn at several levels of detail.
 inline ocl::Defines with_levels(ocl::Defines defines, bool levels) {
   if (levels) defines.insert({"ISO_LEVELS", "1"});

@@ -10,20 +10,15 @@ namespace isowave::core {
 namespace {
 
 /// Distinct blocks that a pass's pairs can belong to.
-std::uint64_t max_visible(std::uint64_t num_rays, std::uint32_t num_slots) {
-  return std::min<std::uint64_t>(num_rays, num_slots);
+std::uint64_t max_visible(const Group::Limits &limits) {
+  return std::min<std::uint64_t>(limits.num_rays, limits.num_slots);
 }
 
-/// Tiles of group_size * items entries.
-std::uint64_t num_tiles(std::uint64_t count, std::uint32_t group_size, std::uint32_t items) {
-  const std::uint64_t tile = std::uint64_t{group_size} * items;
-  return (count + tile - 1) / tile;
-}
-
-/// A launch over `count` entries in such tiles.
-ocl::Range tiles_range(std::uint64_t count, std::uint32_t group_size, std::uint32_t items,
+/// A launch over the pass's pairs in tiles of group_size * items.
+ocl::Range tiles_range(const Group::Limits &limits, std::uint32_t items,
                        const ocl::Device &device) {
-  return ocl::Range::strided(num_tiles(count, group_size, items) * group_size, group_size, device);
+  const std::uint64_t tiles = num_tiles(limits.num_rays, limits.group_size, items);
+  return ocl::Range::strided(tiles * limits.group_size, limits.group_size, device);
 }
 
 ocl::Defines group_stage_defines(std::uint32_t group_size, ClosestHit closest) {
@@ -45,31 +40,51 @@ Grouping grouping_from_string(std::string_view name) {
   throw Error("no grouping is called '{}'; there are: radix, counting", name);
 }
 
-Group::Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
-             std::uint32_t group_size, Grouping grouping, ClosestHit closest)
-    : groups_{{device, "grouped pair ids", num_rays},
-              {device, "block rays", max_visible(num_rays, num_slots)}},
-      pair_slots_(device, "cache slots of pairs", num_rays),
-      gather_(grouping == Grouping::kRadix
-                  ? decltype(gather_)(std::in_place_type<ByRadix>, device, num_rays, num_slots,
-                                      group_size, closest)
-                  : decltype(gather_)(std::in_place_type<ByCounting>, device, num_rays, num_slots,
-                                      group_size, closest)) {}
+ocl::BufferSizes Group::sizes(const Limits &limits) {
+  const std::uint64_t rays = limits.num_rays, slots = limits.num_slots;
+  ocl::BufferSizes sizes{ocl::buffer_size<uint>("grouped pair ids", rays),
+                         ocl::buffer_size<BlockRays>("block rays", max_visible(limits)),
+                         ocl::buffer_size<uint>("cache slots of pairs", rays)};
+  if (limits.grouping == Grouping::kRadix) {
+    const std::uint64_t tiles = num_tiles(rays, limits.group_size, ISO_SCAN_ITEMS);
+    return sizes.add(RadixSort::sizes(rays, limits.group_size))
+        .add({ocl::buffer_size<uint>("group tile sums", tiles)});
+  }
+  return sizes.add({ocl::buffer_size<uint>("pairs by slot", slots),
+                    ocl::buffer_size<uint>("pair offsets by slot", slots),
+                    ocl::buffer_size<uint>("group candidates", 1)});
+}
+
+Group::Group(ocl::Device &device, const Limits &limits, ClosestHit closest)
+    : Group(device, limits, sizes(limits), group_stage_defines(limits.group_size, closest)) {}
+
+Group::Group(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
+             const ocl::Defines &defines)
+    : groups_{{device, sizes["grouped pair ids"]}, {device, sizes["block rays"]}},
+      pair_slots_(device, sizes["cache slots of pairs"]),
+      gather_(make_gather(device, limits, sizes, defines)) {}
+
+Group::Gather Group::make_gather(ocl::Device &device, const Limits &limits,
+                                 const ocl::BufferSizes &sizes, const ocl::Defines &defines) {
+  if (limits.grouping == Grouping::kRadix)
+    return Gather(std::in_place_type<ByRadix>, device, limits, sizes, defines);
+  return Gather(std::in_place_type<ByCounting>, device, limits, sizes, defines);
+}
 
 void Group::operator()(const BlockCache &cache, Wavefront &rays) {
   std::visit([&](auto &gather) { gather(cache, rays, pair_slots_, groups_); }, gather_);
 }
 
-Group::ByRadix::ByRadix(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
-                        std::uint32_t group_size, ClosestHit closest)
-    : pair_tiles_range(tiles_range(num_rays, group_size, ISO_GROUP_ITEMS, device)),
-      key_tiles_range(tiles_range(num_rays, group_size, ISO_SCAN_ITEMS, device)),
-      key_bits(std::max(1, static_cast<int>(std::bit_width(num_slots - 1)))),
-      sort(device, num_rays, group_size),
-      tile_sums(device, "group tile sums", num_tiles(num_rays, group_size, ISO_SCAN_ITEMS)),
-      select(device, "group", "group_select", group_stage_defines(group_size, closest)),
-      head_sums(device, "group", "group_head_sums", group_stage_defines(group_size, closest)),
-      heads(device, "group", "group_heads", group_stage_defines(group_size, closest)) {}
+Group::ByRadix::ByRadix(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
+                        const ocl::Defines &defines)
+    : pair_tiles_range(tiles_range(limits, ISO_GROUP_ITEMS, device)),
+      key_tiles_range(tiles_range(limits, ISO_SCAN_ITEMS, device)),
+      key_bits(std::max(1, static_cast<int>(std::bit_width(limits.num_slots - 1)))),
+      sort(device, limits.num_rays, limits.group_size),
+      tile_sums(device, sizes["group tile sums"]),
+      select(device, "group", "group_select", defines),
+      head_sums(device, "group", "group_head_sums", defines),
+      heads(device, "group", "group_heads", defines) {}
 
 void Group::ByRadix::operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &keys,
                                 BlockGroups &groups) {
@@ -80,17 +95,17 @@ void Group::ByRadix::operator()(const BlockCache &cache, Wavefront &rays, ocl::B
   heads(key_tiles_range, rays.counts, keys, tile_sums, groups.block_rays);
 }
 
-Group::ByCounting::ByCounting(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
-                              std::uint32_t group_size, ClosestHit closest)
-    : pair_tiles_range(tiles_range(num_rays, group_size, ISO_GROUP_ITEMS, device)),
-      candidates_range(ocl::Range::strided(max_visible(num_rays, num_slots), group_size, device)),
-      pairs_range(ocl::Range::strided(num_rays, ocl::kGroupSize, device, 2)),
-      slot_counts(device, "pairs by slot", num_slots),
-      slot_offsets(device, "pair offsets by slot", num_slots),
-      candidate_count(device, "group candidates", 1),
-      count(device, "group", "group_count", group_stage_defines(group_size, closest)),
-      blocks(device, "group", "group_blocks", group_stage_defines(group_size, closest)),
-      scatter(device, "group", "group_scatter", group_stage_defines(group_size, closest)) {}
+Group::ByCounting::ByCounting(ocl::Device &device, const Limits &limits,
+                              const ocl::BufferSizes &sizes, const ocl::Defines &defines)
+    : pair_tiles_range(tiles_range(limits, ISO_GROUP_ITEMS, device)),
+      candidates_range(ocl::Range::strided(max_visible(limits), limits.group_size, device)),
+      pairs_range(ocl::Range::strided(limits.num_rays, ocl::kGroupSize, device, 2)),
+      slot_counts(device, sizes["pairs by slot"]),
+      slot_offsets(device, sizes["pair offsets by slot"]),
+      candidate_count(device, sizes["group candidates"]),
+      count(device, "group", "group_count", defines),
+      blocks(device, "group", "group_blocks", defines),
+      scatter(device, "group", "group_scatter", defines) {}
 
 void Group::ByCounting::operator()(const BlockCache &cache, Wavefront &rays,
                                    ocl::Buffer<uint> &pair_slots, BlockGroups &groups) {

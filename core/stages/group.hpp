@@ -34,9 +34,16 @@ struct BlockGroups {
 
 class Group {
  public:
-  Group(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
-        std::uint32_t group_size, Grouping grouping = kDefaultGrouping,
-        ClosestHit closest = kDefaultClosestHit);
+  /// What the lengths of its buffers depend on.
+  struct Limits {
+    std::uint64_t num_rays = 0;   ///< bounds a pass's pairs
+    std::uint32_t num_slots = 0;  ///< of the cache
+    std::uint32_t group_size = 64;
+    Grouping grouping = kDefaultGrouping;
+  };
+  static ocl::BufferSizes sizes(const Limits &limits);
+
+  Group(ocl::Device &device, const Limits &limits, ClosestHit closest = kDefaultClosestHit);
 
   /// In: counts.granted_count and counts.visible_count are 0, as begin_pass leaves them.
   /// Out: groups(), both counts; the other pairs are marked "not tested"; rays.mask is overwritten.
@@ -47,8 +54,8 @@ class Group {
 
  private:
   struct ByRadix {
-    ByRadix(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
-            std::uint32_t group_size, ClosestHit closest);
+    ByRadix(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
+            const ocl::Defines &defines);
     void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &keys,
                     BlockGroups &groups);
 
@@ -64,8 +71,8 @@ class Group {
   };
 
   struct ByCounting {
-    ByCounting(ocl::Device &device, std::uint64_t num_rays, std::uint32_t num_slots,
-               std::uint32_t group_size, ClosestHit closest);
+    ByCounting(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
+               const ocl::Defines &defines);
     void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &pair_slots,
                     BlockGroups &groups);
 
@@ -84,10 +91,17 @@ class Group {
         scatter;
   };
 
+  using Gather = std::variant<ByRadix, ByCounting>;
+
+  Group(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
+        const ocl::Defines &defines);
+  static Gather make_gather(ocl::Device &device, const Limits &limits,
+                            const ocl::BufferSizes &sizes, const ocl::Defines &defines);
+
   BlockGroups groups_;
   ocl::Buffer<uint>
       pair_slots_;  ///< [R] by radix the keys of the sort, else slots of pairs' blocks, by pair
-  std::variant<ByRadix, ByCounting> gather_;
+  Gather gather_;
 };
 
 }  // namespace isowave::core

@@ -2,9 +2,13 @@
 
 namespace isowave::core {
 
-KeptPicture::KeptPicture(ocl::Device &device, ImageSize largest)
+ocl::BufferSizes KeptPicture::sizes(std::uint64_t num_rays) {
+  return {ocl::buffer_size<HitRecord>("kept hits", num_rays)};
+}
+
+KeptPicture::KeptPicture(ocl::Device &device, std::uint64_t num_rays)
     : device_(device),
-      hits_(device, "kept hits", largest.num_rays()),
+      hits_(device, sizes(num_rays)["kept hits"]),
       show_(device, "kept_picture", "show_kept") {}
 
 void KeptPicture::compile(Wavefront &rays) {

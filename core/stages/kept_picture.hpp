@@ -20,8 +20,9 @@ inline ImageSize halved(ImageSize size, unsigned times) {
 
 class KeptPicture {
  public:
-  /// Largest size of a picture that can be kept.
-  KeptPicture(ocl::Device &device, ImageSize largest);
+  /// num_rays: of the largest picture that can be kept.
+  static ocl::BufferSizes sizes(std::uint64_t num_rays);
+  KeptPicture(ocl::Device &device, std::uint64_t num_rays);
 
   /// Launches the kernel without a pixel to show, see Device::Compiling.
   void compile(Wavefront &rays);

@@ -28,19 +28,39 @@ std::uint64_t num_samples(std::uint64_t num_blocks) {
 
 }  // namespace
 
+ocl::BufferSizes MacrocellBuffers::sizes(const Limits &limits) {
+  ocl::BufferSizes sizes{ocl::buffer_size<cl_ushort>("block ranges", limits.num_blocks)};
+  for (std::size_t i = 0; i < limits.num_selections; ++i)
+    sizes.add({ocl::buffer_size<uint>("macrocell masks", 2 * limits.num_macrocells)});
+  return sizes;
+}
+
+MacrocellBuffers::MacrocellBuffers(ocl::Device &device, const Limits &limits)
+    : ranges(device, sizes(limits)["block ranges"]) {
+  for (const ocl::BufferSize &size : sizes(limits).named("macrocell masks"))
+    masks.emplace_back(device, size);
+}
+
+ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num_selections) {
+  ocl::BufferSizes sizes{ocl::buffer_size<cl_ushort>("macrocell ranges", num_macrocells),
+                         ocl::buffer_size<uint>("active limits", ISO_BOUND_CODES)};
+  for (std::size_t i = 0; i < num_selections; ++i)
+    sizes.add({ocl::buffer_size<int>("active box", 6)});
+  return sizes;
+}
+
 Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
                        std::shared_ptr<MacrocellBuffers> buffers)
     : num_coarse_(static_cast<std::uint32_t>(num_macrocells(frame))),
       coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
-      buffers_(buffers
-                   ? std::move(buffers)
-                   : std::make_shared<MacrocellBuffers>(device, block_count(frame), num_coarse_)),
-      coarse_ranges_(device, "macrocell ranges", num_coarse_),
-      limits_(device, "active limits", ISO_BOUND_CODES),
+      buffers_(buffers ? std::move(buffers)
+                       : std::make_shared<MacrocellBuffers>(
+                             device, MacrocellBuffers::Limits{block_count(frame), num_coarse_})),
+      coarse_ranges_(device, own_sizes()["macrocell ranges"]),
+      limits_(device, own_sizes()["active limits"]),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
-  selections_.reserve(buffers_->masks.size());
-  for (std::size_t i = 0; i < buffers_->masks.size(); ++i)
-    selections_.push_back({.box = ocl::Buffer<int>(device, "active box", 6)});
+  for (const ocl::BufferSize &size : own_sizes().named("active box"))
+    selections_.push_back({.box = ocl::Buffer<int>(device, size)});
   build(device, frame, stream);
 }
 
@@ -49,8 +69,8 @@ void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildK
   const auto compiling = device.compiling();
   const FrameParams no_blocks{};
   const ocl::Range range{1, ocl::kGroupSize};
-  ocl::Buffer<ValueRange> partials(device, "range samples", 8);
-  const ocl::Buffer<float> thresholds(device, "range thresholds", kNumThresholds);
+  ocl::Buffer<ValueRange> partials(device, sampling_sizes(1)["range samples"]);
+  const ocl::Buffer<float> thresholds(device, layer_sizes(1)["range thresholds"]);
   // limits_ stands in for words that are not read.
   kernels.partials(range, no_blocks, limits_, limits_, limits_, limits_, limits_, stream.layout, 0,
                    0, 0, 0, partials);
@@ -69,13 +89,12 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
   Partials decode{device, frame, stream, kernels.partials};
   thresholds_ = sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame)), decode);
 
-  const ocl::Buffer<float> thresholds(device, "range thresholds",
-                                      std::span<const float>(thresholds_));
   const std::uint32_t layer_blocks = frame.blocks_x * frame.blocks_y;
-  ocl::Buffer<ValueRange> below(device, "range partials, layer below",
-                                8 * std::size_t{layer_blocks});
-  ocl::Buffer<ValueRange> above(device, "range partials, layer above",
-                                8 * std::size_t{layer_blocks});
+  const ocl::BufferSizes scratch = layer_sizes(layer_blocks);
+  ocl::Buffer<float> thresholds(device, scratch["range thresholds"]);
+  thresholds.write(thresholds_);
+  ocl::Buffer<ValueRange> below(device, scratch["range partials, layer below"]);
+  ocl::Buffer<ValueRange> above(device, scratch["range partials, layer above"]);
   const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
 
   decode(0, 1, layer_blocks, below);
@@ -90,10 +109,18 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
 
 std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
   const std::uint64_t blocks = std::uint64_t{num_blocks.x} * num_blocks.y * num_blocks.z;
-  const std::uint64_t samples = num_samples(blocks),
-                      layer_blocks = std::uint64_t{num_blocks.x} * num_blocks.y;
-  return std::max(8 * sizeof(ValueRange) * samples,
-                  2 * 8 * sizeof(ValueRange) * layer_blocks + kNumThresholds * sizeof(float));
+  const std::uint64_t layer_blocks = std::uint64_t{num_blocks.x} * num_blocks.y;
+  return std::max(sampling_sizes(blocks).bytes(), layer_sizes(layer_blocks).bytes());
+}
+
+ocl::BufferSizes Macrocells::sampling_sizes(std::uint64_t num_blocks) {
+  return {ocl::buffer_size<ValueRange>("range samples", 8 * num_samples(num_blocks))};
+}
+
+ocl::BufferSizes Macrocells::layer_sizes(std::uint64_t layer_blocks) {
+  return {ocl::buffer_size<float>("range thresholds", kNumThresholds),
+          ocl::buffer_size<ValueRange>("range partials, layer below", 8 * layer_blocks),
+          ocl::buffer_size<ValueRange>("range partials, layer above", 8 * layer_blocks)};
 }
 
 void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
@@ -122,7 +149,7 @@ std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint3
                                                  Partials &decode) {
   const auto stride = static_cast<std::uint32_t>(sample_stride(num_blocks));
   const auto count = static_cast<std::uint32_t>(num_samples(num_blocks));
-  ocl::Buffer<ValueRange> partials(device, "range samples", 8 * std::size_t{count});
+  ocl::Buffer<ValueRange> partials(device, sampling_sizes(num_blocks)["range samples"]);
   decode(0, stride, count, partials);
   const std::vector<ValueRange> samples = partials.read();
   std::vector<float> values;

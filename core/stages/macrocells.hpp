@@ -18,15 +18,17 @@ namespace isowave::core {
 /// Of one level of detail or of several, one behind the other: FrameParams::ranges_begin,
 /// masks_begin.
 struct MacrocellBuffers {
-  /// num_selections: masks are kept of so many, for whoever draws the volume, and its lower and
-  /// upper bound, by turns.
-  MacrocellBuffers(ocl::Device &device, std::uint64_t num_blocks, std::uint64_t num_macrocells,
-                   std::size_t num_selections = 1)
-      : ranges(device, "block ranges", num_blocks) {
-    masks.reserve(num_selections);
-    for (std::size_t i = 0; i < num_selections; ++i)
-      masks.emplace_back(device, "macrocell masks", 2 * num_macrocells);
-  }
+  /// What the lengths of its buffers depend on.
+  struct Limits {
+    std::uint64_t num_blocks = 0, num_macrocells = 0;  ///< of all levels together
+    /// Masks are kept of so many, for whoever draws the volume, and its lower and upper bound, by
+    /// turns.
+    std::size_t num_selections = 1;
+  };
+  static ocl::BufferSizes sizes(const Limits &limits);
+
+  MacrocellBuffers(ocl::Device &device, const Limits &limits);
+
   ocl::Buffer<cl_ushort> ranges;
   std::vector<ocl::Buffer<uint>> masks;  ///< [selections]
   std::size_t selection = 0;             ///< the one in use, at all levels
@@ -39,14 +41,17 @@ struct BlockBox {
 
 class Macrocells {
  public:
+  /// num_macrocells: of its level of detail. num_selections: of its MacrocellBuffers, whose own
+  /// buffers are not among these.
+  static ocl::BufferSizes sizes(std::uint64_t num_macrocells, std::size_t num_selections);
+  /// Bytes that building needs beside what stays.
+  static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
+
   /// Decodes every block once, beside a sample for the quantile table, and waits.
   /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z
   /// layer. buffers: shared with other levels; none: its own.
   Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
              std::shared_ptr<MacrocellBuffers> buffers = {});
-
-  /// Bytes that building needs beside what stays.
-  static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Rebuilds masks() for frame.isovalue, where voxels may be voxel_error from those that the
   /// ranges were made of. moved: the stream, if its layout raises or lowers voxels as it did not
@@ -101,6 +106,12 @@ class Macrocells {
     std::optional<std::array<int, 6>> active_box{};
   };
   Selection &selection() { return selections_[buffers_->selection]; }
+
+  ocl::BufferSizes own_sizes() const { return sizes(num_coarse_, buffers_->masks.size()); }
+  /// Scratch of the build: while it samples blocks for the quantile table ...
+  static ocl::BufferSizes sampling_sizes(std::uint64_t num_blocks);
+  /// ... and then, while it makes the blocks' ranges one z layer after the other.
+  static ocl::BufferSizes layer_sizes(std::uint64_t layer_blocks);
 
   struct BuildKernels {
     PartialsKernel partials;

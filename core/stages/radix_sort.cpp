@@ -24,26 +24,29 @@ RadixRanking ranking_for(const ocl::Device &device) {
 
 }  // namespace
 
+ocl::BufferSizes RadixSort::sizes(std::uint64_t max_count, std::uint32_t group_size) {
+  // The table has the pairs of each digit, and those of each digit and tile.
+  const std::uint64_t tiles = num_tiles(max_count, group_size, ISO_RADIX_ITEMS);
+  return {ocl::buffer_size<uint>("sort keys, other half", max_count),
+          ocl::buffer_size<uint>("sort values, other half", max_count),
+          ocl::buffer_size<uint>("sort digit table", ISO_RADIX_DIGITS * (1 + tiles))};
+}
+
 RadixSort::RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size,
                      RadixRanking ranking)
     : max_count_(max_count),
       group_size_(group_size),
       tiles_range_(ocl::Range::strided((max_count + ISO_RADIX_ITEMS - 1) / ISO_RADIX_ITEMS,
                                        group_size, device)),
-      other_keys_(device, "sort keys, other half", max_count),
-      other_values_(device, "sort values, other half", max_count),
-      table_(device, "sort digit table", table_size(max_count, group_size)),
+      other_keys_(device, sizes(max_count, group_size)["sort keys, other half"]),
+      other_values_(device, sizes(max_count, group_size)["sort values, other half"]),
+      table_(device, sizes(max_count, group_size)["sort digit table"]),
       histogram_(device, "radix_sort", "radix_histogram", radix_defines(group_size, ranking)),
       scan_(device, "radix_sort", "radix_scan", radix_defines(group_size, ranking)),
       scatter_(device, "radix_sort", "radix_scatter", radix_defines(group_size, ranking)) {}
 
 RadixSort::RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size)
     : RadixSort(device, max_count, group_size, ranking_for(device)) {}
-
-std::uint64_t RadixSort::table_size(std::uint64_t max_count, std::uint32_t group_size) {
-  const std::uint64_t tile = std::uint64_t{group_size} * ISO_RADIX_ITEMS;
-  return ISO_RADIX_DIGITS * (1 + (max_count + tile - 1) / tile);
-}
 
 void RadixSort::operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, CountsBuffer &counts,
                            uint count_field, uint key_bits) {

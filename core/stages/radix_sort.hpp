@@ -15,6 +15,7 @@ enum class RadixRanking {
 class RadixSort {
  public:
   /// max_count: the largest number of pairs any call may sort; scratch is O(max_count).
+  static ocl::BufferSizes sizes(std::uint64_t max_count, std::uint32_t group_size);
   RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size,
             RadixRanking ranking);
   /// Ranks as suits the device.
@@ -31,9 +32,6 @@ class RadixSort {
   /// range. Asynchronous: enqueues and does not wait.
   void operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, CountsBuffer &counts,
                   uint count_field, uint key_bits);
-
-  /// Entries of the table of digits.
-  static std::uint64_t table_size(std::uint64_t max_count, std::uint32_t group_size);
 
  private:
   std::size_t max_count_;

@@ -21,21 +21,29 @@ ocl::Defines resident_defines(Solver solver) {
 
 }  // namespace
 
-Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
-                   Solver solver)
-    : Resident(device, volume, size, solver, DeviceStream(device, volume)) {}
+ocl::BufferSizes Resident::sizes(std::uint64_t num_blocks, ImageSize size) {
+  return {ocl::buffer_size<float>("decoded volume", ISO_BLOCK_VOXELS * num_blocks),
+          ocl::buffer_size<ulong>("voxels inside", num_blocks),
+          ocl::buffer_size<ulong>("changing cells", num_blocks),
+          ocl::buffer_size<HitRecord>("hits", size.num_rays())};
+}
 
 Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
-                   Solver solver, const DeviceStream &stream)
+                   Solver solver)
+    : Resident(device, volume, size, solver, DeviceStream(device, volume),
+               sizes(volume.block_count(), size)) {}
+
+Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
+                   Solver solver, const DeviceStream &stream, const ocl::BufferSizes &sizes)
     : device_(device),
       info_(volume.info),
       size_(size),
       num_blocks_(static_cast<std::uint32_t>(volume.block_count())),
       macrocells_(device, make_grid_params(volume.info), stream),
-      values_(device, "decoded volume", volume.block_count() * ISO_BLOCK_VOXELS),
-      inside_(device, "voxels inside", volume.block_count()),
-      changing_(device, "changing cells", volume.block_count()),
-      hits_(device, "hits", size.num_rays()),
+      values_(device, sizes["decoded volume"]),
+      inside_(device, sizes["voxels inside"]),
+      changing_(device, sizes["changing cells"]),
+      hits_(device, sizes["hits"]),
       inside_kernel_(device, "resident", "resident_inside", resident_defines(solver)),
       changing_kernel_(device, "resident", "resident_changing", resident_defines(solver)),
       kernel_(device, "resident", "resident", resident_defines(solver)) {
@@ -54,14 +62,15 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
 
 std::optional<std::string> Resident::obstacle(const ocl::Device &device,
                                               const CompressedVolume &volume, ImageSize size) {
-  const std::uint64_t blocks = volume.block_count();
-  const std::uint64_t values = blocks * ISO_BLOCK_VOXELS * sizeof(float);
-  const glm::uvec3 cells = (volume.num_blocks() + 3u) / 4u;
-  const std::uint64_t macrocells = 2 * blocks + 10 * std::uint64_t{cells.x} * cells.y * cells.z +
-                                   Macrocells::setup_scratch_bytes(volume.num_blocks());
-  const std::uint64_t all = volume.word_count() * sizeof(uint) + macrocells + values +
-                            2 * blocks * sizeof(ulong) + size.num_rays() * sizeof(HitRecord);
+  const FrameParams grid = make_grid_params(volume.info);
+  const std::uint64_t blocks = volume.block_count(), macrocells = num_macrocells(grid);
   const ocl::Capabilities &can = device.capabilities();
+  ocl::BufferSizes buffers = sizes(blocks, size);
+  const std::uint64_t values = buffers["decoded volume"].bytes();
+  buffers.add(MacrocellBuffers::sizes({blocks, macrocells}))
+      .add(Macrocells::sizes(macrocells, 1))
+      .add(DeviceStream::sizes(volume, split_stream(volume, can.largest_allocation), false));
+  const std::uint64_t all = buffers.bytes() + Macrocells::setup_scratch_bytes(volume.num_blocks());
   if (values > can.largest_allocation) {
     return fmt::format("the decoded volume is {} bytes, the device's largest allocation {}", values,
                        can.largest_allocation);

@@ -16,6 +16,9 @@ namespace isowave::core {
 
 class Resident {
  public:
+  /// Of what stays beside the Macrocells.
+  static ocl::BufferSizes sizes(std::uint64_t num_blocks, ImageSize size);
+
   /// Decodes the whole volume and waits. Throws Error when memory does not suffice. `device` must
   /// outlive this; `volume` need not.
   Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
@@ -35,7 +38,7 @@ class Resident {
  private:
   /// stream: the compressed volume, which only decoding needs.
   Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size, Solver solver,
-           const DeviceStream &stream);
+           const DeviceStream &stream, const ocl::BufferSizes &sizes);
 
   ocl::Device &device_;
   VolumeInfo info_;

@@ -25,9 +25,14 @@ void ExclusiveScan::operator()(ocl::Buffer<uint> &values, CountsBuffer &counts, 
   scan_({1, group_size_}, values, counts, count_field, divisor, total_field);
 }
 
+ocl::BufferSizes Compaction::sizes(std::uint64_t max_count, std::uint32_t group_size) {
+  return {
+      ocl::buffer_size<uint>("scan tile sums", num_tiles(max_count, group_size, ISO_SCAN_ITEMS))};
+}
+
 Compaction::Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t group_size)
     : tile_(group_size * ISO_SCAN_ITEMS),
-      tile_offsets_(device, "scan tile sums", (max_count + tile_ - 1) / tile_),
+      tile_offsets_(device, sizes(max_count, group_size)["scan tile sums"]),
       scan_(device, group_size),
       count_(device, "scan", "compact_count", group_defines(group_size)),
       values_(device, "scan", "compact_values", group_defines(group_size)) {

@@ -28,6 +28,7 @@ class ExclusiveScan {
 class Compaction {
  public:
   /// max_count: the largest count any call may have.
+  static ocl::BufferSizes sizes(std::uint64_t max_count, std::uint32_t group_size);
   Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t group_size);
 
   /// out = values[i] of every i < n with mask[i] != 0, n in `count_field`; how many goes to

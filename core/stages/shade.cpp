@@ -58,10 +58,15 @@ Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
   return rgb_image(columns, rows, packed);
 }
 
+ocl::BufferSizes Shade::sizes(std::uint64_t max_pixels) {
+  return {ocl::buffer_size<ShadeParams>("shading", 1),
+          ocl::buffer_size<uint>("framebuffer", max_pixels)};
+}
+
 Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
     : device_(device),
-      params_(device, "shading", 1),
-      image_(device, "framebuffer", max_pixels),
+      params_(device, sizes(max_pixels)["shading"]),
+      image_(device, sizes(max_pixels)["framebuffer"]),
       kernel_(device, "shade", "shade") {}
 
 void Shade::compile(Wavefront &rays) {

@@ -28,6 +28,7 @@ Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
 class Shade {
  public:
   /// max_pixels: of a picture.
+  static ocl::BufferSizes sizes(std::uint64_t max_pixels);
   Shade(ocl::Device &device, std::uint64_t max_pixels);
 
   /// Launches the kernel without a pixel to shade, see Device::Compiling.

@@ -29,25 +29,15 @@ inline ocl::Defines closest_defines(ClosestHit closest) {
 }
 
 struct Wavefront {
-  /// with_pairs: pipeline `blocks` needs the arrays of ray-block pairs, `rays` does not. levels: of
-  /// detail.
-  explicit Wavefront(ocl::Device &device, std::uint64_t rays, bool with_pairs = true,
-                     std::size_t levels = 1)
-      : num_rays(rays),
-        level_frames(device, "level frames", levels),
-        counts(device, "pass counts", 1),
-        previous_counts(device, "pass counts, previous", 1),
-        next_counts(device, "pass counts, next", 1),
-        hits(device, "hits", rays),
-        ray_block_ids(device, "ray states", rays),
-        active_ray_ids(device, "active ray ids", rays),
-        next_active_ray_ids(device, "active ray ids, next", rays),
-        mask(device, "mask", with_pairs ? rays : 0),
-        pair_block_ids(device, "pair block ids", with_pairs ? rays : 0),
-        pair_hits(device, "pair hits", with_pairs ? rays : 0),
-        closest_pairs(device, "closest pairs", with_pairs ? rays : 0) {
-    reset_counts();
-  }
+  /// What the lengths of its buffers depend on.
+  struct Limits {
+    std::uint64_t num_rays = 0;
+    bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
+    std::size_t num_levels = 1;  ///< of detail
+  };
+  static ocl::BufferSizes sizes(const Limits &limits);
+
+  Wavefront(ocl::Device &device, const Limits &limits);
 
   /// As before the first pass of all. Waits.
   void reset_counts() {
@@ -92,6 +82,9 @@ struct Wavefront {
   ocl::Buffer<PairHit> pair_hits;    ///< [window_count * spec_count] what intersection found
   ocl::Buffer<uint>
       closest_pairs;  ///< [window_count] by active ray: its pair that decides (closest_pair.h)
+
+ private:
+  Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferSizes &sizes);
 };
 
 }  // namespace isowave::core

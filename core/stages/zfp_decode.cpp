@@ -16,14 +16,20 @@ ocl::Defines all_defines(ocl::Defines stream_defines, bool levels) {
 
 }  // namespace
 
+ocl::BufferSizes ZfpDecode::sizes(std::uint64_t max_blocks, bool stream_on_host, bool levels) {
+  if (!stream_on_host || !levels) return {};
+  return {ocl::buffer_size<uint>("decode places", max_blocks)};
+}
+
 ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks,
                      const ocl::Defines &stream_defines, bool levels)
     : device_(device),
       stream_defines_(stream_defines),
       range_(ocl::Range::strided(max_blocks, ocl::kGroupSize, device)),
       kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines, levels)) {
-  if (levels && DeviceStream::is_window(stream_defines))
-    places_.emplace(device, "decode places", max_blocks);
+  const bool stream_on_host = DeviceStream::is_window(stream_defines);
+  if (stream_on_host && levels)
+    places_.emplace(device, sizes(max_blocks, stream_on_host, levels)["decode places"]);
 }
 
 void ZfpDecode::compile(const DeviceStream &stream, const CountsBuffer &counts, BlockCache &cache) {

@@ -13,6 +13,8 @@ namespace isowave::core {
 
 class ZfpDecode {
  public:
+  /// Of one level of detail alone, and where streams are whole on the device, it has no buffers.
+  static ocl::BufferSizes sizes(std::uint64_t max_blocks, bool stream_on_host, bool levels);
   /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams
   /// to come. levels: block ids count on through several levels of detail (FrameParams), and only
   /// blocks of the levels at hand are decoded.

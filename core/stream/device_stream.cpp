@@ -32,6 +32,25 @@ void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffe
   }
 }
 
+/// Where blocks begin, if they have lengths of their own, and the bounds of their errors behind it;
+/// nothing of both: no buffer.
+ocl::BufferSizes index_sizes(std::span<const std::uint32_t> index,
+                             std::span<const std::uint8_t> bounds) {
+  const std::uint64_t words = index.size() + (bounds.size() + 3) / 4;
+  if (words == 0) return {};
+  return {ocl::buffer_size<uint>("block index", words)};
+}
+
+std::span<const std::uint32_t> index_of(const CompressedVolume &volume) {
+  if (!volume.is_indexed()) return {};
+  return volume.index;
+}
+
+std::span<const std::uint8_t> bounds_of(const CompressedVolume &volume, bool with_bounds) {
+  if (!with_bounds) return {};
+  return volume.bounds.codes;
+}
+
 }  // namespace
 
 StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part) {
@@ -51,8 +70,19 @@ StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_p
   return split;
 }
 
-std::uint64_t bound_words(const CompressedVolume &volume) {
-  return (volume.bounds.codes.size() + 3) / 4;
+ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, const StreamSplit &split,
+                                     bool with_bounds) {
+  ocl::BufferSizes sizes;
+  for (const std::uint64_t words : split.words)
+    sizes.add({ocl::buffer_size<uint>("zfp stream", words)});
+  return sizes.add(index_sizes(index_of(volume), bounds_of(volume, with_bounds)));
+}
+
+/// A window brings where its blocks begin.
+ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, OnHost host,
+                                     bool with_bounds) {
+  return StreamWindow::sizes(volume, host.window_blocks)
+      .add(index_sizes({}, bounds_of(volume, with_bounds)));
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
@@ -68,13 +98,12 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
   }
   layout = layout_of(volume, split.words_per_part);
   std::uint64_t first = 0;
-  for (const std::uint64_t words : split.words) {
-    parts.emplace_back(device, "zfp stream", words);
+  for (const ocl::BufferSize &size : sizes(volume, split, with_bounds).named("zfp stream")) {
+    parts.emplace_back(device, size);
     write_words(volume, first, parts.back());
     first += split.words_per_part;
   }
-  add_index(device, indexed_ ? volume.index : std::span<const std::uint32_t>{},
-            with_bounds ? volume.bounds.codes : std::span<const std::uint8_t>{});
+  add_index(device, index_of(volume), bounds_of(volume, with_bounds));
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host,
@@ -82,22 +111,24 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, 
     : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks, host.max_copy)),
       layout(layout_of(volume, 0)),
       indexed_(volume.is_indexed()) {
-  if (with_bounds)
-    add_index(device, {}, volume.bounds.codes);  // a window brings where its blocks begin
+  add_index(device, {}, bounds_of(volume, with_bounds));
 }
 
 void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t> index,
                              std::span<const std::uint8_t> bounds) {
   layout.bounds_begin = static_cast<std::uint32_t>(index.size());
+  const ocl::BufferSizes sizes = index_sizes(index, bounds);
+  if (sizes.size() == 0) return;
+  block_index.emplace(device, sizes["block index"]);
   std::vector<std::uint32_t> both;
   if (!bounds.empty()) {
     both.assign(index.begin(), index.end());
-    both.resize(index.size() + (bounds.size() + 3) / 4);
+    both.resize(block_index->size());
     for (std::size_t block = 0; block < bounds.size(); ++block)
       both[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
     index = both;
   }
-  if (!index.empty()) block_index.emplace(device, "block index", index);
+  block_index->write(index);
 }
 
 ocl::Defines DeviceStream::defines() const {

@@ -28,9 +28,6 @@ struct StreamSplit {
 /// largest_part: bytes.
 StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part);
 
-/// Words that the bounds of a volume's blocks take.
-std::uint64_t bound_words(const CompressedVolume &volume);
-
 /// The tag of a stream that stays on the host.
 struct OnHost {
   std::uint32_t window_blocks = 0;  ///< see StreamWindow
@@ -39,6 +36,12 @@ struct OnHost {
 
 class DeviceStream {
  public:
+  /// Of a whole stream in such parts, or of one behind a window; with_bounds: and of the bounds of
+  /// its blocks.
+  static ocl::BufferSizes sizes(const CompressedVolume &volume, const StreamSplit &split,
+                                bool with_bounds);
+  static ocl::BufferSizes sizes(const CompressedVolume &volume, OnHost host, bool with_bounds);
+
   /// Uploads the whole volume and waits. with_bounds: and those of its blocks, for
   /// layout.bound_unit. largest_part: bytes of a buffer at most; 0: what the device allows. Throws
   /// Error when four such buffers do not hold it.

@@ -55,27 +55,29 @@ void hold_back(ocl::Device &device, const cl::Event &event) {
 }  // namespace
 
 StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume,
-                           std::uint32_t window_blocks, std::uint64_t max_copy)
+                           std::uint32_t window_blocks, const ocl::BufferSizes &sizes)
     : device_(device),
       volume_(volume),
       window_blocks_(window_blocks),
-      halves_{Half{{device, "stream window", half_words(volume, window_blocks)},
-                   {device, "stream staging", half_words(volume, window_blocks)},
-                   {},
-                   {}},
-              Half{{device, "stream window", half_words(volume, window_blocks)},
-                   {device, "stream staging", half_words(volume, window_blocks)},
-                   {},
-                   {}}} {
-  const std::uint64_t num_words = volume.word_count();
-  if (!volume.file || num_words * sizeof(std::uint32_t) > max_copy) return;
+      halves_{Half{{device, sizes["stream window"]}, {device, sizes["stream staging"]}, {}, {}},
+              Half{{device, sizes["stream window"]}, {device, sizes["stream staging"]}, {}, {}}} {}
+
+StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume,
+                           std::uint32_t window_blocks, std::uint64_t max_copy)
+    : StreamWindow(device, volume, window_blocks, sizes(volume, window_blocks)) {
+  copy_payload(max_copy);
+}
+
+void StreamWindow::copy_payload(std::uint64_t max_copy) {
+  const std::uint64_t num_words = volume_.word_count();
+  if (!volume_.file || num_words * sizeof(std::uint32_t) > max_copy) return;
   copy_.resize(num_words);
   parallel_for(
       (num_words + kCopyWords - 1) / kCopyWords, 0, [&](std::uint64_t part, std::uint32_t) {
         const std::uint64_t first = part * kCopyWords;
-        volume.read_words(32 * first,
-                          std::span(copy_).subspan(
-                              first, std::min<std::uint64_t>(kCopyWords, num_words - first)));
+        volume_.read_words(32 * first,
+                           std::span(copy_).subspan(
+                               first, std::min<std::uint64_t>(kCopyWords, num_words - first)));
       });
 }
 
@@ -96,12 +98,15 @@ std::uint64_t StreamWindow::words_per_block(const CompressedVolume &volume) {
   return volume.payload_bits() / 32 / volume.block_count() + 1;
 }
 
-std::uint64_t StreamWindow::half_words(const CompressedVolume &volume,
-                                       std::uint64_t window_blocks) {
-  const std::uint64_t words = window_blocks * words_per_block(volume) + kDecoderAhead;
-  if (!volume.is_indexed()) return words;
-  return std::max<std::uint64_t>(words, (volume.max_block_bits() + 31) / 32 + kDecoderAhead) +
-         window_blocks + 1;
+ocl::BufferSizes StreamWindow::sizes(const CompressedVolume &volume, std::uint32_t window_blocks) {
+  std::uint64_t words = window_blocks * words_per_block(volume) + kDecoderAhead;
+  if (volume.is_indexed()) {
+    const std::uint64_t largest = (volume.max_block_bits() + 31) / 32 + kDecoderAhead;
+    words = std::max(words, largest) + window_blocks + 1;
+  }
+  const ocl::BufferSize window = ocl::buffer_size<uint>("stream window", words),
+                        staging = ocl::buffer_size<uint>("stream staging", words);
+  return {window, window, staging, staging};
 }
 
 std::size_t StreamWindow::run_length(std::span<const uint> block_ids) const {

@@ -33,10 +33,10 @@ class StreamWindow {
   /// Words of one block in the window, where each begins with a whole word: of every block at a
   /// fixed rate, otherwise of most.
   static std::uint64_t words_per_block(const CompressedVolume &volume);
-  /// Words of one half and of its staging memory: blocks, before them where each begins and ends
-  /// unless all are alike (kernels_cl/device/block_stream.h), and behind them two words that
+  /// Of both halves and their staging memory. Each holds blocks, before them where each begins and
+  /// ends unless all are alike (kernels_cl/device/block_stream.h), and behind them two words that
   /// decoders read past their block.
-  static std::uint64_t half_words(const CompressedVolume &volume, std::uint64_t window_blocks);
+  static ocl::BufferSizes sizes(const CompressedVolume &volume, std::uint32_t window_blocks);
 
   /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in
   /// `words`.
@@ -63,6 +63,9 @@ class StreamWindow {
     cl::Event used;      ///< words may be overwritten
   };
 
+  StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks,
+               const ocl::BufferSizes &sizes);
+  void copy_payload(std::uint64_t max_copy);
   /// Of block_ids, how many of the first fit one half; at least one.
   std::size_t run_length(std::span<const uint> block_ids) const;
   /// The volume's bits from the beginning of block block_id on, as many as `out` has.

@@ -85,6 +85,16 @@ void ZfpEncode::measure_errors(const ocl::Buffer<float> &voxels, const glm::uvec
            dims.z, bits_per_block, words, errors);
 }
 
+ocl::BufferSizes LayerEncoder::sizes(const glm::uvec3 &dims, std::uint32_t bits_per_block,
+                                     bool measure_error) {
+  const glm::uvec3 piece = largest_piece(dims);
+  const std::uint64_t blocks = block_count(piece);
+  return {ocl::buffer_size<float>("voxels to encode", voxel_count(piece)),
+          ocl::buffer_size<uint>("encoded words", blocks * (bits_per_block / 32) + 1),
+          ocl::buffer_size<float>("encoding errors",
+                                  measure_error ? ZfpEncode::kErrorsPerBlock * blocks : 0)};
+}
+
 LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims,
                            std::uint32_t bits_per_block, bool measure_error, BlockErrors errors)
     : device_(device),
@@ -94,10 +104,9 @@ LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims,
       measure_error_(measure_error),
       errors_(std::move(errors)),
       zfp_encode_(device),
-      voxels_(device, "voxels to encode", voxel_count(piece_dims_)),
-      words_(device, "encoded words", block_count(piece_dims_) * (bits_per_block / 32) + 1),
-      device_errors_(device, "encoding errors",
-                     measure_error ? ZfpEncode::kErrorsPerBlock * block_count(piece_dims_) : 0) {
+      voxels_(device, own_sizes()["voxels to encode"]),
+      words_(device, own_sizes()["encoded words"]),
+      device_errors_(device, own_sizes()["encoding errors"]) {
   zfp_encode_.compile(voxels_, words_, measure_error ? &device_errors_ : nullptr);
 }
 

@@ -53,6 +53,9 @@ class LayerEncoder {
   /// Takes the payload in order.
   using Sink = std::function<void(std::span<const std::byte>)>;
 
+  static ocl::BufferSizes sizes(const glm::uvec3 &dims, std::uint32_t bits_per_block,
+                                bool measure_error);
+
   /// dims: of the whole volume. bits_per_block: a multiple of 64.
   LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block,
                bool measure_error, BlockErrors errors = BlockErrors(false));
@@ -78,6 +81,7 @@ class LayerEncoder {
     cl::Event done;
   };
 
+  ocl::BufferSizes own_sizes() const { return sizes(dims_, bits_per_block_, measure_error_); }
   void enqueue_piece(const glm::uvec3 &dims);
   void hand_over(const Result &result, const Sink &sink);
 

@@ -360,8 +360,8 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
     fmt::print("its blocks are uploaded through a window, {} at a time\n",
                with_commas(plan.window_blocks));
   }
-  for (const MemoryPlan::Buffer &buffer : plan.buffers) {
-    fmt::print("  {:>16} bytes  {}\n", with_commas(buffer.bytes), buffer.name);
+  for (const ocl::BufferSize &buffer : plan.buffers) {
+    fmt::print("  {:>16} bytes  {}\n", with_commas(buffer.bytes()), buffer.name);
   }
   fmt::print("  {:>16} bytes  in all, with {} cache slots; at most {} during setup\n",
              with_commas(plan.total()), with_commas(plan.cache_slots),

@@ -1,0 +1,41 @@
+#include "core/stages/wavefront.hpp"
+
+namespace isowave::core {
+
+ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
+  const std::uint64_t rays = limits.num_rays, pairs = limits.with_pairs ? rays : 0;
+  return {ocl::buffer_size<PassCounts>("pass counts", 1),
+          ocl::buffer_size<PassCounts>("pass counts, previous", 1),
+          ocl::buffer_size<PassCounts>("pass counts, next", 1),
+          ocl::buffer_size<FrameParams>("level frames", limits.num_levels),
+          ocl::buffer_size<HitRecord>("hits", rays),
+          ocl::buffer_size<uint>("ray states", rays),
+          ocl::buffer_size<uint>("active ray ids", rays),
+          ocl::buffer_size<uint>("active ray ids, next", rays),
+          ocl::buffer_size<uint>("mask", pairs),
+          ocl::buffer_size<uint>("pair block ids", pairs),
+          ocl::buffer_size<PairHit>("pair hits", pairs),
+          ocl::buffer_size<uint>("closest pairs", pairs)};
+}
+
+Wavefront::Wavefront(ocl::Device &device, const Limits &limits)
+    : Wavefront(device, limits.num_rays, sizes(limits)) {}
+
+Wavefront::Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferSizes &sizes)
+    : num_rays(rays),
+      level_frames(device, sizes["level frames"]),
+      counts(device, sizes["pass counts"]),
+      previous_counts(device, sizes["pass counts, previous"]),
+      next_counts(device, sizes["pass counts, next"]),
+      hits(device, sizes["hits"]),
+      ray_block_ids(device, sizes["ray states"]),
+      active_ray_ids(device, sizes["active ray ids"]),
+      next_active_ray_ids(device, sizes["active ray ids, next"]),
+      mask(device, sizes["mask"]),
+      pair_block_ids(device, sizes["pair block ids"]),
+      pair_hits(device, sizes["pair hits"]),
+      closest_pairs(device, sizes["closest pairs"]) {
+  reset_counts();
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,304 @@
+// What sizes() states of each class that makes device buffers is what the device books when one is
+// made alone: neither more nor less, under the same names.
+
+#include "core/ocl/buffer_sizes.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+
+#include "core/render/pass_readback.hpp"
+#include "core/render/pipeline.hpp"
+#include "core/stages/kept_picture.hpp"
+#include "core/stages/resident.hpp"
+#include "core/stages/shade.hpp"
+#include "core/zfp/zfp_encode.hpp"
+#include "tests/stage_world.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave::core {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(BufferSizes, AreFoundByNameAndAddedUp) {
+  const ocl::BufferSizes sizes = ocl::BufferSizes{ocl::buffer_size<std::uint16_t>("a", 3)}.add(
+      {ocl::buffer_size<std::uint32_t>("b", 0), ocl::buffer_size<double>("a", 5)});
+  EXPECT_EQ(sizes.size(), 3u);
+  EXPECT_EQ(sizes["a"].bytes(), 6u);
+  EXPECT_EQ(sizes["b"].bytes(), 1u) << "OpenCL has no empty buffers";
+  EXPECT_EQ(sizes.named("a").bytes(), 46u);
+  EXPECT_EQ(sizes.named("none").size(), 0u);
+  EXPECT_EQ(sizes.bytes(), 47u);
+  EXPECT_EQ(ocl::BufferSizes().bytes(), 0u);
+  EXPECT_THAT([&] { sizes["c"]; }, ThrowsMessage<std::invalid_argument>(HasSubstr("'c'")));
+}
+
+TEST(BufferSizes, BytesDoNotOverflow) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+  EXPECT_EQ(ocl::buffer_size<std::uint32_t>("", kMost / 4).bytes(), kMost / 4 * 4);
+  EXPECT_EQ(ocl::buffer_size<std::uint32_t>("", kMost / 4 + 1).bytes(), kMost);
+}
+
+using Bytes = std::map<std::string, std::uint64_t>;
+
+Bytes booked_on(ocl::Device &device) {
+  Bytes booked;
+  for (const auto &[name, entry] : device.ledger().by_name()) {
+    if (entry.current != 0) booked[name] = entry.current;
+  }
+  return booked;
+}
+
+/// What make() makes books `sizes` beside what there is, and gives it all back.
+void expect_books(ocl::Device &device, const ocl::BufferSizes &sizes, const auto &make) {
+  const Bytes before = booked_on(device);
+  Bytes expected;
+  for (const ocl::BufferSize &size : sizes) expected[size.name] += size.bytes();
+  {
+    [[maybe_unused]] const auto made = make();
+    Bytes booked = booked_on(device);
+    for (const auto &[name, bytes] : before) {
+      if ((booked[name] -= bytes) == 0) booked.erase(name);
+    }
+    EXPECT_EQ(booked, expected);
+  }
+  EXPECT_EQ(booked_on(device), before) << "what is left when it is gone";
+}
+
+/// 5 x 2 x 3 blocks, 2 of its macrocells along x; with bounds of its blocks' errors.
+CompressedVolume small_volume(bool indexed) {
+  const glm::uvec3 dims(17, 8, 10);
+  CompressedVolume volume =
+      compress_with_libzfp(random_voxels(dims, 0, 1, 5), dims, indexed ? 0 : 256, -8);
+  volume.bounds.codes.assign(volume.block_count(), 1);
+  return volume;
+}
+
+/// Makes a class by several limits.
+struct Maker {
+  const char *name;
+  void (*check)(ocl::Device &device);
+};
+
+void check_wavefront(ocl::Device &device) {
+  for (const Wavefront::Limits &limits :
+       {Wavefront::Limits{1}, {.num_rays = 1000, .with_pairs = false}, {333, true, 4}})
+    expect_books(device, Wavefront::sizes(limits), [&] { return Wavefront(device, limits); });
+}
+
+void check_block_cache(ocl::Device &device) {
+  const FrameParams grid = grid_frame({65, 9, 30});
+  for (const auto &[slots, rays] : {std::pair(8u, 1u), {100u, 1u}, {100u, 50u}, {777u, 5000u}}) {
+    const BlockCache::Limits limits = BlockCache::limits_for(grid, slots, rays);
+    expect_books(device, BlockCache::sizes(limits), [&] { return BlockCache(device, limits, 8); });
+  }
+}
+
+void check_macrocell_buffers(ocl::Device &device) {
+  for (const MacrocellBuffers::Limits &limits : {MacrocellBuffers::Limits{1, 1}, {100, 7, 3}})
+    expect_books(device, MacrocellBuffers::sizes(limits),
+                 [&] { return MacrocellBuffers(device, limits); });
+}
+
+void check_macrocells(ocl::Device &device) {
+  for (const bool indexed : {false, true}) {
+    const CompressedVolume volume = small_volume(indexed);
+    const FrameParams grid = make_grid_params(volume.info);
+    const DeviceStream stream(device, volume);
+    const MacrocellBuffers::Limits limits{volume.block_count(), num_macrocells(grid), 3};
+    const auto buffers = std::make_shared<MacrocellBuffers>(device, limits);
+    expect_books(device, Macrocells::sizes(limits.num_macrocells, 3),
+                 [&] { return Macrocells(device, grid, stream, buffers); });
+    ocl::BufferSizes with_own = MacrocellBuffers::sizes({limits.num_blocks, limits.num_macrocells});
+    expect_books(device, with_own.add(Macrocells::sizes(limits.num_macrocells, 1)),
+                 [&] { return Macrocells(device, grid, stream); });
+  }
+}
+
+void check_device_stream(ocl::Device &device) {
+  for (const bool indexed : {false, true}) {
+    const CompressedVolume volume = small_volume(indexed);
+    const std::uint64_t bytes = volume.word_count() * sizeof(uint);
+    for (const bool with_bounds : {false, true}) {
+      for (const std::uint64_t largest : {bytes, bytes / 2}) {
+        const StreamSplit split = split_stream(volume, largest);
+        ASSERT_EQ(split.num_parts > 1, largest < bytes);
+        expect_books(device, DeviceStream::sizes(volume, split, with_bounds),
+                     [&] { return DeviceStream(device, volume, largest, with_bounds); });
+      }
+      const OnHost host{11};
+      expect_books(device, DeviceStream::sizes(volume, host, with_bounds),
+                   [&] { return DeviceStream(device, volume, host, with_bounds); });
+    }
+  }
+}
+
+void check_stream_window(ocl::Device &device) {
+  for (const bool indexed : {false, true}) {
+    const CompressedVolume volume = small_volume(indexed);
+    for (const uint window_blocks : {1u, 8u, 100u})
+      expect_books(device, StreamWindow::sizes(volume, window_blocks),
+                   [&] { return StreamWindow(device, volume, window_blocks); });
+  }
+}
+
+void check_zfp_decode(ocl::Device &device) {
+  const CompressedVolume volume = small_volume(false);
+  const DeviceStream whole(device, volume), window(device, volume, OnHost{8});
+  for (const bool levels : {false, true}) {
+    for (const DeviceStream *stream : {&whole, &window})
+      expect_books(device, ZfpDecode::sizes(30, stream == &window, levels),
+                   [&] { return ZfpDecode(device, 30, stream->defines(), levels); });
+  }
+  EXPECT_EQ(ZfpDecode::sizes(30, true, true).bytes(), 120u);
+}
+
+void check_compaction(ocl::Device &device) {
+  for (const auto &[count, group_size] : {std::pair(1u, 8u), {64u, 8u}, {65u, 8u}, {5000u, 64u}})
+    expect_books(device, Compaction::sizes(count, group_size),
+                 [&] { return Compaction(device, count, group_size); });
+}
+
+void check_radix_sort(ocl::Device &device) {
+  for (const auto &[count, group_size] : {std::pair(1u, 8u), {128u, 8u}, {129u, 8u}, {5000u, 64u}})
+    expect_books(device, RadixSort::sizes(count, group_size),
+                 [&] { return RadixSort(device, count, group_size); });
+}
+
+void check_group(ocl::Device &device) {
+  for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
+    for (const Group::Limits &limits :
+         {Group::Limits{1, 8, 8, grouping}, {100, 1000, 64, grouping}, {1000, 100, 8, grouping}})
+      expect_books(device, Group::sizes(limits), [&] { return Group(device, limits); });
+  }
+}
+
+void check_shade(ocl::Device &device) {
+  for (const uint pixels : {1u, 1000u})
+    expect_books(device, Shade::sizes(pixels), [&] { return Shade(device, pixels); });
+}
+
+void check_kept_picture(ocl::Device &device) {
+  for (const uint rays : {1u, 1000u})
+    expect_books(device, KeptPicture::sizes(rays), [&] { return KeptPicture(device, rays); });
+}
+
+void check_pass_readback(ocl::Device &device) {
+  expect_books(device, PassReadback::sizes(), [&] { return PassReadback(device); });
+}
+
+/// With all stages that they are made of, also those that have no buffers.
+void check_pipelines(ocl::Device &device) {
+  const CompressedVolume volume = small_volume(false);
+  const FrameParams grid = make_grid_params(volume.info);
+  DeviceStream stream(device, volume);
+  Macrocells macrocells(device, grid, stream);
+  ZfpDecode decode(device, 30, stream.defines());
+  std::vector<Level> levels;
+  levels.push_back({volume.info, volume.precision, LevelError(volume, true), std::move(stream),
+                    std::move(macrocells), std::move(decode)});
+  for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
+    const Group::Limits limits{100, 20, 8, grouping};
+    FrameState state{device, std::move(levels), Wavefront(device, {limits.num_rays}),
+                     BlockCache(device, BlockCache::limits_for(grid, 20, 100), 8)};
+    for (const PipelineKind kind : {PipelineKind::kBlocks, PipelineKind::kRays})
+      expect_books(device, pipeline_sizes(kind, limits), [&] {
+        return make_pipeline(kind, state, limits, kDefaultSolver, kDefaultClosestHit);
+      });
+    levels = std::move(state.levels);
+  }
+}
+
+void check_resident(ocl::Device &device) {
+  const CompressedVolume volume = small_volume(false);
+  const ImageSize size{10, 7, 2};
+  const FrameParams grid = make_grid_params(volume.info);
+  ocl::BufferSizes sizes = Resident::sizes(volume.block_count(), size);
+  sizes.add(MacrocellBuffers::sizes({volume.block_count(), num_macrocells(grid)}))
+      .add(Macrocells::sizes(num_macrocells(grid), 1));
+  expect_books(device, sizes, [&] { return Resident(device, volume, size); });
+}
+
+void check_layer_encoder(ocl::Device &device) {
+  for (const bool measure : {false, true}) {
+    for (const glm::uvec3 &dims : {glm::uvec3(5, 4, 3), glm::uvec3(65, 66, 67)})
+      expect_books(device, LayerEncoder::sizes(dims, 128, measure),
+                   [&] { return LayerEncoder(device, dims, 128, measure); });
+  }
+}
+
+constexpr std::array kMakers = {Maker{"Wavefront", check_wavefront},
+                                Maker{"BlockCache", check_block_cache},
+                                Maker{"MacrocellBuffers", check_macrocell_buffers},
+                                Maker{"Macrocells", check_macrocells},
+                                Maker{"DeviceStream", check_device_stream},
+                                Maker{"StreamWindow", check_stream_window},
+                                Maker{"ZfpDecode", check_zfp_decode},
+                                Maker{"Compaction", check_compaction},
+                                Maker{"RadixSort", check_radix_sort},
+                                Maker{"Group", check_group},
+                                Maker{"Shade", check_shade},
+                                Maker{"KeptPicture", check_kept_picture},
+                                Maker{"PassReadback", check_pass_readback},
+                                Maker{"Pipelines", check_pipelines},
+                                Maker{"Resident", check_resident},
+                                Maker{"LayerEncoder", check_layer_encoder}};
+
+void PrintTo(const Maker &maker, std::ostream *out) {
+  *out << maker.name;
+}
+
+class BufferSizesOnDevice : public testing::TestWithParam<std::tuple<ocl::DeviceInfo, Maker>> {
+ protected:
+  ocl::Device device_{std::get<0>(GetParam())};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, BufferSizesOnDevice,
+                         testing::Combine(testing::ValuesIn(devices_under_test()),
+                                          testing::ValuesIn(kMakers)),
+                         [](const auto &param) {
+                           return device_test_name({std::get<0>(param.param), param.index}) + "_" +
+                                  std::get<1>(param.param).name;
+                         });
+
+TEST_P(BufferSizesOnDevice, AreWhatIsBooked) {
+  std::get<1>(GetParam()).check(device_);
+}
+
+class BufferSizesMakeBuffersOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
+INSTANTIATE_TEST_SUITE_P(Devices, BufferSizesMakeBuffersOnDevice,
+                         testing::ValuesIn(devices_under_test()), device_test_name);
+
+TEST_P(BufferSizesMakeBuffersOnDevice, SmallOfTheirElementsAlone) {
+  ocl::Device device(GetParam());
+  const ocl::BufferSize size = ocl::buffer_size<uint>("words", 5);
+  EXPECT_EQ(ocl::Buffer<uint>(device, size).size(), 5u);
+  EXPECT_EQ(ocl::PinnedBuffer(device, size).words().size(), 5u);
+  EXPECT_THAT([&] { ocl::Buffer<ulong>(device, size); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("'words' has elements of 8 bytes")));
+  EXPECT_THAT([&] { ocl::PinnedBuffer(device, ocl::buffer_size<ulong>("longs", 5)); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("'longs'")));
+  EXPECT_EQ(device.ledger().current(), 0u);
+}
+
+/// The scratch of macrocells' build, too: what is booked at the most is what is stated.
+TEST_P(BufferSizesMakeBuffersOnDevice, SmallSetupScratchIsTheRestOfThePeak) {
+  for (const glm::uvec3 &dims : {glm::uvec3(1), glm::uvec3(70, 33, 9), glm::uvec3(4, 4, 800)}) {
+    const CompressedVolume volume = compress_with_libzfp(random_voxels(dims, 0, 1, 6), dims, 64);
+    ocl::Device device(GetParam());
+    const DeviceStream stream(device, volume);
+    const Macrocells macrocells(device, make_grid_params(volume.info), stream);
+    EXPECT_EQ(device.ledger().peak(),
+              device.ledger().current() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
+  }
+}
+
+}  // namespace
+}  // namespace isowave::core
