@@ -10,6 +10,7 @@
 #include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/block_grid.h"
+#include "kernels_cl/portable/window.h"
 
 namespace isowave::core {
 
@@ -237,11 +238,11 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   const double rays = static_cast<double>(size_.num_rays());
   PassStats stats;
   stats.counts = counts;
-  stats.counts.window_count = std::min(counts.window_count, counts.active_count);
+  stats.counts.window_count = rays_in_window(counts.window_count, counts.active_count);
   const bool is_blocks = options_.pipeline == PipelineKind::kBlocks;
   // Pipeline `rays` looks ahead at the end of a pass, for the rays that are left.
-  const uint rays_looking =
-      std::min(counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
+  const uint rays_looking = rays_in_window(
+      counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
   if (rays_looking != 0) stats.n_spec = static_cast<double>(counts.ahead_count) / rays_looking;
   if (is_blocks) stats.visible_blocks = counts.visible_count;
   // A launch that is not needed costs more than a pass that finds slots missing now and then. The
