@@ -17,8 +17,8 @@ struct BlockCache {
   struct Limits {
     std::uint32_t num_slots = kMinCacheSlots;  ///< at least that many
     std::uint64_t num_rays = 0;                ///< bounds a pass's pairs
-    std::uint64_t num_blocks = 0;              ///< ids of blocks, those of all levels of detail
-    std::uint64_t num_macrocells = 0;          ///< that have them
+    std::uint64_t num_blocks = 0;              ///< of all levels of detail, by their ids
+    std::uint64_t num_macrocells = 0;          ///< of these blocks
 
     /// The most requests that are listed: no more than can be granted; a ray's block asks for at
     /// most 8, and a block is listed once.
