@@ -27,11 +27,11 @@ class CacheInput {
                                static_cast<std::uint32_t>(key_bits), 1)},
         rays_(device, {num_pairs}),
         cache_(device,
-               BlockCache::limits_for(cube_params(static_cast<std::uint32_t>(key_bits)),
+               BlockCache::limits_for(cube_params(static_cast<std::uint32_t>(key_bits)).grid,
                                       static_cast<std::uint32_t>(num_needed()), num_pairs),
                kGroupSize) {
     FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
-    params.table_groups = cache_.table_groups;
+    params.schedule.table_groups = cache_.table_groups;
     rays_.frame = params;
     for (int set = 0; set < 2; ++set) {
       open_pass(true);

@@ -45,8 +45,8 @@ BlockPairs make_block_pairs(Distribution distribution, std::size_t num_pairs,
 FrameParams cube_params(std::uint32_t key_bits) {
   const std::uint32_t edge = 1u << (key_bits / 3);
   FrameParams params{};
-  params.blocks_x = params.blocks_y = params.blocks_z = edge;
-  params.dims_x = params.dims_y = params.dims_z = 4 * edge;
+  params.grid.blocks_x = params.grid.blocks_y = params.grid.blocks_z = edge;
+  params.grid.dims_x = params.grid.dims_y = params.grid.dims_z = 4 * edge;
   return params;
 }
 

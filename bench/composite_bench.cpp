@@ -20,7 +20,7 @@ struct CompositeInput : FrameRig {
         closest(how),
         composite(device, rays.num_rays, how) {
     start();
-    thin_wavefront(params.max_spec_count);
+    thin_wavefront(params.schedule.max_spec_count);
     begin_pass();
     find_blocks();
     intersect(cache, group.groups(), rays);

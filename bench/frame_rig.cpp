@@ -20,7 +20,7 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
       stream(device, volume),
       rays(device, {setup.size.num_pixels()}),
       macrocells(device, params, stream),
-      cache(device, BlockCache::limits_for(params, slots_of(volume, setup), rays.num_rays),
+      cache(device, BlockCache::limits_for(params.grid, slots_of(volume, setup), rays.num_rays),
             kGroupSize),
       compaction(device, rays.num_rays, kGroupSize),
       initial_rays(device, rays.num_rays),
@@ -30,11 +30,11 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
       group(device, {rays.num_rays, cache.num_slots, kGroupSize}),
       intersect(device, rays.num_rays, kGroupSize),
       composite(device, rays.num_rays) {
-  params.max_spec_count = setup.max_speculation;
-  params.table_groups = cache.table_groups;
+  params.schedule.max_spec_count = setup.max_speculation;
+  params.schedule.table_groups = cache.table_groups;
   macrocells.select(params);
-  macrocells.set_active_box(params);
-  set_screen_box(params);
+  params.surface = macrocells.surface(params);
+  params.screen = make_screen_box(params.grid, params.view, params.surface);
   rays.frame = params;
 }
 

@@ -20,11 +20,11 @@ struct GroupInput {
         pairs(
             make_block_pairs(distribution, num_pairs, std::size_t{1} << visible_bits, kKeyBits, 0)),
         rays(device, {num_pairs}),
-        cache(device, BlockCache::limits_for(cube_params(kKeyBits), num_slots, num_pairs),
+        cache(device, BlockCache::limits_for(cube_params(kKeyBits).grid, num_slots, num_pairs),
               kGroupSize),
         group(device, {num_pairs, num_slots, kGroupSize, how}) {
     FrameParams params = cube_params(kKeyBits);
-    params.table_groups = cache.table_groups;
+    params.schedule.table_groups = cache.table_groups;
     rays.frame = params;
     rays.pair_block_ids.write(pairs.pair_block_ids);
     open_pass();

@@ -24,8 +24,7 @@ struct MacrocellsInput {
         stream(device, volume),
         macrocells(device, params, stream) {
     macrocells.select(params);
-    macrocells.set_index(params);
-    macrocells.set_active_box(params);
+    params.surface = macrocells.surface(params);
     verify();
   }
 
@@ -53,7 +52,8 @@ struct MacrocellsInput {
       check(thresholds[range_low] <= low && thresholds[range_high] >= high, "block range");
       const std::size_t cell = bx / 4 + coarse * (by / 4 + coarse * (bz / 4));
       const std::size_t bit = bx % 4 + 4 * (by % 4) + 16 * (bz % 4);
-      const bool active = range_low < params.isovalue_index && range_high >= params.isovalue_index;
+      const bool active =
+          range_low < params.surface.isovalue_index && range_high >= params.surface.isovalue_index;
       check((masks[2 * cell + bit / 32] >> (bit % 32) & 1u) == active, "bit of a block");
     }
   }
@@ -80,10 +80,10 @@ void select_isovalue(benchmark::State &state) {
   measure(
       state, {blocks, blocks * (sizeof(cl_ushort) + 1.0 / 8)}, [] {},
       [&] {
-        in.params.isovalue =
-            std::nextafter(in.params.isovalue, kMixingLayerIsovalue + 1.0f);  // or nothing is done
+        in.params.surface.isovalue = std::nextafter(
+            in.params.surface.isovalue, kMixingLayerIsovalue + 1.0f);  // or nothing is done
         in.macrocells.select(in.params);
-        in.macrocells.set_active_box(in.params);
+        in.params.surface = in.macrocells.surface(in.params);
       });
 }
 

@@ -23,7 +23,7 @@ ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
 /// Are so many keys too many, those of evicted blocks included? Three eighths of the entries stay
 /// without.
 ISO_INLINE int table_is_full(const FrameParams *frame, uint num_keys) {
-  return num_keys > 5 * frame->table_groups;
+  return num_keys > 5 * frame->schedule.table_groups;
 }
 
 /// Adds a key to the table, or finds the one it has.
@@ -248,7 +248,8 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
   const FrameParams *frame = &frame_params;
   const uint cutoff_rank = cache->cutoff_rank, rebuild = cache->rebuild;
   if (counts->requested_count == 0) return;
-  for (uint i = get_global_id(0); rebuild && i < 8 * frame->table_groups; i += get_global_size(0)) {
+  for (uint i = get_global_id(0); rebuild && i < 8 * frame->schedule.table_groups;
+       i += get_global_size(0)) {
     table[i].block_id = ISO_INVALID_ID;
     table[i].slot = ISO_BLOCK_ABSENT;
   }
@@ -292,12 +293,13 @@ kernel void cache_classify(const FrameParams frame_params, uint num_slots,
     if (slot_block_ids[slot] != ISO_INVALID_ID) {
       ulong bits = 0;
       for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
-        bits |= (ulong)(cache_values[slot * ISO_BLOCK_VOXELS + v] - frame->isovalue >= 0.0f) << v;
+        bits |= (ulong)(cache_values[slot * ISO_BLOCK_VOXELS + v] - frame->surface.isovalue >= 0.0f)
+                << v;
       }
       inside[slot] = bits;
     }
   }
-  for (uint i = get_global_id(0); i < 8 * frame->table_groups; i += get_global_size(0)) {
+  for (uint i = get_global_id(0); i < 8 * frame->schedule.table_groups; i += get_global_size(0)) {
     table[i].changing_low = table[i].changing_high = (uint)ISO_CHANGING_UNKNOWN;
   }
 }

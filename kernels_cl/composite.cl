@@ -27,7 +27,7 @@ kernel void composite(const FrameParams frame_params, global PassCounts *counts,
       const uint pair = closest_pair(closest_pairs, pair_block_ids, pair_hits, a, spec_count);
       if (pair == ISO_INVALID_ID ||
           (pair_hits[pair].cell == ISO_NOT_TESTED && pair != a * spec_count)) {
-        if (frame->per_ray_speculation)
+        if (frame->schedule.per_ray_speculation)
           active_ray_ids[a] = pack_entry(ray_id, further_ahead(entry.log_ahead), 0);
       }
       if (pair != ISO_INVALID_ID) {

@@ -19,9 +19,9 @@
 /// Whether every block of the dual grid of block b is cached: all or nothing. slot: its own.
 ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b,
                                    global const BlockEntry *table, uint *slot) {
-  const uint outside = (b.x + 1 == frame->blocks_x ? 0xAAu : 0u) |
-                       (b.y + 1 == frame->blocks_y ? 0xCCu : 0u) |
-                       (b.z + 1 == frame->blocks_z ? 0xF0u : 0u);
+  const uint outside = (b.x + 1 == frame->grid.blocks_x ? 0xAAu : 0u) |
+                       (b.y + 1 == frame->grid.blocks_y ? 0xCCu : 0u) |
+                       (b.z + 1 == frame->grid.blocks_z ? 0xF0u : 0u);
   BlockEntry entries[8];
   uint absent = 0;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);

@@ -72,7 +72,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
       float value = 0.0f; /* beyond the volume: no cell of the block uses it */
       if (slot != ISO_BLOCK_ABSENT) {
         value = cache_values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)] -
-                frame->isovalue;
+                frame->surface.isovalue;
       }
       dual_grid[vertex] = value;
     }

@@ -8,12 +8,12 @@
 kernel void show_kept(const FrameParams frame_params, uint kept_width, uint kept_height,
                       global const HitRecord *kept, uint everywhere, global HitRecord *hits) {
   const FrameParams *frame = &frame_params;
-  const int width = (int)frame->width, height = (int)frame->height;
+  const int width = (int)frame->view.width, height = (int)frame->view.height;
   const int small_width = (int)kept_width, small_height = (int)kept_height;
-  for (uint pixel = get_global_id(0); pixel < frame->width * frame->height;
+  for (uint pixel = get_global_id(0); pixel < frame->view.width * frame->view.height;
        pixel += get_global_size(0)) {
     if (!everywhere && hits[pixel].t < INFINITY) continue;
-    const int column = (int)(pixel % frame->width), row = (int)(pixel / frame->width);
+    const int column = (int)(pixel % frame->view.width), row = (int)(pixel / frame->view.width);
     /* Distances from the middle, in halves of a pixel of the one picture times the other's height.
      */
     const int x = (2 * column + 1 - width) * small_height + small_width * height;

@@ -41,8 +41,9 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
     const uint block_id = sampled_block(first_block + i * stride, stride);
     const BlockCoords b = block_coords(frame, block_id);
-    const uint size_x = min(4u, frame->dims_x - 4 * b.x), size_y = min(4u, frame->dims_y - 4 * b.y),
-               size_z = min(4u, frame->dims_z - 4 * b.z);
+    const uint size_x = min(4u, frame->grid.dims_x - 4 * b.x),
+               size_y = min(4u, frame->grid.dims_y - 4 * b.y),
+               size_z = min(4u, frame->grid.dims_z - 4 * b.z);
     float values[ISO_BLOCK_VOXELS];
     decode_block(part_0, part_1, part_2, part_3, index, layout, block_id, i, values);
     for (uint lattice = 0; lattice < 8; ++lattice) {
@@ -72,21 +73,22 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
                              global const ValueRange *below, global const ValueRange *above,
                              global const float *thresholds, global ushort *ranges) {
   const FrameParams *frame = &frame_params;
-  const uint layer_blocks = frame->blocks_x * frame->blocks_y;
+  const uint layer_blocks = frame->grid.blocks_x * frame->grid.blocks_y;
   for (uint i = get_global_id(0); i < layer_blocks; i += get_global_size(0)) {
-    const uint x = i % frame->blocks_x, y = i / frame->blocks_x;
-    const int owns_cells =
-        4 * x + 1 < frame->dims_x && 4 * y + 1 < frame->dims_y && 4 * layer + 1 < frame->dims_z;
+    const uint x = i % frame->grid.blocks_x, y = i / frame->grid.blocks_x;
+    const int owns_cells = 4 * x + 1 < frame->grid.dims_x && 4 * y + 1 < frame->grid.dims_y &&
+                           4 * layer + 1 < frame->grid.dims_z;
     ValueRange range;
     uint low = 255, high = 0;
     range.min = INFINITY;
     range.max = -INFINITY;
     for (uint corner = 0; corner < 8; ++corner) {
       const uint nx = x + (corner & 1), ny = y + (corner >> 1 & 1);
-      if (nx >= frame->blocks_x || ny >= frame->blocks_y ||
-          layer + (corner >> 2) >= frame->blocks_z)
+      if (nx >= frame->grid.blocks_x || ny >= frame->grid.blocks_y ||
+          layer + (corner >> 2) >= frame->grid.blocks_z)
         continue;
-      range = join(range, (corner & 4 ? above : below)[8 * (nx + frame->blocks_x * ny) + corner]);
+      const uint partial = 8 * (nx + frame->grid.blocks_x * ny) + corner;
+      range = join(range, (corner & 4 ? above : below)[partial]);
     }
     if (owns_cells) {
       /* Bisection: thresholds[low] <= min < thresholds[low + 1], and the first threshold >= max. */
@@ -109,17 +111,17 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
           begin = middle;
       }
     }
-    ranges[frame->ranges_begin + i + layer_blocks * layer] = (ushort)(low | high << 8);
+    ranges[frame->place.ranges_begin + i + layer_blocks * layer] = (ushort)(low | high << 8);
   }
 }
 
 /// The block of bit 0..63 of a coarse macrocell, or ISO_INVALID_ID outside the volume.
 ISO_INLINE uint macrocell_block(const FrameParams *frame, uint coarse, uint bit) {
-  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  const uint coarse_x = (frame->grid.blocks_x + 3) / 4, coarse_y = (frame->grid.blocks_y + 3) / 4;
   const uint x = 4 * (coarse % coarse_x) + (bit & 3),
              y = 4 * (coarse / coarse_x % coarse_y) + (bit >> 2 & 3),
              z = 4 * (coarse / coarse_x / coarse_y) + (bit >> 4);
-  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z
+  return x < frame->grid.blocks_x && y < frame->grid.blocks_y && z < frame->grid.blocks_z
              ? block_id_at(frame, x, y, z)
              : ISO_INVALID_ID;
 }
@@ -134,8 +136,8 @@ kernel void macrocell_coarse_ranges(const FrameParams frame_params, uint num_coa
     for (uint bit = 0; bit < 64; ++bit) {
       const uint block_id = macrocell_block(frame, coarse, bit);
       if (block_id == ISO_INVALID_ID) continue;
-      low = min(low, (uint)ranges[frame->ranges_begin + block_id] & 255u);
-      high = max(high, (uint)ranges[frame->ranges_begin + block_id] >> 8);
+      low = min(low, (uint)ranges[frame->place.ranges_begin + block_id] & 255u);
+      high = max(high, (uint)ranges[frame->place.ranges_begin + block_id] >> 8);
     }
     coarse_ranges[coarse] = (ushort)(low | high << 8);
   }
@@ -174,17 +176,18 @@ kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse,
       for (uint bit = 0; bit < 64; ++bit) {
         const uint block_id = macrocell_block(frame, coarse, bit);
         if (block_id == ISO_INVALID_ID) continue;
-        const uint range = ranges[frame->ranges_begin + block_id];
+        const uint range = ranges[frame->place.ranges_begin + block_id];
         if (holds_isovalue(range, widest) &&
             (has_bounds == 0 ||
              holds_isovalue(range, limits[dual_grid_code(frame, bounds + bounds_begin, block_id)])))
           words[bit >> 5] |= 1u << (bit & 31);
       }
     }
-    masks[frame->masks_begin + 2 * coarse] = words[0];
-    masks[frame->masks_begin + 2 * coarse + 1] = words[1];
+    masks[frame->place.masks_begin + 2 * coarse] = words[0];
+    masks[frame->place.masks_begin + 2 * coarse + 1] = words[1];
     if ((words[0] | words[1]) != 0) {
-      const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+      const uint coarse_x = (frame->grid.blocks_x + 3) / 4,
+                 coarse_y = (frame->grid.blocks_y + 3) / 4;
       const int at[3] = {(int)(coarse % coarse_x), (int)(coarse / coarse_x % coarse_y),
                          (int)(coarse / coarse_x / coarse_y)};
       for (int axis = 0; axis < 3; ++axis) {

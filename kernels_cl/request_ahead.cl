@@ -59,9 +59,10 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
 
 /// Of the rays that wait, active_ray_ids [counts->next_active_count], the first
 /// counts->window_count ask for the blocks that they touch in their next active blocks: N_Spec of
-/// them (Sec. 4), or their own number of frame->per_ray_speculation. Out: request_block_ids
-/// [counts->requested_count, at most capacity]. The other arguments as in march. Groups stride over
-/// the rays; when these are few, each has more work-items, which share its blocks out among them.
+/// them (Sec. 4), or their own number of frame->schedule.per_ray_speculation. Out:
+/// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march.
+/// Groups stride over the rays; when these are few, each has more work-items, which share its
+/// blocks out among them.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,
@@ -98,8 +99,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       ISO_FRAME_OF(level, next);
       const LastPlanes last = last_planes(level);
       const Ray ray = make_ray(level, entry.pixel);
-      const uint own = min(own_ahead(entry), frame->max_spec_count);
-      const uint ahead = min(frame->per_ray_speculation ? max(own, least) : spec_count, most);
+      const uint own = min(own_ahead(entry), frame->schedule.max_spec_count);
+      const uint ahead =
+          min(frame->schedule.per_ray_speculation ? max(own, least) : spec_count, most);
       if (lane == 0) num_ahead += ahead;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
         const uint num_found =

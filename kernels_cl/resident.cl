@@ -37,7 +37,7 @@ kernel void resident_inside(const FrameParams frame_params, uint num_blocks,
     ulong bits = 0;
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
       const float value = values[(ulong)block_id * ISO_BLOCK_VOXELS + v];
-      bits |= (ulong)(value - frame->isovalue >= 0.0f) << v;
+      bits |= (ulong)(value - frame->surface.isovalue >= 0.0f) << v;
     }
     inside[block_id] = bits;
   }
@@ -53,9 +53,9 @@ kernel void resident_changing(const FrameParams frame_params, uint num_blocks,
     const BlockCoords b = block_coords(frame, block_id);
     ulong bits[8];
     for (uint corner = 0; corner < 8; ++corner) {
-      bits[corner] = inside[block_id_at(frame, min(b.x + (corner & 1), frame->blocks_x - 1),
-                                        min(b.y + (corner >> 1 & 1), frame->blocks_y - 1),
-                                        min(b.z + (corner >> 2), frame->blocks_z - 1))];
+      bits[corner] = inside[block_id_at(frame, min(b.x + (corner & 1), frame->grid.blocks_x - 1),
+                                        min(b.y + (corner >> 1 & 1), frame->grid.blocks_y - 1),
+                                        min(b.z + (corner >> 2), frame->grid.blocks_z - 1))];
     }
     changing[block_id] = changing_cells(bits);
   }
@@ -69,7 +69,7 @@ ISO_INLINE void resident_corners(const FrameParams *frame, global const float *v
                vz = (uint)(z + (corner >> 2));
     const ulong block_id = block_id_at(frame, vx >> 2, vy >> 2, vz >> 2);
     w[corner] = values[block_id * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] -
-                frame->isovalue;
+                frame->surface.isovalue;
   }
 }
 
@@ -144,12 +144,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident
   local uint *found = found_blocks + get_local_id(0);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   const LastPlanes last = last_planes(frame);
-  const PixelBox image = {0, 0, frame->width, frame->height};
+  const PixelBox image = {0, 0, frame->view.width, frame->view.height};
   const uint pixel = tiled_pixel(frame, image, get_global_id(0));
   if (pixel != ISO_INVALID_ID) {
-    const uint column = pixel % frame->width, row = pixel / frame->width;
-    const int in_box = column >= frame->screen_begin_x && column < frame->screen_end_x &&
-                       row >= frame->screen_begin_y && row < frame->screen_end_y;
+    const uint column = pixel % frame->view.width, row = pixel / frame->view.width;
+    const int in_box = column >= frame->screen.begin_x && column < frame->screen.end_x &&
+                       row >= frame->screen.begin_y && row < frame->screen.end_y;
     const Ray ray = make_ray(frame, pixel);
     uint next = in_box ? first_block(frame, &ray) : ISO_INVALID_ID;
     int hit = 0;

@@ -6,7 +6,7 @@
 kernel void shade(const FrameParams frame_params, constant ShadeParams *params, uint samples,
                   global const HitRecord *hits, global uint *image) {
   const FrameParams *frame = &frame_params;
-  const uint columns = frame->width / samples, rows = frame->height / samples;
+  const uint columns = frame->view.width / samples, rows = frame->view.height / samples;
   for (uint pixel = get_global_id(0); pixel < columns * rows; pixel += get_global_size(0))
     image[pixel] = shade_pixel(frame, params, samples, pixel % columns, pixel / columns, hits);
 }

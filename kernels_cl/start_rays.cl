@@ -42,8 +42,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
     global uint *hit_words) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
-  const PixelBox box = {frame->screen_begin_x, frame->screen_begin_y, frame->screen_end_x,
-                        frame->screen_end_y};
+  const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
+                        frame->screen.end_y};
   const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
   if (get_global_id(0) == 0) {
     next->last_frame_pass = counts->frame_pass;

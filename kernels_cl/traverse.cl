@@ -5,7 +5,7 @@
 
 /// pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k ascending along the
 /// ray; ISO_INVALID_ID behind the last. They are N_Spec at most, fewer where a ray has its own
-/// number (frame->per_ray_speculation). closest_pairs [window_count] = ISO_INVALID_ID.
+/// number (frame->schedule.per_ray_speculation). closest_pairs [window_count] = ISO_INVALID_ID.
 /// ray_block_ids [pixel]: in, the block to go on from; out, the first block not yet looked at, or
 /// ISO_INVALID_ID when the ray has left the volume. macrocell_masks [2 * coarse cells]: bit x + 4y
 /// + 16z of a block in its coarse cell. Grid-stride over the window.
@@ -22,7 +22,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
   for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
     const RayEntry entry = unpack_entry(active_ray_ids[a]);
     const uint ray_id = entry.pixel;
-    const uint ahead = frame->per_ray_speculation ? min(own_ahead(entry), spec_count) : spec_count;
+    const uint ahead =
+        frame->schedule.per_ray_speculation ? min(own_ahead(entry), spec_count) : spec_count;
     const Ray ray = make_ray(frame, ray_id);
     uint block_id = ray_block_ids[ray_id];
     const uint found = find_blocks(frame, macrocell_masks, &ray, &block_id, ahead,

@@ -24,7 +24,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
   local float
       staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
   local uint to_slots[ISO_LEVEL_SLOTS];
-  const float isovalue = frame_params.isovalue == 0.0f ? -0.0f : frame_params.isovalue;
+  const float isovalue =
+      frame_params.surface.isovalue == 0.0f ? -0.0f : frame_params.surface.isovalue;
   const uint count = min(counts->decoded_count, end), item = get_local_id(0);
   for (uint begin = first + get_group_id(0) * ISO_GROUP_SIZE; begin < count;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {

@@ -89,9 +89,9 @@ RendererHit renderer_hit(const FrameParams &frame, const OracleRay &ray, const H
   RendererHit result;
   result.hit = std::isfinite(record.t);
   if (!result.hit) return result;
-  const std::uint32_t block[3] = {record.block_id % frame.blocks_x,
-                                  record.block_id / frame.blocks_x % frame.blocks_y,
-                                  record.block_id / frame.blocks_x / frame.blocks_y};
+  const std::uint32_t block[3] = {record.block_id % frame.grid.blocks_x,
+                                  record.block_id / frame.grid.blocks_x % frame.grid.blocks_y,
+                                  record.block_id / frame.grid.blocks_x / frame.grid.blocks_y};
   const float local[3] = {record.x, record.y, record.z};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     result.cell[axis] = static_cast<int>(4 * block[axis] + (record.cell >> (2 * axis) & 3u));
@@ -115,7 +115,7 @@ Quantiles quantiles(std::vector<double> values) {
 bool place_fits(const FrameParams &frame, const OracleRay &ray, const HitRecord &record,
                 const RendererHit &hit) {
   const double speed = speed_of(ray);
-  const double difference = std::abs(double(record.t) / double(frame.t_scale) - hit.t);
+  const double difference = std::abs(double(record.t) / double(frame.view.t_scale) - hit.t);
   Vec beside;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     beside[axis] = hit.point[axis] - (ray.origin[axis] + hit.t * ray.direction[axis]);
@@ -135,9 +135,9 @@ void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray,
     ++tally.wrong_places;
     if (std::isnan(got.t)) return;  // no position to judge
   }
-  const Vec from_centre{exact.origin[0] - 0.5 * (frame.dims_x - 1),
-                        exact.origin[1] - 0.5 * (frame.dims_y - 1),
-                        exact.origin[2] - 0.5 * (frame.dims_z - 1)};
+  const Vec from_centre{exact.origin[0] - 0.5 * (frame.grid.dims_x - 1),
+                        exact.origin[1] - 0.5 * (frame.grid.dims_y - 1),
+                        exact.origin[2] - 0.5 * (frame.grid.dims_z - 1)};
   const double offset = length(from_centre) >= 3000 ? 5e-5 : 1e-5;
   const bool missed = truth.hit && (!got.hit || (got.t - truth.t) * speed > kSameHit);
   const bool false_hit = got.hit && (!truth.hit || (truth.t - got.t) * speed > kSameHit);
@@ -160,7 +160,8 @@ void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray,
   tally.distance.push_back(std::abs(got.t - truth.t) * speed);
   const double slope = length(oracle.gradient(got.point));
   if (slope > 0)
-    tally.residual.push_back(std::abs(oracle.field(got.point) - double(frame.isovalue)) / slope);
+    tally.residual.push_back(std::abs(oracle.field(got.point) - double(frame.surface.isovalue)) /
+                             slope);
 }
 
 void merge(Accuracy &into, const Accuracy &from) {
@@ -178,13 +179,13 @@ void merge(Accuracy &into, const Accuracy &from) {
 
 Accuracy judge_rays(const FrameParams &frame, std::span<const HitRecord> hits,
                     const JudgeRay &judge_ray) {
-  if (hits.size() != std::size_t{frame.width} * frame.height) {
+  if (hits.size() != std::size_t{frame.view.width} * frame.view.height) {
     throw std::invalid_argument("judge_rays: the hits do not fit the frame");
   }
   std::vector<Accuracy> tallies(thread_count(0));
-  parallel_for(frame.height, 0, [&](std::uint64_t row, std::uint32_t thread) {
-    for (std::uint32_t column = 0; column < frame.width; ++column) {
-      const auto pixel = static_cast<std::uint32_t>(row * frame.width + column);
+  parallel_for(frame.view.height, 0, [&](std::uint64_t row, std::uint32_t thread) {
+    for (std::uint32_t column = 0; column < frame.view.width; ++column) {
+      const auto pixel = static_cast<std::uint32_t>(row * frame.view.width + column);
       judge_ray(make_ray(&frame, pixel), hits[pixel], tallies[thread]);
     }
   });

@@ -25,8 +25,8 @@ void judge_bound(const HitOracle &truth, const FrameParams &frame, std::uint32_t
     return;
   }
   if (!says_hit) return;
-  const double t = double{drawn.t}, pixel_size = 2 * double{frame.pixel_scale} * t;
-  const double error = std::abs(t - hit.t * double{frame.t_scale}) / pixel_size;
+  const double t = double{drawn.t}, pixel_size = 2 * double{frame.view.pixel_scale} * t;
+  const double error = std::abs(t - hit.t * double{frame.view.t_scale}) / pixel_size;
   tally.exceeded += error > bound;
   tally.slack.push_back(bound / error);
 }
@@ -35,12 +35,13 @@ void judge_bound(const HitOracle &truth, const FrameParams &frame, std::uint32_t
 
 BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame,
                         std::span<const HitRecord> drawn, std::span<const float> bounds) {
-  if (drawn.size() != std::size_t{frame.width} * frame.height || bounds.size() != drawn.size())
+  if (drawn.size() != std::size_t{frame.view.width} * frame.view.height ||
+      bounds.size() != drawn.size())
     throw std::invalid_argument("judge_bounds: hits and bounds do not fit the frame");
   std::vector<BoundTally> tallies(thread_count(0));
-  parallel_for(frame.height, 0, [&](std::uint64_t row, std::uint32_t thread) {
-    for (std::uint32_t column = 0; column < frame.width; ++column) {
-      const auto pixel = static_cast<std::uint32_t>(row * frame.width + column);
+  parallel_for(frame.view.height, 0, [&](std::uint64_t row, std::uint32_t thread) {
+    for (std::uint32_t column = 0; column < frame.view.width; ++column) {
+      const auto pixel = static_cast<std::uint32_t>(row * frame.view.width + column);
       judge_bound(truth, frame, pixel, drawn[pixel], double{bounds[pixel]}, tallies[thread]);
     }
   });

@@ -36,7 +36,7 @@ constexpr std::array<ClosedSurface, 3> kSurfaces = {
 /// p: index space of the finest level.
 double trilinear(const FrameParams &frame, std::span<const float> voxels, std::size_t level,
                  const Vec &p) {
-  const std::array<std::size_t, 3> dims{frame.dims_x, frame.dims_y, frame.dims_z};
+  const std::array<std::size_t, 3> dims{frame.grid.dims_x, frame.grid.dims_y, frame.grid.dims_z};
   std::array<std::size_t, 3> c;
   Vec f;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -83,7 +83,7 @@ GridLevels surface_levels(const ClosedSurface &surface, std::size_t num_levels) 
   info.dims = glm::uvec3(kSurfaceEdge);
   for (std::size_t level = 0; level < num_levels; ++level) {
     levels.frames.push_back(make_grid_params(info));
-    levels.frames.back().t_scale = 1;
+    levels.frames.back().view.t_scale = 1;
     levels.voxels.push_back(level == 0 ? sample_surface(surface)
                                        : downsample(2u * info.dims - 2u, levels.voxels.back()));
     info = coarser_level(info);

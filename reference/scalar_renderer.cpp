@@ -17,12 +17,13 @@ namespace {
 
 /// The eight corners of dual cell (x,y,z), minus the isovalue; corner x + 2y + 4z.
 void load_corners(const FrameParams &frame, const float *voxels, int x, int y, int z, float *w) {
-  const std::size_t row = frame.dims_x, layer = row * frame.dims_y;
+  const std::size_t row = frame.grid.dims_x, layer = row * frame.grid.dims_y;
   const float *v = voxels + static_cast<std::size_t>(x) + row * static_cast<std::size_t>(y) +
                    layer * static_cast<std::size_t>(z);
   const std::size_t offsets[8] = {0,     1,         row,         row + 1,
                                   layer, layer + 1, layer + row, layer + row + 1};
-  for (int corner = 0; corner < 8; ++corner) w[corner] = v[offsets[corner]] - frame.isovalue;
+  for (int corner = 0; corner < 8; ++corner)
+    w[corner] = v[offsets[corner]] - frame.surface.isovalue;
 }
 
 /// Cells [begin, end) along each axis.
@@ -87,8 +88,8 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
 HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
                      std::optional<bool> &inside) {
   const LastPlanes last = last_planes(&frame), zero{};
-  const RayEvent end = border_event(frame.end_t);
-  RayEvent enter = border_event(frame.begin_t), exit = end;
+  const RayEvent end = border_event(frame.band.end_t);
+  RayEvent enter = border_event(frame.band.begin_t), exit = end;
   HitRecord hit = no_hit();
   const std::optional<bool> before = std::exchange(inside, std::nullopt);
   if (!clip_to_box(&ray, zero, last, &enter, &exit)) return hit;
@@ -123,7 +124,7 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
 }
 
 void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
-  if (voxels.size() != std::size_t{frame.dims_x} * frame.dims_y * frame.dims_z) {
+  if (voxels.size() != std::size_t{frame.grid.dims_x} * frame.grid.dims_y * frame.grid.dims_z) {
     throw std::invalid_argument("scalar renderer: the voxels do not fit the frame's dims");
   }
 }
@@ -132,10 +133,10 @@ void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
 template <class TracePixel>
 std::vector<HitRecord> trace_pixels(const FrameParams &frame, unsigned threads,
                                     TracePixel trace_pixel) {
-  std::vector<HitRecord> hits(std::size_t{frame.width} * frame.height);
-  parallel_for(frame.height, threads, [&](std::uint64_t row, std::uint32_t) {
-    const auto first = static_cast<std::uint32_t>(row * frame.width);
-    for (std::uint32_t pixel = first; pixel < first + frame.width; ++pixel)
+  std::vector<HitRecord> hits(std::size_t{frame.view.width} * frame.view.height);
+  parallel_for(frame.view.height, threads, [&](std::uint64_t row, std::uint32_t) {
+    const auto first = static_cast<std::uint32_t>(row * frame.view.width);
+    for (std::uint32_t pixel = first; pixel < first + frame.view.width; ++pixel)
       hits[pixel] = trace_pixel(pixel);
   });
   return hits;

@@ -31,8 +31,8 @@ HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
                               std::span<const std::vector<float>> voxels, Solver solver,
                               std::span<const Ray> rays);
 
-/// One ray of render_scalar(): the hit of `ray` (index space; t in units of frame.t_scale). frame:
-/// dims, blocks, isovalue and t_scale are used.
+/// One ray of render_scalar(): the hit of `ray` (index space; t in units of frame.view.t_scale).
+/// frame: dims, blocks, isovalue and t_scale are used.
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                        const Ray &ray);
 

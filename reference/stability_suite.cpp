@@ -553,14 +553,14 @@ CaseResult run_case(const StabilityCase &stability_case, Solver solver) {
   for (const StabilityScene &scene : stability_case.scenes) {
     const RootOracle oracle(scene.voxels, scene.dims, scene.isovalue);
     FrameParams frame{};
-    frame.dims_x = scene.dims[0];
-    frame.dims_y = scene.dims[1];
-    frame.dims_z = scene.dims[2];
-    frame.blocks_x = (scene.dims[0] + 3) / 4;
-    frame.blocks_y = (scene.dims[1] + 3) / 4;
-    frame.blocks_z = (scene.dims[2] + 3) / 4;
-    frame.isovalue = scene.isovalue;
-    frame.t_scale = 1;
+    frame.grid.dims_x = scene.dims[0];
+    frame.grid.dims_y = scene.dims[1];
+    frame.grid.dims_z = scene.dims[2];
+    frame.grid.blocks_x = (scene.dims[0] + 3) / 4;
+    frame.grid.blocks_y = (scene.dims[1] + 3) / 4;
+    frame.grid.blocks_z = (scene.dims[2] + 3) / 4;
+    frame.surface.isovalue = scene.isovalue;
+    frame.view.t_scale = 1;
     for (const Ray &ray : scene.rays) {
       const HitRecord hit = trace_scalar(frame, scene.voxels, solver, ray);
       const HitRecord resumed = trace_scalar_by_blocks(frame, scene.voxels, solver, ray);

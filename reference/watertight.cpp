@@ -49,10 +49,10 @@ Shot random_shot(const GridLevels &levels, Random &random) {
                            std::ldexp(static_cast<float>(direction[i]), -static_cast<int>(level)));
     };
     shot.rays.push_back({axis(0), axis(1), axis(2)});
-    shot.frames[level].begin_t = begin;
+    shot.frames[level].band.begin_t = begin;
     if (level + 1 == levels.frames.size()) continue;
     begin += static_cast<float>(random.in_box({0, 0, 0}, {distance == 0 ? 20.0 : 60.0, 1, 1})[0]);
-    shot.frames[level].end_t = begin;
+    shot.frames[level].band.end_t = begin;
   }
   return shot;
 }

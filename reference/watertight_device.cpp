@@ -46,16 +46,16 @@ GridLevels decoded_levels(const CompressedVolume &volume, bool with_levels) {
   return levels;
 }
 
-struct View {
+struct RandomView {
   Camera camera;
   ImageSize size{kPicture, kPicture};
   double voxel_pixels = 0;
   bool from_inside = false;
 };
 
-View random_view(const GridLevels &levels, Random &random) {
+RandomView random_view(const GridLevels &levels, Random &random) {
   const bool lattice = random.below(3) == 0;
-  View view;
+  RandomView view;
   view.from_inside = random.below(2) == 0;
   Vec target;
   do {
@@ -118,8 +118,8 @@ float passes_inside(const GridLevels &levels, const Ray &ray, Random &random) {
 }
 
 /// Adds a view's rays that had to hit, and those of them that did not.
-void judge_view(const GridLevels &levels, const View &view, const std::vector<HitRecord> &hits,
-                std::uint64_t seed, WatertightResult &result) {
+void judge_view(const GridLevels &levels, const RandomView &view,
+                const std::vector<HitRecord> &hits, std::uint64_t seed, WatertightResult &result) {
   VolumeInfo info;
   info.dims = glm::uvec3(kSurfaceEdge);
   const FrameParams frame = make_frame_params(info, view.camera, view.size, 0);
@@ -131,7 +131,7 @@ void judge_view(const GridLevels &levels, const View &view, const std::vector<Hi
       const auto pixel = static_cast<uint>(row * view.size.width + column);
       float latest = std::numeric_limits<float>::max();
       if (!view.from_inside)
-        latest = passes_inside(levels, make_ray(&frame, pixel), random) * frame.t_scale;
+        latest = passes_inside(levels, make_ray(&frame, pixel), random) * frame.view.t_scale;
       if (!std::isfinite(latest)) continue;
       ++row_rays;
       row_leaks += !(hits[pixel].t <= latest);
@@ -165,7 +165,7 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
     WatertightResult result{surface.name + std::string(with_levels ? ", levels" : "")};
     Random random(seed);
     for (std::uint64_t view_id = 0; result.rays < num_rays; ++view_id) {
-      const View view = random_view(levels, random);
+      const RandomView view = random_view(levels, random);
       renderer.render({.camera = view.camera,
                        .size = view.size,
                        .voxel_pixels = with_levels ? view.voxel_pixels : 0.0});

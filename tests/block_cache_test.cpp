@@ -225,7 +225,7 @@ class BlockCacheOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                              group_size, seed));
     Random random(seed);
     const FrameParams frame = plain_frame(kDims, num_pixels);
-    const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
+    const uint num_blocks = frame.grid.blocks_x * frame.grid.blocks_y * frame.grid.blocks_z;
     StageWorld world(device_, frame, num_slots, group_size);
     CacheModel model(frame, num_slots);
     uint centre = 0;
@@ -289,7 +289,7 @@ TEST_P(BlockCacheOnDevice, OneDualGridOfSlotsServesEveryBlock) {
   const FrameParams frame = plain_frame(kDims, 3);
   StageWorld world(device_, frame, kMinCacheSlots, 64);
   CacheModel model(frame, kMinCacheSlots);
-  const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
+  const uint num_blocks = frame.grid.blocks_x * frame.grid.blocks_y * frame.grid.blocks_z;
   for (uint block = 0; block < num_blocks; ++block) {
     SCOPED_TRACE(fmt::format("block {}", block));
     model.pass(world, {block * 37 % num_blocks, block * 11 % num_blocks, block * 5 % num_blocks},
@@ -329,11 +329,12 @@ TEST_P(BlockCacheOnDevice, PassesWithoutRequestsChangeNothing) {
 
 TEST_P(BlockCacheOnDevice, TooFewOrTooManySlotsAreRefused) {
   const FrameParams frame = plain_frame(kDims, 100);
-  EXPECT_THROW(BlockCache(device_, BlockCache::limits_for(frame, 7, 100), 64), Error);
-  EXPECT_THROW(BlockCache(device_, BlockCache::limits_for(frame, 0, 100), 64), Error);
+  EXPECT_THROW(BlockCache(device_, BlockCache::limits_for(frame.grid, 7, 100), 64), Error);
+  EXPECT_THROW(BlockCache(device_, BlockCache::limits_for(frame.grid, 0, 100), 64), Error);
   /* In kernels, 64 * slot must not overflow. */
-  EXPECT_THAT([&] { BlockCache(device_, BlockCache::limits_for(frame, (1u << 26) + 1, 100), 64); },
-              testing::ThrowsMessage<Error>(testing::HasSubstr("slots cannot be used")));
+  EXPECT_THAT(
+      [&] { BlockCache(device_, BlockCache::limits_for(frame.grid, (1u << 26) + 1, 100), 64); },
+      testing::ThrowsMessage<Error>(testing::HasSubstr("slots cannot be used")));
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, BlockCacheOnDevice, testing::ValuesIn(devices_under_test()),

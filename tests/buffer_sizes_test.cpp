@@ -97,7 +97,7 @@ void check_wavefront(ocl::Device &device) {
 void check_block_cache(ocl::Device &device) {
   const FrameParams grid = grid_frame({65, 9, 30});
   for (const auto &[slots, rays] : {std::pair(8u, 1u), {100u, 1u}, {100u, 50u}, {777u, 5000u}}) {
-    const BlockCache::Limits limits = BlockCache::limits_for(grid, slots, rays);
+    const BlockCache::Limits limits = BlockCache::limits_for(grid.grid, slots, rays);
     expect_books(device, BlockCache::sizes(limits), [&] { return BlockCache(device, limits, 8); });
   }
 }
@@ -113,7 +113,7 @@ void check_macrocells(ocl::Device &device) {
     const CompressedVolume volume = small_volume(indexed);
     const FrameParams grid = make_grid_params(volume.info);
     const DeviceStream stream(device, volume);
-    const MacrocellBuffers::Limits limits{volume.block_count(), num_macrocells(grid), 3};
+    const MacrocellBuffers::Limits limits{volume.block_count(), num_macrocells(grid.grid), 3};
     const auto buffers = std::make_shared<MacrocellBuffers>(device, limits);
     expect_books(device, Macrocells::sizes(limits.num_macrocells, 3),
                  [&] { return Macrocells(device, grid, stream, buffers); });
@@ -208,7 +208,7 @@ void check_pipelines(ocl::Device &device) {
   for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
     const Group::Limits limits{100, 20, 8, grouping};
     FrameState state{device, std::move(levels), Wavefront(device, {limits.num_rays}),
-                     BlockCache(device, BlockCache::limits_for(grid, 20, 100), 8)};
+                     BlockCache(device, BlockCache::limits_for(grid.grid, 20, 100), 8)};
     for (const PipelineKind kind : {PipelineKind::kBlocks, PipelineKind::kRays})
       expect_books(device, pipeline_sizes(kind, limits), [&] {
         return make_pipeline(kind, state, limits, kDefaultSolver, kDefaultClosestHit);
@@ -222,8 +222,8 @@ void check_resident(ocl::Device &device) {
   const ImageSize size{10, 7, 2};
   const FrameParams grid = make_grid_params(volume.info);
   ocl::BufferSizes sizes = Resident::sizes(volume.block_count(), size);
-  sizes.add(MacrocellBuffers::sizes({volume.block_count(), num_macrocells(grid)}))
-      .add(Macrocells::sizes(num_macrocells(grid), 1));
+  sizes.add(MacrocellBuffers::sizes({volume.block_count(), num_macrocells(grid.grid)}))
+      .add(Macrocells::sizes(num_macrocells(grid.grid), 1));
   expect_books(device, sizes, [&] { return Resident(device, volume, size); });
 }
 

@@ -364,7 +364,7 @@ TEST(CellIntersect, CellsFarFromTheEye) {
     if (found) {
       ASSERT_LE(std::abs(f.value(s)), 46 * kUnit);
       FrameParams frame = grid_frame({4001, 4001, 4001});
-      frame.t_scale = 2;
+      frame.view.t_scale = 2;
       const HitRecord hit = make_hit(&frame, &ray, w, cell[0], cell[1], cell[2], enter, exit, s);
       const Real t = t_enter + s * (t_exit - t_enter);
       ASSERT_LE(std::abs(hit.t / 2 - t), 2 * kUnit * t);  // t itself is a float32

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Small runs of `isowave bench solvers`, `isowave bench pareto`, tools/size-table,
+# Small runs of `isowave bench solvers`, `isowave bench pareto`,
 # tools/detail-table and `frame_bench --budgets`, and tools/charts of them and of what is no such
 # file.
 #   charts_test.sh PROGRAM [FRAME_BENCH]
@@ -72,28 +72,6 @@ for bad in "--storage rate" "--storage full:3" "--voxel-pixels -1" "--max-surfac
     fail "$bad was accepted"
   fi
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
-done
-
-ISOWAVE=$program "$top/tools/size-table" "$top/tests/data" >"$work/sizes"
-/usr/bin/python3 - "$work/sizes" "$top/tests/data" <<'EOF'
-import gzip, pathlib, re, sys
-equal, exact = [{row.split("|")[1].strip(): [cell.strip() for cell in row.split("|")[2:-1]] for row in table.splitlines()[2:]}
-                for table in open(sys.argv[1]).read().split("\n\n")]
-assert set(equal) == set(exact) == {"fuel", "head"}, (equal, exact)
-for name, cells in equal.items():
-    for cell in cells:
-        fixed, bounded = [int(n.replace(",", "")) for n in re.search(r": ([\d,]+) / ([\d,]+) ", cell).groups()]
-        assert bounded < fixed, (name, cell)
-for name, (size, bits, raw, zipped, *_) in exact.items():
-    voxels = len(gzip.open(next(pathlib.Path(sys.argv[2]).glob(name + "_*"))).read())
-    size, raw, zipped = [int(n.strip("*").replace(",", "")) for n in (size, raw, zipped)]
-    assert raw == voxels and abs(float(bits) - 8 * size / voxels) < 0.01, (name, size, bits, raw)
-    assert size < raw and zipped < raw, (name, size, zipped, raw)
-EOF
-for bad in "$work" "$work/none" "$top/tests/data none.raw.gz"; do
-  # shellcheck disable=SC2086
-  if ISOWAVE=$program "$top/tools/size-table" $bad 2>"$work/error" >/dev/null; then fail "size-table $bad was accepted"; fi
-  [ "$(wc -l <"$work/error")" -eq 1 ] || fail "size-table $bad: $(cat "$work/error")"
 done
 
 fuel=$top/tests/data/fuel_64x33x32_uint8.raw.gz

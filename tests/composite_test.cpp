@@ -37,7 +37,7 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                              per_ray));
     Random random(seed);
     FrameParams frame = case_frame(kDims, camera_cases(kDims)[0], size, 0.3f);
-    frame.per_ray_speculation = per_ray;
+    frame.schedule.per_ray_speculation = per_ray;
     const std::vector<float> voxels = random_voxels(kDims, -1, 1, seed);
     StageWorld world(device_, frame, 4 * 4 * 3, 8);
     fill_cache(world, voxels);
@@ -142,20 +142,22 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   static uint random_cell(const FrameParams &frame, uint block, Random &random) {
-    const uint x = 4 * (block % frame.blocks_x), y = 4 * (block / frame.blocks_x % frame.blocks_y),
-               z = 4 * (block / frame.blocks_x / frame.blocks_y);
-    return random() % std::min(4u, frame.dims_x - 1 - x) +
-           4 * (random() % std::min(4u, frame.dims_y - 1 - y)) +
-           16 * (random() % std::min(4u, frame.dims_z - 1 - z));
+    const uint x = 4 * (block % frame.grid.blocks_x),
+               y = 4 * (block / frame.grid.blocks_x % frame.grid.blocks_y),
+               z = 4 * (block / frame.grid.blocks_x / frame.grid.blocks_y);
+    return random() % std::min(4u, frame.grid.dims_x - 1 - x) +
+           4 * (random() % std::min(4u, frame.grid.dims_y - 1 - y)) +
+           16 * (random() % std::min(4u, frame.grid.dims_z - 1 - z));
   }
 
   static HitRecord host_hit(const FrameParams &frame, const std::vector<float> &voxels, uint pixel,
                             uint block, PairHit result) {
     const Ray ray = make_ray(&frame, pixel);
     const LastPlanes last = last_planes(&frame);
-    const int x = int(4 * (block % frame.blocks_x) + result.cell % 4),
-              y = int(4 * (block / frame.blocks_x % frame.blocks_y) + result.cell / 4 % 4),
-              z = int(4 * (block / frame.blocks_x / frame.blocks_y) + result.cell / 16);
+    const int x = int(4 * (block % frame.grid.blocks_x) + result.cell % 4),
+              y = int(4 * (block / frame.grid.blocks_x % frame.grid.blocks_y) +
+                      result.cell / 4 % 4),
+              z = int(4 * (block / frame.grid.blocks_x / frame.grid.blocks_y) + result.cell / 16);
     const GridWalk cell = walk_from(&ray, x, y, z, 1, last);
     return make_hit(&frame, &ray, cell_corners(frame, voxels, x, y, z).data(), x, y, z,
                     region_entry(&ray, x, y, z, 1, last), walk_exit(&cell, &ray), result.s);

@@ -50,18 +50,18 @@ TEST(LevelFrames, BordersAreWhereVoxelsAreFarEnoughApart) {
   const ImageSize size{100, 50};
   const auto frames = make_level_frames(levels, camera, size, 0.5f, 3.0);
   ASSERT_EQ(frames.size(), 5u);
-  EXPECT_EQ(frames[0].begin_t, 0.0f);
+  EXPECT_EQ(frames[0].band.begin_t, 0.0f);
   std::size_t last = 0;
   for (std::size_t level = 1; level < frames.size() && draws(frames[level]); ++level) {
     last = level;
-    const double world = double{frames[level].begin_t} * frames[level].t_scale;
-    EXPECT_EQ(world, double{frames[level - 1].end_t} * frames[level - 1].t_scale)
+    const double world = double{frames[level].band.begin_t} * frames[level].view.t_scale;
+    EXPECT_EQ(world, double{frames[level - 1].band.end_t} * frames[level - 1].view.t_scale)
         << "not the same border";
     const double pixel = 2.0 * world / 50;  // a picture of 90 degrees is twice as high as it is far
     EXPECT_NEAR(1.5 * (1 << level) / pixel, 3.0, 1e-5);
   }
   EXPECT_GE(last, 2u);
-  EXPECT_EQ(frames[last].end_t, INFINITY);
+  EXPECT_EQ(frames[last].band.end_t, INFINITY);
 }
 
 /// Pixels are the picture's, however many rays each has.
@@ -72,10 +72,10 @@ TEST(LevelFrames, MoreRaysDoNotMoveBorders) {
   const auto nine = make_level_frames(levels, camera, {96, 64, 3}, 0.5f, 1.2);
   EXPECT_GT(std::ranges::count_if(one, draws), 1);
   for (std::size_t level = 0; level < one.size(); ++level) {
-    EXPECT_EQ(nine[level].begin_t, one[level].begin_t);
-    EXPECT_EQ(nine[level].end_t, one[level].end_t);
-    EXPECT_EQ(nine[level].width, 3 * one[level].width);
-    EXPECT_EQ(nine[level].height, 3 * one[level].height);
+    EXPECT_EQ(nine[level].band.begin_t, one[level].band.begin_t);
+    EXPECT_EQ(nine[level].band.end_t, one[level].band.end_t);
+    EXPECT_EQ(nine[level].view.width, 3 * one[level].view.width);
+    EXPECT_EQ(nine[level].view.height, 3 * one[level].view.height);
   }
 }
 
@@ -84,9 +84,10 @@ TEST(LevelFrames, BlockIdsCountOn) {
   const auto frames = make_level_frames(levels, orbit_cameras(levels[0], 1)[0], kMedium, 0.5f, 1.0);
   ASSERT_EQ(frames.size(), 4u);
   for (std::size_t level = 1; level < frames.size(); ++level) {
-    EXPECT_EQ(frames[level].id_begin_z, frames[level - 1].id_begin_z + frames[level - 1].blocks_z);
-    EXPECT_EQ(frames[level].id_blocks_x, frames[0].blocks_x);
-    EXPECT_EQ(frames[level].id_blocks_y, frames[0].blocks_y);
+    EXPECT_EQ(frames[level].place.begin_z,
+              frames[level - 1].place.begin_z + frames[level - 1].grid.blocks_z);
+    EXPECT_EQ(frames[level].place.blocks_x, frames[0].grid.blocks_x);
+    EXPECT_EQ(frames[level].place.blocks_y, frames[0].grid.blocks_y);
   }
 }
 
@@ -98,8 +99,8 @@ TEST(LevelFrames, OneLevelDrawsAllWhereTheVolumeReachesNoBorder) {
     const auto frames = make_level_frames(levels, camera, {128, 72}, 0.5f, voxel_pixels);
     EXPECT_EQ(std::ranges::count_if(frames, draws), 1);
     const auto found = std::ranges::find_if(frames, draws);
-    EXPECT_EQ(found->begin_t, 0.0f);
-    EXPECT_EQ(found->end_t, INFINITY);
+    EXPECT_EQ(found->band.begin_t, 0.0f);
+    EXPECT_EQ(found->band.end_t, INFINITY);
     return found - frames.begin();
   };
   EXPECT_EQ(drawn(near_camera, 0), 0);
@@ -145,9 +146,9 @@ TEST(LevelFrames, NoPointIsLeftOut) {
       if (std::abs(exact - std::round(exact)) < 1e-4) continue;  // at a border
       const auto level =
           static_cast<std::size_t>(std::clamp(std::floor(exact), 0.0, double(levels.size() - 1)));
-      const double t = distance / double{frames[level].t_scale};
-      EXPECT_LE(double{frames[level].begin_t}, t);
-      EXPECT_GE(double{frames[level].end_t}, t);
+      const double t = distance / double{frames[level].view.t_scale};
+      EXPECT_LE(double{frames[level].band.begin_t}, t);
+      EXPECT_GE(double{frames[level].band.end_t}, t);
       EXPECT_TRUE(draws(frames[level]));
     }
   }
@@ -171,7 +172,8 @@ std::size_t num_border_hits(const std::vector<HitRecord> &hits,
   std::size_t count = 0;
   for (const HitRecord &hit : hits) {
     for (const FrameParams &frame : frames)
-      count += draws(frame) && frame.begin_t > 0 && hit.t == frame.begin_t * frame.t_scale;
+      count += draws(frame) && frame.band.begin_t > 0 &&
+               hit.t == frame.band.begin_t * frame.view.t_scale;
   }
   return count;
 }

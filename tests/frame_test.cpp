@@ -31,26 +31,27 @@ struct PixelRange {
 /// Of the pixels whose rays meet the active box.
 PixelRange seen_range(const FrameParams &frame) {
   const LastPlanes last = last_planes(&frame);
-  const LastPlanes begin = {4 * frame.active_begin_x, 4 * frame.active_begin_y,
-                            4 * frame.active_begin_z};
-  const LastPlanes end = {std::min(4 * frame.active_end_x, last.x),
-                          std::min(4 * frame.active_end_y, last.y),
-                          std::min(4 * frame.active_end_z, last.z)};
+  const LastPlanes begin = {4 * frame.surface.active_begin_x, 4 * frame.surface.active_begin_y,
+                            4 * frame.surface.active_begin_z};
+  const LastPlanes end = {std::min(4 * frame.surface.active_end_x, last.x),
+                          std::min(4 * frame.surface.active_end_y, last.y),
+                          std::min(4 * frame.surface.active_end_z, last.z)};
   PixelRange seen;
-  for (uint pixel = 0; pixel < frame.width * frame.height; ++pixel) {
+  for (uint pixel = 0; pixel < frame.view.width * frame.view.height; ++pixel) {
     const Ray ray = make_ray(&frame, pixel);
     RayEvent enter;
-    if (box_entry(&ray, begin, end, &enter)) seen.add(pixel % frame.width, pixel / frame.width);
+    if (box_entry(&ray, begin, end, &enter))
+      seen.add(pixel % frame.view.width, pixel / frame.view.width);
   }
   return seen;
 }
 
 void expect_encloses(const FrameParams &frame, const PixelRange &seen) {
   if (seen.empty()) return;
-  EXPECT_LE(frame.screen_begin_x, seen.begin_x);
-  EXPECT_LE(frame.screen_begin_y, seen.begin_y);
-  EXPECT_GE(frame.screen_end_x, seen.end_x);
-  EXPECT_GE(frame.screen_end_y, seen.end_y);
+  EXPECT_LE(frame.screen.begin_x, seen.begin_x);
+  EXPECT_LE(frame.screen.begin_y, seen.begin_y);
+  EXPECT_GE(frame.screen.end_x, seen.end_x);
+  EXPECT_GE(frame.screen.end_y, seen.end_y);
 }
 
 /// Boxes of a block, of a slab, of all, at random places.
@@ -61,9 +62,9 @@ void choose_active_box(FrameParams &frame, Random &random) {
     const uint size = 1 + random() % (random() % 2 == 0 ? 1 : blocks);
     end = std::min(begin + static_cast<int>(size), static_cast<int>(blocks));
   };
-  choose(frame.dims_x, frame.active_begin_x, frame.active_end_x);
-  choose(frame.dims_y, frame.active_begin_y, frame.active_end_y);
-  choose(frame.dims_z, frame.active_begin_z, frame.active_end_z);
+  choose(frame.grid.dims_x, frame.surface.active_begin_x, frame.surface.active_end_x);
+  choose(frame.grid.dims_y, frame.surface.active_begin_y, frame.surface.active_end_y);
+  choose(frame.grid.dims_z, frame.surface.active_begin_z, frame.surface.active_end_z);
 }
 
 TEST(Frame, ScreenBoxHasEveryPixelThatMeetsTheActiveBox) {
@@ -76,11 +77,11 @@ TEST(Frame, ScreenBoxHasEveryPixelThatMeetsTheActiveBox) {
         expect_encloses(frame, seen_range(frame));
         for (int i = 0; i < 20; ++i) {
           choose_active_box(frame, random);
-          set_screen_box(frame);
-          EXPECT_EQ(frame.screen_begin_x % 8, 0u);
-          EXPECT_EQ(frame.screen_begin_y % 4, 0u);
-          EXPECT_LE(frame.screen_end_x, size.width);
-          EXPECT_LE(frame.screen_end_y, size.height);
+          frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+          EXPECT_EQ(frame.screen.begin_x % 8, 0u);
+          EXPECT_EQ(frame.screen.begin_y % 4, 0u);
+          EXPECT_LE(frame.screen.end_x, size.width);
+          EXPECT_LE(frame.screen.end_y, size.height);
           expect_encloses(frame, seen_range(frame));
         }
       }
@@ -97,9 +98,9 @@ TEST(Frame, ScreenBoxAllowsForRoundedDirections) {
     const glm::dvec3 to(1 + 0.01 * i, 0.7 - 0.02 * i, 1.3), block(34);
     const Camera camera{block - 5e6 * glm::normalize(to), block, {0, 1, 0}, 0.0002};
     FrameParams frame = make_frame_params(info, camera, {360, 360}, 0);
-    frame.active_begin_x = frame.active_begin_y = frame.active_begin_z = 8;
-    frame.active_end_x = frame.active_end_y = frame.active_end_z = 9;
-    set_screen_box(frame);
+    frame.surface.active_begin_x = frame.surface.active_begin_y = frame.surface.active_begin_z = 8;
+    frame.surface.active_end_x = frame.surface.active_end_y = frame.surface.active_end_z = 9;
+    frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
     expect_encloses(frame, seen_range(frame));
   }
 }
@@ -117,23 +118,24 @@ TEST(Frame, ScreenBoxIsTight) {
                      up = glm::cross(right, fwd);
     for (int i = 0; i < 20; ++i) {
       choose_active_box(frame, random);
-      set_screen_box(frame);
+      frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
       glm::dvec2 least(1e9), most(-1e9);
       for (int corner = 0; corner < 8; ++corner) {
-        const glm::dvec3 at((corner & 1) != 0 ? 4 * frame.active_end_x : 4 * frame.active_begin_x,
-                            (corner & 2) != 0 ? 4 * frame.active_end_y : 4 * frame.active_begin_y,
-                            (corner & 4) != 0 ? 4 * frame.active_end_z : 4 * frame.active_begin_z);
+        const glm::dvec3 at(
+            (corner & 1) != 0 ? 4 * frame.surface.active_end_x : 4 * frame.surface.active_begin_x,
+            (corner & 2) != 0 ? 4 * frame.surface.active_end_y : 4 * frame.surface.active_begin_y,
+            (corner & 4) != 0 ? 4 * frame.surface.active_end_z : 4 * frame.surface.active_begin_z);
         const glm::dvec3 to = glm::min(at, 63.0) - camera.eye;
         const glm::dvec2 uv =
             glm::dvec2(glm::dot(to, right), -glm::dot(to, up)) / glm::dot(to, fwd);
-        const glm::dvec2 pixel = 0.5 * (uv / double{frame.pixel_scale} + glm::dvec2(319, 179));
+        const glm::dvec2 pixel = 0.5 * (uv / double{frame.view.pixel_scale} + glm::dvec2(319, 179));
         least = glm::min(least, pixel);
         most = glm::max(most, pixel);
       }
-      EXPECT_GT(frame.screen_begin_x + 8.0, std::max(least.x, 0.0) - 2);
-      EXPECT_GT(frame.screen_begin_y + 4.0, std::max(least.y, 0.0) - 2);
-      EXPECT_LT(frame.screen_end_x - 1.0, std::min(most.x, 319.0) + 2.1);
-      EXPECT_LT(frame.screen_end_y - 1.0, std::min(most.y, 179.0) + 2.1);
+      EXPECT_GT(frame.screen.begin_x + 8.0, std::max(least.x, 0.0) - 2);
+      EXPECT_GT(frame.screen.begin_y + 4.0, std::max(least.y, 0.0) - 2);
+      EXPECT_LT(frame.screen.end_x - 1.0, std::min(most.x, 319.0) + 2.1);
+      EXPECT_LT(frame.screen.end_y - 1.0, std::min(most.y, 179.0) + 2.1);
     }
   }
 }
@@ -141,13 +143,14 @@ TEST(Frame, ScreenBoxIsTight) {
 TEST(Frame, ScreenBoxIsEmptyWhereNothingIsSeen) {
   const glm::uvec3 dims(64);
   FrameParams frame = case_frame(dims, {"away", {{-5, -5, -5}, {40, 40, 40}, {0, 1, 0}, 60}});
-  EXPECT_LT(frame.screen_begin_x, frame.screen_end_x);
-  frame.active_end_x = frame.active_end_y = frame.active_end_z = 0;  // no active block
-  set_screen_box(frame);
-  EXPECT_EQ(frame.screen_begin_x, frame.screen_end_x);
-  EXPECT_EQ(frame.screen_begin_y, frame.screen_end_y);
+  EXPECT_LT(frame.screen.begin_x, frame.screen.end_x);
+  frame.surface.active_end_x = frame.surface.active_end_y = frame.surface.active_end_z =
+      0;  // no active block
+  frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+  EXPECT_EQ(frame.screen.begin_x, frame.screen.end_x);
+  EXPECT_EQ(frame.screen.begin_y, frame.screen.end_y);
   frame = case_frame(dims, {"beside", {{-200, 32, -10}, {-200, 32, 400}, {0, 1, 0}, 20}});
-  EXPECT_EQ(frame.screen_end_x, 0u);
+  EXPECT_EQ(frame.screen.end_x, 0u);
 }
 
 }  // namespace

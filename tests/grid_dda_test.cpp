@@ -167,7 +167,7 @@ class GridDdaWalks : public testing::TestWithParam<glm::uvec3> {
   void for_each_ray(const Check &check) const {
     for (const CameraCase &c : camera_cases(GetParam())) {
       const FrameParams frame = case_frame(GetParam(), c);
-      for (uint pixel = 0; pixel < frame.width * frame.height; ++pixel) {
+      for (uint pixel = 0; pixel < frame.view.width * frame.view.height; ++pixel) {
         SCOPED_TRACE(fmt::format("camera '{}', pixel {}", c.name, pixel));
         check(make_ray(&frame, pixel), last_planes(&frame));
         if (HasFatalFailure()) return;

@@ -35,7 +35,7 @@ class GroupOnDevice : public testing::TestWithParam<GroupingOnDevice> {
                              num_pixels, hot_one_in, group_size, seed));
     Random random(seed);
     const FrameParams frame = plain_frame(kDims, num_pixels);
-    const uint num_blocks = frame.blocks_x * frame.blocks_y * frame.blocks_z;
+    const uint num_blocks = frame.grid.blocks_x * frame.grid.blocks_y * frame.grid.blocks_z;
     StageWorld world(device_, frame, num_slots, group_size);
     Group group(device_, {num_pixels, num_slots, group_size, grouping_});
     Tally tally;

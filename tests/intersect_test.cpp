@@ -36,8 +36,9 @@ BlockHit trace_block(const FrameParams &frame, const std::vector<float> &voxels,
                      uint block) {
   const Ray ray = make_ray(&frame, pixel);
   const LastPlanes last = last_planes(&frame);
-  const int bx = int(block % frame.blocks_x), by = int(block / frame.blocks_x % frame.blocks_y),
-            bz = int(block / frame.blocks_x / frame.blocks_y);
+  const int bx = int(block % frame.grid.blocks_x),
+            by = int(block / frame.grid.blocks_x % frame.grid.blocks_y),
+            bz = int(block / frame.grid.blocks_x / frame.grid.blocks_y);
   const int end_x = std::min(4 * bx + 4, last.x), end_y = std::min(4 * by + 4, last.y),
             end_z = std::min(4 * bz + 4, last.z);
   RayEvent enter = region_entry(&ray, bx, by, bz, 4, last);
@@ -93,7 +94,8 @@ struct ClosedForm {
 
 ClosedForm closed_form(const FrameParams &frame, Field field, const Ray &ray) {
   const double o[3] = {ray.x.o, ray.y.o, ray.z.o}, d[3] = {ray.x.d, ray.y.d, ray.z.d};
-  const double last[3] = {frame.dims_x - 1.0, frame.dims_y - 1.0, frame.dims_z - 1.0};
+  const double last[3] = {frame.grid.dims_x - 1.0, frame.grid.dims_y - 1.0,
+                          frame.grid.dims_z - 1.0};
   double enter = 0, exit = 1e30;
   for (int axis = 0; axis < 3; ++axis) {
     if (d[axis] == 0) {
@@ -106,7 +108,8 @@ ClosedForm closed_form(const FrameParams &frame, Field field, const Ray &ray) {
   }
   if (exit - enter < 1e-3) return {exit < enter - 1e-3, std::nullopt};
   const auto f = [&](double t) {
-    return field_value(field, o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]) - frame.isovalue;
+    return field_value(field, o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]) -
+           frame.surface.isovalue;
   };
   /* f is a quadratic: from three values of it, about the middle of the ray, u in [-1,1]. */
   const double middle = 0.5 * (enter + exit), half = 0.5 * (exit - enter);
@@ -158,7 +161,7 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// scarce: then each pass tests what it can, and what it cannot is not tried again.
   void run(const glm::uvec3 &dims, Field field, const FrameParams &frame, Stages &stages,
            uint spec_count, Tally &tally) {
-    const uint num_pixels = frame.width * frame.height;
+    const uint num_pixels = frame.view.width * frame.view.height;
     const std::vector<float> voxels = make_voxels(field, dims);
     stages.world.set_frame(frame);
     std::vector<std::vector<uint>> blocks(num_pixels);
@@ -242,7 +245,7 @@ class IntersectOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       if (t) {
         const double residual = field_value(field, ray.x.o + *t * ray.x.d, ray.y.o + *t * ray.y.d,
                                             ray.z.o + *t * ray.z.d) -
-                                frame.isovalue;
+                                frame.surface.isovalue;
         ASSERT_LE(std::abs(residual), 46 * 0x1p-24 * first_hits.largest[pixel])
             << "pixel " << pixel;
       }

@@ -82,9 +82,9 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     std::size_t num_selected = 0, num_in_range = 0;
     for (const float isovalue : awkward_isovalues(expected, max_ranges)) {
       SCOPED_TRACE(fmt::format("isovalue {:a}", isovalue));
-      params.isovalue = isovalue;
+      params.surface.isovalue = isovalue;
       macrocells.select(params);
-      macrocells.set_active_box(params);
+      params.surface = macrocells.surface(params);
       expect_box(params, macrocells.masks().read());
       expect_mask(macrocells, params, expected, isovalue, num_selected, num_in_range);
       if (HasFatalFailure()) return;
@@ -96,8 +96,8 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// The box around all set bits, to whole macrocells.
   static void expect_box(const FrameParams &params, const std::vector<uint> &masks) {
-    const int cells[3] = {int(params.blocks_x + 3) / 4, int(params.blocks_y + 3) / 4,
-                          int(params.blocks_z + 3) / 4};
+    const int cells[3] = {int(params.grid.blocks_x + 3) / 4, int(params.grid.blocks_y + 3) / 4,
+                          int(params.grid.blocks_z + 3) / 4};
     int begin[3] = {1 << 20, 1 << 20, 1 << 20}, end[3] = {0, 0, 0};
     for (int cell = 0; cell < cells[0] * cells[1] * cells[2]; ++cell) {
       if ((masks[2 * std::size_t(cell)] | masks[2 * std::size_t(cell) + 1]) == 0) continue;
@@ -107,9 +107,11 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         end[axis] = std::max(end[axis], 4 * at[axis] + 4);
       }
     }
-    const int got_begin[3] = {params.active_begin_x, params.active_begin_y, params.active_begin_z};
-    const int got_end[3] = {params.active_end_x, params.active_end_y, params.active_end_z};
-    const uint dims[3] = {params.dims_x, params.dims_y, params.dims_z};
+    const int got_begin[3] = {params.surface.active_begin_x, params.surface.active_begin_y,
+                              params.surface.active_begin_z};
+    const int got_end[3] = {params.surface.active_end_x, params.surface.active_end_y,
+                            params.surface.active_end_z};
+    const uint dims[3] = {params.grid.dims_x, params.grid.dims_y, params.grid.dims_z};
     for (int axis = 0; axis < 3; ++axis) {
       ASSERT_EQ(got_end[axis], std::min(end[axis], int(num_owning_blocks(dims[axis]))))
           << "axis " << axis;
@@ -143,9 +145,10 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   static bool is_selected(const std::vector<uint> &masks, const FrameParams &params, uint block) {
-    const uint x = block % params.blocks_x, y = block / params.blocks_x % params.blocks_y,
-               z = block / params.blocks_x / params.blocks_y;
-    const uint coarse_x = (params.blocks_x + 3) / 4, coarse_y = (params.blocks_y + 3) / 4;
+    const uint x = block % params.grid.blocks_x,
+               y = block / params.grid.blocks_x % params.grid.blocks_y,
+               z = block / params.grid.blocks_x / params.grid.blocks_y;
+    const uint coarse_x = (params.grid.blocks_x + 3) / 4, coarse_y = (params.grid.blocks_y + 3) / 4;
     const uint coarse = x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4)),
                bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
     return (masks[2 * coarse + bit / 32] >> bit % 32 & 1) != 0;
@@ -239,16 +242,16 @@ TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
       const std::size_t x = i % dims.x / 4, y = i / dims.x % dims.y / 4,
                         z = i / dims.x / dims.y / 4;
       moved[i] += offset_of_voxel(offset, volume.bounds,
-                                  x + params.blocks_x * (y + params.blocks_y * z), 0);
+                                  x + params.grid.blocks_x * (y + params.grid.blocks_y * z), 0);
     }
     const std::vector<Range> expected = dual_cell_ranges(dims, moved);
     for (const float isovalue : awkward_isovalues(expected, 4)) {
-      params.isovalue = isovalue;
+      params.surface.isovalue = isovalue;
       const auto masks = [&](float uniform, float unit) {
         stream.layout.value_offset = uniform;
         stream.layout.bound_unit = unit;
         macrocells.select(params, 0, &stream);
-        macrocells.set_active_box(params);
+        params.surface = macrocells.surface(params);
         return macrocells.masks().read();
       };
       const std::vector<uint> by_block = masks(0, offset.unit), alike = masks(sign * 0.5f, 0);
@@ -336,25 +339,25 @@ TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
   const auto select = [&](Macrocells &macrocells, std::size_t selection, float isovalue,
                           double voxel_error) {
     FrameParams params = grid_frame(dims);
-    params.isovalue = isovalue;
+    params.surface.isovalue = isovalue;
     macrocells.use(selection);
     macrocells.select(params, voxel_error, &stream);
-    macrocells.set_index(params);
-    macrocells.set_active_box(params);
+    params.surface = macrocells.surface(params);
     return std::pair(macrocells.masks().read(),
-                     std::array{static_cast<int>(params.isovalue_index), params.active_begin_x,
-                                params.active_begin_y, params.active_begin_z, params.active_end_x,
-                                params.active_end_y, params.active_end_z});
+                     std::array{static_cast<int>(params.surface.isovalue_index),
+                                params.surface.active_begin_x, params.surface.active_begin_y,
+                                params.surface.active_begin_z, params.surface.active_end_x,
+                                params.surface.active_end_y, params.surface.active_end_z});
   };
   const auto alone = [&](float isovalue, double voxel_error) {
     Macrocells macrocells(device_, grid_frame(dims), stream);
     return select(macrocells, 0, isovalue, voxel_error);
   };
-  Macrocells macrocells(
-      device_, grid_frame(dims), stream,
-      std::make_shared<MacrocellBuffers>(
-          device_, MacrocellBuffers::Limits{volume.block_count(), num_macrocells(grid_frame(dims)),
-                                            kNumFieldBounds}));
+  Macrocells macrocells(device_, grid_frame(dims), stream,
+                        std::make_shared<MacrocellBuffers>(
+                            device_, MacrocellBuffers::Limits{volume.block_count(),
+                                                              num_macrocells(grid_frame(dims).grid),
+                                                              kNumFieldBounds}));
   const float first = sphere_voxels(dims)[1000], other = sphere_voxels(dims)[5000];
   const auto expected = alone(first, 0), wider = alone(first, 0.2), another = alone(other, 0);
   EXPECT_NE(expected, wider);

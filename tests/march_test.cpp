@@ -62,7 +62,7 @@ class MarchOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       EXPECT_LT(pass, 2000);
       if (HasFailure()) break;
     }
-    test::expect_same_hits(rays.hits.read(), expected, world.frame.width);
+    test::expect_same_hits(rays.hits.read(), expected, world.frame.view.width);
     return num_doubts;
   }
 

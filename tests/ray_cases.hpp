@@ -70,7 +70,8 @@ inline std::vector<uint> blocks_of_ray(const FrameParams &frame, uint pixel) {
   while (cell.x >= 0 && cell.x < last.x && cell.y >= 0 && cell.y < last.y && cell.z >= 0 &&
          cell.z < last.z) {
     const uint block =
-        uint(cell.x / 4) + frame.blocks_x * (uint(cell.y / 4) + frame.blocks_y * uint(cell.z / 4));
+        uint(cell.x / 4) +
+        frame.grid.blocks_x * (uint(cell.y / 4) + frame.grid.blocks_y * uint(cell.z / 4));
     if (blocks.empty() || blocks.back() != block) blocks.push_back(block);
     walk_step(&cell, &ray, walk_exit(&cell, &ray), 1, last);
   }

@@ -31,21 +31,21 @@ struct RaysWorld {
         stream(device, volume.compressed),
         macrocells(device, frame, stream),
         rays(device, {.num_rays = size.num_rays(), .with_pairs = false}),
-        cache(device,
-              BlockCache::limits_for(
-                  frame, num_slots != 0 ? num_slots : static_cast<uint>(block_count(frame)),
-                  size.num_rays()),
-              group_size),
+        cache(
+            device,
+            BlockCache::limits_for(
+                frame.grid, num_slots != 0 ? num_slots : static_cast<uint>(block_count(frame.grid)),
+                size.num_rays()),
+            group_size),
         decode(device, cache.capacity, stream.defines()),
         start_rays(device, size.num_rays(), group_size),
         march(device, size.num_rays(), group_size, kDefaultSolver),
         request_ahead(device, size.num_rays(), group_size) {
     macrocells.select(frame);
-    macrocells.set_index(frame);
-    macrocells.set_active_box(frame);
-    set_screen_box(frame);
-    frame.max_spec_count = spec_count;
-    frame.table_groups = cache.table_groups;
+    frame.surface = macrocells.surface(frame);
+    frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+    frame.schedule.max_spec_count = spec_count;
+    frame.schedule.table_groups = cache.table_groups;
     rays.frame = frame;
     const std::vector<uint> masks = macrocells.masks().read();
     for (uint pixel = 0; pixel < size.num_rays(); ++pixel) {
@@ -55,14 +55,14 @@ struct RaysWorld {
   }
 
   glm::uvec3 coords(uint block) const {
-    return {block % frame.blocks_x, block / frame.blocks_x % frame.blocks_y,
-            block / frame.blocks_x / frame.blocks_y};
+    return {block % frame.grid.blocks_x, block / frame.grid.blocks_x % frame.grid.blocks_y,
+            block / frame.grid.blocks_x / frame.grid.blocks_y};
   }
 
   /// Of masks laid out as those of the macrocells.
   bool has_bit(const std::vector<uint> &masks, uint block) const {
     const glm::uvec3 b = coords(block);
-    const uint coarse_x = (frame.blocks_x + 3) / 4, coarse_y = (frame.blocks_y + 3) / 4;
+    const uint coarse_x = (frame.grid.blocks_x + 3) / 4, coarse_y = (frame.grid.blocks_y + 3) / 4;
     const uint bit = b.x % 4 + 4 * (b.y % 4) + 16 * (b.z % 4);
     return (masks[2 * (b.x / 4 + coarse_x * (b.y / 4 + coarse_y * (b.z / 4))) + bit / 32] >>
                 bit % 32 &
@@ -108,7 +108,7 @@ struct RaysWorld {
 
   /// [blocks] slot of each block, ISO_BLOCK_ABSENT if it is not cached.
   std::vector<uint> slots_by_block() const {
-    std::vector<uint> slots(block_count(frame), ISO_BLOCK_ABSENT);
+    std::vector<uint> slots(block_count(frame.grid), ISO_BLOCK_ABSENT);
     for (const BlockEntry &entry : cache.table.read()) {
       if (entry.block_id != ISO_INVALID_ID) slots.at(entry.block_id) = entry.slot;
     }

@@ -58,7 +58,7 @@ std::vector<WaitingRay> random_rays(const RaysWorld &world, uint most, Random &r
 std::set<uint> cache_some(RaysWorld &world, uint one_in, Random &random) {
   std::vector<BlockEntry> table(world.cache.table.size(), {ISO_INVALID_ID, ISO_BLOCK_ABSENT, 0, 0});
   std::set<uint> cached;
-  for (uint block = 0; block < block_count(world.frame); ++block) {
+  for (uint block = 0; block < block_count(world.frame.grid); ++block) {
     if (random() % one_in != 0 || cached.size() == world.cache.num_slots) continue;
     const glm::uvec3 b = world.coords(block);
     uint i = table_home(&world.frame, b.x, b.y, b.z);
@@ -89,16 +89,16 @@ void write_rays(RaysWorld &world, const std::vector<WaitingRay> &waiting,
 /// Blocks that a ray is to look ahead at (Sec. 4, and kernels_cl/portable/window.h).
 uint ahead_of(const FrameParams &frame, const RequestCase &c, const RayEntry &entry,
               const PassCounts &counts) {
-  const uint num_rays = frame.width * frame.height;
+  const uint num_rays = frame.view.width * frame.view.height;
   const auto n_spec = [&](uint at_work) {
-    return std::clamp(num_rays / at_work, 1u, frame.max_spec_count);
+    return std::clamp(num_rays / at_work, 1u, frame.schedule.max_spec_count);
   };
-  const uint own = std::min(1u << entry.log_ahead, frame.max_spec_count);
+  const uint own = std::min(1u << entry.log_ahead, frame.schedule.max_spec_count);
   uint ahead = n_spec(counts.next_active_count);
   if (c.per_ray) ahead = std::max(own, n_spec(counts.active_count) / 2);
   if (counts.window_count < num_rays) {
     const uint asking = std::min(counts.window_count, counts.next_active_count);
-    ahead = std::min(ahead, std::max(1u, 4 * frame.table_groups / (asking + 1)));
+    ahead = std::min(ahead, std::max(1u, 4 * frame.schedule.table_groups / (asking + 1)));
   }
   return ahead;
 }
@@ -110,9 +110,9 @@ Expected expect(const RaysWorld &world, const RequestCase &c,
   const LastPlanes last = last_planes(&frame);
   Expected expected{{}, {}, counts, state};
   expected.counts.spec_count =
-      waiting.empty()
-          ? 0
-          : std::clamp(frame.width * frame.height / uint(waiting.size()), 1u, frame.max_spec_count);
+      waiting.empty() ? 0
+                      : std::clamp(frame.view.width * frame.view.height / uint(waiting.size()), 1u,
+                                   frame.schedule.max_spec_count);
   for (std::size_t i = 0; i < std::min<std::size_t>(waiting.size(), counts.window_count); ++i) {
     const WaitingRay &w = waiting[i];
     const uint ahead = ahead_of(frame, c, w.entry, counts);
@@ -128,8 +128,9 @@ Expected expect(const RaysWorld &world, const RequestCase &c,
       }
       for (uint corner = 0; corner < 8; ++corner) {
         if ((touched >> corner & 1u) == 0) continue;
-        const uint block = w.blocks[k] + (corner & 1) +
-                           frame.blocks_x * ((corner >> 1 & 1) + frame.blocks_y * (corner >> 2));
+        const uint block =
+            w.blocks[k] + (corner & 1) +
+            frame.grid.blocks_x * ((corner >> 1 & 1) + frame.grid.blocks_y * (corner >> 2));
         (cached.contains(block) ? expected.needed : expected.wanted).insert(block);
       }
     }
@@ -144,7 +145,7 @@ class RequestAheadOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Returns how many blocks were asked for.
   std::size_t expect_requests(RaysWorld &world, const RequestCase &c) {
     Random random(c.seed);
-    world.frame.per_ray_speculation = c.per_ray;
+    world.frame.schedule.per_ray_speculation = c.per_ray;
     world.rays.frame = world.frame;
     const std::vector<WaitingRay> waiting = random_rays(world, c.num_waiting, random);
     const std::set<uint> cached = cache_some(world, c.one_cached_in, random);
@@ -184,7 +185,7 @@ class RequestAheadOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     ASSERT_TRUE(std::ranges::includes(expected.wanted, blocks));
     for (std::size_t i = listed; i < list.size(); ++i) ASSERT_EQ(list[i], kUntouched) << i;
     const std::vector<uint> bits = world.cache.requested_bits.read();
-    for (uint block = 0; block < block_count(world.frame); ++block)
+    for (uint block = 0; block < block_count(world.frame.grid); ++block)
       ASSERT_EQ(world.has_bit(bits, block), blocks.contains(block)) << "mark of block " << block;
   }
 

@@ -22,10 +22,10 @@ class SpeculationOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
 TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
   Wavefront rays(device_, {kPixels});
-  rays.frame.width = kWidth;
-  rays.frame.height = kHeight;
+  rays.frame.view.width = kWidth;
+  rays.frame.view.height = kHeight;
   for (const uint most : {1u, 7u, 64u}) {
-    rays.frame.max_spec_count = most;
+    rays.frame.schedule.max_spec_count = most;
     for (const uint active :
          {0u, 1u, 2u, 3u, 5u, kPixels / 7, kPixels / 2 + 1, kPixels - 1, kPixels}) {
       for (const bool scarce : {false, true}) {
@@ -59,9 +59,9 @@ TEST_P(SpeculationOnDevice, SmallCountsOfEveryPass) {
 
 TEST_P(SpeculationOnDevice, SmallRaysLeftBecomeActive) {
   Wavefront rays(device_, {kPixels});
-  rays.frame.width = kWidth;
-  rays.frame.height = kHeight;
-  rays.frame.max_spec_count = 64;
+  rays.frame.view.width = kWidth;
+  rays.frame.view.height = kHeight;
+  rays.frame.schedule.max_spec_count = 64;
   std::vector<uint> left(kPixels, 7);
   rays.next_active_ray_ids.write(left);
   speculation_.begin_pass(rays);

@@ -66,12 +66,12 @@ inline void expect_counts(const CountsBuffer &counts, const PassCounts &expected
 /// The grid of a volume, without a camera.
 inline FrameParams grid_frame(const glm::uvec3 &dims) {
   FrameParams frame{};
-  frame.dims_x = dims.x;
-  frame.dims_y = dims.y;
-  frame.dims_z = dims.z;
-  frame.blocks_x = (dims.x + 3) / 4;
-  frame.blocks_y = (dims.y + 3) / 4;
-  frame.blocks_z = (dims.z + 3) / 4;
+  frame.grid.dims_x = dims.x;
+  frame.grid.dims_y = dims.y;
+  frame.grid.dims_z = dims.z;
+  frame.grid.blocks_x = (dims.x + 3) / 4;
+  frame.grid.blocks_y = (dims.y + 3) / 4;
+  frame.grid.blocks_z = (dims.z + 3) / 4;
   return frame;
 }
 

@@ -18,14 +18,17 @@ namespace isowave::core {
 
 /// The blocks of a dual grid, by plain arithmetic.
 inline std::vector<uint> dual_grid_blocks(const FrameParams &frame, uint block_id) {
-  const uint x = block_id % frame.blocks_x, y = block_id / frame.blocks_x % frame.blocks_y,
-             z = block_id / frame.blocks_x / frame.blocks_y;
+  const uint x = block_id % frame.grid.blocks_x,
+             y = block_id / frame.grid.blocks_x % frame.grid.blocks_y,
+             z = block_id / frame.grid.blocks_x / frame.grid.blocks_y;
   std::vector<uint> blocks;
   for (uint dz = 0; dz < 2; ++dz) {
     for (uint dy = 0; dy < 2; ++dy) {
       for (uint dx = 0; dx < 2; ++dx) {
-        if (x + dx < frame.blocks_x && y + dy < frame.blocks_y && z + dz < frame.blocks_z)
-          blocks.push_back(x + dx + frame.blocks_x * (y + dy + frame.blocks_y * (z + dz)));
+        if (x + dx < frame.grid.blocks_x && y + dy < frame.grid.blocks_y &&
+            z + dz < frame.grid.blocks_z)
+          blocks.push_back(x + dx +
+                           frame.grid.blocks_x * (y + dy + frame.grid.blocks_y * (z + dz)));
       }
     }
   }
@@ -36,8 +39,8 @@ inline std::vector<uint> dual_grid_blocks(const FrameParams &frame, uint block_i
 struct StageWorld {
   StageWorld(ocl::Device &device, const FrameParams &frame_params, uint num_slots, uint group_size)
       : frame(frame_params),
-        rays(device, {frame.width * frame.height}),
-        cache(device, BlockCache::limits_for(frame, num_slots, rays.num_rays), group_size),
+        rays(device, {frame.view.width * frame.view.height}),
+        cache(device, BlockCache::limits_for(frame.grid, num_slots, rays.num_rays), group_size),
         compaction(device, rays.num_rays, group_size) {
     set_frame(frame_params);
     std::vector<uint> ids(rays.num_rays);
@@ -48,7 +51,7 @@ struct StageWorld {
   /// Another camera or isovalue; image size and volume stay.
   void set_frame(const FrameParams &frame_params) {
     frame = frame_params;
-    frame.table_groups = cache.table_groups;
+    frame.schedule.table_groups = cache.table_groups;
     rays.frame = frame;
   }
 
@@ -89,8 +92,9 @@ struct StageWorld {
 
   /// [blocks] slot of each block, ISO_BLOCK_ABSENT if it is not cached.
   std::vector<uint> slots_by_block() const {
-    std::vector<uint> slots(std::size_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z,
-                            ISO_BLOCK_ABSENT);
+    std::vector<uint> slots(
+        std::size_t{frame.grid.blocks_x} * frame.grid.blocks_y * frame.grid.blocks_z,
+        ISO_BLOCK_ABSENT);
     for (const BlockEntry &entry : cache.table.read()) {
       if (entry.block_id != ISO_INVALID_ID) slots.at(entry.block_id) = entry.slot;
     }
@@ -105,14 +109,15 @@ struct StageWorld {
                             slots = cache.decode_slots.read();
     std::vector<float> values = cache.values.read();
     for (uint i = 0; i < granted; ++i) {
-      const uint x0 = 4 * (blocks[i] % frame.blocks_x),
-                 y0 = 4 * (blocks[i] / frame.blocks_x % frame.blocks_y),
-                 z0 = 4 * (blocks[i] / frame.blocks_x / frame.blocks_y);
+      const uint x0 = 4 * (blocks[i] % frame.grid.blocks_x),
+                 y0 = 4 * (blocks[i] / frame.grid.blocks_x % frame.grid.blocks_y),
+                 z0 = 4 * (blocks[i] / frame.grid.blocks_x / frame.grid.blocks_y);
       for (uint v = 0; v < 64; ++v) {
         const uint x = x0 + v % 4, y = y0 + v / 4 % 4, z = z0 + v / 16;
-        const bool in_domain = x < frame.dims_x && y < frame.dims_y && z < frame.dims_z;
+        const bool in_domain =
+            x < frame.grid.dims_x && y < frame.grid.dims_y && z < frame.grid.dims_z;
         values[64 * std::size_t{slots[i]} + v] =
-            in_domain ? voxels[x + frame.dims_x * (y + std::size_t{frame.dims_y} * z)]
+            in_domain ? voxels[x + frame.grid.dims_x * (y + std::size_t{frame.grid.dims_y} * z)]
                       : std::numeric_limits<float>::quiet_NaN();
       }
     }
@@ -132,9 +137,9 @@ struct StageWorld {
 /// A camera-less frame: only grid and number of pixels matter.
 inline FrameParams plain_frame(const glm::uvec3 &dims, uint width, uint height = 1) {
   FrameParams frame = grid_frame(dims);
-  frame.width = width;
-  frame.height = height;
-  frame.max_spec_count = ISO_MAX_SPECULATION;
+  frame.view.width = width;
+  frame.view.height = height;
+  frame.schedule.max_spec_count = ISO_MAX_SPECULATION;
   return frame;
 }
 
@@ -147,7 +152,7 @@ inline std::array<float, 8> cell_corners(const FrameParams &frame, const std::ve
                vy = static_cast<std::size_t>(y + (corner >> 1 & 1)),
                vz = static_cast<std::size_t>(z + (corner >> 2));
     w[static_cast<std::size_t>(corner)] =
-        voxels[vx + frame.dims_x * (vy + frame.dims_y * vz)] - frame.isovalue;
+        voxels[vx + frame.grid.dims_x * (vy + frame.grid.dims_y * vz)] - frame.surface.isovalue;
   }
   return w;
 }

@@ -68,8 +68,8 @@ TEST_P(KeptPictureOnDevice, SmallPicturesCoverLargerOnes) {
     rays.hits.write(padded);
     kept.keep(rays, small);
     rays.hits.write(now);
-    rays.frame.width = full.width;
-    rays.frame.height = full.height;
+    rays.frame.view.width = full.width;
+    rays.frame.view.height = full.height;
     const Hits everywhere = enlarged(before, small, full);
     Hits expected = now;
     for (std::size_t i = 0; i < now.size(); ++i) {

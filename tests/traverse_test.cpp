@@ -25,13 +25,13 @@ namespace {
 using Selection = std::vector<bool>;
 
 std::vector<uint> masks_of(const FrameParams &frame, const Selection &selected) {
-  const uint coarse_x = (frame.blocks_x + 3) / 4, coarse_y = (frame.blocks_y + 3) / 4,
-             coarse_z = (frame.blocks_z + 3) / 4;
+  const uint coarse_x = (frame.grid.blocks_x + 3) / 4, coarse_y = (frame.grid.blocks_y + 3) / 4,
+             coarse_z = (frame.grid.blocks_z + 3) / 4;
   std::vector<uint> masks(2 * std::size_t{coarse_x} * coarse_y * coarse_z);
   for (uint b = 0; b < selected.size(); ++b) {
     if (!selected[b]) continue;
-    const uint x = b % frame.blocks_x, y = b / frame.blocks_x % frame.blocks_y,
-               z = b / frame.blocks_x / frame.blocks_y;
+    const uint x = b % frame.grid.blocks_x, y = b / frame.grid.blocks_x % frame.grid.blocks_y,
+               z = b / frame.grid.blocks_x / frame.grid.blocks_y;
     const uint bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
     masks[2 * (x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4))) + bit / 32] |= 1u << bit % 32;
   }
@@ -40,7 +40,7 @@ std::vector<uint> masks_of(const FrameParams &frame, const Selection &selected) 
 
 Selection random_selection(const FrameParams &frame, uint one_in, uint seed) {
   Random random(seed);
-  Selection selected(std::size_t{frame.blocks_x} * frame.blocks_y * frame.blocks_z);
+  Selection selected(std::size_t{frame.grid.blocks_x} * frame.grid.blocks_y * frame.grid.blocks_z);
   for (std::size_t b = 0; b < selected.size(); ++b) selected[b] = random() % one_in == 0;
   return selected;
 }
@@ -48,7 +48,7 @@ Selection random_selection(const FrameParams &frame, uint one_in, uint seed) {
 using BlockLists = std::vector<std::vector<uint>>;  ///< by pixel, in ray order
 
 BlockLists walk_cells(const FrameParams &frame, const Selection &selected) {
-  BlockLists lists(std::size_t{frame.width} * frame.height);
+  BlockLists lists(std::size_t{frame.view.width} * frame.view.height);
   for (uint pixel = 0; pixel < lists.size(); ++pixel) {
     lists[pixel] = blocks_of_ray(frame, pixel);
     std::erase_if(lists[pixel], [&](uint block) { return !selected[block]; });
@@ -58,10 +58,11 @@ BlockLists walk_cells(const FrameParams &frame, const Selection &selected) {
 
 /// Length of a ray within the dual cells of a block, in voxels; negative when it misses them.
 double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
-  const double b[3] = {4.0 * (block % frame.blocks_x),
-                       4.0 * (block / frame.blocks_x % frame.blocks_y),
-                       4.0 * (block / frame.blocks_x / frame.blocks_y)};
-  const double last[3] = {frame.dims_x - 1.0, frame.dims_y - 1.0, frame.dims_z - 1.0};
+  const double b[3] = {4.0 * (block % frame.grid.blocks_x),
+                       4.0 * (block / frame.grid.blocks_x % frame.grid.blocks_y),
+                       4.0 * (block / frame.grid.blocks_x / frame.grid.blocks_y)};
+  const double last[3] = {frame.grid.dims_x - 1.0, frame.grid.dims_y - 1.0,
+                          frame.grid.dims_z - 1.0};
   const RayAxis axes[3] = {ray.x, ray.y, ray.z};
   double enter = 0, exit = 1e30;
   for (int axis = 0; axis < 3; ++axis) {
@@ -105,7 +106,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     Wavefront &rays = stages.rays;
     const ocl::Buffer<uint> masks(device_, "masks",
                                   std::span<const uint>(masks_of(frame, selected)));
-    const uint num_pixels = frame.width * frame.height;
+    const uint num_pixels = frame.view.width * frame.view.height;
     ocl::Buffer<uint> pairs(device_, "pairs", std::size_t{num_pixels} * spec_count);
     rays.frame = frame;
     PassCounts start{};
@@ -136,9 +137,10 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       stages.kernel(stages.range, rays.frame, masks, rays.counts, rays.active_ray_ids,
                     rays.ray_block_ids, pairs, rays.closest_pairs);
       const std::vector<uint> got = pairs.read(), states = rays.ray_block_ids.read();
-      counts.pair_count = collect(got, active, spec_count, frame.per_ray_speculation, lists);
+      counts.pair_count =
+          collect(got, active, spec_count, frame.schedule.per_ray_speculation, lists);
       for (const uint ray : active)
-        counts.ahead_count += own_ahead(ray, spec_count, frame.per_ray_speculation);
+        counts.ahead_count += own_ahead(ray, spec_count, frame.schedule.per_ray_speculation);
       expect_counts(rays.counts, counts);
       std::vector<uint> closest = rays.closest_pairs.read();
       closest.resize(active.size());
@@ -186,7 +188,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     Stages stages(device_, size.num_pixels(), group_size);
     for (const CameraCase &c : cameras) {
       FrameParams frame = case_frame(dims, c, size);
-      frame.per_ray_speculation = per_ray;
+      frame.schedule.per_ray_speculation = per_ray;
       const Selection selected = random_selection(frame, one_in, 1);
       const BlockLists expected = walk_cells(frame, selected);
       for (const uint spec_count : spec_counts) {
@@ -275,7 +277,7 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   Wavefront rays(device_, {40 * 30});
   Macrocells macrocells(device_, frame, stream);
   macrocells.select(frame);
-  macrocells.set_active_box(frame);
+  frame.surface = macrocells.surface(frame);
   rays.frame = frame;
   const std::vector<uint> masks = macrocells.masks().read();
   Selection selected(9 * 9 * 9);

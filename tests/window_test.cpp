@@ -9,10 +9,10 @@ namespace {
 
 FrameParams frame_of(uint width, uint height) {
   FrameParams frame{};
-  frame.width = width;
-  frame.height = height;
-  frame.max_spec_count = 64;
-  frame.table_groups = 50;
+  frame.view.width = width;
+  frame.view.height = height;
+  frame.schedule.max_spec_count = 64;
+  frame.schedule.table_groups = 50;
   return frame;
 }
 
@@ -54,7 +54,7 @@ TEST(Window, SpeculationSharesTheFramesRaysOut) {
   EXPECT_EQ(speculation_count(&frame, 1), 64u);
   EXPECT_EQ(speculation_count(&frame, 100), 10u);
   EXPECT_EQ(speculation_count(&frame, kRays), 1u);
-  frame.max_spec_count = 3;
+  frame.schedule.max_spec_count = 3;
   EXPECT_EQ(speculation_count(&frame, 100), 3u);
   EXPECT_EQ(speculation_count(&frame, kRays), 1u);
 }

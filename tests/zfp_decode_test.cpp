@@ -140,7 +140,7 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         d_slots(device_, "slots", std::span<const uint>(slots));
 
     FrameParams frame{};
-    frame.isovalue = std::array{0.25f, 0.0f, -0.0f}[seed % 3];
+    frame.surface.isovalue = std::array{0.25f, 0.0f, -0.0f}[seed % 3];
     ocl::Buffer<ulong> inside(device_, "inside", num_slots);
 
     ZfpDecode decode(device_, num_blocks);
@@ -158,8 +158,8 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (uint i = 0; i < start.decoded_count; ++i) {
       std::uint64_t expected_inside = 0;
       for (uint v = 0; v < 64; ++v)
-        expected_inside |= std::uint64_t{expected[64 * std::size_t{slots[i]} + v] >= frame.isovalue}
-                           << v;
+        expected_inside |=
+            std::uint64_t{expected[64 * std::size_t{slots[i]} + v] >= frame.surface.isovalue} << v;
       ASSERT_EQ(got_inside[slots[i]], expected_inside) << "request " << i;
     }
   }

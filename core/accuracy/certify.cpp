@@ -74,13 +74,13 @@ bool starts_certainly(std::span<const FrameParams> frames, std::span<BlockValues
     if (!draws(frame)) continue;
     const Ray ray = make_ray(&frame, pixel);
     const LastPlanes last = last_planes(&frame), zero{};
-    RayEvent enter = border_event(frame.begin_t), exit = border_event(frame.end_t);
+    RayEvent enter = border_event(frame.band.begin_t), exit = border_event(frame.band.end_t);
     if (!clip_to_box(&ray, zero, last, &enter, &exit)) continue;
     const glm::ivec3 cell(locate(ray.x, 0, enter, 1, 0, last.x - 1),
                           locate(ray.y, 1, enter, 1, 0, last.y - 1),
                           locate(ray.z, 2, enter, 1, 0, last.z - 1));
     std::array<float, 8> lower{}, upper{};
-    values[level].corners(cell, frame.isovalue, lower, upper);
+    values[level].corners(cell, frame.surface.isovalue, lower, upper);
     return inside_at(&ray, lower.data(), enter, cell.x, cell.y, cell.z, 0) ==
            inside_at(&ray, upper.data(), enter, cell.x, cell.y, cell.z, 0);
   }
@@ -93,7 +93,8 @@ std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel
   const LastPlanes last = last_planes(&finest), zero{};
   RayEvent enter = start_event(), exit = border_event(std::numeric_limits<float>::infinity());
   if (!clip_to_box(&ray, zero, last, &enter, &exit)) return {1, 0};
-  return {double{enter.t.hi} * double{finest.t_scale}, double{exit.t.hi} * double{finest.t_scale}};
+  return {double{enter.t.hi} * double{finest.view.t_scale},
+          double{exit.t.hi} * double{finest.view.t_scale}};
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ double blocks_share(std::span<const HitRecord> hits, std::span<const FrameParams
     if (std::isinf(hit.t)) continue;
     int level = 0;
     for (std::size_t i = 1; i < frames.size(); ++i) {
-      if (draws(frames[i]) && frames[i].begin_t * frames[i].t_scale <= hit.t)
+      if (draws(frames[i]) && frames[i].band.begin_t * frames[i].view.t_scale <= hit.t)
         level = static_cast<int>(i);
     }
     const double blocks = double{hit.t} * double{hit.t};

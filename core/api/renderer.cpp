@@ -83,12 +83,13 @@ class HitCells {
     Hit hit;
     hit.t = record.t;
     if (std::isinf(record.t)) return hit;
-    const std::uint32_t columns = grids_[0].id_blocks_x, rows = grids_[0].id_blocks_y;
+    const std::uint32_t columns = grids_[0].place.blocks_x, rows = grids_[0].place.blocks_y;
     const std::uint32_t layer = record.block_id / columns / rows;
-    while (hit.level + 1 < grids_.size() && grids_[hit.level + 1].id_begin_z <= layer) ++hit.level;
+    while (hit.level + 1 < grids_.size() && grids_[hit.level + 1].place.begin_z <= layer)
+      ++hit.level;
     hit.cell = {4 * (record.block_id % columns) + record.cell % 4,
                 4 * (record.block_id / columns % rows) + record.cell / 4 % 4,
-                4 * (layer - grids_[hit.level].id_begin_z) + record.cell / 16};
+                4 * (layer - grids_[hit.level].place.begin_z) + record.cell / 16};
     hit.position = {record.x, record.y, record.z};
     hit.gradient = {record.grad_x, record.grad_y, record.grad_z};
     return hit;

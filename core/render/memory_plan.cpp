@@ -53,7 +53,7 @@ ocl::BufferSizes stream_sizes(const MemoryPlan &plan, const CompressedVolume &vo
 void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
   const ocl::BufferSizes stream = stream_sizes(plan, volume, request);
   plan.stream_bytes += stream.bytes();
-  plan.buffers.add(stream).add(Macrocells::sizes(num_macrocells(make_grid_params(volume.info)),
+  plan.buffers.add(stream).add(Macrocells::sizes(num_macrocells(make_grid(volume.info)),
                                                  plan.limits.macrocells.num_selections));
   plan.setup_bytes = std::max(plan.setup_bytes,
                               plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
@@ -64,8 +64,8 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
   const std::uint64_t rays = request.num_rays;
   const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, request.with_levels));
   const FrameParams &last = grids.back();  // the others' ranges and masks lie before its
-  return {.macrocells = {.num_blocks = last.ranges_begin + block_count(last),
-                         .num_macrocells = last.masks_begin / 2 + num_macrocells(last),
+  return {.macrocells = {.num_blocks = last.place.ranges_begin + block_count(last.grid),
+                         .num_macrocells = last.place.masks_begin / 2 + num_macrocells(last.grid),
                          .num_selections = request.with_bounds ? kNumFieldBounds : 1},
           .rays = {.num_rays = rays,
                    .with_pairs = request.pipeline == PipelineKind::kBlocks,

@@ -141,8 +141,8 @@ void Renderer::compile_kernels() {
   const auto compiling = device_.compiling();
   Wavefront &rays = state_.rays;
   rays.frame = FrameParams{};
-  rays.frame.width = rays.frame.height = rays.frame.max_spec_count = 1;
-  rays.frame.table_groups = state_.cache.table_groups;
+  rays.frame.view.width = rays.frame.view.height = rays.frame.schedule.max_spec_count = 1;
+  rays.frame.schedule.table_groups = state_.cache.table_groups;
   // Frames of one level of detail and of several have kernels of their own.
   for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, state_.levels.size());
        ++num_levels) {
@@ -194,19 +194,19 @@ void Renderer::begin_frame(const FrameRequest &request) {
   state_.drawing = {static_cast<std::size_t>(first - frames.begin()),
                     static_cast<std::size_t>(end - frames.begin())};
   const bool has_bands = end - first > 1;
+  const Schedule schedule{.max_spec_count = options_.max_speculation,
+                          .per_ray_speculation = options_.per_ray_speculation,
+                          .table_groups = state_.cache.table_groups};
   for (std::size_t i = 0; i < frames.size(); ++i) {
     Level &level = state_.levels[i];
     FrameParams &frame = frames[i];
-    frame.max_spec_count = options_.max_speculation;
-    frame.per_ray_speculation = options_.per_ray_speculation;
-    frame.table_groups = state_.cache.table_groups;
+    frame.schedule = schedule;
     if (draws(frame)) {
       const auto stage = device_.timer().stage("macrocells");
       level.macrocells.select(frame, level.range_error, &level.stream);
-      level.macrocells.set_index(frame);
-      level.macrocells.set_active_box(frame);
+      frame.surface = level.macrocells.surface(frame);
       // Where there are several bands, a ray stands at a border wherever it crosses that.
-      if (!has_bands) set_screen_box(frame);
+      if (!has_bands) frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
     }
     level.frame = frame;
   }

@@ -13,7 +13,7 @@ Camera surface_camera(Macrocells &macrocells, const VolumeInfo &info,
   std::optional<BlockBox> box;
   for (const float isovalue : isovalues) {
     if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-    frame.isovalue = isovalue;
+    frame.surface.isovalue = isovalue;
     macrocells.select(frame);
     const std::optional<BlockBox> blocks = macrocells.active_blocks(frame);
     if (!blocks) continue;

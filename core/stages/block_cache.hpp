@@ -25,8 +25,7 @@ struct BlockCache {
     std::uint32_t max_requests() const;
   };
   /// For the blocks of `grid`, or, of several levels of detail, of make_id_grid().
-  static Limits limits_for(const FrameParams &grid, std::uint32_t num_slots,
-                           std::uint64_t num_rays) {
+  static Limits limits_for(const BlockGrid &grid, std::uint32_t num_slots, std::uint64_t num_rays) {
     return {num_slots, num_rays, block_count(grid), core::num_macrocells(grid)};
   }
   static ocl::BufferSizes sizes(const Limits &limits);
@@ -54,7 +53,7 @@ struct BlockCache {
   void clear();
 
   std::uint32_t num_slots;
-  std::uint32_t table_groups;     ///< FrameParams::table_groups
+  std::uint32_t table_groups;     ///< Schedule::table_groups
   std::uint32_t capacity;         ///< of the request list: requests beyond it are dropped
   ocl::Buffer<BlockEntry> table;  ///< [8 * table_groups] see kernels_cl/portable/block_table.h
   ocl::Buffer<float> values;      ///< [num_slots * 64] decoded values, x + 4y + 16z within a slot

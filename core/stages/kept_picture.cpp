@@ -24,7 +24,7 @@ void KeptPicture::keep(const Wavefront &rays, ImageSize size) {
 }
 
 void KeptPicture::show(Wavefront &rays, bool everywhere) {
-  const std::uint64_t num_rays = std::uint64_t{rays.frame.width} * rays.frame.height;
+  const std::uint64_t num_rays = std::uint64_t{rays.frame.view.width} * rays.frame.view.height;
   show_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_), rays.frame, size_.ray_columns(),
         size_.ray_rows(), hits_, everywhere ? 1u : 0u, rays.hits);
 }

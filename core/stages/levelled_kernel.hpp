@@ -19,8 +19,8 @@ class LevelledKernel {
 
   /// The version for the frame at work.
   ocl::Kernel<Params...> &of(const Wavefront &rays) {
-    return levels_ && (rays.num_level_frames > 1 || rays.frame.id_begin_z != 0) ? *levels_
-                                                                                : finest_;
+    return levels_ && (rays.num_level_frames > 1 || rays.frame.place.begin_z != 0) ? *levels_
+                                                                                   : finest_;
   }
 
  private:

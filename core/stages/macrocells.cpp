@@ -51,11 +51,12 @@ ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num
 
 Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
                        std::shared_ptr<MacrocellBuffers> buffers)
-    : num_coarse_(static_cast<std::uint32_t>(num_macrocells(frame))),
+    : num_coarse_(static_cast<std::uint32_t>(num_macrocells(frame.grid))),
       coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
-      buffers_(buffers ? std::move(buffers)
-                       : std::make_shared<MacrocellBuffers>(
-                             device, MacrocellBuffers::Limits{block_count(frame), num_coarse_})),
+      buffers_(buffers
+                   ? std::move(buffers)
+                   : std::make_shared<MacrocellBuffers>(
+                         device, MacrocellBuffers::Limits{block_count(frame.grid), num_coarse_})),
       coarse_ranges_(device, own_sizes()["macrocell ranges"]),
       limits_(device, own_sizes()["active limits"]),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
@@ -87,9 +88,10 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
                        {device, "macrocells", "macrocell_coarse_ranges", stream.defines()}};
   compile(device, stream, kernels);
   Partials decode{device, frame, stream, kernels.partials};
-  thresholds_ = sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame)), decode);
+  thresholds_ =
+      sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame.grid)), decode);
 
-  const std::uint32_t layer_blocks = frame.blocks_x * frame.blocks_y;
+  const std::uint32_t layer_blocks = frame.grid.blocks_x * frame.grid.blocks_y;
   const ocl::BufferSizes scratch = layer_sizes(layer_blocks);
   ocl::Buffer<float> thresholds(device, scratch["range thresholds"]);
   thresholds.write(thresholds_);
@@ -98,8 +100,8 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
   const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
 
   decode(0, 1, layer_blocks, below);
-  for (std::uint32_t layer = 0; layer < frame.blocks_z; ++layer) {
-    if (layer + 1 < frame.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
+  for (std::uint32_t layer = 0; layer < frame.grid.blocks_z; ++layer) {
+    if (layer + 1 < frame.grid.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
     kernels.ranges(layer_range, frame, layer, below, above, thresholds, buffers_->ranges);
     std::swap(below, above);
   }
@@ -188,7 +190,7 @@ void Macrocells::select(const FrameParams &frame, double voxel_error, const Devi
     return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) -
                                       thresholds_.begin());
   };
-  const double isovalue = double{frame.isovalue};
+  const double isovalue = double{frame.surface.isovalue};
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
   const std::array of = {isovalue, voxel_error, double{layout.value_offset},
                          double{layout.bound_unit}};
@@ -218,18 +220,25 @@ void Macrocells::select(const FrameParams &frame, double voxel_error, const Devi
   selected.of = of;
 }
 
-void Macrocells::set_active_box(FrameParams &frame) {
+Surface Macrocells::surface(const FrameParams &frame) {
   Selection &selected = selection();
   if (!selected.active_box) selected.box.read(selected.active_box.emplace());
-  const std::array<int *, 6> fields = {&frame.active_begin_x, &frame.active_begin_y,
-                                       &frame.active_begin_z, &frame.active_end_x,
-                                       &frame.active_end_y,   &frame.active_end_z};
-  const std::array<std::uint32_t, 3> dims = {frame.dims_x, frame.dims_y, frame.dims_z};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const int num_blocks = static_cast<int>(num_owning_blocks(dims[i]));
-    *fields[i] = std::min((*selected.active_box)[i], num_blocks) * ISO_MACROCELL_BLOCKS;
-    *fields[3 + i] = std::min((*selected.active_box)[3 + i] * ISO_MACROCELL_BLOCKS, num_blocks);
-  }
+  const std::array<int, 6> &macrocells = *selected.active_box;
+  const auto begin = [](int first, uint dim) {
+    return std::min(first, static_cast<int>(num_owning_blocks(dim))) * ISO_MACROCELL_BLOCKS;
+  };
+  const auto end = [](int behind, uint dim) {
+    return std::min(behind * ISO_MACROCELL_BLOCKS, static_cast<int>(num_owning_blocks(dim)));
+  };
+  const BlockGrid &grid = frame.grid;
+  return {.isovalue = frame.surface.isovalue,
+          .isovalue_index = selected.isovalue_index,
+          .active_begin_x = begin(macrocells[0], grid.dims_x),
+          .active_begin_y = begin(macrocells[1], grid.dims_y),
+          .active_begin_z = begin(macrocells[2], grid.dims_z),
+          .active_end_x = end(macrocells[3], grid.dims_x),
+          .active_end_y = end(macrocells[4], grid.dims_y),
+          .active_end_z = end(macrocells[5], grid.dims_z)};
 }
 
 std::optional<BlockBox> Macrocells::active_blocks(const FrameParams &frame) const {
@@ -237,10 +246,10 @@ std::optional<BlockBox> Macrocells::active_blocks(const FrameParams &frame) cons
   const auto macrocells = [](std::uint32_t blocks) {
     return (static_cast<int>(blocks) + kEdge - 1) / kEdge;
   };
-  const glm::ivec3 dims(macrocells(frame.blocks_x), macrocells(frame.blocks_y),
-                        macrocells(frame.blocks_z));
-  std::vector<uint> bits(2 * num_macrocells(frame));
-  masks().read(bits, frame.masks_begin);
+  const glm::ivec3 dims(macrocells(frame.grid.blocks_x), macrocells(frame.grid.blocks_y),
+                        macrocells(frame.grid.blocks_z));
+  std::vector<uint> bits(2 * num_macrocells(frame.grid));
+  masks().read(bits, frame.place.masks_begin);
   constexpr int kMost = std::numeric_limits<int>::max();
   BlockBox box{glm::ivec3(kMost), glm::ivec3(0)};
   for (std::size_t word = 0; word < bits.size(); ++word) {

@@ -15,7 +15,7 @@
 
 namespace isowave::core {
 
-/// Of one level of detail or of several, one behind the other: FrameParams::ranges_begin,
+/// Of one level of detail or of several, one behind the other: LevelPlace::ranges_begin,
 /// masks_begin.
 struct MacrocellBuffers {
   /// What the lengths of its buffers depend on.
@@ -53,15 +53,14 @@ class Macrocells {
   Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
              std::shared_ptr<MacrocellBuffers> buffers = {});
 
-  /// Rebuilds masks() for frame.isovalue, where voxels may be voxel_error from those that the
-  /// ranges were made of. moved: the stream, if its layout raises or lowers voxels as it did not
-  /// when the ranges were made. Does nothing where the masks in use are those.
+  /// Rebuilds masks() for frame.surface.isovalue, where voxels may be voxel_error from those that
+  /// the ranges were made of. moved: the stream, if its layout raises or lowers voxels as it did
+  /// not when the ranges were made. Does nothing where the masks in use are those.
   void select(const FrameParams &frame, double voxel_error = 0,
               const DeviceStream *moved = nullptr);
-  /// Sets what a frame of the isovalue selected last needs: its isovalue_index ...
-  void set_index(FrameParams &frame) { frame.isovalue_index = selection().isovalue_index; }
-  /// ... and its active box, for which the first call waits.
-  void set_active_box(FrameParams &frame);
+  /// What select() found for frame.surface.isovalue, which it was called with last: the frame's
+  /// surface. The first call waits.
+  Surface surface(const FrameParams &frame);
 
   /// The blocks that own the active ones of the isovalue selected last: [begin, end) along x, y, z;
   /// none: there is no active block. Waits.

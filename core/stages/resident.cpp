@@ -62,8 +62,8 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
 
 std::optional<std::string> Resident::obstacle(const ocl::Device &device,
                                               const CompressedVolume &volume, ImageSize size) {
-  const FrameParams grid = make_grid_params(volume.info);
-  const std::uint64_t blocks = volume.block_count(), macrocells = num_macrocells(grid);
+  const std::uint64_t blocks = volume.block_count(),
+                      macrocells = num_macrocells(make_grid(volume.info));
   const ocl::Capabilities &can = device.capabilities();
   ocl::BufferSizes buffers = sizes(blocks, size);
   const std::uint64_t values = buffers["decoded volume"].bytes();
@@ -91,10 +91,10 @@ double Resident::render(const Camera &camera, float isovalue) {
     inside_kernel_(blocks, frame, num_blocks_, values_, inside_);
     changing_kernel_(blocks, frame, num_blocks_, inside_, changing_);
   }
-  macrocells_.set_active_box(frame);
-  set_screen_box(frame);
+  frame.surface = macrocells_.surface(frame);
+  frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
   selected_isovalue_ = isovalue;
-  const std::size_t tiles = std::size_t{(frame.width + 7) / 8} * ((frame.height + 3) / 4);
+  const std::size_t tiles = std::size_t{(frame.view.width + 7) / 8} * ((frame.view.height + 3) / 4);
   // One work-item per pixel: rays differ too much in length for strides over them to keep a device
   // busy.
   kernel_(ocl::Range::covering(tiles * kTilePixels, ocl::kGroupSize), frame, macrocells_.masks(),

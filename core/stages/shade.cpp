@@ -50,7 +50,7 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
 
 Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
                     const std::vector<HitRecord> &hits, std::uint32_t samples) {
-  const std::uint32_t columns = frame.width / samples, rows = frame.height / samples;
+  const std::uint32_t columns = frame.view.width / samples, rows = frame.view.height / samples;
   std::vector<uint> packed(std::size_t{columns} * rows);
   for (uint pixel = 0; pixel < packed.size(); ++pixel)
     packed[pixel] =
@@ -78,7 +78,8 @@ void Shade::compile(Wavefront &rays) {
 }
 
 Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
-  const std::uint32_t columns = rays.frame.width / samples, rows = rays.frame.height / samples;
+  const std::uint32_t columns = rays.frame.view.width / samples,
+                      rows = rays.frame.view.height / samples;
   std::vector<uint> packed(std::size_t{columns} * rows);
   params_.write({&params, 1});
   kernel_(ocl::Range::strided(packed.size(), ocl::kGroupSize, device_), rays.frame, params_,

@@ -37,12 +37,18 @@ void place_levels(std::span<FrameParams> frames) {
   for (std::size_t i = 1; i < frames.size(); ++i) {
     const FrameParams &finer = frames[i - 1];
     FrameParams &frame = frames[i];
-    frame.id_blocks_x = finer.id_blocks_x;
-    frame.id_blocks_y = finer.id_blocks_y;
-    frame.id_begin_z = finer.id_begin_z + finer.blocks_z;
-    frame.ranges_begin = finer.ranges_begin + static_cast<uint>(block_count(finer));
-    frame.masks_begin = finer.masks_begin + 2 * static_cast<uint>(num_macrocells(finer));
+    frame.place = {
+        .blocks_x = finer.place.blocks_x,
+        .blocks_y = finer.place.blocks_y,
+        .begin_z = finer.place.begin_z + finer.grid.blocks_z,
+        .ranges_begin = finer.place.ranges_begin + static_cast<uint>(block_count(finer.grid)),
+        .masks_begin = finer.place.masks_begin + 2 * static_cast<uint>(num_macrocells(finer.grid))};
   }
+}
+
+ScreenBox around(const ScreenBox &a, const ScreenBox &b) {
+  return {std::min(a.begin_x, b.begin_x), std::min(a.begin_y, b.begin_y),
+          std::max(a.end_x, b.end_x), std::max(a.end_y, b.end_y)};
 }
 
 }  // namespace
@@ -67,9 +73,9 @@ std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels) {
   return grids;
 }
 
-FrameParams make_id_grid(std::span<const FrameParams> level_grids) {
-  FrameParams grid = level_grids.front();
-  grid.blocks_z = level_grids.back().id_begin_z + level_grids.back().blocks_z;
+BlockGrid make_id_grid(std::span<const FrameParams> level_grids) {
+  BlockGrid grid = level_grids.front().grid;
+  grid.blocks_z = level_grids.back().place.begin_z + level_grids.back().grid.blocks_z;
   return grid;
 }
 
@@ -91,7 +97,7 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   for (const VolumeInfo &info : levels)
     frames.push_back(make_frame_params(info, camera, size, isovalue));
   place_levels(frames);
-  for (std::size_t i = 1; i < frames.size(); ++i) frames[i].begin_t = frames[i].end_t = 0.0f;
+  for (std::size_t i = 1; i < frames.size(); ++i) frames[i].band = {};
   if (voxel_pixels == 0 || levels.size() == 1) return frames;
 
   const VolumeInfo &finest = levels[0];
@@ -104,23 +110,22 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   // Levels' t differ by powers of two, so that their borders are the same in all bits.
   const auto border = [&](std::size_t level, const FrameParams &frame) {
     const double t = std::ldexp(voxel, static_cast<int>(level)) / (voxel_pixels * pixel);
-    return static_cast<float>(t / frames[0].t_scale) * (frames[0].t_scale / frame.t_scale);
+    return static_cast<float>(t / frames[0].view.t_scale) *
+           (frames[0].view.t_scale / frame.view.t_scale);
   };
   const auto world_border = [&](std::size_t level) {
-    return double{border(level, frames[0])} * double{frames[0].t_scale};
+    return double{border(level, frames[0])} * double{frames[0].view.t_scale};
   };
   std::size_t first = 0, last = levels.size() - 1;
   while (first + 1 < levels.size() && world_border(first + 1) <= nearest) ++first;
   while (last > first && world_border(last) >= farthest) --last;
-  frames[0].end_t = 0.0f;
+  frames[0].band = {};
   for (std::size_t level = first; level <= last; ++level) {
     FrameParams &frame = frames[level];
-    frame.begin_t = level == first ? 0.0f : border(level, frame);
-    frame.end_t = level == last ? std::numeric_limits<float>::infinity() : border(level + 1, frame);
-    frames[first].screen_begin_x = std::min(frames[first].screen_begin_x, frame.screen_begin_x);
-    frames[first].screen_begin_y = std::min(frames[first].screen_begin_y, frame.screen_begin_y);
-    frames[first].screen_end_x = std::max(frames[first].screen_end_x, frame.screen_end_x);
-    frames[first].screen_end_y = std::max(frames[first].screen_end_y, frame.screen_end_y);
+    frame.band = {
+        .begin_t = level == first ? 0.0f : border(level, frame),
+        .end_t = level == last ? std::numeric_limits<float>::infinity() : border(level + 1, frame)};
+    frames[first].screen = around(frames[first].screen, frame.screen);
   }
   return frames;
 }

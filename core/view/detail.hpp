@@ -42,10 +42,10 @@ std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_le
 std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels);
 /// All levels' ids as those of one grid: its blocks are as many along x and y as the finest
 /// level's.
-FrameParams make_id_grid(std::span<const FrameParams> level_grids);
+BlockGrid make_id_grid(std::span<const FrameParams> level_grids);
 
 inline bool draws(const FrameParams &frame) {
-  return frame.begin_t < frame.end_t;
+  return frame.band.begin_t < frame.band.end_t;
 }
 
 /// Throws Error unless it is finite and at least 0.

@@ -48,18 +48,17 @@ void check_places(const VolumeInfo &info, const glm::dvec3 &place, std::string_v
 
 }  // namespace
 
+BlockGrid make_grid(const VolumeInfo &info) {
+  const glm::uvec3 dims = info.dims, blocks = (dims + 3u) / 4u;
+  return {dims.x, dims.y, dims.z, blocks.x, blocks.y, blocks.z};
+}
+
 FrameParams make_grid_params(const VolumeInfo &info) {
   FrameParams frame{};
-  const glm::uvec3 dims = info.dims, blocks = (dims + 3u) / 4u;
-  frame.dims_x = dims.x;
-  frame.dims_y = dims.y;
-  frame.dims_z = dims.z;
-  frame.blocks_x = blocks.x;
-  frame.blocks_y = blocks.y;
-  frame.blocks_z = blocks.z;
-  frame.id_blocks_x = blocks.x;
-  frame.id_blocks_y = blocks.y;
-  frame.end_t = std::numeric_limits<float>::infinity();
+  frame.grid = make_grid(info);
+  frame.place.blocks_x = frame.grid.blocks_x;
+  frame.place.blocks_y = frame.grid.blocks_y;
+  frame.band = {.begin_t = 0, .end_t = std::numeric_limits<float>::infinity()};
   return frame;
 }
 
@@ -100,14 +99,10 @@ void check_drawable(const VolumeInfo &info, std::string_view what) {
   check_places(info, info.origin, what);
 }
 
-FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
-                              float isovalue) {
+View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size) {
   check_volume_info(info, "the volume");
   check_camera(camera, "the camera");
   check_image_size(size);
-  if (std::isnan(isovalue))
-    throw Error("the isovalue is NaN: give a number in the volume's value range");
-
   check_drawable(info, "the volume");
 
   const glm::dmat3 world_to_index = glm::inverse(info.index_to_world());
@@ -135,43 +130,50 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   right *= t_scale;
   up *= t_scale;
 
+  return {.width = size.ray_columns(),
+          .height = size.ray_rows(),
+          .eye_x = flush_tiny(eye.x),
+          .eye_y = flush_tiny(eye.y),
+          .eye_z = flush_tiny(eye.z),
+          .fwd_x = flush_tiny(fwd.x),
+          .fwd_y = flush_tiny(fwd.y),
+          .fwd_z = flush_tiny(fwd.z),
+          .right_x = flush_tiny(right.x),
+          .right_y = flush_tiny(right.y),
+          .right_z = flush_tiny(right.z),
+          .up_x = flush_tiny(up.x),
+          .up_y = flush_tiny(up.y),
+          .up_z = flush_tiny(up.z),
+          .pixel_scale =
+              static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows()),
+          .t_scale = static_cast<float>(t_scale)};
+}
+
+FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
+                              float isovalue) {
+  const View view = make_view(info, camera, size);
+  if (std::isnan(isovalue))
+    throw Error("the isovalue is NaN: give a number in the volume's value range");
   FrameParams frame = make_grid_params(info);
-  frame.active_end_x = static_cast<int>(num_owning_blocks(info.dims.x));
-  frame.active_end_y = static_cast<int>(num_owning_blocks(info.dims.y));
-  frame.active_end_z = static_cast<int>(num_owning_blocks(info.dims.z));
-  frame.width = size.ray_columns();
-  frame.height = size.ray_rows();
-  frame.eye_x = flush_tiny(eye.x);
-  frame.eye_y = flush_tiny(eye.y);
-  frame.eye_z = flush_tiny(eye.z);
-  frame.fwd_x = flush_tiny(fwd.x);
-  frame.fwd_y = flush_tiny(fwd.y);
-  frame.fwd_z = flush_tiny(fwd.z);
-  frame.right_x = flush_tiny(right.x);
-  frame.right_y = flush_tiny(right.y);
-  frame.right_z = flush_tiny(right.z);
-  frame.up_x = flush_tiny(up.x);
-  frame.up_y = flush_tiny(up.y);
-  frame.up_z = flush_tiny(up.z);
-  frame.pixel_scale =
-      static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows());
-  frame.t_scale = static_cast<float>(t_scale);
-  frame.isovalue = isovalue;
-  frame.max_spec_count = 1;
-  set_screen_box(frame);
+  frame.view = view;
+  frame.surface.isovalue = isovalue;
+  frame.surface.active_end_x = static_cast<int>(num_owning_blocks(info.dims.x));
+  frame.surface.active_end_y = static_cast<int>(num_owning_blocks(info.dims.y));
+  frame.surface.active_end_z = static_cast<int>(num_owning_blocks(info.dims.z));
+  frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+  frame.schedule.max_spec_count = 1;
   return frame;
 }
 
-void set_screen_box(FrameParams &frame) {
-  frame.screen_begin_x = frame.screen_begin_y = frame.screen_end_x = frame.screen_end_y = 0;
-  if (frame.active_end_x == 0) return;
-  const glm::dvec2 size(frame.width, frame.height);
-  const glm::dmat3 basis(glm::dvec3(frame.fwd_x, frame.fwd_y, frame.fwd_z),
-                         glm::dvec3(frame.right_x, frame.right_y, frame.right_z),
-                         glm::dvec3(frame.up_x, frame.up_y, frame.up_z));
+ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface) {
+  if (surface.active_end_x == 0) return {};
+  const glm::dvec2 size(view.width, view.height);
+  const glm::dmat3 basis(glm::dvec3(view.fwd_x, view.fwd_y, view.fwd_z),
+                         glm::dvec3(view.right_x, view.right_y, view.right_z),
+                         glm::dvec3(view.up_x, view.up_y, view.up_z));
   const glm::dmat3 to_view = glm::inverse(basis);
-  const glm::dvec3 eye(frame.eye_x, frame.eye_y, frame.eye_z);
-  const double pixel = 2.0 * frame.pixel_scale;  // step of u and v
+  const glm::dvec3 eye(view.eye_x, view.eye_y, view.eye_z);
+  const double pixel = 2.0 * view.pixel_scale;   // step of u and v
   const glm::dvec2 border = 0.5 * pixel * size;  // largest |u|, |v|
 
   // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of
@@ -188,11 +190,11 @@ void set_screen_box(FrameParams &frame) {
     const auto plane = [corner](int axis, int first, int behind, uint dim) {
       return (corner >> axis & 1) == 0 ? 4.0 * first : std::min(4.0 * behind, dim - 1.0);
     };
-    const glm::dvec3 at(plane(0, frame.active_begin_x, frame.active_end_x, frame.dims_x),
-                        plane(1, frame.active_begin_y, frame.active_end_y, frame.dims_y),
-                        plane(2, frame.active_begin_z, frame.active_end_z, frame.dims_z));
-    const glm::dvec3 view = to_view * (at - eye);
-    if (!(view.x > 1e-3 && margin.x < size.x &&
+    const glm::dvec3 at(plane(0, surface.active_begin_x, surface.active_end_x, grid.dims_x),
+                        plane(1, surface.active_begin_y, surface.active_end_y, grid.dims_y),
+                        plane(2, surface.active_begin_z, surface.active_end_z, grid.dims_z));
+    const glm::dvec3 in_view = to_view * (at - eye);
+    if (!(in_view.x > 1e-3 && margin.x < size.x &&
           margin.y < size.y)) {  // beside or behind the eye, or all rounded
       begin = glm::dvec2(0);
       end = size;
@@ -200,17 +202,17 @@ void set_screen_box(FrameParams &frame) {
     }
     // See make_ray(): u = (2 column + 1 - width) pixel_scale, v = (height - 1 - 2 row) pixel_scale.
     const glm::dvec2 projected =
-        0.5 * (size - 1.0) + glm::dvec2(view.y, -view.z) / (view.x * pixel);
+        0.5 * (size - 1.0) + glm::dvec2(in_view.y, -in_view.z) / (in_view.x * pixel);
     begin = glm::min(begin, projected - margin);
     end = glm::max(end, projected + margin + 1.0);
   }
   begin = glm::clamp(glm::floor(begin), glm::dvec2(0), size);
   end = glm::clamp(glm::ceil(end), glm::dvec2(0), size);
-  if (begin.x >= end.x || begin.y >= end.y) return;
-  frame.screen_begin_x = static_cast<uint>(begin.x) / 8 * 8;
-  frame.screen_begin_y = static_cast<uint>(begin.y) / 4 * 4;
-  frame.screen_end_x = static_cast<uint>(end.x);
-  frame.screen_end_y = static_cast<uint>(end.y);
+  if (begin.x >= end.x || begin.y >= end.y) return {};
+  return {.begin_x = static_cast<uint>(begin.x) / 8 * 8,
+          .begin_y = static_cast<uint>(begin.y) / 4 * 4,
+          .end_x = static_cast<uint>(end.x),
+          .end_y = static_cast<uint>(end.y)};
 }
 
 std::vector<float> depth_of(const std::vector<HitRecord> &hits) {

@@ -33,12 +33,12 @@ inline std::uint32_t num_owning_blocks(std::uint32_t dim) {
   return (dim + 2) / 4;
 }
 
-inline std::uint64_t block_count(const FrameParams &grid) {
+inline std::uint64_t block_count(const BlockGrid &grid) {
   return std::uint64_t{grid.blocks_x} * grid.blocks_y * grid.blocks_z;
 }
 
 /// Coarse macrocells (kernels_cl/macrocells.cl).
-inline std::uint64_t num_macrocells(const FrameParams &grid) {
+inline std::uint64_t num_macrocells(const BlockGrid &grid) {
   const auto cells = [](std::uint32_t blocks) {
     return (std::uint64_t{blocks} + ISO_MACROCELL_BLOCKS - 1) / ISO_MACROCELL_BLOCKS;
   };
@@ -49,17 +49,21 @@ inline std::uint64_t num_macrocells(const FrameParams &grid) {
 /// is so far away that voxels are lost beside it. `what` names the volume.
 void check_drawable(const VolumeInfo &info, std::string_view what);
 
-/// Of the grid only, for what is done before there is a camera.
+BlockGrid make_grid(const VolumeInfo &info);
+
+/// Of a volume without levels of detail, and without a camera: for what is done before there is
+/// one.
 FrameParams make_grid_params(const VolumeInfo &info);
 
-/// Sets the frame's screen box: a rectangle of the pixels whose rays, as make_ray() rounds them,
-/// may meet its active box.
-void set_screen_box(FrameParams &frame);
+/// Computes the camera basis once, in double, and maps it to index space. Throws Error: a
+/// degenerate camera, or one too far away, what check_drawable() or check_image_size() refuses.
+View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size);
 
-/// Computes the camera basis once, in double, and maps it to index space. The active box is the
-/// whole volume; isovalue_index, speculation and table_groups are left for the renderer. Throws
-/// Error: a degenerate camera, or one too far away, what check_drawable() or check_image_size()
-/// refuses, a NaN isovalue.
+/// The rays, as make_ray() rounds them, that may meet the surface's active box.
+ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface);
+
+/// A frame in which the whole volume is active, without speculation and without a cache: what the
+/// scalar reference needs. Throws Error: what make_view() throws, a NaN isovalue.
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
                               float isovalue);
 

@@ -52,7 +52,7 @@ ISO_INLINE uint tiled_pixel(const FrameParams *frame, PixelBox box, uint i) {
   const uint tiles_x = (box.end_x - box.begin_x + 7) / 8, tile = i / 32;
   const uint x = box.begin_x + 8 * (tile % tiles_x) + (i & 7);
   const uint y = box.begin_y + 4 * (tile / tiles_x) + (i >> 3 & 3);
-  return x < box.end_x && y < box.end_y ? x + frame->width * y : ISO_INVALID_ID;
+  return x < box.end_x && y < box.end_y ? x + frame->view.width * y : ISO_INVALID_ID;
 }
 
 #endif

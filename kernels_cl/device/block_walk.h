@@ -21,7 +21,7 @@
 
 ISO_INLINE int is_active(const FrameParams *frame, global const uint *macrocell_masks,
                          BlockCoords b) {
-  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  const uint coarse_x = (frame->grid.blocks_x + 3) / 4, coarse_y = (frame->grid.blocks_y + 3) / 4;
   const uint cell = b.x / 4 + coarse_x * (b.y / 4 + coarse_y * (b.z / 4));
   const uint bit = (b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3);
   return (macrocell_masks[masks_begin(frame) + 2 * cell + bit / 32] >> (bit % 32) & 1u) != 0;
@@ -46,15 +46,15 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
                             const Ray *ray, uint *block_id, uint wanted, ISO_FOUND uint *found,
                             uint stride) {
   const LastPlanes last = last_planes(frame);
-  const uint coarse_x = (frame->blocks_x + 3) / 4, coarse_y = (frame->blocks_y + 3) / 4;
+  const uint coarse_x = (frame->grid.blocks_x + 3) / 4, coarse_y = (frame->grid.blocks_y + 3) / 4;
   const uint begin = masks_begin(frame);
   /* The coarse cells behind the box, in the ray's direction. */
-  const int behind_x =
-                ray->x.d > 0.0f ? (frame->active_end_x + 3) / 4 : frame->active_begin_x / 4 - 1,
-            behind_y =
-                ray->y.d > 0.0f ? (frame->active_end_y + 3) / 4 : frame->active_begin_y / 4 - 1,
-            behind_z =
-                ray->z.d > 0.0f ? (frame->active_end_z + 3) / 4 : frame->active_begin_z / 4 - 1;
+  const int behind_x = ray->x.d > 0.0f ? (frame->surface.active_end_x + 3) / 4
+                                       : frame->surface.active_begin_x / 4 - 1,
+            behind_y = ray->y.d > 0.0f ? (frame->surface.active_end_y + 3) / 4
+                                       : frame->surface.active_begin_y / 4 - 1,
+            behind_z = ray->z.d > 0.0f ? (frame->surface.active_end_z + 3) / 4
+                                       : frame->surface.active_begin_z / 4 - 1;
   const BlockCoords from = block_coords(frame, *block_id);
   /* The outer walk steps from coarse cell to coarse cell; only in those with a bit is there an
    * inner one. */
@@ -102,17 +102,17 @@ ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
   const LastPlanes last = last_planes(frame);
   LastPlanes begin, end;
   RayEvent enter = band_begin(frame), exit = band_end(frame);
-  begin.x = 4 * frame->active_begin_x;
-  begin.y = 4 * frame->active_begin_y;
-  begin.z = 4 * frame->active_begin_z;
-  end.x = min(4 * frame->active_end_x, last.x);
-  end.y = min(4 * frame->active_end_y, last.y);
-  end.z = min(4 * frame->active_end_z, last.z);
+  begin.x = 4 * frame->surface.active_begin_x;
+  begin.y = 4 * frame->surface.active_begin_y;
+  begin.z = 4 * frame->surface.active_begin_z;
+  end.x = min(4 * frame->surface.active_end_x, last.x);
+  end.y = min(4 * frame->surface.active_end_y, last.y);
+  end.z = min(4 * frame->surface.active_end_z, last.z);
   if (begin.x >= end.x || !clip_to_box(ray, begin, end, &enter, &exit)) return ISO_INVALID_ID;
-  return block_id_at(frame,
-                     (uint)locate(ray->x, 0, enter, 4, frame->active_begin_x, (end.x - 1) / 4),
-                     (uint)locate(ray->y, 1, enter, 4, frame->active_begin_y, (end.y - 1) / 4),
-                     (uint)locate(ray->z, 2, enter, 4, frame->active_begin_z, (end.z - 1) / 4));
+  return block_id_at(
+      frame, (uint)locate(ray->x, 0, enter, 4, frame->surface.active_begin_x, (end.x - 1) / 4),
+      (uint)locate(ray->y, 1, enter, 4, frame->surface.active_begin_y, (end.y - 1) / 4),
+      (uint)locate(ray->z, 2, enter, 4, frame->surface.active_begin_z, (end.z - 1) / 4));
 }
 
 /// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones, or the ray's
@@ -122,9 +122,10 @@ ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoor
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const RayEvent exit = walk_exit(&w, ray);
   walk_step(&w, ray, exit, 4, last);
-  return !ends_band(frame, exit) && w.x >= frame->active_begin_x && w.x < frame->active_end_x &&
-                 w.y >= frame->active_begin_y && w.y < frame->active_end_y &&
-                 w.z >= frame->active_begin_z && w.z < frame->active_end_z
+  return !ends_band(frame, exit) && w.x >= frame->surface.active_begin_x &&
+                 w.x < frame->surface.active_end_x && w.y >= frame->surface.active_begin_y &&
+                 w.y < frame->surface.active_end_y && w.z >= frame->surface.active_begin_z &&
+                 w.z < frame->surface.active_end_z
              ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
              : ISO_INVALID_ID;
 }

@@ -8,14 +8,14 @@
 
 /// Where this level's masks begin among those of all levels.
 ISO_INLINE uint masks_begin(const FrameParams *frame) {
-  return ISO_LEVELS ? frame->masks_begin : 0u;
+  return ISO_LEVELS ? frame->place.masks_begin : 0u;
 }
 
 ISO_INLINE RayEvent band_begin(const FrameParams *frame) {
-  return border_event(ISO_LEVELS ? frame->begin_t : 0.0f);
+  return border_event(ISO_LEVELS ? frame->band.begin_t : 0.0f);
 }
 ISO_INLINE RayEvent band_end(const FrameParams *frame) {
-  return border_event(ISO_LEVELS ? frame->end_t : INFINITY);
+  return border_event(ISO_LEVELS ? frame->band.end_t : INFINITY);
 }
 
 /// Is `exit` beyond the band?

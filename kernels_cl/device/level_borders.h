@@ -10,9 +10,9 @@
 /// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the
 /// block with this id.
 ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint block_id) {
-  const uint layer = block_id / (frames[0].id_blocks_x * frames[0].id_blocks_y);
+  const uint layer = block_id / (frames[0].place.blocks_x * frames[0].place.blocks_y);
   uint level = 0;
-  while (level + 1 < num_frames && layer >= frames[level + 1].id_begin_z) ++level;
+  while (level + 1 < num_frames && layer >= frames[level + 1].place.begin_z) ++level;
   return level;
 }
 
@@ -21,8 +21,8 @@ ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint
 ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
                               global const ushort *ranges, BlockCoords b) {
   if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
-  return ranges[frame->ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >=
-                 frame->isovalue_index
+  return ranges[frame->place.ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >=
+                 frame->surface.isovalue_index
              ? ISO_SIDE_INSIDE
              : ISO_SIDE_OUTSIDE;
 }
@@ -56,12 +56,12 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
     const FrameParams behind = frames[level + 1];
     const Ray ray = make_ray(&behind, pixel);
     BlockCoords b;
-    const int is_at_border = block_at_border(&behind, &ray, behind.begin_t, &b);
+    const int is_at_border = block_at_border(&behind, &ray, behind.band.begin_t, &b);
     if (is_at_border && side == ISO_SIDE_UNKNOWN) {
       const FrameParams before = frames[level];
       const Ray ray_before = make_ray(&before, pixel);
       BlockCoords left;
-      if (block_at_border(&before, &ray_before, before.end_t, &left))
+      if (block_at_border(&before, &ray_before, before.band.end_t, &left))
         side = side_of_block(&before, macrocell_masks, ranges, left);
     }
     if (is_at_border && side != ISO_SIDE_UNKNOWN &&

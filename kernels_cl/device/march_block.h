@@ -62,8 +62,9 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
   BlockEntry entries[8];
   ulong cells;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
-  *have = (b.x + 1 == frame->blocks_x ? 0xAAu : 0u) | (b.y + 1 == frame->blocks_y ? 0xCCu : 0u) |
-          (b.z + 1 == frame->blocks_z ? 0xF0u : 0u);
+  *have = (b.x + 1 == frame->grid.blocks_x ? 0xAAu : 0u) |
+          (b.y + 1 == frame->grid.blocks_y ? 0xCCu : 0u) |
+          (b.z + 1 == frame->grid.blocks_z ? 0xF0u : 0u);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
     slots[corner * ISO_GROUP_SIZE] = entries[corner].slot;
@@ -122,7 +123,7 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
           const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
           found->w[corner] = cache_values[slot * ISO_BLOCK_VOXELS +
                                           (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
-                             frame->isovalue;
+                             frame->surface.isovalue;
         }
         if (has_side(side))
           found->at_border = inside_at(ray, found->w, found->enter, found->cell.x, found->cell.y,

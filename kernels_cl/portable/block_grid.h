@@ -18,33 +18,33 @@ typedef struct BlockCoords {
 /// Place of block (x,y,z) among those of its level of detail, as its stream and its ranges are
 /// ordered.
 ISO_INLINE uint level_block_at(const FrameParams *frame, uint x, uint y, uint z) {
-  return x + frame->blocks_x * (y + frame->blocks_y * z);
+  return x + frame->grid.blocks_x * (y + frame->grid.blocks_y * z);
 }
 
 /// Place among those of this level of the block with this id, of a frame with several levels;
 /// ISO_INVALID_ID if it is another level's.
 ISO_INLINE uint level_block_of(const FrameParams *frame, uint block_id) {
-  const uint x = block_id % frame->id_blocks_x,
-             y = block_id / frame->id_blocks_x % frame->id_blocks_y,
-             z = block_id / frame->id_blocks_x / frame->id_blocks_y - frame->id_begin_z;
-  return z < frame->blocks_z ? level_block_at(frame, x, y, z)
-                             : ISO_INVALID_ID; /* finer: z has wrapped around */
+  const uint x = block_id % frame->place.blocks_x,
+             y = block_id / frame->place.blocks_x % frame->place.blocks_y,
+             z = block_id / frame->place.blocks_x / frame->place.blocks_y - frame->place.begin_z;
+  return z < frame->grid.blocks_z ? level_block_at(frame, x, y, z)
+                                  : ISO_INVALID_ID; /* finer: z has wrapped around */
 }
 
 /// The grid in which ids of blocks count: that of all levels of detail, one behind the other along
 /// z, or of the only one.
 ISO_INLINE uint id_blocks_x(const FrameParams *frame) {
-  return ISO_LEVELS ? frame->id_blocks_x : frame->blocks_x;
+  return ISO_LEVELS ? frame->place.blocks_x : frame->grid.blocks_x;
 }
 ISO_INLINE uint id_blocks_y(const FrameParams *frame) {
-  return ISO_LEVELS ? frame->id_blocks_y : frame->blocks_y;
+  return ISO_LEVELS ? frame->place.blocks_y : frame->grid.blocks_y;
 }
 /// Layer z of a level in that grid, and back.
 ISO_INLINE uint id_layer(const FrameParams *frame, uint z) {
-  return z + (ISO_LEVELS ? frame->id_begin_z : 0u);
+  return z + (ISO_LEVELS ? frame->place.begin_z : 0u);
 }
 ISO_INLINE uint layer_of_id(const FrameParams *frame, uint layer) {
-  return layer - (ISO_LEVELS ? frame->id_begin_z : 0u);
+  return layer - (ISO_LEVELS ? frame->place.begin_z : 0u);
 }
 
 /// Wraps around for blocks of finer levels than the frame's, and block_table.h takes that back.
@@ -75,7 +75,7 @@ ISO_INLINE uint sampled_block(uint begin, uint stride) {
 /// volume.
 ISO_INLINE uint dual_grid_block(const FrameParams *frame, BlockCoords b, uint corner) {
   const uint x = b.x + (corner & 1u), y = b.y + (corner >> 1 & 1u), z = b.z + (corner >> 2);
-  return x < frame->blocks_x && y < frame->blocks_y && z < frame->blocks_z
+  return x < frame->grid.blocks_x && y < frame->grid.blocks_y && z < frame->grid.blocks_z
              ? block_id_at(frame, x, y, z)
              : ISO_INVALID_ID;
 }

@@ -49,18 +49,18 @@ typedef struct CacheState {
 #define ISO_TABLE_STEP \
   9u  ///< from entry to entry of a search; odd, and no factor of the table's size
 
-/// Where the search for block (x,y,z) begins. frame->table_groups: entries / 8.
+/// Where the search for block (x,y,z) begins. frame->schedule.table_groups: entries / 8.
 ISO_INLINE uint table_home(const FrameParams *frame, uint x, uint y, uint z) {
   const uint layer = id_layer(frame, z); /* the same seen from every level */
   uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((layer >> 1) * 0xC2B2AE3Du);
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   h ^= h >> 13;
-  return 8u * (uint)(((ulong)h * frame->table_groups) >> 32) + (x & 1u) + 2u * (y & 1u) +
+  return 8u * (uint)(((ulong)h * frame->schedule.table_groups) >> 32) + (x & 1u) + 2u * (y & 1u) +
          4u * (layer & 1u);
 }
 
 ISO_INLINE uint table_next(const FrameParams *frame, uint entry) {
-  const uint next = entry + ISO_TABLE_STEP, size = 8u * frame->table_groups;
+  const uint next = entry + ISO_TABLE_STEP, size = 8u * frame->schedule.table_groups;
   return next >= size ? next - size : next;
 }
 

@@ -141,9 +141,9 @@ ISO_INLINE HitRecord make_hit(const FrameParams *frame, const Ray *r, const floa
   HitRecord hit;
   /* Two-float differences first: t_exit - t_enter may be far below an ulp of t. */
   const float length = (exit.t.hi - enter.t.hi) + (exit.t.lo - enter.t.lo);
-  hit.t = (enter.t.hi + fma(s, length, enter.t.lo)) * frame->t_scale;
-  hit.block_id =
-      (uint)(x >> 2) + frame->blocks_x * ((uint)(y >> 2) + frame->blocks_y * (uint)(z >> 2));
+  hit.t = (enter.t.hi + fma(s, length, enter.t.lo)) * frame->view.t_scale;
+  hit.block_id = (uint)(x >> 2) +
+                 frame->grid.blocks_x * ((uint)(y >> 2) + frame->grid.blocks_y * (uint)(z >> 2));
   hit.cell = (uint)((x & 3) + 4 * (y & 3) + 16 * (z & 3));
   hit.x = lerp(s, a.x, b.x);
   hit.y = lerp(s, a.y, b.y);

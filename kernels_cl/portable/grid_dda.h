@@ -67,21 +67,24 @@ ISO_INLINE RayAxis make_ray_axis(float o, float d) {
 }
 
 /// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) /
-/// sqrt(1 + u^2 + v^2), mapped to index space; t * frame->t_scale is the distance from the eye in
-/// world units.
+/// sqrt(1 + u^2 + v^2), mapped to index space; t * frame->view.t_scale is the distance from the eye
+/// in world units.
 ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
-  const int column = (int)(pixel % frame->width);
-  const int row = (int)(pixel / frame->width);
-  const float u = (float)(2 * column + 1 - (int)frame->width) * frame->pixel_scale;
-  const float v = (float)((int)frame->height - 1 - 2 * row) * frame->pixel_scale;
+  const int column = (int)(pixel % frame->view.width);
+  const int row = (int)(pixel / frame->view.width);
+  const float u = (float)(2 * column + 1 - (int)frame->view.width) * frame->view.pixel_scale;
+  const float v = (float)((int)frame->view.height - 1 - 2 * row) * frame->view.pixel_scale;
   const float length = sqrt(fma(u, u, fma(v, v, 1.0f)));
   Ray r;
-  r.x = make_ray_axis(frame->eye_x,
-                      fma(v, frame->up_x, fma(u, frame->right_x, frame->fwd_x)) / length);
-  r.y = make_ray_axis(frame->eye_y,
-                      fma(v, frame->up_y, fma(u, frame->right_y, frame->fwd_y)) / length);
-  r.z = make_ray_axis(frame->eye_z,
-                      fma(v, frame->up_z, fma(u, frame->right_z, frame->fwd_z)) / length);
+  r.x = make_ray_axis(
+      frame->view.eye_x,
+      fma(v, frame->view.up_x, fma(u, frame->view.right_x, frame->view.fwd_x)) / length);
+  r.y = make_ray_axis(
+      frame->view.eye_y,
+      fma(v, frame->view.up_y, fma(u, frame->view.right_y, frame->view.fwd_y)) / length);
+  r.z = make_ray_axis(
+      frame->view.eye_z,
+      fma(v, frame->view.up_z, fma(u, frame->view.right_z, frame->view.fwd_z)) / length);
   return r;
 }
 
@@ -184,9 +187,9 @@ typedef struct LastPlanes {
 
 ISO_INLINE LastPlanes last_planes(const FrameParams *frame) {
   LastPlanes last;
-  last.x = (int)frame->dims_x - 1;
-  last.y = (int)frame->dims_y - 1;
-  last.z = (int)frame->dims_z - 1;
+  last.x = (int)frame->grid.dims_x - 1;
+  last.y = (int)frame->grid.dims_y - 1;
+  last.z = (int)frame->grid.dims_z - 1;
   return last;
 }
 

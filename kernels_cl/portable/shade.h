@@ -81,7 +81,7 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadePa
   uint i;
   for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
     const uint ray_id =
-        (row * samples + i / samples) * frame->width + column * samples + i % samples;
+        (row * samples + i / samples) * frame->view.width + column * samples + i % samples;
     const Color color = shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x,
                                   hits[ray_id].grad_y, hits[ray_id].grad_z);
     r += color.r;

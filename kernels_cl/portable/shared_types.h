@@ -67,37 +67,76 @@ inline uint popcount(uint x) {
   0 /* 1: frames are drawn in bands of several levels of detail (core/view/detail.hpp) */
 #endif
 
-/// All that a frame's kernels need of grid, camera and isovalue. Kernels get it by value: NVIDIA's
-/// compiler reads a pointer to constant memory through the cache, again in every turn of a loop.
-typedef struct FrameParams {
+/// The voxels of a volume, or of one of its levels of detail, and the blocks that hold them.
+typedef struct BlockGrid {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
   uint blocks_x, blocks_y, blocks_z;  ///< blocks of 4^3 voxels, partial ones counted
-  uint width,
-      height;  ///< rays: those of the image, or several for each of its pixels along both axes
+} BlockGrid;
+ISO_CHECK_SIZE(BlockGrid, 24);
+
+/// Where a level's blocks, ranges and masks lie among those of all levels of detail. Ids of blocks
+/// count on through all levels: block (x,y,z) of this one is number
+/// x + blocks_x (y + blocks_y (begin_z + z)).
+typedef struct LevelPlace {
+  uint blocks_x, blocks_y;         ///< blocks of the finest level
+  uint begin_z;                    ///< layers of blocks of the levels before this one
+  uint ranges_begin, masks_begin;  ///< first entries of this level (macrocells.cl)
+} LevelPlace;
+ISO_CHECK_SIZE(LevelPlace, 20);
+
+/// The camera and the rays of its picture.
+typedef struct View {
+  uint width, height;         ///< rays: those of the image, or several for each of its pixels along
+                              ///< both axes
   float eye_x, eye_y, eye_z;  ///< camera position, index space
-  float fwd_x, fwd_y,
-      fwd_z;  ///< camera basis mapped to index space, divided by t_scale (see make_ray)
-  float right_x, right_y, right_z;
-  float up_x, up_y, up_z;
+  /// Camera basis mapped to index space, divided by t_scale (see make_ray).
+  float fwd_x, fwd_y, fwd_z, right_x, right_y, right_z, up_x, up_y, up_z;
   float pixel_scale;  ///< tan(fovy / 2) / height: half a ray's step of u and v
   float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
+} View;
+ISO_CHECK_SIZE(View, 64);
+
+/// The part of the rays that one level of detail draws [t of the kernels].
+typedef struct Band {
+  float begin_t, end_t;
+} Band;
+ISO_CHECK_SIZE(Band, 8);
+
+/// The isosurface, and where its blocks are.
+typedef struct Surface {
   float isovalue;
   uint isovalue_index;  ///< the first threshold of macrocells.cl that is >= it
-  uint max_spec_count;  ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
-  int active_begin_x, active_begin_y,
-      active_begin_z;  ///< box around the active blocks, whole macrocells:
-  int active_end_x, active_end_y,
-      active_end_z;  ///< from begin to below end [blocks]; empty if end_x = 0
-  /// The pixels whose rays may meet that box, from whole tiles of 8 x 4: from begin to below end.
-  uint screen_begin_x, screen_begin_y, screen_end_x, screen_end_y;
+  /// Box around the active blocks, whole macrocells: from begin to below end [blocks]; empty if
+  /// active_end_x = 0.
+  int active_begin_x, active_begin_y, active_begin_z, active_end_x, active_end_y, active_end_z;
+} Surface;
+ISO_CHECK_SIZE(Surface, 32);
+
+/// The rays that may meet the box of the active blocks, in whole tiles of 8 x 4: from begin to
+/// below end.
+typedef struct ScreenBox {
+  uint begin_x, begin_y, end_x, end_y;
+} ScreenBox;
+ISO_CHECK_SIZE(ScreenBox, 16);
+
+/// How passes share out rays and cache slots.
+typedef struct Schedule {
+  uint max_spec_count;       ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
   uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
-  /// Only where ISO_LEVELS is 1. Ids of blocks count on through all levels of detail: block (x,y,z)
-  /// of this one is number x + id_blocks_x (y + id_blocks_y (id_begin_z + z)).
-  uint id_blocks_x, id_blocks_y, id_begin_z;
-  uint ranges_begin,
-      masks_begin;       ///< this level's among those of all levels (macrocells.cl) [entries]
-  float begin_t, end_t;  ///< the band of the rays that is drawn at this level [t of the kernels]
+} Schedule;
+ISO_CHECK_SIZE(Schedule, 12);
+
+/// All that a frame's kernels need besides buffers. Kernels get it by value: NVIDIA's compiler
+/// reads a pointer to constant memory through the cache, again in every turn of a loop.
+typedef struct FrameParams {
+  BlockGrid grid;
+  LevelPlace place;  ///< only read where ISO_LEVELS is 1
+  View view;
+  Band band;  ///< only read where ISO_LEVELS is 1
+  Surface surface;
+  ScreenBox screen;
+  Schedule schedule;
 } FrameParams;
 ISO_CHECK_SIZE(FrameParams, 176);
 

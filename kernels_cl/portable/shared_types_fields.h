@@ -6,19 +6,21 @@
 // Lists that read as lists:
 // clang-format off
 
-#define ISO_FRAME_PARAMS_FIELDS(X)                                          \
-  X(dims_x) X(dims_y) X(dims_z) X(blocks_x) X(blocks_y) X(blocks_z)         \
-  X(width) X(height)                                                        \
-  X(eye_x) X(eye_y) X(eye_z) X(fwd_x) X(fwd_y) X(fwd_z)                     \
-  X(right_x) X(right_y) X(right_z) X(up_x) X(up_y) X(up_z)                  \
-  X(pixel_scale) X(t_scale) X(isovalue) X(isovalue_index)                   \
-  X(max_spec_count)                                                         \
-  X(active_begin_x) X(active_begin_y) X(active_begin_z)                     \
-  X(active_end_x) X(active_end_y) X(active_end_z)                           \
-  X(screen_begin_x) X(screen_begin_y) X(screen_end_x) X(screen_end_y)       \
-  X(per_ray_speculation) X(table_groups)                                    \
-  X(id_blocks_x) X(id_blocks_y) X(id_begin_z)                               \
-  X(ranges_begin) X(masks_begin) X(begin_t) X(end_t)
+#define ISO_FRAME_PARAMS_FIELDS(X)                                                             \
+  X(grid.dims_x) X(grid.dims_y) X(grid.dims_z)                                                 \
+  X(grid.blocks_x) X(grid.blocks_y) X(grid.blocks_z)                                           \
+  X(place.blocks_x) X(place.blocks_y) X(place.begin_z)                                         \
+  X(place.ranges_begin) X(place.masks_begin)                                                   \
+  X(view.width) X(view.height)                                                                 \
+  X(view.eye_x) X(view.eye_y) X(view.eye_z) X(view.fwd_x) X(view.fwd_y) X(view.fwd_z)          \
+  X(view.right_x) X(view.right_y) X(view.right_z) X(view.up_x) X(view.up_y) X(view.up_z)       \
+  X(view.pixel_scale) X(view.t_scale)                                                          \
+  X(band.begin_t) X(band.end_t)                                                                \
+  X(surface.isovalue) X(surface.isovalue_index)                                                \
+  X(surface.active_begin_x) X(surface.active_begin_y) X(surface.active_begin_z)                \
+  X(surface.active_end_x) X(surface.active_end_y) X(surface.active_end_z)                      \
+  X(screen.begin_x) X(screen.begin_y) X(screen.end_x) X(screen.end_y)                          \
+  X(schedule.max_spec_count) X(schedule.per_ray_speculation) X(schedule.table_groups)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
 #define ISO_BLOCK_RAYS_FIELDS(X) X(begin) X(end)
 #define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)

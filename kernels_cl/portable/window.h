@@ -13,7 +13,7 @@
 ISO_NAMESPACE_BEGIN
 
 ISO_INLINE uint frame_rays(const FrameParams *frame) {
-  return frame->width * frame->height;
+  return frame->view.width * frame->view.height;
 }
 
 /// Of so many rays, those that take part.
@@ -53,7 +53,7 @@ ISO_INLINE uint speculation_count(const FrameParams *frame, uint num_rays) {
   uint count = 0;
   if (num_rays != 0) {
     count = frame_rays(frame) / num_rays;
-    if (count > frame->max_spec_count) count = frame->max_spec_count;
+    if (count > frame->schedule.max_spec_count) count = frame->schedule.max_spec_count;
     if (count == 0) count = 1;
   }
   return count;
@@ -65,7 +65,7 @@ ISO_INLINE uint speculation_count(const FrameParams *frame, uint num_rays) {
 ISO_INLINE uint most_ahead(const FrameParams *frame, uint window, uint num_rays) {
   uint most = ISO_MAX_SPECULATION;
   if (window < frame_rays(frame)) {
-    most = 4 * frame->table_groups / (num_rays + 1);
+    most = 4 * frame->schedule.table_groups / (num_rays + 1);
     if (most == 0) most = 1;
   }
   return most;

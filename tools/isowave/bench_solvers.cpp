@@ -121,9 +121,11 @@ Subject load_subject(const std::string &argument, const BenchSolversArgs &option
 class FrameOracle final : public HitOracle {
  public:
   explicit FrameOracle(const Subject &subject)
-      : oracle_(subject.voxels, {subject.frame.dims_x, subject.frame.dims_y, subject.frame.dims_z},
+      : oracle_(subject.voxels,
+                {subject.frame.grid.dims_x, subject.frame.grid.dims_y, subject.frame.grid.dims_z},
                 subject.isovalue) {
-    const std::size_t num_pixels = std::size_t{subject.frame.width} * subject.frame.height;
+    const std::size_t num_pixels =
+        std::size_t{subject.frame.view.width} * subject.frame.view.height;
     std::vector<OracleHit> hits(num_pixels);
     parallel_for(num_pixels, 0, [&](std::uint64_t pixel, std::uint32_t) {
       hits[pixel] =
@@ -157,7 +159,8 @@ class FrameOracle final : public HitOracle {
 std::vector<CellSegment> gather_segments(const std::vector<Subject> &subjects) {
   std::vector<CellSegment> all;
   for (const Subject &subject : subjects) {
-    for (std::uint32_t pixel = 0; pixel < subject.frame.width * subject.frame.height; ++pixel) {
+    for (std::uint32_t pixel = 0; pixel < subject.frame.view.width * subject.frame.view.height;
+         ++pixel) {
       append_segments(subject.frame, subject.voxels, make_ray(&subject.frame, pixel), all);
     }
   }
@@ -327,7 +330,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
         solver.max_steps != 1)
       continue;
     RendererOptions renderer_options;
-    renderer_options.size = {subject.frame.width, subject.frame.height};
+    renderer_options.size = {subject.frame.view.width, subject.frame.view.height};
     renderer_options.solver = solver;
     Run run{solver,
             std::make_unique<Renderer>(device, subject.volume, renderer_options),
@@ -351,7 +354,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
   }
   return {{"volume", subject.name},
           {"isovalue", subject.isovalue},
-          {"size", {subject.frame.width, subject.frame.height}},
+          {"size", {subject.frame.view.width, subject.frame.view.height}},
           {"entries", entries}};
 }
 

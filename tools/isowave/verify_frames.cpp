@@ -86,8 +86,9 @@ class FrameDrawer {
 
   std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
     if (!renderer_) return render_scalar(frame, voxels_, solver_);
-    renderer_->render(
-        {.camera = scene_.cameras[view], .isovalue = frame.isovalue, .voxel_error = voxel_error_});
+    renderer_->render({.camera = scene_.cameras[view],
+                       .isovalue = frame.surface.isovalue,
+                       .voxel_error = voxel_error_});
     return renderer_->hits();
   }
   std::string name() const { return device_ ? device_->info().name : "scalar reference"; }
@@ -110,11 +111,11 @@ struct Totals {
 void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, std::size_t view,
                std::span<const HitRecord> hits, const ordered_json &labels, ordered_json &document,
                Totals &totals) {
-  const std::array<double, 3> eye{frame.eye_x, frame.eye_y, frame.eye_z};
-  const Dims dims{frame.dims_x, frame.dims_y, frame.dims_z};
+  const std::array<double, 3> eye{frame.view.eye_x, frame.view.eye_y, frame.view.eye_z};
+  const Dims dims{frame.grid.dims_x, frame.grid.dims_y, frame.grid.dims_z};
   for (const FrameJudge &judge : judges) {
     const std::string row =
-        fmt::format("{}, isovalue {}, view {}", judge.oracle, frame.isovalue, view);
+        fmt::format("{}, isovalue {}, view {}", judge.oracle, frame.surface.isovalue, view);
     ordered_json entry = {{"oracle", judge.oracle}};
     if (judge.uses_embree && !within_embree_reach(eye, dims)) {
       const std::string why = out_of_reach(eye, dims);
