@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/base/error.hpp"
+#include "core/ocl/build_log.hpp"
 #include "core/ocl/device_list.hpp"
 #include "core/ocl/kernel_sources.hpp"
 #include "core/ocl/pocl_environment.hpp"
@@ -63,18 +64,6 @@ std::string build_options(const DeviceInfo &device, Defines defines) {
   return options;
 }
 
-/// The line of a compiler's log that says most.
-std::string first_error(std::string_view log) {
-  std::string first;
-  while (!log.empty()) {
-    const std::string_view line = log.substr(0, log.find('\n'));
-    if (line.find("error") != std::string_view::npos) return std::string(line);
-    if (first.empty()) first = line;
-    log.remove_prefix(std::min(log.size(), line.size() + 1));
-  }
-  return first.empty() ? "the compiler left no log" : first;
-}
-
 }  // namespace
 
 Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(device_handle(info)) {
@@ -128,7 +117,8 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
     return programs_.emplace(std::move(key), std::move(program)).first->second;
   } catch (const cl::BuildError &error) {
     std::string log;
-    for (const auto &[device, text] : error.getBuildLog()) log += text;
+    for (const auto &[device, said] : error.getBuildLog())
+      log += with_file_names(said, kernel_text(stem));
     const std::string message =
         fmt::format("{}.cl does not build on '{}' with {}: {}: {}{}", stem, info_.name, options,
                     error_name(error.err()), first_error(log), cache_trouble());
