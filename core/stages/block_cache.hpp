@@ -30,26 +30,35 @@ struct BlockCache {
   }
   static ocl::BufferSizes sizes(const Limits &limits);
 
-  /// levels: frames may have several levels of detail. Throws Error when there are too few slots,
-  /// or more than ISO_MAX_CACHE_SLOTS.
+  /// levels  frames may have several levels of detail
+  /// Throws  Error: fewer than kMinCacheSlots, or more than ISO_MAX_CACHE_SLOTS
   BlockCache(ocl::Device &device, const Limits &limits, std::uint32_t group_size,
              bool levels = false);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones.
-  /// Out: counts.requested_count. Asynchronous. (Pipeline `rays` asks by RequestAhead.)
+  /// Pipeline `rays` asks by RequestAhead instead.
+  ///
+  /// In     rays.pair_block_ids
+  /// Out    request_block_ids; counts.requested_count
+  /// Waits  no
   void request(Wavefront &rays);
   /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the
-  /// free ones, but none that the pass uses; the block served first gets what it takes. asked: the
-  /// counts that hold requested_count. Asynchronous.
+  /// free ones, but none that the pass uses; the block served first gets what it takes.
+  ///
+  /// asked  the counts that hold requested_count
+  /// Waits  no
   void evict(const CountsBuffer &asked, Wavefront &rays);
-  /// Gives the free slots to requests. Out: counts.decoded_count; request_block_ids and
-  /// decode_slots hold that many. Asynchronous.
+  /// Gives the free slots to requests.
+  ///
+  /// asked  the counts that hold requested_count
+  /// Out    request_block_ids, decode_slots [counts.decoded_count]
+  /// Waits  no
   void assign(const CountsBuffer &asked, Wavefront &rays);
 
-  /// Brings inside and the table up to date with another isovalue of rays.frame. Asynchronous.
+  /// Brings `inside` and the table up to date with another isovalue of rays.frame. Waits: no.
   void classify(Wavefront &rays);
 
-  /// Forgets every block: the next pass finds the cache as it was made. Asynchronous.
+  /// Forgets every block: the next pass finds the cache as it was made. Waits: no.
   void clear();
 
   std::uint32_t num_slots;

@@ -13,8 +13,10 @@ class Composite {
  public:
   Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest = kDefaultClosestHit);
 
-  /// Out: rays.hits, rays.ray_block_ids (where rays without slots wait), rays.next_active_ray_ids,
-  /// counts.hit_count and counts.next_active_count. Asynchronous.
+  /// In     rays.pair_hits, closest_pairs
+  /// Out    rays.hits; ray_block_ids, where rays without slots wait; next_active_ray_ids;
+  ///        counts.hit_count, next_active_count
+  /// Waits  no
   void operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction);
 
  private:

@@ -45,9 +45,11 @@ class Group {
 
   Group(ocl::Device &device, const Limits &limits, ClosestHit closest = kDefaultClosestHit);
 
-  /// In: counts.granted_count and counts.visible_count are 0, as begin_pass leaves them.
-  /// Out: groups(), both counts; the other pairs are marked "not tested"; rays.mask is overwritten.
-  /// O(pairs). Asynchronous.
+  /// Takes time in proportion to the pairs. Overwrites rays.mask.
+  ///
+  /// In     rays.pair_block_ids; counts.granted_count, visible_count: 0, as begin_pass leaves them
+  /// Out    groups(), both counts; the other pairs are marked "not tested"
+  /// Waits  no
   void operator()(const BlockCache &cache, Wavefront &rays);
 
   const BlockGroups &groups() const { return groups_; }

@@ -11,8 +11,9 @@ class InitialRays {
  public:
   explicit InitialRays(ocl::Device &device, std::uint64_t num_rays);
 
-  /// In: rays.frame. Out: hits (none), ray_block_ids, next_active_ray_ids and
-  /// counts.next_active_count. Asynchronous.
+  /// In     rays.frame
+  /// Out    rays.hits: none; ray_block_ids, next_active_ray_ids; counts.next_active_count
+  /// Waits  no
   void operator()(Wavefront &rays, Compaction &compaction);
 
  private:

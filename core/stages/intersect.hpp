@@ -15,7 +15,8 @@ class Intersect {
   Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size,
             Solver solver = kDefaultSolver, ClosestHit closest = kDefaultClosestHit);
 
-  /// Out: rays.pair_hits of every pair in `groups`; rays.closest_pairs. Asynchronous.
+  /// Out    rays.pair_hits of every pair in `groups`; rays.closest_pairs
+  /// Waits  no
   void operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays);
 
  private:

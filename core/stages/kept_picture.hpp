@@ -26,11 +26,15 @@ class KeptPicture {
 
   /// Launches the kernel without a pixel to show, see Device::Compiling.
   void compile(Wavefront &rays);
-  /// Copies the hit buffer, a picture of that size. Asynchronous. Throws std::invalid_argument: a
-  /// larger picture.
+  /// Copies the hit buffer, a picture of that size.
+  ///
+  /// Throws  std::invalid_argument: a picture of more rays than the constructor was told
+  /// Waits   no
   void keep(const Wavefront &rays, ImageSize size);
-  /// The hit buffer, a picture as large as rays.frame says, takes the kept hits: where it has none,
-  /// or everywhere. Asynchronous.
+  /// Fills the hit buffer, a picture as large as rays.frame says, from the kept one, enlarged.
+  ///
+  /// everywhere  or only where the hit buffer has no hit
+  /// Waits       no
   void show(Wavefront &rays, bool everywhere);
 
  private:

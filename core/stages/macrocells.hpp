@@ -41,29 +41,42 @@ struct BlockBox {
 
 class Macrocells {
  public:
-  /// num_macrocells: of its level of detail. num_selections: of its MacrocellBuffers, whose own
-  /// buffers are not among these.
+  /// Without the buffers of its MacrocellBuffers.
+  ///
+  /// num_macrocells  of its level of detail
+  /// num_selections  of its MacrocellBuffers
   static ocl::BufferSizes sizes(std::uint64_t num_macrocells, std::size_t num_selections);
   /// Bytes that building needs beside what stays.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
-  /// Decodes every block once, beside a sample for the quantile table, and waits.
-  /// frame  its dims and blocks are used. Scratch during the build: 128 bytes per block of one z
-  /// layer. buffers: shared with other levels; none: its own.
+  /// Decodes every block once, beside a sample for the quantile table. Needs 128 bytes of scratch
+  /// for each block of one z layer.
+  ///
+  /// frame    its grid and place are used
+  /// buffers  shared with other levels; none: its own
+  /// Waits    yes
   Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
              std::shared_ptr<MacrocellBuffers> buffers = {});
 
-  /// Rebuilds masks() for frame.surface.isovalue, where voxels may be voxel_error from those that
-  /// the ranges were made of. moved: the stream, if its layout raises or lowers voxels as it did
-  /// not when the ranges were made. Does nothing where the masks in use are those.
+  /// Makes masks() for an isovalue; nothing to do where they are those in use. Ranges were made of
+  /// voxels of all bit planes, and blocks may since be decoded to other values: by voxel_error and
+  /// by the offsets of `moved`, ranges are taken to be wider.
+  ///
+  /// frame        its grid, place and surface.isovalue are used
+  /// voxel_error  how far a decoded voxel may be from the one that the ranges were made of
+  /// moved        the stream, if its layout raises or lowers voxels; none: it does not
+  /// Waits        no
   void select(const FrameParams &frame, double voxel_error = 0,
               const DeviceStream *moved = nullptr);
-  /// What select() found for frame.surface.isovalue, which it was called with last: the frame's
-  /// surface. The first call waits.
+  /// What select() found: the surface of the frame that it was called with last.
+  ///
+  /// Waits  at the first call for an isovalue
   Surface surface(const FrameParams &frame);
 
-  /// The blocks that own the active ones of the isovalue selected last: [begin, end) along x, y, z;
-  /// none: there is no active block. Waits.
+  /// The box around the active blocks of the isovalue selected last.
+  ///
+  /// Returns  nothing where no block is active
+  /// Waits    yes
   std::optional<BlockBox> active_blocks(const FrameParams &frame) const;
 
   /// Takes other masks, of all levels that share the buffers, for select() and all that follows.

@@ -16,11 +16,11 @@ class March {
         bool levels = false);
 
   /// Takes rays further, as far as what was requested in the pass before has been provided.
-  /// Asynchronous.
   ///
   /// macrocells  of any level of detail, since levels share what is used of them
   /// Out         rays.hits; next_active_ray_ids and ray_block_ids of the rays that wait;
   ///             counts.hit_count, granted_count (blocks intersected), next_active_count
+  /// Waits       no
   void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:

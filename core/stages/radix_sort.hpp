@@ -21,15 +21,15 @@ class RadixSort {
   /// Ranks as suits the device.
   RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size);
 
-  /// Sorts pairs [0, n) by key, ascending; equal keys keep their order; n is the count in
-  /// `count_field`.
+  /// Sorts the first n pairs by key, ascending; equal keys keep their order. Takes time in
+  /// proportion to n * key_bits.
   ///
-  /// keys, values  at least max_count entries. Entries past n are undefined afterwards: the buffers
-  /// trade
-  ///               places with scratch ones.
-  /// key_bits      1..32; every key must be < 2^key_bits. O(n * key_bits).
-  /// Throws std::invalid_argument when buffers are smaller than max_count or key_bits is out of
-  /// range. Asynchronous: enqueues and does not wait.
+  /// keys, values  at least max_count entries; those past n are undefined afterwards, since the
+  ///               buffers trade places with scratch ones
+  /// count_field   of `counts`: n
+  /// key_bits      1..32; every key must be < 2^key_bits
+  /// Throws        std::invalid_argument: buffers smaller than max_count, key_bits out of range
+  /// Waits         no
   void operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, CountsBuffer &counts,
                   uint count_field, uint key_bits);
 

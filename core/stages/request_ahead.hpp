@@ -14,13 +14,14 @@ class RequestAhead {
   RequestAhead(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
                bool levels = false);
 
-  /// The rays that wait ask for blocks, as far as they are in the pass's window. Asynchronous.
+  /// The rays that wait ask for blocks, as far as they are in the pass's window.
   ///
   /// macrocells  of any level of detail, since levels share what is used of them
   /// In          rays.next_active_ray_ids, ray_block_ids; counts.next_active_count, active_count,
   ///             window_count
   /// Out         the cache's requests, and the block that it must serve; counts.requested_count,
   ///             spec_count, pair_count, ahead_count
+  /// Waits       no
   void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:

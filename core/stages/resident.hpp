@@ -19,8 +19,12 @@ class Resident {
   /// Of what stays beside the Macrocells.
   static ocl::BufferSizes sizes(std::uint64_t num_blocks, ImageSize size);
 
-  /// Decodes the whole volume and waits. Throws Error when memory does not suffice. `device` must
-  /// outlive this; `volume` need not.
+  /// Decodes the whole volume.
+  ///
+  /// device  must outlive this
+  /// volume  need not
+  /// Throws  Error: the device's memory does not suffice
+  /// Waits   yes
   Resident(ocl::Device &device, const CompressedVolume &volume, ImageSize size,
            Solver solver = kDefaultSolver);
 
@@ -28,11 +32,14 @@ class Resident {
   static std::optional<std::string> obstacle(const ocl::Device &device,
                                              const CompressedVolume &volume, ImageSize size);
 
-  /// Draws one frame and waits. Returns ms of wall clock, from the camera to the finished hit
-  /// buffer on the device. The first frame of an isovalue also finds its blocks.
+  /// Draws one frame. The first frame of an isovalue also finds its blocks.
+  ///
+  /// Returns  wall clock from the camera to the finished hit buffer on the device [ms]
+  /// Waits    yes
   double render(const Camera &camera, float isovalue);
 
-  /// The hit buffer [height * width], row 0 at the top. Waits.
+  /// Returns  the hit buffer [height * width], row 0 at the top
+  /// Waits    yes
   std::vector<HitRecord> hits() const { return hits_.read(); }
 
  private:

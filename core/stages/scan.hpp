@@ -1,7 +1,6 @@
 #pragma once
 // Exclusive prefix sum and stream compaction with counts that live on the device (Sec. 3.6, 4.2).
-// In: a table or a mask; out: sums or the kept entries in order. Asynchronous: enqueues and does
-// not wait.
+// In: a table or a mask; out: sums or the kept entries in order.
 
 #include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
@@ -14,8 +13,11 @@ class ExclusiveScan {
  public:
   ExclusiveScan(ocl::Device &device, std::uint32_t group_size);
 
-  /// Scans ceil(n / divisor) entries, n being the count in `count_field`. The sum of all goes to
-  /// `total_field` unless that is ISO_INVALID_ID. Sums wrap at 2^32.
+  /// Scans the first ceil(n / divisor) entries. Sums wrap at 2^32.
+  ///
+  /// count_field  of `counts`: n
+  /// total_field  of `counts`: gets the sum of all; ISO_INVALID_ID: none does
+  /// Waits        no
   void operator()(ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field,
                   uint divisor = 1, uint total_field = ISO_INVALID_ID);
 
@@ -27,12 +29,16 @@ class ExclusiveScan {
 /// Keeps the entries whose mask is not 0, in order.
 class Compaction {
  public:
-  /// max_count: the largest count any call may have.
+  /// max_count  the largest count any call may have
   static ocl::BufferSizes sizes(std::uint64_t max_count, std::uint32_t group_size);
   Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t group_size);
 
-  /// out = values[i] of every i < n with mask[i] != 0, n in `count_field`; how many goes to
-  /// `total_field`. `out` must not be `values`.
+  /// Keeps values[i] of every i < n with mask[i] != 0, in order.
+  ///
+  /// count_field  of `counts`: n
+  /// out          must not be `values`
+  /// total_field  of `counts`: gets how many were kept
+  /// Waits        no
   void operator()(const ocl::Buffer<uint> &mask, const ocl::Buffer<uint> &values,
                   CountsBuffer &counts, uint count_field, ocl::Buffer<uint> &out, uint total_field);
 

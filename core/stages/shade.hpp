@@ -20,8 +20,11 @@ struct Appearance {
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
 
-/// The picture of a frame's hit buffer on the host, of so many rays a pixel along each axis: the
-/// twin's. Same bits as Shade.
+/// The same on the host, with the same bits.
+///
+/// hits     [height * width] of the frame's rays
+/// samples  rays a pixel along each axis
+/// Returns  RGB
 Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
                     const std::vector<HitRecord> &hits, std::uint32_t samples = 1);
 
@@ -34,7 +37,11 @@ class Shade {
   /// Launches the kernel without a pixel to shade, see Device::Compiling.
   void compile(Wavefront &rays);
 
-  /// Shades rays.hits, of so many rays a pixel along each axis, and waits. RGB.
+  /// Shades rays.hits.
+  ///
+  /// samples  rays a pixel along each axis
+  /// Returns  RGB
+  /// Waits    yes
   Image8 operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples = 1);
 
  private:

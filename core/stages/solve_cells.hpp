@@ -11,8 +11,10 @@ class SolveCells {
  public:
   SolveCells(ocl::Device &device, Solver solver);
 
-  /// roots [n]: the first s in [0,1] at which inside changes along each of cubics [n], or -1.
-  /// Asynchronous. Throws std::invalid_argument when the sizes differ.
+  /// cubics  [n]
+  /// roots   [n] the first s in [0,1] at which inside changes along each cubic, or -1
+  /// Throws  std::invalid_argument: the sizes differ
+  /// Waits   no
   void operator()(const ocl::Buffer<Cubic> &cubics, ocl::Buffer<float> &roots);
 
  private:

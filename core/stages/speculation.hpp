@@ -11,8 +11,10 @@ class Speculation {
  public:
   explicit Speculation(ocl::Device &device) : begin_pass_(device, "speculation", "begin_pass") {}
 
-  /// Opens a pass: the rays left by the last one become active, N_Spec is set, the other counts are
-  /// zeroed. Asynchronous.
+  /// Opens a pass: the rays left by the last one become active.
+  ///
+  /// Out    rays.active_ray_ids; counts.active_count, spec_count; the other counts of a pass: 0
+  /// Waits  no
   void begin_pass(Wavefront &rays) {
     std::swap(rays.active_ray_ids, rays.next_active_ray_ids);
     begin_pass_({1, 1}, rays.frame, rays.counts);

@@ -13,12 +13,13 @@ class StartRays {
   StartRays(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
             bool levels = false);
 
-  /// Begins a frame. Asynchronous.
+  /// Begins a frame.
   ///
   /// macrocells  of any level of detail, since levels share what is used of them
   /// In          rays.counts: next_active_count is 0
   /// Out         rays.hits: none; next_active_ray_ids and ray_block_ids of the rays that meet an
   ///             active block; counts.next_active_count: how many they are
+  /// Waits       no
   void operator()(const Macrocells &macrocells, Wavefront &rays);
 
  private:

@@ -11,9 +11,9 @@ class Traverse {
  public:
   Traverse(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size);
 
-  /// In: active_ray_ids, ray_block_ids (where each ray goes on from), counts.spec_count. Out:
-  /// pair_block_ids, ray_block_ids (the first block not looked at), counts.pair_count.
-  /// Asynchronous.
+  /// In     rays.active_ray_ids; ray_block_ids, where each ray goes on from; counts.spec_count
+  /// Out    rays.pair_block_ids; ray_block_ids, the first block not looked at; counts.pair_count
+  /// Waits  no
   void operator()(const Macrocells &macrocells, Wavefront &rays);
 
  private:

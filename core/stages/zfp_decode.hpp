@@ -15,9 +15,10 @@ class ZfpDecode {
  public:
   /// Of one level of detail alone, and where streams are whole on the device, it has no buffers.
   static ocl::BufferSizes sizes(std::uint64_t max_blocks, bool stream_on_host, bool levels);
-  /// max_blocks: the most a call may decode. stream_defines: DeviceStream::defines() of the streams
-  /// to come. levels: block ids count on through several levels of detail (FrameParams), and only
-  /// blocks of the levels at hand are decoded.
+  /// max_blocks      the most a call may decode
+  /// stream_defines  DeviceStream::defines() of the streams to come
+  /// levels          block ids count on through several levels of detail (LevelPlace), and only
+  ///                 blocks of the levels at hand are decoded
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
             bool levels = false);
 
@@ -32,10 +33,12 @@ class ZfpDecode {
   /// Whether blocks of this level can be decoded together with those that a call is for.
   bool can_join(const DeviceStream &next) const;
 
-  /// Decodes blocks block_ids[0..n) to slots[0..n) of values, n = counts.decoded_count, and notes
-  /// in inside [slots] which voxels are inside. Bit-exact with libzfp. Asynchronous; but where the
-  /// stream stays on the host, waits for all that is enqueued, and throws Error when the volume's
-  /// file has become shorter.
+  /// Decodes blocks to slots of a cache. Bit-exact with libzfp.
+  ///
+  /// In      block_ids, slots [counts.decoded_count]
+  /// Out     values [64 * slots], x + 4y + 16z within a slot; inside [slots], a bit for each voxel
+  /// Throws  Error: the stream stays on the host, and the volume's file has become shorter
+  /// Waits   where the stream stays on the host, for all that is enqueued
   void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                   const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
                   ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
