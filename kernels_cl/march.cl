@@ -25,16 +25,21 @@ ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCoun
   next->free_count = counts->free_count;
 }
 
-/// Walks rays on until they hit, leave or wait: active_ray_ids [prev->next_active_count], each from
-/// ray_block_ids [pixel], an active block. Out: hits [pixel]; next_active_ray_ids
-/// [counts->next_active_count] of those that wait, and in ray_block_ids the block they wait at;
-/// *next, opened. macrocell_masks: as traverse(). frame_params, frames, ranges: as start_rays; a
-/// ray that leaves the band of its level waits behind the border.
+/// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
+/// behind the border.
 ///
-/// Groups stride over the rays, in rounds: find the next blocks, walk their cells. When rays are so
-/// few that a device would wait for the longest of them, each has more work-items, up to one for
-/// each block of a round; the first block in which anything happens decides, which an atomic_min of
-/// its place tells.
+/// frame_params, frames, num_frames, ranges  as start_rays
+/// macrocell_masks                           as traverse
+/// In      active_ray_ids [prev->next_active_count]; ray_block_ids [pixel]: the active block that a
+///         ray goes on from
+/// Out     hits [pixel]; next_active_ray_ids [counts->next_active_count] of the rays that wait, and
+///         in ray_block_ids the block they wait at; *next_counts, opened; slot_stamps of the blocks
+///         that were read
+/// Launch  groups of ISO_GROUP_SIZE, which stride over the rays
+///
+/// In rounds: find the next blocks, walk their cells. When rays are so few that a device would wait
+/// for the longest of them, each has more work-items, up to one for each block of a round; the
+/// first block in which anything happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const ushort *ranges, global BlockEntry *table,

@@ -57,12 +57,15 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
   }
 }
 
-/// Of the rays that wait, active_ray_ids [counts->next_active_count], the first
-/// counts->window_count ask for the blocks that they touch in their next active blocks: N_Spec of
-/// them (Sec. 4), or their own number of frame->schedule.per_ray_speculation. Out:
-/// request_block_ids [counts->requested_count, at most capacity]. The other arguments as in march.
-/// Groups stride over the rays; when these are few, each has more work-items, which share its
-/// blocks out among them.
+/// Of the rays that wait, the first counts->window_count ask for the blocks that they touch in
+/// their next active blocks: N_Spec of them (Sec. 4), or, with
+/// frame->schedule.per_ray_speculation, a number of their own.
+///
+/// In      active_ray_ids [counts->next_active_count]; the other arguments as in march
+/// Out     request_block_ids [counts->requested_count, at most capacity]; slot_stamps of those of
+///         the blocks that are cached
+/// Launch  groups of ISO_GROUP_SIZE, which stride over the rays; when these are few, each has more
+///         work-items, which share its blocks out among them
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,

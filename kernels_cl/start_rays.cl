@@ -29,12 +29,18 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
-/// Begins a frame. hits [pixel], seen as words, = none; next_active_ray_ids
-/// [counts->next_active_count]: of the frame's screen box, the pixels whose rays meet an active
-/// block, each with that block in ray_block_ids [pixel]. counts: of the frame's last pass,
-/// next_active_count 0 before; *next: of the first pass of this frame. frames [num_frames]: with
-/// levels of detail, those that draw, the finest first; frame_params is the first of them. ranges:
-/// of their blocks. Groups stride over the tiles.
+/// Begins a frame.
+///
+/// frames  [num_frames] with levels of detail, those that draw, the finest first; frame_params is
+///         the first of them
+/// ranges  of the blocks of all levels
+/// counts  of the last pass of the frame before
+/// next    counts of this frame's first pass
+/// In      counts->next_active_count: 0
+/// Out     hit_words: hits [pixel], seen as words, all none; next_active_ray_ids
+///         [counts->next_active_count]: of the frame's screen box, the pixels whose rays meet an
+///         active block; ray_block_ids [pixel]: that block
+/// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const uint *macrocell_masks, global const ushort *ranges, global PassCounts *counts,

@@ -65,20 +65,27 @@ struct MemoryPlan {
   std::uint64_t peak() const { return std::max(total(), setup_bytes); }
 };
 
-/// The plan with so many cache slots and the stream where request.stream says, on the device for
-/// kAuto. Throws Error where the stream does not fit four buffers on the device.
+/// The plan with so many cache slots and the stream where request.stream says; kAuto: on the
+/// device.
+///
+/// Throws  Error: the stream does not fit four buffers on the device
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots);
 
 /// As plan_memory(), but kAuto leaves the stream on the host where the plan would otherwise exceed
-/// `budget` bytes, and that takes less.
+/// the budget, and that takes less.
+///
+/// budget  [bytes]
 MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request,
                            std::uint64_t budget, std::uint32_t cache_slots);
 
-/// The plan with the most cache slots, up to `max_slots`, whose peak is within `budget` bytes and
-/// whose buffers the device can allocate. kAuto leaves the stream on the host where that gives more
-/// slots and those that the device would have beside it are not enough to be useful. Throws Error,
-/// with the smallest budget that would do, when 8 slots are too many.
+/// The plan with the most cache slots whose peak is within a budget, and whose buffers the device
+/// can allocate. kAuto leaves the stream on the host where that gives more slots, and those that
+/// the device would have beside the stream are not enough to be useful.
+///
+/// budget     [bytes]
+/// max_slots  the most slots wanted
+/// Throws     Error: not even kMinCacheSlots fit; names the smallest budget that would do
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 

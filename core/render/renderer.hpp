@@ -27,33 +27,47 @@ namespace isowave::core {
 class Renderer {
  public:
   /// Uploads the volume, builds its macrocell ranges and every buffer of the frame, and has the
-  /// kernels compiled; nothing is allocated or compiled later. Throws Error when options are out of
-  /// range or memory does not suffice. `device` must outlive the renderer; `volume` need not,
-  /// unless it stays on the host (memory_plan().stream).
+  /// kernels compiled; nothing is allocated or compiled later.
+  ///
+  /// device   must outlive the renderer
+  /// volume   need not, unless it stays on the host (memory_plan().stream)
+  /// options  capacities: what no request may exceed
+  /// Throws   Error: options out of range, the device's memory or the budget does not suffice
+  /// Waits    yes
   Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
 
-  /// Draws one frame and waits for it. Decoded blocks stay in the cache for the next frame,
-  /// whatever its isovalue, unless that asks for other values (voxel_error, bound), or this one
-  /// needed many more than there are slots. Throws Error: a request that is out of range or that
-  /// the renderer was not made for, a file that blocks are read from has become shorter. The next
-  /// frame is drawn as if this had not been.
+  /// Draws one frame. Decoded blocks stay in the cache for the next frame, whatever its isovalue,
+  /// unless that asks for other values (voxel_error, bound), or this one needed many more than
+  /// there are slots.
+  ///
+  /// Returns  what the passes did, and how long they took [ms]
+  /// Throws   Error: a request that is out of range or that the renderer was not made for; a file
+  ///          that blocks are read from has become shorter. The next frame is not affected.
+  /// Waits    yes
   FrameStats render(const FrameRequest &request);
 
-  /// Throws Error where the renderer was not made for the request: size, levels of detail, bounds.
+  /// Throws  Error: the renderer was not made for the request's size, levels of detail or bound
   void check(const FrameRequest &request) const;
 
-  /// A view in which isosurfaces fill the largest picture, see surface_camera(). Waits. Throws
-  /// Error: NaN.
+  /// A view in which isosurfaces fill the largest picture, see surface_camera().
+  ///
+  /// Throws  Error: an isovalue is NaN
+  /// Waits   yes
   Camera camera(std::span<const float> isovalues);
 
-  /// The hit buffer of the last frame, [size.ray_rows()][size.ray_columns()], row 0 at the top.
-  /// Waits. Throws Error where no frame was drawn.
+  /// Returns  the hit buffer of the last frame [size.ray_rows()][size.ray_columns()], row 0 at the
+  ///          top
+  /// Throws   Error: no frame was drawn
+  /// Waits    yes
   std::vector<HitRecord> hits() const;
-  /// The picture of the hit buffer. Waits. Throws Error where no frame was drawn.
+  /// Returns  the picture of the hit buffer, RGB [size.height][size.width], row 0 at the top
+  /// Throws   Error: no frame was drawn
+  /// Waits    yes
   Image8 shade(const Appearance &appearance = {});
 
-  /// For pictures of one frame with more and more pixels (core/render/time_budget.hpp). Needs
-  /// options().with_kept_picture, or else throws Error.
+  // For pictures of one frame with more and more pixels (core/render/time_budget.hpp). Without
+  // options().with_kept_picture these three throw Error.
+
   /// Puts the last frame's picture aside: of at most half the pixels that the renderer was made
   /// for, along each axis, rounded up (halved()).
   void keep_picture();

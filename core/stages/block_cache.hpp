@@ -55,10 +55,10 @@ struct BlockCache {
   /// Waits  no
   void assign(const CountsBuffer &asked, Wavefront &rays);
 
-  /// Brings `inside` and the table up to date with another isovalue of rays.frame. Waits: no.
+  /// Brings `inside` and the table up to date with another isovalue of rays.frame. Does not wait.
   void classify(Wavefront &rays);
 
-  /// Forgets every block: the next pass finds the cache as it was made. Waits: no.
+  /// Forgets every block: the next pass finds the cache as it was made. Does not wait.
   void clear();
 
   std::uint32_t num_slots;

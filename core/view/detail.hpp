@@ -17,12 +17,14 @@
 namespace isowave::core {
 
 /// One frame for each level, the finest first: as make_frame_params() makes it, but with the
-/// level's band, begin_t to end_t, which is empty where it draws nothing, and block ids that count
-/// on through all levels. The first band begins at the eye, the last one has no end; a level whose
-/// band the volume does not reach into draws nothing. If there are several bands, the active box of
-/// each is its whole domain, and the first one's screen box is for all. voxel_pixels: distance
-/// between a level's voxels, in pixels, at most; 0: the finest level draws all. Throws Error: what
-/// make_frame_params() throws.
+/// level's place and band. The first band begins at the eye, the last one has no end; a level
+/// whose band the volume does not reach into has an empty one, and draws nothing. If there are
+/// several bands, the active box of each is its whole domain, and the first one's screen box is for
+/// all.
+///
+/// levels        the finest first
+/// voxel_pixels  distance between a level's voxels, at most [pixels]; 0: the finest level draws all
+/// Throws        Error: what make_frame_params() throws
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
                                            ImageSize size, float isovalue, double voxel_pixels);
 
@@ -48,9 +50,9 @@ inline bool draws(const FrameParams &frame) {
   return frame.band.begin_t < frame.band.end_t;
 }
 
-/// Throws Error unless it is finite and at least 0.
+/// Throws  Error: not finite, or below 0
 void check_voxel_pixels(double voxel_pixels);
-/// Throws Error where a volume that could have levels of detail has none.
+/// Throws  Error: a volume that could have levels of detail has none
 void check_has_levels(const CompressedVolume &volume);
 
 }  // namespace isowave::core

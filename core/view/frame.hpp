@@ -45,8 +45,9 @@ inline std::uint64_t num_macrocells(const BlockGrid &grid) {
   return cells(grid.blocks_x) * cells(grid.blocks_y) * cells(grid.blocks_z);
 }
 
-/// Throws Error where distances within the volume, or directions, do not fit float32, or its origin
-/// is so far away that voxels are lost beside it. `what` names the volume.
+/// what    names the volume
+/// Throws  Error: distances within the volume, or directions, do not fit float32, or its origin is
+///         so far away that voxels are lost beside it
 void check_drawable(const VolumeInfo &info, std::string_view what);
 
 BlockGrid make_grid(const VolumeInfo &info);
@@ -55,15 +56,20 @@ BlockGrid make_grid(const VolumeInfo &info);
 /// one.
 FrameParams make_grid_params(const VolumeInfo &info);
 
-/// Computes the camera basis once, in double, and maps it to index space. Throws Error: a
-/// degenerate camera, or one too far away, what check_drawable() or check_image_size() refuses.
+/// Computes the camera basis once, in double, and maps it to index space.
+///
+/// camera  in world space
+/// Throws  Error: a degenerate camera, or one too far away; what check_drawable() or
+///         check_image_size() refuses
 View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size);
 
 /// The rays, as make_ray() rounds them, that may meet the surface's active box.
 ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface);
 
 /// A frame in which the whole volume is active, without speculation and without a cache: what the
-/// scalar reference needs. Throws Error: what make_view() throws, a NaN isovalue.
+/// scalar reference needs.
+///
+/// Throws  Error: what make_view() throws; a NaN isovalue
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
                               float isovalue);
 
