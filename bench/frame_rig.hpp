@@ -32,12 +32,16 @@ class FrameRig {
   /// Makes the rays of the frame.
   void start();
   /// Keeps every n-th ray, n = rays / (pixels / spec_count), so that the next pass has N_Spec =
-  /// spec_count (as long as max_speculation allows it). Waits.
+  /// spec_count (as long as max_speculation allows it).
+  ///
+  /// Waits  yes
   void thin_wavefront(std::uint32_t spec_count);
   /// The pass's stages from N_Spec on, up to (and without) traverse, intersect, composite.
   void begin_pass() { speculation.begin_pass(rays); }
   void find_blocks();  ///< traverse .. group
-  /// A whole pass. Waits. Returns what it counted.
+  /// A whole pass. Returns what it counted.
+  ///
+  /// Waits  yes
   PassCounts run_pass();
 
   PassCounts read_counts() const { return rays.counts.read()[0]; }

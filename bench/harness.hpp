@@ -112,7 +112,7 @@ T &input(const Args &...args) {
   return *static_cast<T *>(session.input.get());
 }
 
-/// Throws Error naming `what` unless it holds.
+/// Throws  Error naming `what` unless it holds
 void check(bool holds, const std::string &what);
 
 /// Whether both hold the same bytes: of floats, more than equality says.

@@ -74,7 +74,8 @@ void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, co
            Accuracy &tally);
 
 /// Judges a whole frame with as many threads as there are cores. hits [height * width] of `frame`.
-/// Throws std::invalid_argument when those do not fit, and what the oracle throws.
+///
+/// Throws  std::invalid_argument: those do not fit, and what the oracle throws
 Accuracy judge_frame(const HitOracle &oracle, const FrameParams &frame,
                      std::span<const HitRecord> hits);
 

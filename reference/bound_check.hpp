@@ -22,7 +22,9 @@ struct BoundTally {
 
 /// truth: of the volume before compression. frame: which was drawn, at the finest level. drawn,
 /// bounds [height * width]: its hits, and Certificate::bounds. With as many threads as there are
-/// cores. Throws std::invalid_argument where sizes do not fit.
+/// cores.
+///
+/// Throws  std::invalid_argument: sizes do not fit
 BoundTally judge_bounds(const HitOracle &truth, const FrameParams &frame,
                         std::span<const HitRecord> drawn, std::span<const float> bounds);
 

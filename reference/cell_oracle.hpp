@@ -33,15 +33,17 @@ class EmbreeScene;
 class CellOracle final : public HitOracle {
  public:
   /// voxels [nz][ny][nx], x fastest, finite; they must outlive the oracle. dims 2 to 2^16. Builds
-  /// Embree's tree. Throws std::invalid_argument (dims), Error (memory).
+  /// Embree's tree.
+  ///
+  /// Throws  std::invalid_argument: dims; Error: memory
   CellOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
   CellOracle(std::span<const double> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
   ~CellOracle() override;
   CellOracle(const CellOracle &) = delete;  // Embree holds its address
   CellOracle &operator=(const CellOracle &) = delete;
 
-  /// Throws std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp): cells
-  /// could be lost.
+  /// Throws  std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp): cells
+  ///         could be lost
   OracleHit first_hit(const OracleRay &ray) const override;
   double field(const std::array<double, 3> &point) const override;
   std::array<double, 3> gradient(const std::array<double, 3> &point) const override;

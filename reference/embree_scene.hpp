@@ -13,7 +13,7 @@ RTCRayHit to_embree(const OracleRay &ray);
 /// Device and scene. The scene has the flag ROBUST and, where asked, COMPACT.
 class EmbreeScene {
  public:
-  /// Throws Error when Embree cannot be opened.
+  /// Throws  Error: Embree cannot be opened
   explicit EmbreeScene(bool compact);
   ~EmbreeScene();
   EmbreeScene(const EmbreeScene &) = delete;
@@ -22,8 +22,9 @@ class EmbreeScene {
   RTCDevice device() const { return device_; }
   RTCScene scene() const { return scene_; }
 
-  /// Attaches the scene's one geometry, which the scene owns from here on, and builds. Throws Error
-  /// (memory).
+  /// Attaches the scene's one geometry, which the scene owns from here on, and builds.
+  ///
+  /// Throws  Error: memory
   void build(RTCGeometry geometry);
 
  private:

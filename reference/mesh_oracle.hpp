@@ -68,8 +68,9 @@ class MeshOracle {
   MeshOracle &operator=(const MeshOracle &) = delete;
 
   /// t of the first triangle along the ray behind t = `from`, infinity for none; float32 accuracy.
-  /// Thread-safe. Throws std::invalid_argument for an origin out of Embree's reach
-  /// (embree_reach.hpp).
+  /// Thread-safe.
+  ///
+  /// Throws  std::invalid_argument for an origin out of Embree's reach (embree_reach.hpp)
   double first_hit(const OracleRay &ray, double from = 0) const;
 
   /// Samples the field around the ray's point at t = `at` ever more finely, until triangles agree

@@ -32,8 +32,8 @@ struct Certificate {
 /// volume    what the renderer was made for
 /// request   of the frame
 /// drawn     its hits
-/// Throws Error where the volume's error is not known, or where the solver may miss crossings,
-/// or where the hits are not as many as the rays.
+/// Throws    Error: the volume's error is not known; the solver may miss crossings; the hits are
+///           not as many as the rays
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const HitRecord> drawn);
 

@@ -69,7 +69,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
 /// The request with this detail.
 FrameRequest with_detail(FrameRequest request, const Detail &detail);
 
-/// Throws Error unless it is finite and above 0.
+/// Throws  Error unless it is finite and above 0
 void check_max_surface_error(double max_surface_error);
 
 }  // namespace isowave::core

@@ -33,15 +33,15 @@ struct ColourComparison {
   std::optional<double> psnr_db;  ///< over all channels, peak 255; none (infinite) when equal
 };
 
-/// Throws Error when the images differ in size.
+/// Throws  Error: the images differ in size
 void check_same_size(const auto &a, const auto &b) {
   if (a.width != b.width || a.height != b.height)
     throw Error("the images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height);
 }
 
-/// Throws Error when the images differ in size.
+/// Throws  Error: the images differ in size
 DepthComparison compare_depth(const FloatImage &a, const FloatImage &b);
-/// Throws Error when the images differ in size or number of channels.
+/// Throws  Error: the images differ in size or number of channels
 ColourComparison compare_colour(const Image8 &a, const Image8 &b);
 
 }  // namespace isowave::core

@@ -19,7 +19,8 @@ class Flip {
   Flip(Flip &&) noexcept;
 
   /// Mean over all pixels of FLIP's error, 0 (the same) to 1. RGB; a fourth channel is left out.
-  /// Throws Error when the images differ in size.
+  ///
+  /// Throws  Error: the images differ in size
   double error(const Image8 &test) const;
 
  private:

@@ -12,7 +12,9 @@ namespace isowave::core {
 /// failed, for exceptions that do not say that: "isowave render".
 std::string text_of_current_exception(std::string_view doing);
 
-/// Calls work() and returns what it returns. Throws Error alone.
+/// Calls work() and returns what it returns.
+///
+/// Throws  Error alone
 template <class Work>
 auto guarded(std::string_view doing, const Work &work) {
   try {

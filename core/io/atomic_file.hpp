@@ -11,7 +11,9 @@
 namespace isowave::core {
 
 /// What the name leads to: a file, or the name at which writing through symbolic links would make
-/// one. Throws Error where links go in circles.
+/// one.
+///
+/// Throws  Error: links go in circles
 std::filesystem::path follow_links(const std::filesystem::path &path);
 
 /// Writes to a temporary file beside the target; commit() renames it over the target. Destroyed
@@ -21,14 +23,17 @@ std::filesystem::path follow_links(const std::filesystem::path &path);
 /// the target's name and the system's reason.
 class AtomicFile {
  public:
-  /// Opens the temporary file. Throws Error: folder missing or not writable, target not a regular
-  /// file or not writable.
+  /// Opens the temporary file.
+  ///
+  /// Throws  Error: folder missing or not writable, target not a regular file or not writable
   explicit AtomicFile(const std::filesystem::path &target);
   ~AtomicFile();
   AtomicFile(const AtomicFile &) = delete;
   AtomicFile &operator=(const AtomicFile &) = delete;
 
-  /// Appends all bytes. Throws Error (disk full and such).
+  /// Appends all bytes.
+  ///
+  /// Throws  Error: disk full and such
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
   /// For libraries that want a C stream (libpng); errors set on it are found by commit().
@@ -37,7 +42,9 @@ class AtomicFile {
   /// Hands over all that was written, piece by piece. Nothing may follow.
   void read_back(const std::function<void(std::span<const std::byte>)> &take);
 
-  /// Flushes, closes and renames. Throws Error if any write failed. Call once, nothing may follow.
+  /// Flushes, closes and renames. Call once, nothing may follow.
+  ///
+  /// Throws  Error if any write failed
   void commit();
 
   const std::filesystem::path &target() const { return target_; }

@@ -17,7 +17,9 @@ namespace isowave::core {
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
-  /// Reads up to bytes.size() bytes; fewer only at the end of the data. Throws Error.
+  /// Reads up to bytes.size() bytes; fewer only at the end of the data.
+  ///
+  /// Throws  Error
   virtual std::size_t read(std::span<std::byte> bytes) = 0;
 };
 
@@ -41,8 +43,10 @@ class FileSource : public ByteSource {
 /// gzip: one or more members, as the gzip tool writes and joins them. zlib: one stream.
 enum class Packing { kGzip, kZlib, kGzipOrZlib };
 
-/// Unpacks compressed data, which must end where the part of the file does. Throws Error where the
-/// data are broken, end early, have a wrong checksum, or are followed by anything else.
+/// Unpacks compressed data, which must end where the part of the file does.
+///
+/// Throws  Error: the data are broken, end early, have a wrong checksum, or are followed by
+///         anything else
 class InflateSource : public ByteSource {
  public:
   InflateSource(FileSource packed, Packing packing);

@@ -14,8 +14,8 @@ namespace isowave::core {
 /// whoever writes to it, and a device may never end.
 class InputFile {
  public:
-  /// what: how messages name the file. Throws Error: there is none, it cannot be opened, or it is
-  /// not a regular file.
+  /// what    how messages name the file
+  /// Throws  Error: there is none, it cannot be opened, or it is not a regular file
   InputFile(const std::filesystem::path &path, std::string what);
   explicit InputFile(const std::filesystem::path &path) : InputFile(path, path.string()) {}
   ~InputFile();
@@ -26,9 +26,10 @@ class InputFile {
   const std::string &what() const { return what_; }
   /// In bytes, when the file was opened: what is appended to it later is not read.
   std::uint64_t size() const { return size_; }
-  /// Reads all of `out` from byte `offset` on. Thread-safe. Throws Error: the file has become too
-  /// short for that, or cannot be read. Who writes into the file meanwhile changes what is read;
-  /// who replaces it by another of its name does not.
+  /// Reads all of `out` from byte `offset` on. Thread-safe. Who writes into the file meanwhile
+  /// changes what is read; who replaces it by another of its name does not.
+  ///
+  /// Throws  Error: the file has become too short for that, or cannot be read
   void read(std::uint64_t offset, std::span<std::byte> out) const;
 
  private:
@@ -38,7 +39,7 @@ class InputFile {
   int descriptor_ = -1;
 };
 
-/// Throws Error where InputFile(path) does.
+/// Throws  Error where InputFile(path) does
 void check_input_file(const std::filesystem::path &path);
 
 }  // namespace isowave::core

@@ -11,7 +11,9 @@
 
 namespace isowave::core {
 
-/// Reads and judges the header, not the voxels. Throws Error.
+/// Reads and judges the header, not the voxels.
+///
+/// Throws  Error
 VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file);
 
 }  // namespace isowave::core

@@ -12,7 +12,9 @@
 
 namespace isowave::core {
 
-/// Reads and judges the header, not the voxels. Throws Error.
+/// Reads and judges the header, not the voxels.
+///
+/// Throws  Error
 VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, bool is_gzipped);
 
 }  // namespace isowave::core

@@ -15,13 +15,15 @@ struct FloatImage {
 };
 
 /// Writes numpy format 1.0: '<f4', C order, shape (height, width); every bit is kept. Writes to a
-/// temporary name and renames. Throws Error when it cannot write, std::invalid_argument when pixels
-/// is not width * height long.
+/// temporary name and renames.
+///
+/// Throws  Error: it cannot write; std::invalid_argument: pixels is not width * height long
 void write_npy(const FloatImage &image, const std::filesystem::path &path);
 
-/// Reads a two-dimensional '<f4' array in C order of numpy format 1, 2 or 3. Throws Error in one
-/// line: unreadable, not .npy, another type, order or rank, fewer or more bytes than the shape
-/// says.
+/// Reads a two-dimensional '<f4' array in C order of numpy format 1, 2 or 3.
+///
+/// Throws  Error, in one line: unreadable, not .npy, another type, order or rank, fewer or more
+///         bytes than the shape says
 FloatImage read_npy(const std::filesystem::path &path);
 
 }  // namespace isowave::core

@@ -12,7 +12,9 @@
 
 namespace isowave::core {
 
-/// Reads and judges the header, not the voxels. Throws Error.
+/// Reads and judges the header, not the voxels.
+///
+/// Throws  Error
 VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file);
 
 }  // namespace isowave::core

@@ -11,13 +11,15 @@ namespace isowave::core {
 
 /// Opens Open-SciVis raw (`NAME_XxYxZ_TYPE.raw`, `.raw.gz`), NRRD (.nrrd, .nhdr), MetaImage (.mha,
 /// .mhd) or NIfTI (.nii, .nii.gz), by its extension in any case. Reads and judges the whole header;
-/// layers are read as they are asked for, in bounded memory. Throws Error: unknown extension,
-/// missing file or none but a regular one, bad name, a header that is not understood, zero dims,
-/// truncated or oversized data, more than one component.
+/// layers are read as they are asked for, in bounded memory.
+///
+/// Throws  Error: unknown extension, missing file or none but a regular one, bad name, a header
+///         that is not understood, zero dims, truncated or oversized data, more than one component
 std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path,
                                           const RawOverrides &overrides = {});
-/// The file that has the voxels: where the volume's header names another, that one. Throws Error as
-/// open_volume().
+/// The file that has the voxels: where the volume's header names another, that one.
+///
+/// Throws  Error as open_volume()
 std::filesystem::path voxel_file(const std::filesystem::path &path);
 
 }  // namespace isowave::core

@@ -15,14 +15,16 @@ struct Image8 {
   std::vector<std::uint8_t> pixels;
 };
 
-/// Writes losslessly, to a temporary name that is renamed. Throws Error when it cannot write or a
-/// side is 0 or above PNG's limit; std::invalid_argument when channels or the length of pixels is
-/// wrong.
+/// Writes losslessly, to a temporary name that is renamed.
+///
+/// Throws  Error: it cannot write, or a side is 0 or above PNG's limit; std::invalid_argument:
+///         channels or the length of pixels is wrong
 void write_png(const Image8 &image, const std::filesystem::path &path);
 
 /// Reads 8-bit RGB and RGBA as they are; grey, palette and fewer bits are widened without loss.
-/// Throws Error in one line: unreadable, not PNG, truncated or broken, 16 bits per channel (which 8
-/// cannot hold).
+///
+/// Throws  Error, in one line: unreadable, not PNG, truncated or broken, 16 bits per channel (which
+///         8 cannot hold)
 Image8 read_png(const std::filesystem::path &path);
 
 }  // namespace isowave::core

@@ -48,8 +48,9 @@ struct VolumeHeader {
 /// direction.
 void set_axis(VolumeInfo &info, int axis, double spacing, const glm::dvec3 &direction);
 
-/// Opens the data file that a detached header names, relative to the header's folder. Throws Error
-/// that names both.
+/// Opens the data file that a detached header names, relative to the header's folder.
+///
+/// Throws  Error that names both
 std::shared_ptr<const InputFile> open_data_file(const InputFile &header, const std::string &name);
 
 }  // namespace isowave::core

@@ -20,8 +20,9 @@ namespace isowave::core::ocl {
 class RawBuffer {
  public:
   /// Allocates `bytes` (at least 1 is allocated for 0), sets them to zero and waits: drivers
-  /// allocate lazily, and a budget counts only what is really there. Throws Error when the device
-  /// cannot.
+  /// allocate lazily, and a budget counts only what is really there.
+  ///
+  /// Throws  Error: the device cannot
   RawBuffer(Device &device, std::string name, std::size_t bytes);
   ~RawBuffer();
   RawBuffer(RawBuffer &&) noexcept;
@@ -45,7 +46,9 @@ class RawBuffer {
                   std::size_t offset);
   void copy_bytes(const RawBuffer &from, std::size_t bytes);
   void check_range(std::size_t count, std::size_t offset, std::size_t size) const;
-  /// Its elements' bytes. Throws std::invalid_argument unless elements have element_bytes each.
+  /// Its elements' bytes.
+  ///
+  /// Throws  std::invalid_argument unless elements have element_bytes each
   static std::size_t checked_bytes(const BufferSize &size, std::size_t element_bytes);
   /// count * element_bytes; SIZE_MAX, which no device has, instead of an overflow.
   static std::size_t bytes_of(std::size_t count, std::size_t element_bytes) {
@@ -68,10 +71,12 @@ class Buffer : public RawBuffer {
  public:
   Buffer(Device &device, std::string name, std::size_t count)
       : RawBuffer(device, std::move(name), bytes_of(count, sizeof(T))) {}
-  /// Throws std::invalid_argument where the size is that of elements of another size.
+  /// Throws  std::invalid_argument: the size is that of elements of another size
   Buffer(Device &device, const BufferSize &size)
       : RawBuffer(device, size.name, checked_bytes(size, sizeof(T))) {}
-  /// Holds a copy of `data`. Waits.
+  /// Holds a copy of `data`.
+  ///
+  /// Waits  yes
   Buffer(Device &device, std::string name, std::span<const T> data)
       : Buffer(device, std::move(name), data.size()) {
     write(data);
@@ -79,8 +84,10 @@ class Buffer : public RawBuffer {
 
   std::size_t size() const { return bytes() / sizeof(T); }
 
-  /// Host -> elements [offset, offset + data.size()). Waits. Throws std::invalid_argument past the
-  /// end.
+  /// Host -> elements [offset, offset + data.size()).
+  ///
+  /// Throws  std::invalid_argument: past the end
+  /// Waits   yes
   void write(std::span<const T> data, std::size_t offset = 0) {
     check_range(data.size(), offset, size());
     write_bytes(data.data(), data.size_bytes(), offset * sizeof(T), true);
@@ -90,7 +97,9 @@ class Buffer : public RawBuffer {
     check_range(data.size(), 0, size());
     write_bytes(data.data(), data.size_bytes(), 0, false);
   }
-  /// Elements [offset, offset + out.size()) -> host. Waits.
+  /// Elements [offset, offset + out.size()) -> host.
+  ///
+  /// Waits  yes
   void read(std::span<T> out, std::size_t offset = 0) const {
     check_range(out.size(), offset, size());
     read_bytes(out.data(), out.size_bytes(), offset * sizeof(T), true, nullptr);

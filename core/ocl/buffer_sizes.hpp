@@ -36,8 +36,10 @@ class BufferSizes {
   /// Appends others. Returns *this.
   BufferSizes &add(const BufferSizes &others);
 
-  /// The first buffer of that name. Throws std::invalid_argument where there is none: the
-  /// constructor at work asks for a buffer that its sizes() does not state.
+  /// The first buffer of that name.
+  ///
+  /// Throws  std::invalid_argument: there is none, since the constructor at work asks for a buffer
+  ///         that its sizes() does not state
   const BufferSize &operator[](std::string_view name) const;
   /// All of that name.
   BufferSizes named(std::string_view name) const;

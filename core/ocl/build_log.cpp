@@ -3,27 +3,39 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <regex>
+#include <charconv>
+#include <optional>
+#include <system_error>
 #include <vector>
 
 namespace isowave::core::ocl {
 
 namespace {
 
+/// Takes a whole number from the front of `text`; none: it begins with something else.
+std::optional<std::size_t> take_number(std::string_view &text) {
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{}) return {};
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return number;
+}
+
 /// Of each line of the joined text, where it comes from: `file:line`.
 std::vector<std::string> places_of(std::string_view text) {
-  static const std::regex marker(R"re(#line (\d+) "([^"]+)")re");
+  constexpr std::string_view kMarker = "#line ";
   std::vector<std::string> places;
-  std::string file = "?";
+  std::string_view file = "?";
   std::size_t number = 1;
   while (!text.empty()) {
-    const std::string line(text.substr(0, text.find('\n')));
-    places.push_back(fmt::format("{}:{}", file, number++));
-    if (std::smatch match; std::regex_match(line, match, marker)) {
-      number = std::stoul(match[1]);
-      file = match[2];
-    }
+    std::string_view line = text.substr(0, text.find('\n'));
     text.remove_prefix(std::min(text.size(), line.size() + 1));
+    places.push_back(fmt::format("{}:{}", file, number++));
+    if (!line.starts_with(kMarker)) continue;
+    line.remove_prefix(kMarker.size());  // 12 "portable/window.h"
+    number = take_number(line).value_or(number);
+    file = line.substr(std::min<std::size_t>(2, line.size()));
+    file.remove_suffix(std::min<std::size_t>(1, file.size()));
   }
   return places;
 }
@@ -31,18 +43,18 @@ std::vector<std::string> places_of(std::string_view text) {
 }  // namespace
 
 std::string with_file_names(std::string_view log, std::string_view text) {
-  static const std::regex unnamed(R"((<kernel>|input\.cl):(\d{1,9}):)");
   const std::vector<std::string> places = places_of(text);
-  const std::string all(log);
-  std::string named;
-  auto rest = all.cbegin();
-  for (std::sregex_iterator match(all.begin(), all.end(), unnamed), end; match != end; ++match) {
-    const std::size_t line = std::stoul((*match)[2]);
-    if (line == 0 || line > places.size()) continue;
-    named.append(rest, (*match)[0].first).append(places[line - 1]).append(":");
-    rest = (*match)[0].second;
+  std::string named(log);
+  for (const std::string_view unnamed : {"<kernel>:", "input.cl:"}) {
+    for (std::size_t at = 0; (at = named.find(unnamed, at)) != named.npos; ++at) {
+      std::string_view rest = std::string_view(named).substr(at + unnamed.size());
+      const std::size_t line = take_number(rest).value_or(0);
+      if (line == 0 || line > places.size() || !rest.starts_with(':')) continue;
+      const std::size_t end = named.size() - rest.size();
+      named.replace(at, end - at, places[line - 1]);
+    }
   }
-  return named.append(rest, all.cend());
+  return named;
 }
 
 std::string first_error(std::string_view log) {

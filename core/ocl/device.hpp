@@ -51,8 +51,9 @@ std::vector<DeviceInfo> list_devices();
 
 /// Picks a device. `selector`: "" (the ISOWAVE_DEVICE environment variable if set, else the first
 /// GPU, else the first CPU, else the first device), an index, a type ("gpu", "cpu", "accelerator")
-/// or a case-insensitive fragment of the device or platform name. Throws Error naming the devices
-/// there are.
+/// or a case-insensitive fragment of the device or platform name.
+///
+/// Throws  Error naming the devices there are
 DeviceInfo choose_device(std::string_view selector = "");
 /// The rule of choose_device() alone. `environment` stands for ISOWAVE_DEVICE and counts when
 /// `selector` is empty. Of several matches the first is taken. Returns a reference into `devices`.
@@ -64,9 +65,9 @@ using Defines = std::map<std::string, std::string>;
 
 class Device {
  public:
-  /// Throws Error when the device lacks what core needs: OpenCL 1.2, a compiler, 32 KiB of local
-  /// memory. profiling: record events so that StageTimer reports; costs about 10 us a launch on
-  /// GPUs.
+  /// profiling  record events so that StageTimer reports; costs about 10 us a launch on GPUs
+  /// Throws     Error: the device lacks what core needs: OpenCL 1.2, a compiler, 32 KiB of local
+  ///            memory
   explicit Device(const DeviceInfo &info, bool profiling = false);
   Device(const Device &) = delete;
   Device &operator=(const Device &) = delete;
@@ -76,13 +77,17 @@ class Device {
   const cl::Context &context() const { return context_; }
   cl::CommandQueue &queue() { return queue_; }
   /// A second in-order queue, made when it is first asked for: for transfers that overlap with the
-  /// work of queue(). Events order the two. Throws Error.
+  /// work of queue(). Events order the two.
+  ///
+  /// Throws  Error
   cl::CommandQueue &transfer_queue();
   MemoryLedger &ledger() { return ledger_; }
   StageTimer &timer() { return timer_; }
 
   /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per
-  /// (stem, defines). Throws BuildError when it does not build.
+  /// (stem, defines).
+  ///
+  /// Throws  BuildError: it does not build
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
 
   /// The programs built so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".

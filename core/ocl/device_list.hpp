@@ -8,7 +8,9 @@
 
 namespace isowave::core::ocl {
 
-/// The handle of a listed device. Throws Error when the list has changed since, so that it is gone.
+/// The handle of a listed device.
+///
+/// Throws  Error: the list has changed since, so that it is gone
 cl::Device device_handle(const DeviceInfo &info);
 
 /// True when `list`, words between spaces, holds `word`: an extension in CL_DEVICE_EXTENSIONS.

@@ -64,11 +64,14 @@ class RawKernel {
       : device_(&device), stem_(stem), name_(kernel_name), defines_(defines) {}
 
  protected:
-  /// Makes the kernel, unless that has been done; its program, too. Throws Error when there is none
-  /// of that name, std::invalid_argument when it has another number of parameters.
+  /// Makes the kernel, unless that has been done; its program, too.
+  ///
+  /// Throws  Error: there is none of that name; std::invalid_argument: it has another number of
+  ///         parameters
   void make(std::size_t num_params);
-  /// Enqueues; waits at the first launch, and while a Device::Compiling lives. Throws Error naming
-  /// kernel and OpenCL error.
+  /// Enqueues; waits at the first launch, and while a Device::Compiling lives.
+  ///
+  /// Throws  Error naming kernel and OpenCL error
   void launch(const Range &range);
   template <class T>
   void set(cl_uint index, const In<T> &arg) {

@@ -17,8 +17,9 @@ namespace isowave::core::ocl {
 /// device, and some devices share the host's memory.
 class PinnedBuffer {
  public:
-  /// size: of 32-bit words, not 0 of them. Throws Error when there is no such memory,
-  /// std::invalid_argument: elements of another size.
+  /// size: of 32-bit words, not 0 of them.
+  ///
+  /// Throws  Error: there is no such memory; std::invalid_argument: elements of another size
   PinnedBuffer(Device &device, const BufferSize &size);
   /// No transfer from or to the words may be under way.
   ~PinnedBuffer();

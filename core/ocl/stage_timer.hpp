@@ -40,7 +40,9 @@ class StageTimer {
 
   TimerSource source() const { return source_; }
   /// Waits for the queue; milliseconds per stage since the last call. Empty when off. Call it now
-  /// and then: every launch keeps an event until then. Throws Error when the device failed.
+  /// and then: every launch keeps an event until then.
+  ///
+  /// Throws  Error: the device failed
   std::map<std::string, double> collect();
 
   /// For Kernel and Buffer: the event a launch must fill, or nullptr when none is wanted. Counts

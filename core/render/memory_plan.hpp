@@ -21,7 +21,7 @@ enum class StreamPlace {
   kHost     ///< in memory or in its file; blocks are uploaded when they are asked for
 };
 std::string_view to_string(StreamPlace place);
-/// Throws Error naming the places there are.
+/// Throws  Error naming the places there are
 StreamPlace stream_place_from_string(std::string_view name);
 
 /// What the memory of a renderer depends on, besides its volume.

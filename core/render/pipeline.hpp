@@ -65,9 +65,13 @@ struct FrameState {
 class Pipeline {
  public:
   virtual ~Pipeline() = default;
-  /// Makes the frame's rays from state.rays.frame. Asynchronous.
+  /// Makes the frame's rays from state.rays.frame.
+  ///
+  /// Waits  no
   virtual void begin_frame() = 0;
-  /// Enqueues one pass: a chain of launches whose sizes live on the device. Asynchronous.
+  /// Enqueues one pass: a chain of launches whose sizes live on the device.
+  ///
+  /// Waits  no
   virtual void enqueue_pass() = 0;
   /// Says that no ray is left in the frame. Without it, the next frame knows that passes of this
   /// one were not followed up.

@@ -72,14 +72,20 @@ class Renderer {
   /// for, along each axis, rounded up (halved()).
   void keep_picture();
   /// Where the last frame has no hit, it shows the kept picture's, as after rendering was
-  /// cancelled. Waits.
+  /// cancelled.
+  ///
+  /// Waits  yes
   void fill_from_kept();
   /// The kept picture, of the same request, becomes the last frame's with as many pixels as the
-  /// request says. Waits.
+  /// request says.
+  ///
+  /// Waits  yes
   void enlarge_kept(const FrameRequest &request);
 
   /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture
-  /// depends on it. Waits.
+  /// depends on it.
+  ///
+  /// Waits  yes
   void clear_cache();
 
   ImageSize size() const { return size_; }  ///< of the last frame's picture, or the one at work

@@ -44,7 +44,9 @@ inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
                         const ocl::Device &device);
 
-/// All memory, before any is taken. Throws Error where it does not suffice.
+/// All memory, before any is taken.
+///
+/// Throws  Error: it does not suffice
 MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options);
 

@@ -19,7 +19,9 @@ class StallGuard {
   /// dims: of the volume [voxels].
   explicit StallGuard(const glm::uvec3 &dims) : limit_(std::uint64_t{dims.x} + dims.y + dims.z) {}
 
-  /// counts: of the next pass. Throws Error when there is no progress.
+  /// counts: of the next pass.
+  ///
+  /// Throws  Error: there is no progress
   void check(const PassCounts &counts) {
     const bool stalled = counts.next_active_count >= counts.active_count &&
                          counts.requested_count == 0 && counts.decoded_count == 0;

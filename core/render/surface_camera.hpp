@@ -12,11 +12,12 @@ namespace isowave::core {
 
 /// A view in which isosurfaces fill a picture of that size: of the box of the blocks that they may
 /// be in, by the blocks' ranges of values; of the whole volume where they are in none. From where
-/// orbit_cameras() begins. The same for all devices. Waits.
+/// orbit_cameras() begins. The same for all devices.
 ///
 /// macrocells  of the volume's finest level, of which info is the grid
 /// isovalues   one or more; all surfaces are in the picture
-/// Throws Error: NaN.
+/// Throws      Error: NaN
+/// Waits       yes
 Camera surface_camera(Macrocells &macrocells, const VolumeInfo &info,
                       std::span<const float> isovalues, ImageSize size);
 

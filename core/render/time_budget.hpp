@@ -35,15 +35,18 @@ class TimedFrames {
  public:
   using Clock = std::function<double()>;  ///< [ms]
 
-  /// now: for tests. `renderer` must outlive this. Throws Error where it was made to keep no
-  /// picture.
+  /// now: for tests. `renderer` must outlive this.
+  ///
+  /// Throws  Error: it was made to keep no picture
   explicit TimedFrames(Renderer &renderer, Clock now = steady_clock_ms);
 
   /// Draws the smallest picture, however long it takes, then the largest that is expected to be
   /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
   /// in time is filled from the one before. The hit buffer holds a picture of the full size. The
-  /// request's on_pass is not called. Throws Error unless budget_ms is finite and above 0, where
-  /// half of the picture is larger than what the renderer keeps, and as Renderer::render() does.
+  /// request's on_pass is not called.
+  ///
+  /// Throws  Error unless budget_ms is finite and above 0, where half of the picture is larger than
+  ///         what the renderer keeps, and as Renderer::render() does
   TimedFrame render(const FrameRequest &request, double budget_ms);
 
   static double steady_clock_ms();
@@ -62,7 +65,7 @@ class TimedFrames {
       last_ms_{};  ///< what each step took when it was drawn last; 0: unknown
 };
 
-/// Throws Error unless it is finite and above 0.
+/// Throws  Error unless it is finite and above 0
 void check_time_budget(double budget_ms);
 
 }  // namespace isowave::core

@@ -40,7 +40,7 @@ enum class Field { kSphere, kPlane, kSaddle, kMarschnerLobb, kGyroid, kMixingLay
 
 /// "sphere", "plane", "saddle", "marschner_lobb", "gyroid", "mixing_layer", "shell".
 std::string_view to_string(Field field);
-/// Throws Error naming the fields.
+/// Throws  Error naming the fields
 Field field_from_string(std::string_view name);
 /// All names, for help texts.
 std::vector<std::string> field_names();
@@ -54,13 +54,16 @@ struct GenerateOptions {
 };
 
 /// The volume as a reader, without a file: the voxels that generate_to_file() would write. Layers
-/// may be read in any order. Throws Error on bad dims.
+/// may be read in any order.
+///
+/// Throws  Error on bad dims
 std::unique_ptr<VolumeReader> open_generated(const GenerateOptions &options);
 
 /// Writes the volume as raw little-endian voxels, in a `.nrrd` file behind a header, in memory
 /// O(nx * ny); nothing is left behind on an error. A path without file name, or an existing folder,
-/// gets the Open-SciVis name. Returns the file's path. Throws Error: bad dims, unwritable, a file
-/// name that says other dims or another type.
+/// gets the Open-SciVis name. Returns the file's path.
+///
+/// Throws  Error: bad dims, unwritable, a file name that says other dims or another type
 std::filesystem::path generate_to_file(const GenerateOptions &options,
                                        const std::filesystem::path &path,
                                        const Progress &progress = {});

@@ -33,11 +33,14 @@ struct Storage {
 using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
 
 /// The precision that was asked for, or none: the rate. Reads the whole volume, for a relative
-/// tolerance twice. Throws Error, which names the volume `what`: see choose_precision().
+/// tolerance twice.
+///
+/// Throws  Error, which names the volume `what`: see choose_precision()
 std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string_view what,
                                              const Storage &storage);
-/// Compresses into memory. Clears the stage times of storage.device. Throws Error also on what
-/// cannot be drawn.
+/// Compresses into memory. Clears the stage times of storage.device.
+///
+/// Throws  Error also on what cannot be drawn
 CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
                                  const Storage &storage);
 

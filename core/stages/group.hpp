@@ -21,7 +21,7 @@ inline constexpr Grouping kDefaultGrouping = Grouping::kCounting;
 
 /// "radix", "counting".
 std::string_view to_string(Grouping grouping);
-/// Throws Error naming both.
+/// Throws  Error naming both
 Grouping grouping_from_string(std::string_view name);
 
 /// The pass's work for intersection. Pairs of one block lie together; which block comes first is

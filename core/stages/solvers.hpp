@@ -19,7 +19,9 @@ inline constexpr std::array<std::string_view, 4> kSolverNames{"linear", "marmitt
 /// "linear", "marmitt", "analytic", "bernstein".
 std::string_view to_string(Solver solver);
 /// The solver of that name with the steps its authors use: linear and marmitt 4, bernstein 32 (it
-/// stops by itself after 3 to 5). Throws Error naming the solvers.
+/// stops by itself after 3 to 5).
+///
+/// Throws  Error naming the solvers
 Solver solver_from_string(std::string_view name);
 
 /// Whether it misses no crossing, and converges.

@@ -20,7 +20,7 @@ inline constexpr ClosestHit kDefaultClosestHit = ClosestHit::kAtomicMin;
 
 /// "scan", "atomic-min".
 std::string_view to_string(ClosestHit closest);
-/// Throws Error naming both.
+/// Throws  Error naming both
 ClosestHit closest_hit_from_string(std::string_view name);
 
 /// The macro for the kernels that take part.
@@ -39,7 +39,9 @@ struct Wavefront {
 
   Wavefront(ocl::Device &device, const Limits &limits);
 
-  /// As before the first pass of all. Waits.
+  /// As before the first pass of all.
+  ///
+  /// Waits  yes
   void reset_counts() {
     PassCounts start{};
     start.ray_count = static_cast<uint>(num_rays);
@@ -49,7 +51,9 @@ struct Wavefront {
     next_counts.write({&start, 1});
   }
 
-  /// Pipeline `rays`: no ray goes on from the last pass. Waits.
+  /// Pipeline `rays`: no ray goes on from the last pass.
+  ///
+  /// Waits  yes
   void forget_rays() {
     PassCounts last = counts.read().front();
     last.next_active_count = 0;

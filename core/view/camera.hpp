@@ -26,10 +26,10 @@ struct CameraFile {
   std::vector<Camera> cameras;
 };
 
-/// Throws Error: unreadable, not JSON, a field missing or of a wrong type, eye == at, up parallel
-/// to the view, fovy outside (0,180), no cameras.
+/// Throws  Error: unreadable, not JSON, a field missing or of a wrong type, eye == at, up parallel
+///         to the view, fovy outside (0,180), no cameras
 CameraFile read_camera_file(const std::filesystem::path &path);
-/// Throws Error when the camera is degenerate (see read_camera_file); `what` names it.
+/// Throws  Error: the camera is degenerate (see read_camera_file); `what` names it
 void check_camera(const Camera &camera, std::string_view what);
 
 /// A view of a box from the front right and above, where orbit_cameras() begins, in which it fills

@@ -24,7 +24,7 @@ struct ImageSize {
   std::uint64_t num_rays() const { return num_pixels() * samples * samples; }
 };
 
-/// Throws Error: an image of 0 pixels, more than 2^28 rays, samples out of range.
+/// Throws  Error: an image of 0 pixels, more than 2^28 rays, samples out of range
 void check_image_size(ImageSize size);
 
 /// Blocks along an axis of `dim` voxels that own dual cells: all but a last one of a single voxel

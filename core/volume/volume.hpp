@@ -17,7 +17,7 @@ enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32
 
 /// "uint8", "int8", ... "float64".
 std::string_view to_string(VoxelType type);
-/// Throws Error naming the accepted types.
+/// Throws  Error naming the accepted types
 VoxelType voxel_type_from_string(std::string_view name);
 /// Bytes per voxel.
 std::size_t size_of(VoxelType type);
@@ -62,9 +62,10 @@ struct VolumeInfo {
   glm::dmat3 index_to_world() const;
 };
 
-/// Throws Error if any dimension is below 2 or above kMaxDim, spacing is not finite and positive,
-/// the origin is not finite, or the direction is not invertible. `what` names the file in the
-/// message.
+/// `what` names the file in the message.
+///
+/// Throws  Error if any dimension is below 2 or above kMaxDim, spacing is not finite and positive,
+///         the origin is not finite, or the direction is not invertible
 void check_volume_info(const VolumeInfo &info, std::string_view what);
 inline constexpr std::uint32_t kMaxDim = 1u << 16;
 
@@ -74,10 +75,11 @@ class VolumeReader {
   virtual ~VolumeReader() = default;
   const VolumeInfo &info() const { return info_; }
 
-  /// Reads voxel layers [z_begin, z_begin + num_layers) to `out` [num_layers * ny * nx].
-  /// Calls must ask for ascending, non-overlapping layers (gzip streams cannot go back).
-  /// Integer types are converted exactly up to 2^24 and rounded beyond. NaN and Inf pass through.
-  /// Throws Error on a short or unreadable file.
+  /// Reads voxel layers [z_begin, z_begin + num_layers) to `out` [num_layers * ny * nx]. Calls must
+  /// ask for ascending, non-overlapping layers (gzip streams cannot go back). Integer types are
+  /// converted exactly up to 2^24 and rounded beyond. NaN and Inf pass through.
+  ///
+  /// Throws  Error on a short or unreadable file
   virtual void read_layers(std::uint32_t z_begin, std::uint32_t num_layers,
                            std::span<float> out) = 0;
 

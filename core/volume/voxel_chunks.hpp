@@ -78,8 +78,10 @@ struct ValueRange {
   std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
   std::array<double, 2> source{};  ///< as the source has them
 };
-/// Reads the volume from front to back for `coder`. Throws Error: voxels that cannot be compressed,
-/// after all of them were looked at; a bad grid; an unfit map_nan.
+/// Reads the volume from front to back for `coder`.
+///
+/// Throws  Error: voxels that cannot be compressed, after all of them were looked at; a bad grid;
+///         an unfit map_nan
 ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder);
 
 }  // namespace isowave::core

@@ -19,9 +19,11 @@ struct ErrorGoal {
 
 /// The fewest bit planes with which no voxel exceeds the goal. zfp's promise is for the worst of
 /// all volumes, so up to six planes fewer than it demands are tried on every voxel. What the cast
-/// to float32 loses counts (Chunk::lost). Reads the whole volume. Throws Error: what
-/// read_in_chunks() throws; a tolerance that is not positive, or that float32 and zfp cannot keep
-/// (names the smallest that they can); `exact` of other volumes than integers below 2^24.
+/// to float32 loses counts (Chunk::lost). Reads the whole volume.
+///
+/// Throws  Error: what read_in_chunks() throws; a tolerance that is not positive, or that float32
+///         and zfp cannot keep (names the smallest that they can); `exact` of other volumes than
+///         integers below 2^24
 BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
                                 const InputOptions &options);
 
@@ -95,8 +97,9 @@ class ErrorBoundCoder : public ChunkCoder {
 
 /// Finds the lengths of all blocks of a fixed-accuracy payload without an index by decoding it
 /// front to back. Calls take(bits, count) for each run of `count` blocks of the same length, in
-/// order. volume.indexed_bits must be at least the payload's length. Throws Error, which names
-/// `what`, where the payload ends too early.
+/// order. volume.indexed_bits must be at least the payload's length.
+///
+/// Throws  Error, which names `what`, where the payload ends too early
 void find_block_lengths(const CompressedVolume &volume, const std::string &what,
                         const std::function<void(std::uint32_t bits, std::uint64_t count)> &take);
 

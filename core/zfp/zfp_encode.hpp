@@ -19,14 +19,18 @@ class ZfpEncode {
   explicit ZfpEncode(ocl::Device &device);
 
   /// Launches the kernels without a block to work on, that which measures only with `errors`.
-  /// Waits.
+  ///
+  /// Waits  yes
   void compile(const ocl::Buffer<float> &voxels, ocl::Buffer<uint> &words,
                ocl::Buffer<float> *errors);
 
   /// Encodes voxels [dims.z][dims.y][dims.x], block (bx,by,bz) to the bits_per_block / 32 words at
   /// index bx + blocks_x * (by + blocks_y * bz) of them. Bit-exact with libzfp, partial blocks too.
-  /// Every magnitude is 0 or in [2^-97, 2^126). Throws std::invalid_argument unless bits_per_block
-  /// is a multiple of 32 in 32..2048 and both buffers are large enough. Asynchronous.
+  /// Every magnitude is 0 or in [2^-97, 2^126).
+  ///
+  /// Throws  std::invalid_argument unless bits_per_block is a multiple of 32 in 32..2048 and both
+  ///         buffers are large enough
+  /// Waits   no
   void operator()(const ocl::Buffer<float> &voxels, const glm::uvec3 &dims,
                   std::uint32_t bits_per_block, ocl::Buffer<uint> &words);
 

@@ -103,7 +103,9 @@ struct CompressedVolume {
   /// Size of words, or what it would be.
   std::uint64_t word_count() const;
   /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its
-  /// end. Throws Error where a file is shorter than it was, or cannot be read.
+  /// end.
+  ///
+  /// Throws  Error: a file is shorter than it was, or cannot be read
   void read_words(std::uint64_t bit, std::span<std::uint32_t> out) const;
 };
 
@@ -115,8 +117,9 @@ void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_
 /// Gives a volume, and its coarser levels, another spacing.
 void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
 
-/// Compresses a volume in memory, layer by layer. Throws Error (bad rate, NaN, short file, more
-/// levels than it can have).
+/// Compresses a volume in memory, layer by layer.
+///
+/// Throws  Error: bad rate, NaN, short file, more levels than it can have
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
 /// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each
 /// block, 9 where float32 does not hold all voxels. Writes to a temporary name and renames; nothing
@@ -124,13 +127,16 @@ CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
 
-/// Writes a volume as compress_to_file() does. Throws Error: blocks of a fixed rate that is not a
-/// multiple of 1 bit a voxel (other writers' files), or the file cannot be written.
+/// Writes a volume as compress_to_file() does.
+///
+/// Throws  Error: blocks of a fixed rate that is not a multiple of 1 bit a voxel (other writers'
+///         files), or the file cannot be written
 void write_zfp_file(const CompressedVolume &volume, const std::filesystem::path &path);
 
 /// Reads a `.zfp` file of ours or any 3D float zfp file of fixed rate or fixed accuracy with a full
-/// header (spacing 1 then). Throws Error in one line on a broken header, other types or modes,
-/// truncation, checksum mismatch.
+/// header (spacing 1 then).
+///
+/// Throws  Error, in one line: a broken header, other types or modes, truncation, checksum mismatch
 CompressedVolume read_zfp_file(const std::filesystem::path &path);
 /// As read_zfp_file(), but leaves the payload in the file, to be read when it is needed: words
 /// stays empty. The checksum is checked once, here.

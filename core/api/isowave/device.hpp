@@ -52,7 +52,7 @@ class Device {
 /// selector  "": what the environment variable ISOWAVE_DEVICE selects, else the first GPU, else the
 ///           first CPU, else the first device; or an index, a type ("gpu"), or a part of the name
 ///           of device or platform in any case
-/// Throws Error: there is none, or it lacks what the kernels need.
+/// Throws    Error: there is none, or it lacks what the kernels need
 std::shared_ptr<Device> open_device(std::string_view selector = {},
                                     const DeviceOptions &options = {});
 

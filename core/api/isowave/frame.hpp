@@ -112,7 +112,9 @@ struct Frame {
   std::optional<DetailChoice> detail{};  ///< where max_surface_error was given
 };
 
-/// Writes frame.picture. Throws Error: no picture, or it cannot be written.
+/// Writes frame.picture.
+///
+/// Throws  Error: no picture, or it cannot be written
 void save_png(const Frame &frame, const std::filesystem::path &path);
 
 }  // namespace isowave

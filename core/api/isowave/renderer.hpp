@@ -25,17 +25,19 @@ struct RendererOptions {
 class Renderer {
  public:
   /// Brings the compressed volume to the device, or what of it is needed where it does not fit, and
-  /// has the kernels compiled. Keeps device and volume alive. Throws Error: the memory does not
-  /// suffice (names what would), options out of range.
+  /// has the kernels compiled. Keeps device and volume alive.
+  ///
+  /// Throws  Error: the memory does not suffice (names what would), options out of range
   Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
            const RendererOptions &options = {});
   ~Renderer();
   Renderer(Renderer &&) noexcept;
   Renderer &operator=(Renderer &&) noexcept;
 
-  /// Draws a frame and waits for it. Decoded blocks are kept for further frames. Throws Error: a
-  /// request that the renderer was not made for, a degenerate camera, a NaN; further frames are
-  /// drawn as if it had not been.
+  /// Draws a frame and waits for it. Decoded blocks are kept for further frames.
+  ///
+  /// Throws  Error: a request that the renderer was not made for, a degenerate camera, a NaN;
+  ///         further frames are drawn as if it had not been
   Frame render(const FrameRequest &request);
 
   /// A view from the front right and above in which the isosurface fills the picture; the volume,

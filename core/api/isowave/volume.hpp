@@ -69,7 +69,9 @@ class Volume {
 
   /// Decodes all voxels: [nz][ny][nx].
   std::vector<float> decode() const;
-  /// Writes a `.zfp` file to a temporary name and renames it. Throws Error.
+  /// Writes a `.zfp` file to a temporary name and renames it.
+  ///
+  /// Throws  Error: the file cannot be written
   void save(const std::filesystem::path &path) const;
 
   struct Implementation;
@@ -86,8 +88,8 @@ class Volume {
 ///              .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz: compressed into memory.
 ///              generate:FIELD_XxYxZ_TYPE: a synthetic volume (`isowave generate --help`)
 /// compression  of what is not compressed yet; refused with a .zfp file
-/// Throws Error: no such file, a header that is not understood, a wrong size, NaN, a volume that
-/// cannot be drawn.
+/// Throws       Error: no such file, a header that is not understood, a wrong size, NaN, a volume
+///              that cannot be drawn
 std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
                                           const Compression &compression = {},
                                           const RawFile &raw = {});
@@ -95,11 +97,11 @@ std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
 /// Compresses voxels in memory.
 ///
 /// voxels  [nz][ny][nx] of `type`, x fastest; not needed afterwards
-/// Throws Error: a bad grid, NaN without map_nan, a tolerance that cannot be kept.
+/// Throws  Error: a bad grid, NaN without map_nan, a tolerance that cannot be kept
 std::shared_ptr<const Volume> compress(const void *voxels, VoxelType type, const Grid &grid,
                                        const Compression &compression = {});
 
-/// Throws Error unless a number of voxels is that of the grid.
+/// Throws  Error unless a number of voxels is that of the grid
 void check_num_voxels(std::uint64_t num_voxels, const Grid &grid);
 
 /// The type of voxels T.
