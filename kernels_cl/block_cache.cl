@@ -49,8 +49,10 @@ ISO_INLINE void table_evict(const FrameParams *frame, global BlockEntry *table, 
   table[i].slot = ISO_BLOCK_ABSENT;
 }
 
-/// Per pair: stamps the cached blocks of its dual grid and appends the missing ones, once each, to
-/// the request list [capacity]. Grid-stride over pair slots.
+/// For each pair, stamps the cached blocks of its dual grid and lists the missing ones, once each.
+///
+/// Out     request_block_ids [counts->requested_count, at most capacity]; slot_stamps
+/// Launch  grid-stride over pair slots
 kernel void cache_request(const FrameParams frame_params, global PassCounts *counts,
                           global const uint *pair_block_ids, global const BlockEntry *table,
                           global uint *slot_stamps, global uint *requested_bits,
@@ -111,11 +113,14 @@ ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *tabl
   return latest;
 }
 
-/// Of slots with blocks. Unless free slots suffice: slot_ranks [slots], eviction_rank() of each,
-/// and how many there are of each rank. Where the table may be rebuilt: slot_changing [slots], what
-/// it knows of the blocks' cells. Were that lost, a view that comes again could need blocks that
-/// were not worth keeping. rank_histogram [ISO_EVICTION_RANKS]: zero before. Grid-stride over
-/// slots.
+/// Ranks the slots with blocks for eviction, unless free slots suffice.
+///
+/// In      rank_histogram [ISO_EVICTION_RANKS]: 0
+/// Out     slot_ranks [slots]: eviction_rank(); rank_histogram: how many have each; slot_changing
+///         [slots], where the table may be rebuilt: what it knows of the blocks' cells
+/// Launch  grid-stride over slots
+///
+/// Were slot_changing lost, a view that comes again could need blocks that were not worth keeping.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots, uint capacity,
     global const CacheState *cache, global const BlockEntry *table,
@@ -154,8 +159,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ra
   }
 }
 
-/// Decides how many slots are freed and of which ranks they are. One work-group. rank_histogram is
-/// zeroed again.
+/// Decides how many slots are freed, and of which ranks they are.
+///
+/// Out     rank_histogram: 0 again
+/// Launch  one work-group
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
     global const BlockEntry *table, global uint *slot_stamps, global uint *requested_bits,
@@ -304,9 +311,13 @@ kernel void cache_classify(const FrameParams frame_params, uint num_slots,
   }
 }
 
-/// asked: the counts of the pass that listed the requests; counts: of the one at work. Request i
-/// gets the i-th free slot from the end; requests past the last are dropped. decode_slots
-/// [requests]: the slots. Takes the marks of all requests back. Grid-stride over requests.
+/// Request i gets the i-th free slot from the end; requests past the last are dropped. Takes the
+/// marks of all requests back.
+///
+/// asked   counts of the pass that listed the requests
+/// counts  of the pass at work
+/// Out     decode_slots [counts->decoded_count]
+/// Launch  grid-stride over requests
 kernel void cache_assign(const FrameParams frame_params, global const PassCounts *asked,
                          global PassCounts *counts, global const uint *request_block_ids,
                          uint capacity, global const uint *free_slots, global BlockEntry *table,

@@ -5,9 +5,12 @@
 #include "portable/cell_intersect.h"
 #include "portable/ray_state.h"
 
-/// Per active ray: hits [pixel] where it hit; ray_block_ids [pixel], where it waits for a block
-/// without slots; ray_active_mask [active_count] = 1 where it goes on. active_ray_ids: a ray that
-/// moved on looks twice as far ahead. Grid-stride.
+/// Ends the rays that hit.
+///
+/// Out     hits [pixel] where a ray hit; ray_block_ids [pixel] where it waits for a block without
+///         slots; ray_active_mask [active_count]: 1 where it goes on; active_ray_ids: a ray that
+///         moved on looks twice as far ahead
+/// Launch  grid-stride over the active rays
 kernel void composite(const FrameParams frame_params, global PassCounts *counts,
                       global uint *active_ray_ids, global const uint *pair_block_ids,
                       global const PairHit *pair_hits, global const uint *closest_pairs,

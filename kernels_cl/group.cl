@@ -34,10 +34,12 @@ ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b,
 
 #define PAIR_TILE (ISO_GROUP_SIZE * ISO_GROUP_ITEMS)
 
-/// pair_ids, keys [granted_count]: the pairs that can be intersected, and the cache slots of their
-/// blocks, which sort by block with the fewest bits. Marks the others as not tested. Groups stride
-/// over tiles of pairs; each appends with one global atomic a tile. counts->granted_count: 0
-/// before.
+/// Lists the pairs that can be intersected, and marks the others as not tested.
+///
+/// In      counts->granted_count: 0
+/// Out     pair_ids, keys [granted_count]: the pairs, and the cache slots of their blocks, which
+///         sort by block with the fewest bits
+/// Launch  groups stride over tiles of pairs; each appends with one global atomic a tile
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_select(
     const FrameParams frame_params, global PassCounts *counts, global const uint *pair_block_ids,
     global const BlockEntry *table, global PairHit *pair_hits, global uint *closest_pairs,
@@ -82,7 +84,8 @@ ISO_INLINE int starts_block(global const uint *keys, uint i) {
   return i == 0 || keys[i] != keys[i - 1];
 }
 
-/// tile_sums [tiles of sorted keys] = number of blocks that start there. Groups stride over tiles.
+/// Out     tile_sums [tiles of sorted keys]: how many blocks start there
+/// Launch  groups stride over tiles
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_head_sums(
     global const PassCounts *counts, global const uint *keys, global uint *tile_sums) {
   local uint num_heads;
@@ -101,8 +104,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_he
   }
 }
 
-/// block_rays [visible_count], in the order of the keys. Groups stride over tiles; each sums up the
-/// tiles before its own, which are too few for a launch between. counts->visible_count: 0 before.
+/// Finds where each block's pairs begin and end.
+///
+/// In      counts->visible_count: 0
+/// Out     block_rays [visible_count], in the order of the keys
+/// Launch  groups stride over tiles; each sums up the tiles before its own, which are too few for a
+///         launch between
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_heads(
     global PassCounts *counts, global const uint *keys, global const uint *tile_sums,
     global BlockRays *block_rays) {
@@ -151,9 +158,11 @@ ISO_INLINE void find_slots(const FrameParams *frame, global const BlockEntry *ta
   }
 }
 
-/// pair_slots [pair slots]: the cache slot of each pair's block, or ISO_BLOCK_ABSENT; pair_ranks
-/// [pair slots]: its place among the pairs of that block, if cached. Lists the slots of those
-/// blocks. Groups stride over tiles of pairs; each appends with one global atomic a tile.
+/// Counts the pairs of each cached block, and lists the slots of those blocks.
+///
+/// Out     pair_slots [pair slots]: the cache slot of each pair's block, or ISO_BLOCK_ABSENT;
+///         pair_ranks [pair slots]: its place among the pairs of that block, if cached
+/// Launch  groups stride over tiles of pairs; each appends with one global atomic a tile
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_count(
     const FrameParams frame_params, global const PassCounts *counts,
     global const uint *pair_block_ids, global const BlockEntry *table, global uint *pair_slots,
@@ -197,11 +206,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_co
   }
 }
 
-/// block_rays [visible_count]: of the candidates whose dual grid is cached, in any order;
-/// slot_offsets [slots]: where the pairs of each candidate begin, or ISO_INVALID_ID where it is not
-/// visible. slot_counts of the candidates = 0, for the next pass. Groups stride over the
-/// candidates; each draws places with two global atomics a turn. counts->granted_count and
-/// visible_count: 0 before.
+/// Gives each candidate whose dual grid is cached a place for its pairs.
+///
+/// In      counts->granted_count, visible_count: 0
+/// Out     block_rays [visible_count], in any order; slot_offsets [slots]: where the pairs of each
+///         candidate begin, or ISO_INVALID_ID where it is not visible; slot_counts of the
+///         candidates: 0, for the next pass
+/// Launch  groups stride over the candidates; each draws places with two global atomics a turn
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_blocks(
     const FrameParams frame_params, global PassCounts *counts, global const uint *candidate_slots,
     global const uint *candidate_count, global const uint *slot_block_ids,
@@ -240,8 +251,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_bl
   }
 }
 
-/// pair_ids [granted_count]: the pairs in their groups. Marks the others as not tested.
-/// candidate_count = 0, for the next pass. Grid-stride over pair slots.
+/// Moves pairs to their groups, and marks the others as not tested.
+///
+/// Out     pair_ids [granted_count]; candidate_count: 0, for the next pass
+/// Launch  grid-stride over pair slots
 kernel void group_scatter(global const PassCounts *counts, global const uint *pair_block_ids,
                           global const uint *pair_slots, global const uint *pair_ranks,
                           global const uint *slot_offsets, global PairHit *pair_hits,

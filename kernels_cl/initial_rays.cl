@@ -4,8 +4,11 @@
 #include "portable/cell_intersect.h"
 #include "portable/window.h"
 
-/// One entry per pixel [height * width]: no hit yet, the first block of the ray, whether it meets
-/// any that may be active. ray_ids: its entry, for the compaction that follows. Grid-stride.
+/// Begins a frame.
+///
+/// Out     by pixel [height * width]: hits: none; the first block of the ray; whether it meets any
+///         that may be active; ray_ids: its entry, for the compaction that follows
+/// Launch  grid-stride over pixels
 kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
                          global uint *ray_block_ids, global uint *ray_ids,
                          global uint *ray_active_mask, global PassCounts *counts) {

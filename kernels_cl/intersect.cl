@@ -42,10 +42,13 @@ ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes las
   return hit;
 }
 
-/// One work-group per visible block, striding over them. pair_ids [granted_count]: pairs gathered
-/// by their block; block_rays [visible_count]: which of them are a block's; pair_block_ids [pair
-/// slots]. pair_hits [pair slots]: written for every pair. closest_pairs [active rays]: see
-/// closest_pair.h.
+/// Intersects the rays of each block with its cells.
+///
+/// In      pair_ids [granted_count]: pairs gathered by their block; block_rays [visible_count]:
+///         which of them are a block's; pair_block_ids [pair slots]
+/// Out     pair_hits [pair slots], written for every pair; closest_pairs [active rays]: see
+///         closest_pair.h
+/// Launch  a work-group per visible block, striding over them
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
     const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_ids,
     global const BlockRays *block_rays, global const uint *pair_block_ids,
@@ -89,8 +92,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
 }
 
 /// The pairs whose walk came into doubt, walked on from there with 48-bit arithmetic. They are few,
-/// but in intersect() the registers for them would cost a fifth of its speed (H100). Same
-/// arguments, less block_rays; grid-stride over the pairs.
+/// but in intersect() the registers for them would cost a fifth of its speed (H100).
+///
+/// In      as intersect, without block_rays
+/// Out     pair_hits and closest_pairs of those pairs
+/// Launch  grid-stride over the pairs
 kernel void settle_doubts(const FrameParams frame_params, global const PassCounts *counts,
                           global const uint *pair_ids, global const uint *pair_block_ids,
                           global const BlockEntry *table, global const float *cache_values,

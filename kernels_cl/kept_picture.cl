@@ -2,9 +2,12 @@
 /// yet.
 #include "portable/shared_types.h"
 
-/// hits [height * width] takes from kept [kept_height * kept_width] the hit whose pixel lies
-/// nearest in the frame: where it has none itself, or everywhere. Both pictures have the same
-/// vertical field of view. Grid-stride.
+/// Fills a picture with the kept one's hits, each pixel with the nearest of the same place: where
+/// it has none itself, or everywhere. Both pictures have the same vertical field of view.
+///
+/// In      kept [kept_height * kept_width]
+/// Out     hits [height * width]
+/// Launch  grid-stride over pixels
 kernel void show_kept(const FrameParams frame_params, uint kept_width, uint kept_height,
                       global const HitRecord *kept, uint everywhere, global HitRecord *hits) {
   const FrameParams *frame = &frame_params;

@@ -28,10 +28,13 @@ ISO_INLINE ValueRange join(ValueRange a, ValueRange b) {
   return r;
 }
 
-/// partials [(first_partial + num_blocks) * 8]: entry 8 b + m is the range of the block's voxels
-/// with x = 0 if m & 1, y = 0 if m & 2, z = 0 if m & 4; padding left out. Block i of the launch is
-/// sampled_block(first_block + i * stride, stride) and b is first_partial + i. part_0 .. layout:
-/// the zfp stream, see block_stream.h. Grid-stride.
+/// Decodes blocks, of which block i is sampled_block(first_block + i * stride, stride).
+///
+/// part_0 .. layout  the zfp stream, see block_stream.h
+/// Out               partials [(first_partial + num_blocks) * 8]: entry 8 (first_partial + i) + m
+///                   is the range of block i's voxels with x = 0 if m & 1, y = 0 if m & 2, z = 0 if
+///                   m & 4; padding left out
+/// Launch            grid-stride over blocks
 kernel void macrocell_partials(const FrameParams frame_params, global const uint *part_0,
                                global const uint *part_1, global const uint *part_2,
                                global const uint *part_3, global const uint *index,
@@ -66,9 +69,13 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
   }
 }
 
-/// The 8-bit range of every block of layer `layer` (in z): ranges [blocks], low in bits 0..7, high
-/// in bits 8..15; low > high in blocks that own no dual cell. below, above: the partials of this
-/// layer and the next, [blocks_x * blocks_y * 8]; above is not read in the last layer. Grid-stride.
+/// Makes the 8-bit ranges of the blocks of one layer in z.
+///
+/// below, above  [blocks_x * blocks_y * 8] the partials of this layer and the next; above is not
+///               read in the last layer
+/// Out           ranges [blocks]: low in bits 0..7, high in bits 8..15; low > high in blocks that
+///               own no dual cell
+/// Launch        grid-stride over the layer's blocks
 kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
                              global const ValueRange *below, global const ValueRange *above,
                              global const float *thresholds, global ushort *ranges) {
@@ -159,11 +166,15 @@ ISO_INLINE uint dual_grid_code(const FrameParams *frame, global const uint *boun
   return code;
 }
 
-/// macrocell_masks [2 * num_coarse]: one bit per block whose range holds the isovalue. limits
-/// [256]: of blocks by the code of their bound, each as wide as the one before at least; without
-/// bounds the first is for all blocks. bounds: packed codes, from word bounds_begin on. box [6]:
-/// in, INT_MAX three times and 0 three times; out, first and behind the last macrocell with a bit,
-/// x, y, z. Once per isovalue. Grid-stride.
+/// Marks the blocks whose range holds the isovalue. Once per isovalue.
+///
+/// limits  [256] of blocks by the code of their bound, each as wide as the one before at least;
+///         without bounds the first is for all blocks
+/// bounds  packed codes, from word bounds_begin on
+/// In      box [6]: INT_MAX three times and 0 three times
+/// Out     masks [2 * num_coarse]: a bit for each block; box: first and behind the last macrocell
+///         with a bit, x, y, z
+/// Launch  grid-stride over coarse macrocells
 kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse,
                             global const ushort *ranges, global const ushort *coarse_ranges,
                             global const uint *limits, uint has_bounds, global const uint *bounds,

@@ -8,9 +8,10 @@
 
 #define TILE (ISO_GROUP_SIZE * ISO_SCAN_ITEMS)
 
-/// values[i] = sum of values[0..i), in place, for ceil(count / divisor) entries; their sum goes to
-/// total_field, unless that is ISO_INVALID_ID. One work-group: made for tables of tiles, which are
-/// short.
+/// values[i] = sum of values[0..i), in place, for ceil(count / divisor) entries.
+///
+/// total_field  of counts: gets the sum of all; ISO_INVALID_ID: none does
+/// Launch       one work-group: made for tables of tiles, which are short
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exclusive(
     global uint *values, global uint *counts, uint count_field, uint divisor, uint total_field) {
   local uint sums[ISO_GROUP_SIZE];

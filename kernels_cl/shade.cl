@@ -1,8 +1,9 @@
 /// shade.cl -- hit buffer -> framebuffer. Never changes which hit was chosen.
 #include "portable/shade.h"
 
-/// hits [height * width]. image [(height / samples) * (width / samples)]: RGBA, 8 bits each.
-/// Grid-stride.
+/// In      hits [height * width]
+/// Out     image [(height / samples) * (width / samples)]: RGBA, 8 bits each
+/// Launch  grid-stride over pixels
 kernel void shade(const FrameParams frame_params, constant ShadeParams *params, uint samples,
                   global const HitRecord *hits, global uint *image) {
   const FrameParams *frame = &frame_params;

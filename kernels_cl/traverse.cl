@@ -3,12 +3,16 @@
 #define ISO_FOUND global
 #include "device/block_walk.h"
 
-/// pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k ascending along the
-/// ray; ISO_INVALID_ID behind the last. They are N_Spec at most, fewer where a ray has its own
-/// number (frame->schedule.per_ray_speculation). closest_pairs [window_count] = ISO_INVALID_ID.
-/// ray_block_ids [pixel]: in, the block to go on from; out, the first block not yet looked at, or
-/// ISO_INVALID_ID when the ray has left the volume. macrocell_masks [2 * coarse cells]: bit x + 4y
-/// + 16z of a block in its coarse cell. Grid-stride over the window.
+/// Finds the next active blocks of each ray: N_Spec at most, fewer where a ray has its own number
+/// (frame->schedule.per_ray_speculation).
+///
+/// macrocell_masks  [2 * coarse cells] bit x + 4y + 16z of a block in its coarse cell
+/// In               active_ray_ids [window_count]; ray_block_ids [pixel]: the block to go on from
+/// Out              pair_block_ids [window_count * spec_count]: entries a * spec_count + k, k
+///                  ascending along the ray, ISO_INVALID_ID behind the last; ray_block_ids [pixel]:
+///                  the first block not yet looked at, or ISO_INVALID_ID when the ray has left the
+///                  volume; closest_pairs [window_count]: ISO_INVALID_ID
+/// Launch           grid-stride over the window
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse(
     const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
     global const uint *active_ray_ids, global uint *ray_block_ids, global uint *pair_block_ids,

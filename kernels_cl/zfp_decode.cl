@@ -6,14 +6,19 @@
 
 #define ISO_STAGED_VALUES 16u  ///< of each block that go to the cache together: 64 bytes
 
-/// One work-item decodes one block; the work-group stores them together, so that neighbouring
-/// work-items write neighbouring values. The block of request i goes to slot slots[i]: cache_values
-/// [slots * 64], x + 4y + 16z within a slot. part_0 .. layout: the zfp stream, see block_stream.h;
-/// a window holds the blocks from request `first` on. Which of a block's voxels are inside goes to
-/// inside [slots]. Groups stride over requests [first, end), but not beyond decoded_count. With
-/// levels of detail, only those for blocks of this one are served, and of the next one that is
-/// drawn, whose stream is in next_words (or of this one again); a window has blocks of this one
-/// alone: request places [i] is its number i.
+/// Decodes the blocks that got slots. One work-item decodes one block; the work-group stores them
+/// together, so that neighbouring work-items write neighbouring values.
+///
+/// part_0 .. layout  the zfp stream, see block_stream.h; a window holds the blocks from request
+///                   `first` on
+/// next_words        with levels of detail: the stream of the next level that is drawn, or of this
+///                   one again; only requests for blocks of these two levels are served
+/// places            with levels of detail in windows: a window has blocks of this level alone, and
+///                   request places[i] is its number i
+/// In                the block of request i goes to slot slots[i]
+/// Out               cache_values [slots * 64], x + 4y + 16z within a slot; inside [slots]: which
+///                   of a block's voxels are inside
+/// Launch            groups stride over requests [first, end), but not beyond decoded_count
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_decode(
     const FrameParams frame_params, global const uint *part_0, global const uint *part_1,
     global const uint *part_2, global const uint *part_3, global const uint *index,

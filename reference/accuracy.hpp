@@ -75,7 +75,7 @@ void judge(const HitOracle &oracle, const FrameParams &frame, const Ray &ray, co
 
 /// Judges a whole frame with as many threads as there are cores. hits [height * width] of `frame`.
 ///
-/// Throws  std::invalid_argument: those do not fit, and what the oracle throws
+/// Throws  std::invalid_argument: another number of hits; what the oracle throws
 Accuracy judge_frame(const HitOracle &oracle, const FrameParams &frame,
                      std::span<const HitRecord> hits);
 

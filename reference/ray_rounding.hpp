@@ -13,7 +13,7 @@ namespace isowave::core {
 /// Distance of each hit point from the exact ray of its pixel, computed in double [voxels]; nothing
 /// for pixels without a hit. hits [height * width] of make_frame_params(info, camera, size, ...).
 ///
-/// Throws  std::invalid_argument: those do not fit
+/// Throws  std::invalid_argument: another number of hits
 std::vector<double> ray_rounding(const VolumeInfo &info, const Camera &camera, ImageSize size,
                                  std::span<const HitRecord> hits);
 
