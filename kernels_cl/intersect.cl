@@ -9,36 +9,24 @@
 /// came into doubt. dual_grid [125]: vertex x + 5y + 25z minus the isovalue.
 ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes last,
                                    local const float *dual_grid) {
-  RayEvent enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  GridWalk cell = enter_block(ray, b, enter, last);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  CellWalk at = enter_cells(ray, b, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last), last);
   CellChange change;
   PairHit hit;
-  int found = 0, left = 0;
-  hit.cell = ISO_NO_HIT;
-  hit.s = 0.0f;
-  while (!left) {
-    const RayEvent exit = walk_exit(&cell, ray);
-    const int vertex = (cell.x & 3) + 5 * (cell.y & 3) + 25 * (cell.z & 3);
+  int found;
+  do {
+    const int vertex = (at.cell.x & 3) + 5 * (at.cell.y & 3) + 25 * (at.cell.z & 3);
     float w[8];
     for (int corner = 0; corner < 8; ++corner) {
       w[corner] = dual_grid[vertex + (corner & 1) + 5 * (corner >> 1 & 1) + 25 * (corner >> 2)];
     }
-    found = change_or_doubt_in_cell(solver, ray, w, cell.x, cell.y, cell.z, enter, exit, &change);
-    if (found) {
-      hit.cell = (uint)((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3));
-      break;
-    }
-    left = leaves(&cell, &block, exit);
-    walk_step(&cell, ray, exit, 1, last);
-    enter = exit;
-  }
-  if (found == ISO_DOUBTFUL) {
-    hit.cell += ISO_IN_DOUBT;
-  } else if (found) {
-    hit.s = refine(solver, change.cubic, change.bracket);
-  }
+    found = change_or_doubt_in_cell(solver, ray, w, at.cell.x, at.cell.y, at.cell.z, at.enter,
+                                    at.exit, &change);
+  } while (!found && next_cell(&at, ray, last));
+  hit.cell = !found                  ? ISO_NO_HIT
+             : found == ISO_DOUBTFUL ? ISO_IN_DOUBT + cell_in_block(&at.cell)
+                                     : cell_in_block(&at.cell);
+  hit.s = hit.cell < ISO_NO_HIT ? refine(solver, change.cubic, change.bracket) : 0.0f;
   return hit;
 }
 
@@ -113,27 +101,18 @@ kernel void settle_doubts(const FrameParams frame_params, global const PassCount
       const BlockCoords b = block_coords(frame, pair_block_ids[pair]);
       const int x = (int)(4 * b.x + (start & 3)), y = (int)(4 * b.y + (start >> 2 & 3)),
                 z = (int)(4 * b.z + (start >> 4 & 3));
-      const GridWalk block = walk_from(&ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-      GridWalk cell = walk_from(&ray, x, y, z, 1, last);
-      RayEvent enter = region_entry(&ray, x, y, z, 1, last);
+      CellWalk at = start_at_cell(&ray, x, y, z, region_entry(&ray, x, y, z, 1, last), last);
+      CellChange change;
       PairHit hit;
-      int left = 0;
-      hit.cell = ISO_NO_HIT;
-      hit.s = 0.0f;
-      while (!left) {
-        const RayEvent exit = walk_exit(&cell, &ray);
-        CellChange change;
+      int found;
+      do {
         float w[8];
-        load_corners(frame, table, cache_values, cell.x, cell.y, cell.z, w);
-        if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change)) {
-          hit.cell = (uint)((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3));
-          hit.s = refine(solver, change.cubic, change.bracket);
-          break;
-        }
-        left = leaves(&cell, &block, exit);
-        walk_step(&cell, &ray, exit, 1, last);
-        enter = exit;
-      }
+        load_corners(frame, table, cache_values, at.cell.x, at.cell.y, at.cell.z, w);
+        found = change_in_cell(solver, &ray, w, at.cell.x, at.cell.y, at.cell.z, at.enter, at.exit,
+                               &change);
+      } while (!found && next_cell(&at, &ray, last));
+      hit.cell = found ? cell_in_block(&at.cell) : ISO_NO_HIT;
+      hit.s = found ? refine(solver, change.cubic, change.bracket) : 0.0f;
       pair_hits[pair] = hit;
       if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, pair, counts->spec_count);
     }

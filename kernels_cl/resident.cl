@@ -73,64 +73,47 @@ ISO_INLINE void resident_corners(const FrameParams *frame, global const float *v
   }
 }
 
-/// A ray within a block.
-typedef struct CellWalk {
-  GridWalk block, cell;
-  RayEvent enter;  ///< by which it entered the cell
-  float w[8];      ///< of the cell where the walk stopped
+/// A change of inside, or doubt, in a cell of a block.
+typedef struct ResidentChange {
+  CellWalk at;
+  float w[8];
   CellChange change;
-  int left;  ///< has it left the block?
-} CellWalk;
+} ResidentChange;
 
-/// Walks on to the next change of inside in the block's `changing` cells, in float. Returns 1,
-/// ISO_DOUBTFUL, or 0 when the ray has left the block.
+/// Walks on from cell found->at to the next change of inside in the block's `changing` cells, in
+/// float. Returns 1, ISO_DOUBTFUL, or 0 when the ray has left the block.
 ISO_INLINE int walk_to_change(const FrameParams *frame, global const float *values, const Ray *ray,
-                              LastPlanes last, ulong changing, CellWalk *at) {
+                              LastPlanes last, ulong changing, ResidentChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  int found = 0;
-  while (!found && !at->left) {
-    const RayEvent exit = walk_exit(&at->cell, ray);
-    if ((changing >> ((at->cell.x & 3) + 4 * (at->cell.y & 3) + 16 * (at->cell.z & 3)) & 1ul) !=
-        0) {
-      resident_corners(frame, values, at->cell.x, at->cell.y, at->cell.z, at->w);
-      found = change_or_doubt_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z,
-                                      at->enter, exit, &at->change);
+  const GridWalk *cell = &found->at.cell;
+  int result = 0;
+  do {
+    if ((changing >> cell_in_block(cell) & 1ul) != 0) {
+      resident_corners(frame, values, cell->x, cell->y, cell->z, found->w);
+      result = change_or_doubt_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
+                                       found->at.enter, found->at.exit, &found->change);
     }
-    if (!found) {
-      at->left = leaves(&at->cell, &at->block, exit);
-      walk_step(&at->cell, ray, exit, 1, last);
-      at->enter = exit;
-    }
-  }
-  return found;
+  } while (!result && next_cell(&found->at, ray, last));
+  return result;
 }
 
-/// Is there a change of inside on the ray's way through block b, of which those cells change? If
-/// so, *at is its cell.
+/// Is there a change of inside on the ray's way through block b, of which those cells change?
 ISO_INLINE int resident_block(const FrameParams *frame, global const float *values, ulong changing,
-                              const Ray *ray, BlockCoords b, LastPlanes last, CellWalk *at) {
+                              const Ray *ray, BlockCoords b, LastPlanes last,
+                              ResidentChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  int found = 0;
-  if (changing != 0) {
-    at->enter = region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-    at->block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-    at->cell = enter_block(ray, b, at->enter, last);
-    at->left = 0;
-    found = walk_to_change(frame, values, ray, last, changing, at);
-    while (found ==
-           ISO_DOUBTFUL) { /* rare: its 48-bit arithmetic stays out of the loop over cells */
-      const RayEvent exit = walk_exit(&at->cell, ray);
-      found = change_in_cell(solver, ray, at->w, at->cell.x, at->cell.y, at->cell.z, at->enter,
-                             exit, &at->change);
-      if (!found) {
-        at->left = leaves(&at->cell, &at->block, exit);
-        walk_step(&at->cell, ray, exit, 1, last);
-        at->enter = exit;
-        found = walk_to_change(frame, values, ray, last, changing, at);
-      }
-    }
+  int result;
+  if (changing == 0) return 0;
+  found->at = enter_cells(ray, b, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last), last);
+  result = walk_to_change(frame, values, ray, last, changing, found);
+  while (result == ISO_DOUBTFUL) { /* rare: its 48-bit arithmetic stays out of the loop of cells */
+    const GridWalk *cell = &found->at.cell;
+    result = change_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z, found->at.enter,
+                            found->at.exit, &found->change);
+    if (!result && next_cell(&found->at, ray, last))
+      result = walk_to_change(frame, values, ray, last, changing, found);
   }
-  return found;
+  return result;
 }
 
 /// The frame: hits [pixel]. macrocell_masks: as traverse(). One work-item per pixel, in whole tiles
@@ -153,19 +136,20 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident
     const Ray ray = make_ray(frame, pixel);
     uint next = in_box ? first_block(frame, &ray) : ISO_INVALID_ID;
     int hit = 0;
-    CellWalk at;
+    ResidentChange change;
     while (next != ISO_INVALID_ID && !hit) {
       const uint num_found = find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE,
                                          found, ISO_GROUP_SIZE);
       for (uint i = 0; i < num_found && !hit; ++i) {
         const uint block_id = found[i * ISO_GROUP_SIZE];
         hit = resident_block(frame, values, changing[block_id], &ray, block_coords(frame, block_id),
-                             last, &at);
+                             last, &change);
       }
     }
-    hits[pixel] = hit ? make_hit(frame, &ray, at.w, at.cell.x, at.cell.y, at.cell.z, at.enter,
-                                 walk_exit(&at.cell, &ray),
-                                 refine(solver, at.change.cubic, at.change.bracket))
-                      : no_hit();
+    const GridWalk *cell = &change.at.cell;
+    hits[pixel] =
+        hit ? make_hit(frame, &ray, change.w, cell->x, cell->y, cell->z, change.at.enter,
+                       change.at.exit, refine(solver, change.change.cubic, change.change.bracket))
+            : no_hit();
   }
 }

@@ -6,12 +6,48 @@
 #include "portable/block_grid.h"
 #include "portable/grid_dda.h"
 
-/// The cell of block b in which the ray is just after `enter`, by which it entered the block.
-ISO_INLINE GridWalk enter_block(const Ray *ray, BlockCoords b, RayEvent enter, LastPlanes last) {
+/// A ray's way through the cells of one block:
+///
+///     CellWalk at = enter_cells(ray, b, enter, last);
+///     do {
+///       // the ray is in cell at.cell from at.enter to at.exit
+///     } while (next_cell(&at, ray, last));
+typedef struct CellWalk {
+  GridWalk block, cell;
+  RayEvent enter, exit;  ///< of the cell
+} CellWalk;
+
+/// At cell (x,y,z), which the ray enters by `enter`.
+ISO_INLINE CellWalk start_at_cell(const Ray *ray, int x, int y, int z, RayEvent enter,
+                                  LastPlanes last) {
+  CellWalk at;
+  at.block = walk_from(ray, x >> 2, y >> 2, z >> 2, 4, last);
+  at.cell = walk_from(ray, x, y, z, 1, last);
+  at.enter = enter;
+  at.exit = walk_exit(&at.cell, ray);
+  return at;
+}
+
+/// At the cell of block b in which the ray is just after `enter`, by which it entered the block.
+ISO_INLINE CellWalk enter_cells(const Ray *ray, BlockCoords b, RayEvent enter, LastPlanes last) {
   const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
-  return walk_from(ray, locate(ray->x, 0, enter, 1, x0, min(x0 + 3, last.x - 1)),
-                   locate(ray->y, 1, enter, 1, y0, min(y0 + 3, last.y - 1)),
-                   locate(ray->z, 2, enter, 1, z0, min(z0 + 3, last.z - 1)), 1, last);
+  return start_at_cell(ray, locate(ray->x, 0, enter, 1, x0, min(x0 + 3, last.x - 1)),
+                       locate(ray->y, 1, enter, 1, y0, min(y0 + 3, last.y - 1)),
+                       locate(ray->z, 2, enter, 1, z0, min(z0 + 3, last.z - 1)), enter, last);
+}
+
+/// Goes on to the next cell. Returns 0 if the ray leaves the block instead.
+ISO_INLINE int next_cell(CellWalk *at, const Ray *ray, LastPlanes last) {
+  if (leaves(&at->cell, &at->block, at->exit)) return 0;
+  walk_step(&at->cell, ray, at->exit, 1, last);
+  at->enter = at->exit;
+  at->exit = walk_exit(&at->cell, ray);
+  return 1;
+}
+
+/// Which of its block's cells it is, x + 4y + 16z.
+ISO_INLINE uint cell_in_block(const GridWalk *cell) {
+  return (uint)((cell->x & 3) + 4 * (cell->y & 3) + 16 * (cell->z & 3));
 }
 
 /// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which

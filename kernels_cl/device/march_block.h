@@ -29,8 +29,7 @@ ISO_INLINE uint cell_blocks(int x, int y, int z) {
 /// A change of inside, or doubt, in a cell of a block.
 typedef struct BlockChange {
   CellChange change;
-  GridWalk cell;
-  RayEvent enter;
+  CellWalk at;
   float w[8];
   int at_border;  ///< it is where the cell is entered: a level of detail has another opinion than
                   ///< the one before
@@ -99,22 +98,23 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
                            int may_end, BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   uint have; /* corners of the dual grid */
-  int result = ISO_RAY_LEFT, left = 0;
+  int result = ISO_RAY_LEFT;
   const ulong cells = open_block(frame, table, inside, b, slots, &have);
   if ((have & 1u) == 0) return ISO_RAY_WAITS;
   slot_stamps[slots[0]] = stamp; /* for all of the dual grid: see last_use() in block_cache.cl */
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const int ends = may_end && ends_band(frame, walk_exit(&block, ray));
   if (cells == 0 && !has_side(side) && !ends) return ISO_RAY_LEFT;
-  found->enter = band_entry(frame, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
-  found->cell = enter_block(ray, b, found->enter, last);
+  const RayEvent enter =
+      band_entry(frame, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
+  const GridWalk *cell = &found->at.cell;
+  found->at = enter_cells(ray, b, enter, last);
   found->at_border = 0;
-  while (result == ISO_RAY_LEFT && !left) {
-    const int x = found->cell.x & 3, y = found->cell.y & 3, z = found->cell.z & 3;
-    const RayEvent cell_exit = walk_exit(&found->cell, ray);
-    const int ends_here = ends && ends_band(frame, cell_exit);
-    const RayEvent exit = ends_here ? band_end(frame) : cell_exit;
-    if ((cells >> (x + 4 * y + 16 * z) & 1ul) != 0 || has_side(side) || ends_here) {
+  do {
+    const int x = cell->x & 3, y = cell->y & 3, z = cell->z & 3;
+    const int ends_here = ends && ends_band(frame, found->at.exit);
+    const RayEvent exit = ends_here ? band_end(frame) : found->at.exit;
+    if ((cells >> cell_in_block(cell) & 1ul) != 0 || has_side(side) || ends_here) {
       if ((cell_blocks(x, y, z) & ~have) != 0) {
         result = ISO_RAY_WAITS;
       } else {
@@ -126,27 +126,22 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
                              frame->surface.isovalue;
         }
         if (has_side(side))
-          found->at_border = inside_at(ray, found->w, found->enter, found->cell.x, found->cell.y,
-                                       found->cell.z, 0) != (side == ISO_SIDE_INSIDE);
+          found->at_border = inside_at(ray, found->w, found->at.enter, cell->x, cell->y, cell->z,
+                                       0) != (side == ISO_SIDE_INSIDE);
         result = changes_at_border(found) ? ISO_RAY_HIT
                  : precise
-                     ? change_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
-                                      found->cell.z, found->enter, exit, &found->change)
-                     : change_or_doubt_in_cell(solver, ray, found->w, found->cell.x, found->cell.y,
-                                               found->cell.z, found->enter, exit, &found->change);
+                     ? change_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
+                                      found->at.enter, exit, &found->change)
+                     : change_or_doubt_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
+                                               found->at.enter, exit, &found->change);
         if (result == ISO_RAY_LEFT && ends_here)
-          result = inside_at(ray, found->w, exit, found->cell.x, found->cell.y, found->cell.z, 1)
+          result = inside_at(ray, found->w, exit, cell->x, cell->y, cell->z, 1)
                        ? ISO_RAY_ENDS_INSIDE
                        : ISO_RAY_ENDS_OUTSIDE;
       }
     }
-    if (result == ISO_RAY_LEFT) {
-      left = leaves(&found->cell, &block, cell_exit);
-      walk_step(&found->cell, ray, cell_exit, 1, last);
-      found->enter = cell_exit;
-      side = ISO_SIDE_UNKNOWN;
-    }
-  }
+    side = ISO_SIDE_UNKNOWN;
+  } while (result == ISO_RAY_LEFT && next_cell(&found->at, ray, last));
   return result;
 }
 
@@ -166,8 +161,8 @@ ISO_INLINE HitRecord hit_of(const FrameParams *frame, const Ray *ray, const Bloc
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   const float s =
       changes_at_border(found) ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);
-  return make_hit(frame, ray, found->w, found->cell.x, found->cell.y, found->cell.z, found->enter,
-                  band_exit(frame, walk_exit(&found->cell, ray)), s);
+  return make_hit(frame, ray, found->w, found->at.cell.x, found->at.cell.y, found->at.cell.z,
+                  found->at.enter, band_exit(frame, found->at.exit), s);
 }
 
 #endif
