@@ -261,8 +261,8 @@ class Volume:
     @property
     def direction(self) -> npt.NDArray[np.float64]:
         """3 x 3; column a: unit world direction (x, y, z) of index axis a, in the order x, y, z."""
-        columns: npt.NDArray[np.float64] = np.array(self._core.direction, float)
-        return columns.T
+        columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
+        return np.ascontiguousarray(columns.T)
 
     @property
     def dtype(self) -> np.dtype[Any]:

@@ -47,7 +47,8 @@ def nibabel_image(image: Any, has_spacing: bool) -> Found:
     surplus = (0,) * (len(sizes) - 3)
 
     def fetch(begin: int, end: int) -> Any:
-        layers = data[(slice(None), slice(None), slice(begin, end), *surplus)]
+        index = (slice(None), slice(None), slice(begin, end), *surplus)
+        layers = data[index]
         # A masked array must stay one.
         return (layers if isinstance(layers, np.ndarray) else np.asarray(layers)).T
 
