@@ -801,6 +801,26 @@ def test_xarray_over_dask():
     check_source(source, make_voxels(), spacing=(3.0, 1.0, 1.0), origin=(10.0, 0.0, 0.0))
 
 
+@pytest.mark.parametrize(
+    "encoding, layers",
+    [
+        ({"preferred_chunks": {"z": 4, "y": 5}}, 4),
+        ({"preferred_chunks": {"z": 100}}, 7),
+        ({"chunksizes": (3, 5, 3), "original_shape": (NZ, NY, NX)}, 3),
+        ({"chunksizes": (3, 5, 3), "original_shape": (9, NY, NX)}, 1),  # of a variable cut since
+        ({"chunksizes": None, "original_shape": (NZ, NY, NX)}, 1),
+        ({"preferred_chunks": {"z": (4, 3)}}, 1),
+        ({"preferred_chunks": {"z": 0}}, 1),
+    ],
+)
+def test_xarray_chunks_of_a_file(encoding, layers):
+    xarray = pytest.importorskip("xarray")
+    given = labelled(xarray)
+    given.encoding.update(encoding)
+    assert as_source(given).chunk_layers == layers
+    check_source(as_source(given), make_voxels())
+
+
 @pytest.mark.parametrize("slab", SLABS)
 def test_xarray_over_a_zarr_store(slab):
     xarray, zarr = pytest.importorskip("xarray"), pytest.importorskip("zarr", minversion="3")
@@ -1127,10 +1147,7 @@ print([name for name in {PACKAGES} if name in sys.modules])
     [
         ("xarray", "xarray.DataArray(voxels)"),
         ("zarr", "zarr.array(voxels)"),
-        (
-            "h5py",
-            "h5py.File('a', 'w', driver='core', backing_store=False).create_dataset('a', data=voxels)",
-        ),
+        ("h5py", "make_h5py()"),
         ("tensorstore", "tensorstore.array(voxels)"),
         ("SimpleITK", "SimpleITK.GetImageFromArray(voxels)"),
         ("nibabel", "nibabel.Nifti1Image(voxels, numpy.eye(4))"),
@@ -1147,13 +1164,17 @@ def make_vtk():
     image.SetDimensions(3, 5, 7)
     image.AllocateScalars(4, 1)
     return image
+def make_h5py():
+    file = h5py.File('a', 'w', driver='core', backing_store=False)
+    return file.create_dataset('a', data=voxels)
+def packages():
+    return {{name.partition('.')[0] for name in sys.modules}}
 voxels = numpy.zeros((7, 5, 3), 'int16')
 made = {make}
-before = set(sys.modules)
+before = packages()
 source = as_source(made)
 source.read(0, source.shape[0])
-names = {{name.partition('.')[0] for name in sys.modules}} - {{name.partition('.')[0] for name in before}}
-print(sorted(names & set({PACKAGES + ['vtkmodules']})))
+print(sorted((packages() - before) & set({PACKAGES + ['vtkmodules']})))
 """
     assert run_python(code).strip() == "[]"
 
