@@ -172,6 +172,7 @@ def sizes(run):
     return rows
 
 
+VIEWS = 2
 # Rays a pixel along each axis, and --voxel-pixels. The first is what the others are compared with.
 DETAIL_PICTURES = ((4, 0), (1, 0), (1, 0.5), (1, 1), (2, 0), (2, 0.25), (2, 0.5), (2, 1))
 
@@ -195,21 +196,24 @@ def detail(run):
         run.run("isowave", "convert", path, output="d.zfp", rate=16, levels="all", no_verify=True)
         wanted = None
         for samples, distance in DETAIL_PICTURES:
+            name = f"{short_name(path)}_{samples}_{distance}"
             run.run(
                 "isowave",
                 "render",
                 "d.zfp",
                 isovalue=isovalues[1],
                 size="16x12" if run.options.quick else "64x48",
-                orbit=2,
+                orbit=VIEWS,
                 samples=samples,
                 voxel_pixels=distance,
                 device=run.options.device,
                 no_stage_times=True,
-                output=f"d{samples}_{distance}.png",
+                output=f"{name}.png",
                 stats="s.json",
             )
-            pictures = sorted(run.work.glob(f"d{samples}_{distance}_*.png"))
+            pictures = sorted(run.work.glob(f"{name}_*.png"))
+            if len(pictures) != VIEWS:
+                raise Failed(f"{name}: {len(pictures)} pictures of {VIEWS} views")
             if wanted is None:
                 wanted = pictures
                 continue
