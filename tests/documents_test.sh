@@ -22,7 +22,7 @@ results=$work/top/results/a.json
 measured() { # OPTION...: into the results
   measure -o "$results" "$@" > "$work/out" || fail "$(cat "$work/out")"
 }
-measured --only frames,error,time,stability
+measured --only frames,error,time,stability,sweep
 measured --only storage,sizes,detail,solvers,pareto --volumes "$top/tests/data"
 tables=(front frames error time stability leaks storage sizes detail solvers solver_frames pareto
   pareto_times)
@@ -48,7 +48,7 @@ assert coarse < one < four, detail
 EOF
 if grep -qF "$top/tests/data" "$results"; then fail 'the folder of the volumes is named'; fi
 "$top/tools/charts" "$results" -o "$work" > "$work/out"
-for chart in a_cells a_frames a_pareto; do
+for chart in a_cells a_frames a_pareto a_budgets; do
   [ -s "$work/$chart.png" ] || fail "$chart.png is missing"
 done
 

@@ -4,12 +4,19 @@ import gzip
 import json
 import math
 import os
-import pathlib
 import shlex
 import statistics
 import subprocess
 
-from measuring.run import CPU_VOLUMES, GPU_VOLUMES, TOP, Failed, as_arguments, short_name
+from measuring.run import (
+    CPU_VOLUMES,
+    GPU_VOLUMES,
+    TOP,
+    Failed,
+    as_arguments,
+    short_name,
+    what_was_measured,
+)
 
 
 def watertight(run):
@@ -277,12 +284,3 @@ def solvers(run):
     device = run.options.device
     run.run("isowave", "bench", "solvers", *subjects, **options, device=device, json="b.json")
     return [what_was_measured(run.read_json("b.json"))]
-
-
-def what_was_measured(document):
-    """Without what the file of tools/measure says once for all, and without folders."""
-    said = {"schema", "benchmark", "device", "date"}
-    row = {name: value for name, value in document.items() if name not in said}
-    if "volume" in row:
-        row["volume"] = pathlib.PurePath(row["volume"]).name
-    return row

@@ -65,6 +65,15 @@ def short_name(path):
     return path.name.split("_")[0].split(".")[0]
 
 
+def what_was_measured(document):
+    """Without what the file of tools/measure says once for all, and without folders."""
+    said = {"schema", "benchmark", "device", "date", "context", "command"}
+    row = {name: value for name, value in document.items() if name not in said}
+    if "volume" in row:
+        row["volume"] = pathlib.PurePath(row["volume"]).name
+    return row
+
+
 class Run:
     """One call of tools/measure.
 

@@ -9,6 +9,7 @@ SECTIONS = {
         speed.speculation,
         speed.slots,
         speed.budgets,
+        speed.sweep,
         speed.levels,
         speed.storage,
         speed.error,

@@ -3,7 +3,14 @@
 import re
 import statistics
 
-from measuring.run import CPU_VOLUMES, GPU_VOLUMES, as_arguments, voxels_of
+from measuring.run import (
+    CPU_VOLUMES,
+    GPU_VOLUMES,
+    QUICK_VOLUMES,
+    as_arguments,
+    voxels_of,
+    what_was_measured,
+)
 
 
 def frame_row(run, field, storage=(), rounds=3, resident=False, **options):
@@ -88,6 +95,24 @@ def budgets(run):
         for field in run.fields()
         for budget in budgets_of.get(field, ())
     ]
+
+
+def sweep(run):
+    """One row: what `frame_bench --budgets` writes."""
+    quick = run.options.quick
+    field = CPU_VOLUMES[0] if run.options.on_cpu else GPU_VOLUMES[1]
+    run.run(
+        "bench/frame_bench",
+        run.volume(QUICK_VOLUMES[0] if quick else field),
+        isovalue=128,
+        size=(64, 48) if quick else (1280, 720),
+        device=run.options.device,
+        rounds=1 if quick else 2,
+        orbit=2 if quick else None,
+        budgets="auto:3" if quick else "auto:10",
+        json="g.json",
+    )
+    return [what_was_measured(run.read_json("g.json"))]
 
 
 def levels(run):
