@@ -21,7 +21,7 @@ printf '%0100d\n' 0 > "$wide"
 mapfile -t files < <(
   find . -maxdepth 1 -type f ! -name LICENSE
   find .ci bench core kernels_cl reference tests tools -type f \
-    ! -name '*.json' ! -name '*.png' ! -name '*.pyc' ! -name '*.gz' \
+    ! -name '*.json' ! -name '*.png' ! -name '*.svg' ! -name '*.pyc' ! -name '*.gz' \
     ! -path 'tests/fuzz/seeds/*' ! -path 'tests/fuzz/found/*' \
     ! -path kernels_cl/portable/shared_types_fields.h
 )

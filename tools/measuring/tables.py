@@ -348,7 +348,7 @@ def pareto(rows):
             yield (
                 subject(row),
                 f"`--{point['storage'].replace(':', ' ')}`",
-                f"{point['bytes'] / 1e6:.1f}",
+                f"{point['bytes'] / 1e6:.3g}",
                 ms(point["ms"]),
                 f"{100 * point['wrong_pixels']:.2g} %",
                 f"{point['depth_p99']:.2g}",
