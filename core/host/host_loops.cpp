@@ -17,7 +17,7 @@ namespace isowave::core {
 namespace {
 
 /// Eight at a time: what compilers keep in vectors.
-ISO_INLINE BlockRange range_of_block(const float *values) {
+inline BlockRange range_of_block(const float *values) {
   float low[8], high[8];
   for (int lane = 0; lane < 8; ++lane) low[lane] = high[lane] = values[lane];
   for (int i = 8; i < 64; i += 8) {
@@ -36,7 +36,7 @@ ISO_INLINE BlockRange range_of_block(const float *values) {
 }
 
 /// Without the padding of a block at the volume's end.
-ISO_INLINE BlockRange range_within(const EncodedBlock &block, const float *values) {
+inline BlockRange range_within(const EncodedBlock &block, const float *values) {
   BlockRange range = {values[0], values[0]};
   for (uint z = 0; z < block.size_z; ++z) {
     for (uint y = 0; y < block.size_y; ++y) {
@@ -50,7 +50,7 @@ ISO_INLINE BlockRange range_within(const EncodedBlock &block, const float *value
   return range;
 }
 
-ISO_INLINE BlockRange decode(const EncodedBlock &block, float *values) {
+inline BlockRange decode(const EncodedBlock &block, float *values) {
   zfp_decode_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
   if (block.whole_numbers) {
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
@@ -59,7 +59,7 @@ ISO_INLINE BlockRange decode(const EncodedBlock &block, float *values) {
                                                                      : range_within(block, values);
 }
 
-ISO_INLINE ulong inside(const float *values, float isovalue) {
+inline ulong inside(const float *values, float isovalue) {
   ulong bits = 0;
   for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
     bits |= static_cast<ulong>(values[v] - isovalue >= 0.0f) << v;
@@ -67,8 +67,8 @@ ISO_INLINE ulong inside(const float *values, float isovalue) {
 }
 
 /// The corners of dual cell (x,y,z) minus the isovalue, corner x + 2y + 4z.
-ISO_INLINE void load_corners(const FrameParams &frame, const HostField &field, int x, int y, int z,
-                             float *w) {
+inline void load_corners(const FrameParams &frame, const HostField &field, int x, int y, int z,
+                         float *w) {
   for (int corner = 0; corner < 8; ++corner) {
     const auto vx = static_cast<uint>(x + (corner & 1)),
                vy = static_cast<uint>(y + (corner >> 1 & 1)),
@@ -80,9 +80,8 @@ ISO_INLINE void load_corners(const FrameParams &frame, const HostField &field, i
 }
 
 /// The first hit of a ray in a block's changing cells. enter: by which it enters the block.
-ISO_INLINE bool trace_block(const FrameParams &frame, const HostField &field, const Ray &ray,
-                            const GridWalk &block, RayEvent enter, LastPlanes last,
-                            HitRecord *hit) {
+inline bool trace_block(const FrameParams &frame, const HostField &field, const Ray &ray,
+                        const GridWalk &block, RayEvent enter, LastPlanes last, HitRecord *hit) {
   const BlockCoords b = {static_cast<uint>(block.x), static_cast<uint>(block.y),
                          static_cast<uint>(block.z)};
   const ulong changing = field.changing[level_block_at(&frame, b.x, b.y, b.z)];
@@ -102,8 +101,8 @@ ISO_INLINE bool trace_block(const FrameParams &frame, const HostField &field, co
 }
 
 /// The block of a macrocell that the ray is in just after `enter`, by which it entered that.
-ISO_INLINE GridWalk enter_macrocell(const Ray &ray, const GridWalk &macrocell, RayEvent enter,
-                                    LastPlanes last) {
+inline GridWalk enter_macrocell(const Ray &ray, const GridWalk &macrocell, RayEvent enter,
+                                LastPlanes last) {
   const auto block = [&](RayAxis a, int axis, int coarse, int last_plane) {
     const int first = coarse * ISO_MACROCELL_BLOCKS, end = first + ISO_MACROCELL_BLOCKS - 1,
               domain_end = (last_plane - 1) / 4;
@@ -119,32 +118,32 @@ struct ActiveBox {
   LastPlanes first, final;  ///< macrocells
 };
 
-ISO_INLINE ActiveBox active_box(const Surface &surface, LastPlanes last) {
+inline ActiveBox active_box(const Surface &surface, LastPlanes last) {
   const auto end = [](int blocks, int last_plane) {
     return 4 * blocks < last_plane ? 4 * blocks : last_plane;
   };
-  constexpr int kEdge = ISO_MACROCELL_BLOCKS;
+  constexpr int kBlocks = ISO_MACROCELL_BLOCKS;
   return {{4 * surface.active_begin_x, 4 * surface.active_begin_y, 4 * surface.active_begin_z},
           {end(surface.active_end_x, last.x), end(surface.active_end_y, last.y),
            end(surface.active_end_z, last.z)},
-          {surface.active_begin_x / kEdge, surface.active_begin_y / kEdge,
-           surface.active_begin_z / kEdge},
-          {(surface.active_end_x - 1) / kEdge, (surface.active_end_y - 1) / kEdge,
-           (surface.active_end_z - 1) / kEdge}};
+          {surface.active_begin_x / kBlocks, surface.active_begin_y / kBlocks,
+           surface.active_begin_z / kBlocks},
+          {(surface.active_end_x - 1) / kBlocks, (surface.active_end_y - 1) / kBlocks,
+           (surface.active_end_z - 1) / kBlocks}};
 }
 
 /// Walks from macrocell to macrocell, in those with an active block from block to block, and in
 /// active blocks from cell to cell.
-ISO_INLINE bool trace_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
-                          LastPlanes last, const Ray &ray, HitRecord *hit) {
-  constexpr int kEdge = 4 * ISO_MACROCELL_BLOCKS;
+inline bool trace_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
+                      LastPlanes last, const Ray &ray, HitRecord *hit) {
+  constexpr int kVoxels = 4 * ISO_MACROCELL_BLOCKS;
   const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
   RayEvent enter;
   if (!box_entry(&ray, box.begin, box.end, &enter)) return false;
   GridWalk coarse =
-      walk_from(&ray, locate(ray.x, 0, enter, kEdge, box.first.x, box.final.x),
-                locate(ray.y, 1, enter, kEdge, box.first.y, box.final.y),
-                locate(ray.z, 2, enter, kEdge, box.first.z, box.final.z), kEdge, last);
+      walk_from(&ray, locate(ray.x, 0, enter, kVoxels, box.first.x, box.final.x),
+                locate(ray.y, 1, enter, kVoxels, box.first.y, box.final.y),
+                locate(ray.z, 2, enter, kVoxels, box.first.z, box.final.z), kVoxels, last);
   while (coarse.x >= box.first.x && coarse.x <= box.final.x && coarse.y >= box.first.y &&
          coarse.y <= box.final.y && coarse.z >= box.first.z && coarse.z <= box.final.z) {
     const ulong mask =
@@ -165,14 +164,14 @@ ISO_INLINE bool trace_ray(const FrameParams &frame, const HostField &field, cons
         walk_step(&block, &ray, exit, 4, last);
       }
     }
-    walk_step(&coarse, &ray, exit, kEdge, last);
+    walk_step(&coarse, &ray, exit, kVoxels, last);
     enter = exit;
   }
   return false;
 }
 
-ISO_INLINE uint trace(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                      HitRecord *hits) {
+inline uint trace(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                  HitRecord *hits) {
   const LastPlanes last = last_planes(&frame);
   const ActiveBox box = active_box(frame.surface, last);
   uint num_hits = 0;
@@ -186,8 +185,8 @@ ISO_INLINE uint trace(const FrameParams &frame, const HostField &field, const Ra
   return num_hits;
 }
 
-ISO_INLINE void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
-                      const HitRecord *hits, std::uint8_t *rgb) {
+inline void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
+                  const HitRecord *hits, std::uint8_t *rgb) {
   const uint columns = frame.view.width / samples;
   for (uint column = 0; column < columns; ++column) {
     const uint rgba = shade_pixel(&frame, &params, samples, column, row, hits);
