@@ -14,13 +14,18 @@ namespace {
 
 FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t num_rays) {
   FrameStatistics result;
-  result.passes = static_cast<std::uint32_t>(stats.passes.size());
+  result.passes = static_cast<std::uint32_t>(stats.passes.size()) + stats.normals.passes;
   result.rays = num_rays;
   result.hits = stats.rays_hit;
   for (const core::PassStats &pass : stats.passes) {
     result.decoded_blocks += pass.counts.decoded_count;
     for (const auto &[stage, ms] : pass.stage_ms) result.stage_ms[stage] += ms;
   }
+  result.normals_passes = stats.normals.passes;
+  result.normals_decoded_blocks = stats.normals.decoded_blocks;
+  result.normals_ms = stats.normals.ms;
+  result.decoded_blocks += stats.normals.decoded_blocks;
+  for (const auto &[stage, ms] : stats.normals.stage_ms) result.stage_ms[stage] += ms;
   result.uploaded_bytes = stats.uploaded_bytes;
   result.first_level = static_cast<std::uint32_t>(stats.first_level);
   result.last_level = static_cast<std::uint32_t>(stats.last_level);
@@ -112,7 +117,7 @@ Camera public_camera(const core::Camera &camera) {
 
 core::Appearance core_appearance(const Appearance &appearance) {
   return {to_glm(appearance.surface), to_glm(appearance.background), appearance.ambient,
-          appearance.diffuse, appearance.specular};
+          appearance.diffuse,         appearance.specular,           appearance.above};
 }
 
 core::FrameRequest core_request(const FrameRequest &request) {
@@ -124,6 +129,10 @@ core::FrameRequest core_request(const FrameRequest &request) {
   result.voxel_pixels = request.voxel_pixels;
   result.voxel_error = request.voxel_error;
   result.bound = static_cast<core::FieldBound>(request.bound);
+  const bool shows_normals =
+      request.want_picture || request.want_normals || request.want_hits || request.on_pass;
+  result.normals =
+      shows_normals ? static_cast<core::Normals>(request.normals) : core::Normals::kCell;
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include "core/stages/solvers.hpp"
 #include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/smooth_gradient.h"
 #include "kernels_cl/portable/zfp_codec.h"
 
 // All that a loop calls becomes part of it, and so is compiled for the processor that it is for.
@@ -66,17 +67,41 @@ inline ulong inside(const float *values, float isovalue) {
   return bits;
 }
 
+inline float voxel_at(const FrameParams &frame, const HostField &field, int x, int y, int z) {
+  const auto vx = static_cast<uint>(x), vy = static_cast<uint>(y), vz = static_cast<uint>(z);
+  const ulong block = level_block_at(&frame, vx >> 2, vy >> 2, vz >> 2);
+  return field.values[block * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
+}
+
 /// The corners of dual cell (x,y,z) minus the isovalue, corner x + 2y + 4z.
 inline void load_corners(const FrameParams &frame, const HostField &field, int x, int y, int z,
                          float *w) {
   for (int corner = 0; corner < 8; ++corner) {
-    const auto vx = static_cast<uint>(x + (corner & 1)),
-               vy = static_cast<uint>(y + (corner >> 1 & 1)),
-               vz = static_cast<uint>(z + (corner >> 2));
-    const ulong block = level_block_at(&frame, vx >> 2, vy >> 2, vz >> 2);
-    w[corner] = field.values[block * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] -
+    w[corner] = voxel_at(frame, field, x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)) -
                 frame.surface.isovalue;
   }
+}
+
+/// Gives a hit the smooth gradient, where there is one.
+inline void smooth_gradient(const FrameParams &frame, const HostField &field, LastPlanes last,
+                            HitRecord *hit) {
+  const Stencil s = stencil_of(block_coords(&frame, hit->block_id), hit->cell, last);
+  const StencilAxis axes[3] = {s.x, s.y, s.z};
+  float corners[8], beyond[8], derivatives[3];
+  for (uint axis = 0; axis < 3; ++axis) {
+    for (int corner = 0; corner < 8; ++corner) {
+      int at[3] = {s.x.cell + (corner & 1), s.y.cell + (corner >> 1 & 1), s.z.cell + (corner >> 2)};
+      corners[corner] = voxel_at(frame, field, at[0], at[1], at[2]);
+      at[axis] = (corner >> axis & 1) != 0 ? axes[axis].above : axes[axis].below;
+      beyond[corner] = voxel_at(frame, field, at[0], at[1], at[2]);
+    }
+    derivatives[axis] =
+        smooth_derivative(corners, beyond, 1u << axis, axes[axis], {hit->x, hit->y, hit->z});
+  }
+  if (is_no_gradient({derivatives[0], derivatives[1], derivatives[2]})) return;
+  hit->grad_x = derivatives[0];
+  hit->grad_y = derivatives[1];
+  hit->grad_z = derivatives[2];
 }
 
 /// The first hit of a ray in a block's changing cells. enter: by which it enters the block.
@@ -171,7 +196,7 @@ inline bool trace_ray(const FrameParams &frame, const HostField &field, const Ac
 }
 
 inline uint trace(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                  HitRecord *hits) {
+                  bool is_smooth, HitRecord *hits) {
   const LastPlanes last = last_planes(&frame);
   const ActiveBox box = active_box(frame.surface, last);
   uint num_hits = 0;
@@ -179,7 +204,9 @@ inline uint trace(const FrameParams &frame, const HostField &field, const RayTil
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
       const uint ray_id = x + frame.view.width * y;
       const Ray ray = make_ray(&frame, ray_id);
-      num_hits += trace_ray(frame, field, box, last, ray, hits + ray_id) ? 1u : 0u;
+      if (!trace_ray(frame, field, box, last, ray, hits + ray_id)) continue;
+      if (is_smooth) smooth_gradient(frame, field, last, hits + ray_id);
+      ++num_hits;
     }
   }
   return num_hits;
@@ -202,8 +229,8 @@ ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
   return inside(values, isovalue);
 }
 ISO_WHOLE_LOOP uint trace_anywhere(const FrameParams &frame, const HostField &field,
-                                   const RayTile &tile, HitRecord *hits) {
-  return trace(frame, field, tile, hits);
+                                   const RayTile &tile, bool is_smooth, HitRecord *hits) {
+  return trace(frame, field, tile, is_smooth, hits);
 }
 ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
                                    uint samples, uint row, const HitRecord *hits,
@@ -219,8 +246,8 @@ ISO_WIDE_LOOP ulong inside_wide(const float *values, float isovalue) {
   return inside(values, isovalue);
 }
 ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                              HitRecord *hits) {
-  return trace(frame, field, tile, hits);
+                              bool is_smooth, HitRecord *hits) {
+  return trace(frame, field, tile, is_smooth, hits);
 }
 ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
                               uint row, const HitRecord *hits, std::uint8_t *rgb) {

@@ -47,10 +47,11 @@ struct HostLoops {
   /// Writes the hits of a tile of the frame's rays into hits [height * width], those of rays that
   /// hit something alone.
   ///
-  /// frame    its surface's box is that of the field's active blocks
-  /// Returns  how many there are
+  /// frame      its surface's box is that of the field's active blocks
+  /// is_smooth  hits have smooth gradients (Normals::kSmooth)
+  /// Returns    how many there are
   uint (*trace)(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                HitRecord *hits);
+                bool is_smooth, HitRecord *hits);
   /// Shades a row of the picture of the frame's hits [height * width].
   ///
   /// samples  rays of a pixel along each axis

@@ -67,6 +67,7 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
   frame_ = frame;
   samples_ = size.samples;
+  normals_ = request.normals;
   hits_.assign(size.num_rays(), no_hit());
 
   // Bands have whole rows of pixels; without a callback, one has all.
@@ -109,7 +110,7 @@ std::uint64_t HostRenderer::draw_band(std::uint32_t begin_row, std::uint32_t end
         num_hits += loops.trace(
             frame_, field,
             {x, y, std::min(x + kTileRays, screen.end_x), std::min(y + tile_rows, end_y)},
-            hits_.data());
+            normals_ == Normals::kSmooth, hits_.data());
       });
   return num_hits;
 }

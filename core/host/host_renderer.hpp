@@ -60,6 +60,7 @@ class HostRenderer {
   HostBlocks blocks_;
   FrameParams frame_{};
   std::uint32_t samples_ = 1;
+  Normals normals_ = Normals::kSmooth;
   std::vector<HitRecord> hits_;
 };
 
