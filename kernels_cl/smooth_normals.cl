@@ -5,11 +5,11 @@
 ///
 /// All but the gradients of hits keep their bits.
 #define ISO_FOUND local
-#include "device/block_cells.h"
 #include "device/level_borders.h"
 #include "device/pass_counts.h"
 #include "device/touched_requests.h"
 #include "device/work_group.h"
+#include "portable/block_cells.h"
 #include "portable/smooth_gradient.h"
 
 /// Looks for those of the 2^3 blocks from `base` on whose bits (corner x + 2y + 4z) are set in

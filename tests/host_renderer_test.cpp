@@ -16,6 +16,7 @@
 #include "core/host/host_renderer.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/render/renderer.hpp"
+#include "reference/random.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_cases.hpp"
 #include "tests/run_program.hpp"
@@ -171,9 +172,15 @@ TEST(HostLoops, AllGiveTheSameBits) {
   frame.surface = blocks.surface();
   const ShadeParams shading = make_shade_params(volume.info(), {});
   const Image8 picture = shade_scalar(frame, shading, expected);
+  std::vector<HitRecord> smooth = expected;
+  smooth_gradients(frame, volume.voxels, smooth);
   for (const HostLoops &loops : all_host_loops()) {
     std::vector<HitRecord> hits(64 * 48, no_hit());
-    EXPECT_EQ(loops.trace(frame, blocks.field(), {0, 0, 64, 48}, hits.data()),
+    EXPECT_EQ(loops.trace(frame, blocks.field(), {0, 0, 64, 48}, true, hits.data()),
+              test::num_hits(expected));
+    expect_same_hits(hits, smooth, 64);
+    std::ranges::fill(hits, no_hit());
+    EXPECT_EQ(loops.trace(frame, blocks.field(), {0, 0, 64, 48}, false, hits.data()),
               test::num_hits(expected));
     expect_same_hits(hits, expected, 64);
     std::vector<std::uint8_t> row(3 * 64);
@@ -228,6 +235,76 @@ TEST(HostRenderer, BandsGrowFromTheTopAndCanBeStopped) {
   request.on_pass = [&](const PassStats &pass) { return pass.completed_percent < 100; };
   EXPECT_FALSE(renderer.render(request).cancelled) << "nothing was left";
   expect_same_hits(renderer.hits(), whole, size.width);
+}
+
+/// Rays of any origin and direction, the last ones along axes and in planes of cells.
+std::vector<WorldRay> any_rays(const glm::uvec3 &dims, std::size_t count) {
+  Random random(11);
+  const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
+  const auto within = [&](double least, double most) { return random.in(least, most); };
+  std::vector<WorldRay> rays;
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 from =
+                         extent * glm::dvec3(random.in(-1, 2), random.in(-1, 2), random.in(-1, 2)),
+                     to = extent * glm::dvec3(random.in(0, 1), random.in(0, 1), random.in(0, 1));
+    // Numbers that float32 holds, the largest component between 1/2 and 1.
+    const glm::vec3 towards(to - from);
+    const float largest = std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)});
+    glm::vec3 direction = towards / largest * 0.75f;
+    glm::vec3 origin(from);
+    if (i % 4 == 3) {
+      const auto axis = static_cast<int>(i / 4 % 3);
+      direction[axis] = 0;
+      if (glm::length(direction) < 0.5f) direction[(axis + 1) % 3] = 0.75f;
+      origin = glm::round(origin);
+    }
+    rays.push_back({origin, direction});
+  }
+  return rays;
+}
+
+TEST(HostRenderer, RaysOfAnyOriginHitWhatTheTwinFinds) {
+  const glm::uvec3 dims(33, 29, 37);
+  const TestVolume volume(dims, test::gyroid_field(9), 12);
+  HostRenderer renderer(volume.compressed);
+  const std::vector<WorldRay> rays = any_rays(dims, 4000);
+  FrameParams frame = make_grid_params(volume.info());
+  frame.view.t_scale = 1;
+  frame.surface.isovalue = 0.2f;
+  std::vector<HitRecord> expected;
+  for (const WorldRay &ray : rays) {
+    const glm::vec3 o(ray.origin), d(ray.direction);
+    expected.push_back(
+        trace_scalar(frame, volume.voxels, kDefaultSolver,
+                     {make_ray_axis(o.x, d.x), make_ray_axis(o.y, d.y), make_ray_axis(o.z, d.z)}));
+    const float largest = std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+    ASSERT_TRUE(largest >= 0.5f && largest < 1.0f);
+  }
+  EXPECT_GT(test::num_hits(expected), 1000u);
+  expect_same_hits(renderer.cast_rays(rays, 0.2f, Normals::kCell), expected, 1);
+  smooth_gradients(frame, volume.voxels, expected);
+  expect_same_hits(renderer.cast_rays(rays, 0.2f, Normals::kSmooth), expected, 1);
+
+  // t counts in lengths of the direction.
+  std::vector<WorldRay> longer = rays;
+  for (WorldRay &ray : longer) ray.direction *= 8.0;
+  for (HitRecord &hit : expected) hit.t /= 8;
+  expect_same_hits(renderer.cast_rays(longer, 0.2f, Normals::kSmooth), expected, 1);
+  EXPECT_TRUE(renderer.cast_rays({}, 0.2f, Normals::kSmooth).empty());
+}
+
+TEST(HostRenderer, RaysThatCannotBeTracedAreOneLine) {
+  const TestVolume volume({20, 20, 20}, test::gyroid_field(9), 8);
+  HostRenderer renderer(volume.compressed);
+  const auto error_of_ray = [&](const WorldRay &ray, float isovalue = 0.2f) {
+    const std::vector<WorldRay> rays = {{{0, 0, 0}, {1, 0, 0}}, ray};
+    return error_of([&] { renderer.cast_rays(rays, isovalue, Normals::kCell); });
+  };
+  EXPECT_THAT(error_of_ray({{0, 0, 0}, {0, 0, 0}}), HasSubstr("ray 1 has no direction"));
+  EXPECT_THAT(error_of_ray({{0, 0, 0}, {0, NAN, 1}}), HasSubstr("ray 1 has no direction"));
+  EXPECT_THAT(error_of_ray({{0, INFINITY, 0}, {1, 0, 0}}), HasSubstr("ray 1 begins"));
+  EXPECT_THAT(error_of_ray({{0, 2e7, 0}, {1, 0, 0}}), HasSubstr("ray 1 begins 2e+07 voxels"));
+  EXPECT_THAT(error_of_ray({{0, 0, 0}, {1, 0, 0}}, NAN), HasSubstr("NaN"));
 }
 
 TEST(HostRenderer, MemoryIsStatedAndLimited) {
@@ -306,6 +383,36 @@ TEST(ApiHostRenderer, RefusesInOneLineWhatDevicesAloneCan) {
   EXPECT_THAT(error_of([] { isowave::HostRenderer(nullptr); }), HasSubstr("needs a volume"));
   EXPECT_THAT(error_of([] { isowave::HostRenderer(public_volume(), {.memory_limit = 1000}); }),
               HasSubstr("raise the limit"));
+}
+
+TEST(ApiHostRenderer, CastRaysInTheWorld) {
+  Grid grid{.dims = {21, 21, 21}, .spacing = {1, 2, 3}, .origin = {5, 6, 7}};
+  std::vector<float> voxels;
+  for (int i = 0; i < 21 * 21 * 21; ++i) voxels.push_back(static_cast<float>(i / 441));  // z
+  isowave::HostRenderer renderer(compress(voxels, grid, {.tolerance = 1e-4}));
+  // The surface is the plane z = 7 + 3 * 10.5.
+  const std::vector<isowave::Ray> rays = {{{10, 20, 0}, {0, 0, 1}},
+                                          {{10, 20, 0}, {0, 0, 10}},
+                                          {{10, 20, 100}, {0.5, 0.25, -2}},
+                                          {{10, 20, 0}, {0, 0, -1}},
+                                          {{100, 20, 0}, {0, 0, 1}}};
+  const Frame hits = renderer.cast_rays(rays, 10.5f);
+  ASSERT_EQ(hits.rows, 1u);
+  ASSERT_EQ(hits.columns, 5u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double t = (38.5 - rays[i].origin[2]) / rays[i].direction[2];
+    EXPECT_NEAR(hits.depth[i], t, 1e-3 * t);
+    EXPECT_NEAR(hits.positions[i][2], 38.5, 1e-3);
+    EXPECT_NEAR(hits.positions[i][0], rays[i].origin[0] + t * rays[i].direction[0], 1e-3);
+    EXPECT_NEAR(hits.normals[i][2], -1, 1e-3);
+    EXPECT_EQ(hits.hits[i].cell[2], 10u);
+  }
+  for (std::size_t i = 3; i < 5; ++i) {
+    EXPECT_TRUE(std::isinf(hits.depth[i]));
+    EXPECT_TRUE(std::isnan(hits.positions[i][0]));
+  }
+  EXPECT_THAT(error_of([&] { renderer.cast_rays(std::vector<isowave::Ray>(1), 1); }),
+              HasSubstr("direction"));
 }
 
 TEST(ApiHostRenderer, FramesCanBeWatchedAndStopped) {

@@ -212,6 +212,21 @@ inline uint trace(const FrameParams &frame, const HostField &field, const RayTil
   return num_hits;
 }
 
+inline void cast(const FrameParams &frame, const HostField &field, const IndexRay *rays,
+                 uint num_rays, bool is_smooth, HitRecord *hits) {
+  const LastPlanes last = last_planes(&frame);
+  const ActiveBox box = active_box(frame.surface, last);
+  for (uint i = 0; i < num_rays; ++i) {
+    const IndexRay &r = rays[i];
+    const Ray ray = {make_ray_axis(r.origin[0], r.direction[0]),
+                     make_ray_axis(r.origin[1], r.direction[1]),
+                     make_ray_axis(r.origin[2], r.direction[2])};
+    if (!trace_ray(frame, field, box, last, ray, hits + i)) continue;
+    hits[i].t *= r.t_scale;
+    if (is_smooth) smooth_gradient(frame, field, last, hits + i);
+  }
+}
+
 inline void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
                   const HitRecord *hits, std::uint8_t *rgb) {
   const uint columns = frame.view.width / samples;
@@ -232,6 +247,11 @@ ISO_WHOLE_LOOP uint trace_anywhere(const FrameParams &frame, const HostField &fi
                                    const RayTile &tile, bool is_smooth, HitRecord *hits) {
   return trace(frame, field, tile, is_smooth, hits);
 }
+ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &field,
+                                  const IndexRay *rays, uint num_rays, bool is_smooth,
+                                  HitRecord *hits) {
+  cast(frame, field, rays, num_rays, is_smooth, hits);
+}
 ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
                                    uint samples, uint row, const HitRecord *hits,
                                    std::uint8_t *rgb) {
@@ -249,6 +269,10 @@ ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, 
                               bool is_smooth, HitRecord *hits) {
   return trace(frame, field, tile, is_smooth, hits);
 }
+ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, const IndexRay *rays,
+                             uint num_rays, bool is_smooth, HitRecord *hits) {
+  cast(frame, field, rays, num_rays, is_smooth, hits);
+}
 ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
                               uint row, const HitRecord *hits, std::uint8_t *rgb) {
   shade(frame, params, samples, row, hits, rgb);
@@ -262,9 +286,9 @@ bool is_wide() {
 #endif
 
 constexpr HostLoops kLoops[] = {
-    {decode_anywhere, inside_anywhere, trace_anywhere, shade_anywhere},
+    {decode_anywhere, inside_anywhere, trace_anywhere, cast_anywhere, shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
-    {decode_wide, inside_wide, trace_wide, shade_wide},
+    {decode_wide, inside_wide, trace_wide, cast_wide, shade_wide},
 #endif
 };
 

@@ -37,6 +37,13 @@ struct RayTile {
   uint begin_x, begin_y, end_x, end_y;  ///< of the frame's rays
 };
 
+/// A ray of any origin, in index space.
+struct IndexRay {
+  float origin[3];     ///< [voxels]
+  float direction[3];  ///< [voxels per t]; the largest component is from 1/2 to below 1
+  float t_scale;       ///< power of two: t of the kernels -> t of whoever asks
+};
+
 struct HostLoops {
   /// Decodes a block to values [64].
   ///
@@ -52,6 +59,11 @@ struct HostLoops {
   /// Returns    how many there are
   uint (*trace)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                 bool is_smooth, HitRecord *hits);
+  /// Writes the hits of rays into hits [num_rays], those of rays that hit something alone.
+  ///
+  /// frame      as for trace(); its view is not used
+  void (*cast)(const FrameParams &frame, const HostField &field, const IndexRay *rays,
+               uint num_rays, bool is_smooth, HitRecord *hits);
   /// Shades a row of the picture of the frame's hits [height * width].
   ///
   /// samples  rays of a pixel along each axis

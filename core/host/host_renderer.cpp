@@ -21,6 +21,8 @@ namespace {
 constexpr std::uint32_t kTileRays = 16;
 /// Of a band, for each thread, so that none waits long for the last.
 constexpr std::uint32_t kTilesPerThread = 8;
+/// Rays of any origin that a thread takes at a time.
+constexpr std::uint32_t kRunRays = 1024;
 
 std::uint64_t mebibytes(std::uint64_t bytes) {
   return (bytes + (1u << 20) - 1) >> 20;
@@ -37,8 +39,27 @@ const CompressedVolume &checked(const CompressedVolume &volume,
       mebibytes(needed), limit >> 20);
 }
 
-std::uint32_t rounded_up(std::uint32_t count, std::uint32_t unit) {
+template <class Count>
+Count rounded_up(Count count, std::uint32_t unit) {
   return (count + unit - 1) / unit;
+}
+
+/// number: of the ray, for messages.
+IndexRay index_ray(const glm::dvec3 &origin, const glm::dvec3 &direction, std::size_t number) {
+  const auto largest = [](const glm::dvec3 &v) {
+    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  };
+  const double length = largest(direction), away = largest(origin);
+  if (!std::isfinite(length + direction.x + direction.y + direction.z) || length == 0)
+    throw Error("ray {} has no direction: give three finite numbers that are not all 0", number);
+  if (!std::isfinite(away + origin.x + origin.y + origin.z) || away > 1e7) {
+    throw Error("ray {} begins {:.3g} voxels from the volume's origin: up to 1e7 can be traced",
+                number, away);
+  }
+  int exponent = 0;
+  std::frexp(length, &exponent);
+  const glm::vec3 o(origin), d(direction * std::exp2(-exponent));
+  return {{o.x, o.y, o.z}, {d.x, d.y, d.z}, static_cast<float>(std::exp2(-exponent))};
 }
 
 }  // namespace
@@ -113,6 +134,32 @@ std::uint64_t HostRenderer::draw_band(std::uint32_t begin_row, std::uint32_t end
             normals_ == Normals::kSmooth, hits_.data());
       });
   return num_hits;
+}
+
+std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                               Normals normals) {
+  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
+  const glm::dmat3 world_to_index = glm::inverse(info_.index_to_world());
+  std::vector<IndexRay> index_rays(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const glm::dvec3 origin = world_to_index * (rays[i].origin - info_.origin);
+    index_rays[i] = index_ray(origin, world_to_index * rays[i].direction, i);
+  }
+  FrameParams frame = make_grid_params(info_);
+  frame.view.t_scale = 1;
+  frame.surface.isovalue = isovalue;
+  blocks_.select(isovalue);
+  frame.surface = blocks_.surface();
+  std::vector<HitRecord> hits(rays.size(), no_hit());
+  const HostField field = blocks_.field();
+  parallel_for(
+      rounded_up(rays.size(), kRunRays), num_threads_, [&](std::uint64_t run, std::uint32_t) {
+        const std::size_t begin = run * kRunRays;
+        host_loops().cast(frame, field, index_rays.data() + begin,
+                          static_cast<uint>(std::min<std::size_t>(kRunRays, rays.size() - begin)),
+                          normals == Normals::kSmooth, hits.data() + begin);
+      });
+  return hits;
 }
 
 Camera HostRenderer::camera(float isovalue, ImageSize size) const {

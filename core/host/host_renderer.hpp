@@ -6,6 +6,7 @@
 // blocks, blocks, and cells whose corners are on one side.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/host/host_blocks.hpp"
@@ -18,6 +19,11 @@ struct HostRendererOptions {
   /// Bytes that it may take; 0: a quarter of the host's memory.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor
+};
+
+/// A ray in world space: origin + t direction, t from 0 on.
+struct WorldRay {
+  glm::dvec3 origin, direction;
 };
 
 /// Not thread-safe.
@@ -35,6 +41,13 @@ class HostRenderer {
   /// request  without levels of detail, voxel_error and bound; a size
   /// Throws   Error: others; what make_frame_params() throws
   FrameStats render(const FrameRequest &request);
+
+  /// The first hit of each ray. t counts in lengths of its direction. Leaves the last frame as it
+  /// is.
+  ///
+  /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
+  ///         1e7 voxels away from the volume's origin
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue, Normals normals);
 
   /// Throws  Error: a request that render() refuses
   static void check(const FrameRequest &request);

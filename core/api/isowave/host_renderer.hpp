@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "isowave/frame.hpp"
 #include "isowave/volume.hpp"
@@ -15,6 +16,11 @@ struct HostRendererOptions {
   /// voxel.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor. The result is the same for any number
+};
+
+/// In world space: origin + t direction, t from 0 on.
+struct Ray {
+  Vector3 origin, direction;
 };
 
 /// Keeps the whole volume decoded in host memory. May be used from several threads: frames are
@@ -40,6 +46,14 @@ class HostRenderer {
   Frame render(const FrameRequest &request);
   /// Whether render() draws such a request.
   static bool can_draw(const FrameRequest &request);
+
+  /// Where rays of any origin and direction first cross the isosurface.
+  ///
+  /// Returns  one row of rays.size() columns: depth, in lengths of the ray's direction; normals,
+  ///          positions and hits; no picture
+  /// Throws   Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more
+  ///          than 1e7 voxels from the volume's origin
+  Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
 
   /// The view that Renderer::camera() takes, for a picture of that size.
   Camera camera(float isovalue, const ImageSize &size = {}) const;
