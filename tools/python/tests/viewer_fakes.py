@@ -60,6 +60,8 @@ class FakeVolume:
     renderers: list[dict[str, Any]] = field(default_factory=list)
     shape: tuple[int, int, int] = (SIDE, SIDE, SIDE)
     spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    direction: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
     dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
     value_range: tuple[float, float] = (0.0, VALUES)
     nbytes: int = 65536

@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .interfaces import ImageLike, RendererLike, VolumeLike
-from .pictures import count_rays, dividing_value, encode_jpeg, encode_png, fit_size
+from .pictures import box_corners, count_rays, dividing_value, encode_jpeg, encode_png, fit_size
+from .pictures import narrow_factor
 from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, View, Wish
 from .protocol import VERSION, check
 
@@ -273,7 +274,7 @@ class Scene:
 
     def _draw(self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage) -> None:
         began = self._clock()
-        view = client.view or wish.view or home_view(renderer, self._made, wish)
+        view = client.view or wish.view or self._home_view(renderer, wish)
         with self._changed:
             if client.wish is not wish:
                 return
@@ -424,6 +425,18 @@ class Scene:
             width, height = (max(1, side // FIRST_DIVISOR) for side in wish.size)
             return fit_size((width, height), 1, self._limit()), 1
         return fit_size(wish.size, wish.samples, self._limit()), wish.samples
+
+    def _home_view(self, renderer: RendererLike, wish: Wish) -> View:
+        """The view in which the surface fills the picture."""
+        camera = renderer.camera(wish.isovalue)
+        eye, at, up = (np.asarray(v, np.float64) for v in (camera.eye, camera.at, camera.up))
+        aspect = wish.size[0] / wish.size[1]
+        made = self._made.size if self._made else wish.size
+        factor = narrow_factor(
+            box_corners(self._volume) - at, eye - at, up, camera.fovy, aspect, made[0] / made[1]
+        )
+        x, y, z = (float(v) for v in at + factor * (eye - at))
+        return View((x, y, z), _triple(at), _triple(up), float(camera.fovy))
 
     def _limit(self) -> int:
         return self._made.rays if self._made else MAX_RAYS
@@ -625,15 +638,8 @@ class TooManyClients(ProtocolError):
     """The scene has as many clients as it may have."""
 
 
-def home_view(renderer: RendererLike, made: RendererOptions | None, wish: Wish) -> View:
-    """The view in which the surface fills the picture, from further away in a narrow picture."""
-    camera = renderer.camera(wish.isovalue)
-    aspect = wish.size[0] / wish.size[1]
-    made_aspect = made.size[0] / made.size[1] if made else aspect
-    away = max(1.0, made_aspect / aspect)
-    eye, at, up = ([float(v) for v in p] for p in (camera.eye, camera.at, camera.up))
-    x, y, z = (a + away * (e - a) for e, a in zip(eye, at))
-    return View((x, y, z), (at[0], at[1], at[2]), (up[0], up[1], up[2]), float(camera.fovy))
+def _triple(v: NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(v[0]), float(v[1]), float(v[2])
 
 
 def first_line(error: Exception) -> str:

@@ -61,14 +61,12 @@ class Limits:
 
     message_rate, message_burst  messages of a client: a second, and at once
     queue                        messages that wait to be sent to a client; more: it is gone
-    send_seconds                 for one message to be sent
     connections                  at the same time, of all kinds
     """
 
     message_rate: float = 250
     message_burst: float = 500
     queue: int = 64
-    send_seconds: float = 30
     connections: int = 64
 
 
@@ -255,15 +253,14 @@ class _Connection:
     async def _write(self) -> None:
         while True:
             head, data = await self._queue.get()
+            # Who does not read is noticed by the pings that uvicorn sends.
             text = json.dumps(head, allow_nan=False)
             if data is None:
-                sending = self._websocket.send_text(text)
+                await self._websocket.send_text(text)
             else:
                 encoded = text.encode()
-                sending = self._websocket.send_bytes(
-                    struct.pack("<I", len(encoded)) + encoded + data
-                )
-            await asyncio.wait_for(sending, self._limits.send_seconds)
+                size = struct.pack("<I", len(encoded))
+                await self._websocket.send_bytes(size + encoded + data)
 
 
 class _BinaryMessage(ProtocolError):

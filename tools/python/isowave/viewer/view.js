@@ -220,15 +220,15 @@ const HTML = `
     <label>Surface <input name="color" type="color"></label>
     <label>Background <input name="background" type="color"></label>
     <h2>Quality</h2>
-    <label>Largest error <span><input name="max_error" type="number" min="0.001" max="1000"
+    <label>Largest error <span class="unit"><input name="max_error" type="number" min="0.001" max="1000"
       step="any" placeholder="none"> px</span></label>
     <label>Samples per pixel <select name="samples"><option value="1">1</option>
       <option value="2">4</option><option value="3">9</option><option value="4">16</option></select>
     </label>
-    <label>Time budget <span><input name="time_budget" type="number" min="1" max="600000" step="any"
+    <label>Time budget <span class="unit"><input name="time_budget" type="number" min="1" max="600000" step="any"
       placeholder="none"> ms</span></label>
     <h2>Device</h2>
-    <form class="budget"><label>Memory budget <span><input name="budget" type="number" min="1"
+    <form class="budget"><label>Memory budget <span class="unit"><input name="budget" type="number" min="1"
       max="9000000" step="1" placeholder="default"> MiB</span></label></form>
     <dl class="device"></dl>
     <h2>This picture</h2>
@@ -277,7 +277,7 @@ const CSS = `
 .histogram input::-moz-range-thumb { width: ${THUMB}px; height: 44px; border: 0; border-radius: 0;
   background: linear-gradient(var(--accent), var(--accent)) center / 2px 100% no-repeat,
     radial-gradient(circle at 50% 50%, var(--accent) 5px, transparent 5.8px); }
-.ends { display: flex; justify-content: space-between; color: var(--soft); font-size: 11px;
+.ends { display: flex; padding: 0 ${THUMB / 2}px; justify-content: space-between; color: var(--soft); font-size: 11px;
   font-variant-numeric: tabular-nums; }
 .panel { grid-area: panel; width: 248px; padding: 12px 14px; overflow: auto;
   background: var(--card); border-left: 1px solid var(--line); }
@@ -287,22 +287,25 @@ const CSS = `
 .volume { margin: 0 0 10px; color: var(--soft); font-size: 12px; }
 .panel label { display: flex; justify-content: space-between; align-items: center; gap: 8px;
   min-height: 30px; }
+.panel select { width: 76px; margin-right: 32px; }
+.panel input[type=color] { width: 76px; margin-right: 32px; }
 .buttons { display: grid; grid-template-columns: 1fr 1fr; gap: 6px; }
 .paste { margin-top: 8px; }
 .paste label { display: block; }
 .problem { margin: 4px 0; color: var(--bad); }
 button, input, select, textarea { font: inherit; color: inherit; }
 button, input[type=number], select, textarea { border: 1px solid var(--edge); border-radius: 4px;
-  background: var(--field); padding: 3px 8px; min-height: 28px; }
+  background: var(--field); padding: 0 8px; height: 28px; }
 button { cursor: pointer; background: var(--card); white-space: nowrap; }
 button:hover { border-color: var(--accent); color: var(--accent); }
-.panel input[type=number] { width: 84px; text-align: right; appearance: textfield; }
+.unit { display: grid; grid-template-columns: 76px 26px; align-items: center; gap: 6px; }
+.panel input[type=number] { width: 100%; text-align: right; appearance: textfield; }
 input::-webkit-inner-spin-button { display: none; }
 input::placeholder { color: var(--soft); opacity: 1; }
-input[type=color] { width: 44px; height: 26px; padding: 2px; border: 1px solid var(--edge);
+input[type=color] { height: 26px; padding: 2px; border: 1px solid var(--edge);
   border-radius: 4px; background: var(--field); cursor: pointer; }
 input:invalid { border-color: var(--bad); outline-color: var(--bad); }
-textarea { width: 100%; resize: vertical; font: 12px/1.4 ui-monospace, monospace; }
+textarea { width: 100%; height: auto; padding: 4px 8px; resize: vertical; font: 12px/1.4 ui-monospace, monospace; }
 :focus-visible { outline: 2px solid var(--accent); outline-offset: 2px; }
 .picture:focus-visible, .histogram input:focus-visible { outline-offset: -2px; }
 dl { display: grid; grid-template-columns: auto 1fr; gap: 2px 10px; margin: 4px 0; }
@@ -321,7 +324,7 @@ summary { cursor: pointer; }
   .iso .number { width: 84px; }
   .panel { width: auto; border: 0; border-top: 1px solid var(--line); overflow: visible; }
 }
-@media (pointer: coarse) { button, input[type=number], select { min-height: 36px; }
+@media (pointer: coarse) { button, input[type=number], select { height: 36px; }
   .panel label { min-height: 40px; } }
 @media (prefers-reduced-motion: reduce) { * { transition: none !important; } }
 `;
@@ -516,7 +519,7 @@ class View {
     const { counts, range: [from, to] } = this.histogram;
     const [low, high] = this.range;
     const inset = (THUMB / 2) * ratio; // the thumb's middle goes from here to there
-    const x = (v) => inset + ((v - low) / (high - low || 1)) * (width - 2 * inset);
+    const x = (v) => Math.round(inset + ((v - low) / (high - low || 1)) * (width - 2 * inset));
     const most = Math.log1p(Math.max(...counts, 1));
     counts.forEach((count, i) => {
       const [a, b] = [i, i + 1].map((k) => from + ((to - from) * k) / counts.length);
@@ -524,7 +527,7 @@ class View {
       const inside = b > this.state.isovalue;
       context.fillStyle = style.getPropertyValue(inside ? "--accent" : "--bars");
       context.globalAlpha = inside ? 0.55 : 1;
-      context.fillRect(x(a), height - bar, Math.max(1, x(b) - x(a) + 0.5), bar);
+      context.fillRect(x(a), height - bar, Math.max(1, x(b) - x(a)), bar);
     });
   }
 
