@@ -279,7 +279,7 @@ const CSS = `
     radial-gradient(circle at 50% 50%, var(--accent) 5px, transparent 5.8px); }
 .ends { display: flex; padding: 0 ${THUMB / 2}px; justify-content: space-between; color: var(--soft); font-size: 11px;
   font-variant-numeric: tabular-nums; }
-.panel { grid-area: panel; width: 248px; padding: 12px 14px; overflow: auto;
+.panel { grid-area: panel; width: 268px; padding: 12px 14px; overflow: auto;
   background: var(--card); border-left: 1px solid var(--line); }
 .panel h1 { margin: 0; font-size: 14px; font-weight: 600; overflow-wrap: anywhere; }
 .panel h2 { margin: 14px 0 4px; font-size: 11px; font-weight: 600; color: var(--soft);
@@ -287,8 +287,7 @@ const CSS = `
 .volume { margin: 0 0 10px; color: var(--soft); font-size: 12px; }
 .panel label { display: flex; justify-content: space-between; align-items: center; gap: 8px;
   min-height: 30px; }
-.panel select { width: 76px; margin-right: 32px; }
-.panel input[type=color] { width: 76px; margin-right: 32px; }
+.panel :is(select, input[type=color]) { flex: none; width: 76px; margin-right: 32px; }
 .buttons { display: grid; grid-template-columns: 1fr 1fr; gap: 6px; }
 .paste { margin-top: 8px; }
 .paste label { display: block; }
