@@ -184,6 +184,7 @@ TEST(Api, WhatCannotBeOpenedIsAnError) {
   EXPECT_THAT(error_of([&] { sphere()->save(folder / "no" / "such" / "folder.zfp"); }),
               HasSubstr("folder.zfp"));
   EXPECT_THAT(error_of([&] { save_png(Frame{}, folder / "a.png"); }), HasSubstr("no picture"));
+  EXPECT_THAT(error_of([&] { encode_png(Frame{}); }), HasSubstr("no picture"));
 }
 
 class ApiOnDevice : public testing::TestWithParam<core::ocl::DeviceInfo> {
@@ -195,7 +196,7 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
   const auto volume = sphere();
   Renderer renderer(open_device(selector()), volume, {.largest = {64, 48, 1}});
   FrameRequest request = small_request(renderer);
-  request.want_hits = request.want_normals = true;
+  request.want_hits = request.want_normals = request.want_positions = true;
   const Frame frame = renderer.render(request);
   EXPECT_EQ(frame.picture.size(), 3u * 64 * 48);
   ASSERT_EQ(frame.depth.size(), 64u * 48);
@@ -209,6 +210,7 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
     const float length = std::hypot(normal[0], normal[1], normal[2]);
     if (std::isinf(hit.t)) {
       EXPECT_EQ(length, 0);
+      EXPECT_TRUE(std::isnan(frame.positions[i][0]));
       continue;
     }
     ++num_hits;
@@ -221,6 +223,7 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
       const double spacing = volume->grid().spacing[axis];
       const double world =
           volume->grid().origin[axis] + spacing * (double{hit.position[axis]} + hit.cell[axis]);
+      EXPECT_FLOAT_EQ(frame.positions[i][axis], static_cast<float>(world));
       outwards[axis] = (world - centre[axis]) / (spacing * spacing);
       norm += outwards[axis] * outwards[axis];
       cosine += outwards[axis] * double{normal[axis]};
@@ -230,15 +233,19 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
   EXPECT_EQ(frame.statistics.hits, num_hits);
   EXPECT_TRUE(frame.statistics.complete);
   EXPECT_EQ(renderer.render(request).depth, frame.depth);
+  const test::TemporaryFolder folder;
+  save_png(frame, folder / "a.png");
+  const std::vector<std::uint8_t> png = encode_png(frame);
+  EXPECT_EQ(test::read_file(folder / "a.png"), std::string(png.begin(), png.end()));
 }
 
 /// From as near as it may: the box of the surface's blocks is in the picture, and fills it.
 TEST_P(ApiOnDevice, SurfacesFillThePicture) {
   for (const float isovalue : {0.3f, 0.6f, 0.9f, 5.0f}) {
-    Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}});
+    Renderer renderer(open_device(selector()), sphere(), {.largest = {640, 48, 1}});
     FrameRequest request = small_request(renderer);
     request.isovalue = isovalue;
-    request.camera = renderer.camera(isovalue);
+    request.camera = renderer.camera(isovalue, request.size);
     const Frame frame = renderer.render(request);
     if (isovalue > 1) {
       EXPECT_EQ(frame.statistics.hits, 0u) << "no surface";

@@ -13,6 +13,7 @@
 #include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
+#include "tests/setting.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave::core {
@@ -151,24 +152,8 @@ TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
 INSTANTIATE_TEST_SUITE_P(Devices, CompileOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
 
-/// Sets an environment variable for as long as it lives.
-class Setting {
- public:
-  Setting(const char *name, const std::string &value) : name_(name) {
-    if (const char *before = std::getenv(name)) before_ = before;
-    ::setenv(name, value.c_str(), 1);
-  }
-  ~Setting() { before_ ? ::setenv(name_, before_->c_str(), 1) : ::unsetenv(name_); }
-  Setting(const Setting &) = delete;
-  Setting &operator=(const Setting &) = delete;
-
- private:
-  const char *name_;
-  std::optional<std::string> before_;
-};
-
 TEST(KernelCache, FolderIsTheDrivers) {
-  const Setting home("HOME", "/home/someone"), cache("XDG_CACHE_HOME", ""),
+  const test::Setting home("HOME", "/home/someone"), cache("XDG_CACHE_HOME", ""),
       pocl("POCL_CACHE_DIR", ""), mesa("MESA_SHADER_CACHE_DIR", ""), nvidia("CUDA_CACHE_PATH", "");
   const auto folder = [](const char *platform) {
     ocl::DeviceInfo info;
@@ -179,7 +164,7 @@ TEST(KernelCache, FolderIsTheDrivers) {
   EXPECT_EQ(folder("rusticl"), "/home/someone/.cache/mesa_shader_cache");
   EXPECT_EQ(folder("NVIDIA CUDA"), "/home/someone/.nv/ComputeCache");
   EXPECT_EQ(folder("Some other platform"), std::nullopt);
-  const Setting own("POCL_CACHE_DIR", "/elsewhere"), none("CUDA_CACHE_DISABLE", "1"),
+  const test::Setting own("POCL_CACHE_DIR", "/elsewhere"), none("CUDA_CACHE_DISABLE", "1"),
       xdg("XDG_CACHE_HOME", "/x");
   EXPECT_EQ(folder("Portable Computing Language"), "/elsewhere");
   EXPECT_EQ(folder("rusticl"), "/x/mesa_shader_cache");
@@ -188,7 +173,7 @@ TEST(KernelCache, FolderIsTheDrivers) {
 
 TEST(KernelCache, NewFilesAreNewKernelsButForBookkeeping) {
   const test::TemporaryFolder folder;
-  const Setting own("POCL_CACHE_DIR", folder.path().string());
+  const test::Setting own("POCL_CACHE_DIR", folder.path().string());
   ocl::DeviceInfo info;
   info.platform = "Portable Computing Language";
   test::write_file(folder / "old.so", "");
@@ -216,7 +201,7 @@ std::size_t num_libraries(const fs::path &folder) {
 /// meets no block launches few; so whatever the second run adds had been left to its frames.
 TEST(CompileCommand, TheFirstOpeningSaysSoAndLeavesNothingToFrames) {
   const test::TemporaryFolder folder, cache;
-  const Setting own("POCL_CACHE_DIR", cache.path().string());
+  const test::Setting own("POCL_CACHE_DIR", cache.path().string());
   const std::string raw = test::quoted(folder / "shell_20x20x20_uint8.raw");
   ASSERT_EQ(test::run_isowave("generate shell --dims 20 --type uint8 -o " + raw).status, 0);
   const auto render = [&](const std::string &options) {

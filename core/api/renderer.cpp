@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -13,6 +14,7 @@
 #include "core/api/device_implementation.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/time_budget.hpp"
 #include "core/view/detail.hpp"
@@ -97,6 +99,30 @@ class HitCells {
 
  private:
   std::vector<core::FrameParams> grids_;
+};
+
+/// Where hits are.
+class WorldPositions {
+ public:
+  WorldPositions(const core::CompressedVolume &volume, bool with_levels)
+      : cells_(volume, with_levels), infos_(core::level_infos(volume, with_levels)) {}
+
+  std::array<float, 3> operator()(const core::HitRecord &record) const {
+    if (std::isinf(record.t)) {
+      constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+      return {kNone, kNone, kNone};
+    }
+    const Hit hit = cells_(record);
+    const core::VolumeInfo &info = infos_[hit.level];
+    const glm::dvec3 index = glm::dvec3(hit.cell[0], hit.cell[1], hit.cell[2]) +
+                             glm::dvec3(hit.position[0], hit.position[1], hit.position[2]);
+    const glm::vec3 world(info.origin + info.index_to_world() * index);
+    return {world.x, world.y, world.z};
+  }
+
+ private:
+  HitCells cells_;
+  std::vector<core::VolumeInfo> infos_;
 };
 
 /// Away from larger values, of length 1.
@@ -223,16 +249,20 @@ void Renderer::Implementation::fetch(const FrameRequest &request, const core::Fr
   const core::CompressedVolume &compressed = volume->implementation().volume;
   if (request.want_picture)
     frame.picture = renderer.shade(core_appearance(request.appearance)).pixels;
-  if (!(request.want_depth || request.want_normals || request.want_hits || request.want_bounds))
+  if (!(request.want_depth || request.want_normals || request.want_positions || request.want_hits ||
+        request.want_bounds))
     return;
+  const bool with_levels = renderer.options().with_levels;
   const std::vector<core::HitRecord> records = renderer.hits();
   const auto to_each = [&](auto &out, const auto &make) {
     out.resize(records.size());
-    std::ranges::transform(records, out.begin(), make);
+    core::parallel_for(records.size(), 0,
+                       [&](std::uint64_t i, std::uint32_t) { out[i] = make(records[i]); });
   };
   if (request.want_depth) frame.depth = core::depth_of(records);
   if (request.want_normals) to_each(frame.normals, WorldNormals(compressed.info));
-  if (request.want_hits) to_each(frame.hits, HitCells(compressed, renderer.options().with_levels));
+  if (request.want_positions) to_each(frame.positions, WorldPositions(compressed, with_levels));
+  if (request.want_hits) to_each(frame.hits, HitCells(compressed, with_levels));
   if (request.want_bounds)
     frame.bounds = core::certify(renderer, compressed, drawn, records).bounds;
 }
@@ -285,10 +315,11 @@ Frame Renderer::render(const FrameRequest &request) {
   });
 }
 
-Camera Renderer::camera(float isovalue) {
+Camera Renderer::camera(float isovalue, std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
     const std::lock_guard lock(implementation_->device->implementation().mutex);
-    const core::Camera camera = implementation_->renderer.camera({&isovalue, 1});
+    const core::Camera camera = implementation_->renderer.camera(
+        {&isovalue, 1}, size ? std::optional(core_size(*size)) : std::nullopt);
     return Camera{from_glm(camera.eye), from_glm(camera.at), from_glm(camera.up), camera.fovy_deg};
   });
 }
@@ -310,6 +341,13 @@ void save_png(const Frame &frame, const std::filesystem::path &path) {
   guarded("saving a picture", [&] {
     if (frame.picture.empty()) throw core::Error("{}: the frame has no picture", path.string());
     core::write_png({frame.size.width, frame.size.height, 3, frame.picture}, path);
+  });
+}
+
+std::vector<std::uint8_t> encode_png(const Frame &frame) {
+  return guarded("encoding a picture", [&] {
+    if (frame.picture.empty()) throw core::Error("the frame has no picture");
+    return core::encode_png({frame.size.width, frame.size.height, 3, frame.picture});
   });
 }
 

@@ -3,9 +3,12 @@
 #include "core/api/convert.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
+#include "core/sources/layer_reader.hpp"
 #include "core/sources/load_volume.hpp"
 #include "core/sources/memory_reader.hpp"
+#include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
+#include "core/zfp/voxel_sample.hpp"
 
 namespace isowave {
 
@@ -72,6 +75,13 @@ core::Storage to_storage(const Compression &compression) {
   return storage;
 }
 
+const core::CompressedVolume &level_of(const core::CompressedVolume &volume, std::uint32_t level) {
+  const std::vector<const core::CompressedVolume *> levels = core::levels_of(volume, true);
+  if (level >= levels.size())
+    throw core::Error("level {} of a volume that has {}: count from 0", level, levels.size());
+  return *levels[level];
+}
+
 std::shared_ptr<const Volume> make_volume(core::CompressedVolume volume) {
   return std::make_shared<const Volume>(
       std::make_unique<const Volume::Implementation>(std::move(volume)));
@@ -108,8 +118,20 @@ std::uint32_t Volume::num_levels() const {
   return static_cast<std::uint32_t>(implementation_->volume.coarser_levels.size() + 1);
 }
 
-std::vector<float> Volume::decode() const {
-  return guarded("decoding", [&] { return core::decode_with_libzfp(implementation_->volume); });
+Grid Volume::level_grid(std::uint32_t level) const {
+  return guarded("looking at a level",
+                 [&] { return public_grid(level_of(implementation_->volume, level).info); });
+}
+
+std::vector<float> Volume::decode(std::uint32_t level) const {
+  return guarded("decoding", [&] {
+    return core::decode_with_libzfp(level_of(implementation_->volume, level));
+  });
+}
+
+std::vector<float> Volume::sample(std::uint64_t max_voxels) const {
+  return guarded("decoding",
+                 [&] { return core::sample_voxels(implementation_->volume, max_voxels); });
 }
 
 void Volume::save(const std::filesystem::path &path) const {
@@ -144,6 +166,17 @@ std::shared_ptr<const Volume> compress(const void *voxels, VoxelType type, const
     return make_volume(
         core::compress_volume([&] { return std::make_unique<core::MemoryReader>(info, bytes); },
                               "the array", to_storage(compression)));
+  });
+}
+
+std::shared_ptr<const Volume> compress(const ReadLayers &read, VoxelType type, const Grid &grid,
+                                       const Compression &compression, bool keep) {
+  return guarded("compressing", [&] {
+    const core::Storage storage = to_storage(compression);
+    const auto source =
+        std::make_shared<core::LayerSource>(core_info(grid, type), read, keep && storage.bounded());
+    return make_volume(core::compress_volume(
+        [&] { return std::make_unique<core::LayerReader>(source); }, "the array", storage));
   });
 }
 

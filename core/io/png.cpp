@@ -99,21 +99,38 @@ void begin(Reader &reader, std::FILE *file, const std::string &where) {
   }
 }
 
-}  // namespace
+constexpr int kAsItIs = 0, kRowsFollowEachOther = 0;  ///< of libpng's simplified interface
 
-void write_png(const Image8 &image, const std::filesystem::path &path) {
+png_image describe(const Image8 &image) {
   if (image.channels != 3 && image.channels != 4)
-    throw std::invalid_argument("write_png: channels is not 3 or 4");
-  if (image.pixels.size() != std::size_t(image.width) * image.height * image.channels) {
-    throw std::invalid_argument("write_png: pixels is not width * height * channels long");
-  }
-  AtomicFile out(path);
+    throw std::invalid_argument("a PNG: channels is not 3 or 4");
+  if (image.pixels.size() != std::size_t(image.width) * image.height * image.channels)
+    throw std::invalid_argument("a PNG: pixels is not width * height * channels long");
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   png.width = image.width;
   png.height = image.height;
   png.format = image.channels == 4 ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
-  constexpr int kAsItIs = 0, kRowsFollowEachOther = 0;
+  return png;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_png(const Image8 &image) {
+  png_image png = describe(image);
+  png_alloc_size_t num_bytes = PNG_IMAGE_PNG_SIZE_MAX(png);
+  std::vector<std::uint8_t> bytes(num_bytes);
+  if (png_image_write_to_memory(&png, bytes.data(), &num_bytes, kAsItIs, image.pixels.data(),
+                                kRowsFollowEachOther, nullptr) == 0) {
+    throw Error("cannot make a PNG of the picture: {}", png.message);
+  }
+  bytes.resize(num_bytes);
+  return bytes;
+}
+
+void write_png(const Image8 &image, const std::filesystem::path &path) {
+  AtomicFile out(path);
+  png_image png = describe(image);
   if (png_image_write_to_stdio(&png, out.stream(), kAsItIs, image.pixels.data(),
                                kRowsFollowEachOther, nullptr) == 0) {
     throw Error("{}: cannot write the PNG: {}", path.string(), png.message);

@@ -21,6 +21,9 @@ struct Image8 {
 ///         channels or the length of pixels is wrong
 void write_png(const Image8 &image, const std::filesystem::path &path);
 
+/// The bytes of such a file.
+std::vector<std::uint8_t> encode_png(const Image8 &image);
+
 /// Reads 8-bit RGB and RGBA as they are; grey, palette and fewer bits are widened without loss.
 ///
 /// Throws  Error, in one line: unreadable, not PNG, truncated or broken, 16 bits per channel (which

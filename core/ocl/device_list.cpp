@@ -191,8 +191,8 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
                               std::string_view environment) {
   if (devices.empty()) {
     throw Error(
-        "no OpenCL 1.2 device found: install a driver, for the CPU the package pocl-opencl-icd "
-        "(apt install pocl-opencl-icd){}",
+        "no OpenCL 1.2 device found: install a driver, for the CPU PoCL (apt install "
+        "pocl-opencl-icd; without root and from Python, pip install isowave[cpu]){}",
         cache_trouble());
   }
   const std::string_view source = selector.empty() ? " (from ISOWAVE_DEVICE)" : "";

@@ -291,10 +291,11 @@ void Renderer::decode_as(const std::vector<DecodedValues> &values, FieldBound bo
   if (changes) clear_cache();
 }
 
-Camera Renderer::camera(std::span<const float> isovalues) {
+Camera Renderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
   const Level &finest = state_.levels[0];
   state_.levels[0].macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
-  return surface_camera(state_.levels[0].macrocells, finest.info, isovalues, options_.size);
+  return surface_camera(state_.levels[0].macrocells, finest.info, isovalues,
+                        size.value_or(options_.size));
 }
 
 void Renderer::check_has_picture() const {

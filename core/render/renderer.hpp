@@ -49,11 +49,12 @@ class Renderer {
   /// Throws  Error: the renderer was not made for the request's size, levels of detail or bound
   void check(const FrameRequest &request) const;
 
-  /// A view in which isosurfaces fill the largest picture, see surface_camera().
+  /// A view in which isosurfaces fill a picture of that size, see surface_camera(); none: of the
+  /// largest.
   ///
   /// Throws  Error: an isovalue is NaN
   /// Waits   yes
-  Camera camera(std::span<const float> isovalues);
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {});
 
   /// Returns  the hit buffer of the last frame [size.ray_rows()][size.ray_columns()], row 0 at the
   ///          top

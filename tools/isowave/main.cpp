@@ -21,8 +21,10 @@ int main(int argc, char **argv) {
   add_convert(app);
   add_render(app);
   add_compare(app);
+#ifdef ISOWAVE_HAS_ORACLES
   add_verify(app);
   add_bench(app);
+#endif
   add_man(app);
   add_completion(app);
   std::string statuses = "Exit status:\n";

@@ -58,7 +58,7 @@ struct FrameRequest {
 
   // What the frame brings to the host.
   bool want_picture = true;
-  bool want_depth = false, want_normals = false, want_hits = false;
+  bool want_depth = false, want_normals = false, want_positions = false, want_hits = false;
   bool want_bounds = false;  ///< of the error of each pixel; needs RendererOptions::with_bounds
 
   /// Called after each pass. Return false to stop; the frame is the picture so far.
@@ -103,7 +103,9 @@ struct Frame {
   std::vector<float> depth{};                   ///< [rows][columns] world units; infinity: no hit
   std::vector<std::array<float, 3>> normals{};  ///< [rows][columns] world space, of length 1, away
                                                 ///< from larger values; 0 0 0: no hit
-  std::vector<Hit> hits{};                      ///< [rows][columns]
+  /// [rows][columns] of the hits, world space; NaN: no hit
+  std::vector<std::array<float, 3>> positions{};
+  std::vector<Hit> hits{};  ///< [rows][columns]
   /// [rows][columns] how far the surface may be from the true one along the ray, at most [pixels];
   /// infinity: nothing is certain.
   std::vector<float> bounds{};
@@ -116,5 +118,9 @@ struct Frame {
 ///
 /// Throws  Error: no picture, or it cannot be written
 void save_png(const Frame &frame, const std::filesystem::path &path);
+/// The bytes of such a file.
+///
+/// Throws  Error: no picture
+std::vector<std::uint8_t> encode_png(const Frame &frame);
 
 }  // namespace isowave

@@ -4,7 +4,7 @@
 //   auto device = isowave::open_device();
 //   auto volume = isowave::open_volume("head.nrrd");
 //   isowave::Renderer renderer(device, volume);
-//   isowave::Frame frame = renderer.render({.camera = volume->camera(80), .isovalue = 80});
+//   isowave::Frame frame = renderer.render({.camera = renderer.camera(80), .isovalue = 80});
 //   isowave::save_png(frame, "head.png");
 //
 // What goes wrong is thrown as isowave::Error. Devices, volumes and renderers may be used from

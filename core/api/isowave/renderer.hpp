@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "isowave/device.hpp"
 #include "isowave/frame.hpp"
@@ -40,9 +41,9 @@ class Renderer {
   ///         further frames are drawn as if it had not been
   Frame render(const FrameRequest &request);
 
-  /// A view from the front right and above in which the isosurface fills the picture; the volume,
-  /// where there is no surface.
-  Camera camera(float isovalue);
+  /// A view from the front right and above in which the isosurface fills a picture of that size
+  /// (none: of the largest); the volume, where there is no surface.
+  Camera camera(float isovalue, std::optional<ImageSize> size = {});
 
   const std::shared_ptr<Device> &device() const;
   const std::shared_ptr<const Volume> &volume() const;

@@ -2,12 +2,14 @@
 // Compressed volumes: opened from files of many formats, or made from an array in memory.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <string_view>
 #include <type_traits>
 #include <vector>
@@ -67,8 +69,18 @@ class Volume {
   std::optional<double> max_voxel_error() const;
   std::uint32_t num_levels() const;  ///< of detail, the volume itself among them
 
-  /// Decodes all voxels: [nz][ny][nx].
-  std::vector<float> decode() const;
+  /// The grid of a level of detail; 0: that of the volume.
+  ///
+  /// Throws  Error: there is no such level
+  Grid level_grid(std::uint32_t level) const;
+
+  /// Decodes all voxels, or those of a coarser level of detail: [nz][ny][nx] of its grid.
+  ///
+  /// Throws  Error: there is no such level
+  std::vector<float> decode(std::uint32_t level = 0) const;
+  /// Decodes blocks that are spread over the volume, for histograms: about max_voxels voxels, the
+  /// same ones each time; all, where there are no more.
+  std::vector<float> sample(std::uint64_t max_voxels) const;
   /// Writes a `.zfp` file to a temporary name and renames it.
   ///
   /// Throws  Error: the file cannot be written
@@ -100,6 +112,21 @@ std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
 /// Throws  Error: a bad grid, NaN without map_nan, a tolerance that cannot be kept
 std::shared_ptr<const Volume> compress(const void *voxels, VoxelType type, const Grid &grid,
                                        const Compression &compression = {});
+
+/// Fills `out` [num_layers][ny][nx] with voxels, layers from z_begin on.
+using ReadLayers =
+    std::function<void(std::uint32_t z_begin, std::uint32_t num_layers, std::span<std::byte> out)>;
+
+/// Compresses voxels that are read a few layers at a time, so that they need not be in memory all
+/// at once: arrays in chunked stores, simulations.
+///
+/// read     called for ascending layers, by one thread at a time, not always the calling one
+/// keep     Where compression reads more than once (by a tolerance, or exact), layers that were
+///          read are kept in a temporary file (TMPDIR) of the size of the volume, and each is asked
+///          for once. Else they are asked for again, from front to back.
+/// Throws   Error: as above; what read() throws, as Error
+std::shared_ptr<const Volume> compress(const ReadLayers &read, VoxelType type, const Grid &grid,
+                                       const Compression &compression = {}, bool keep = true);
 
 /// Throws  Error unless a number of voxels is that of the grid
 void check_num_voxels(std::uint64_t num_voxels, const Grid &grid);

@@ -1,0 +1,35 @@
+"""Isosurfaces of volumes too large for the device that draws them.
+
+    import isowave
+
+    volume = isowave.compress(array, tolerance=0.5, spacing=(2, 1, 1))  # or isowave.open("head.nrrd")
+    image = volume.render(isovalue=80, size=(1280, 720))
+    image.save("head.png")  # image.rgba, .depth, .normals, .position are numpy arrays
+    isowave.view(volume)  # in a browser or notebook
+
+What describes an array's axes is in the order of the array, (z, y, x): shape, spacing, origin,
+cells. Vectors in world space are (x, y, z): cameras, normals, positions.
+"""
+
+from isowave import _loader
+
+_loader.prepare()
+
+from isowave._core import Error, __version__  # noqa: E402
+from isowave._renderer import Camera, Image, Renderer  # noqa: E402
+from isowave._report import Report, devices  # noqa: E402
+from isowave._volume import Volume, compress, open, view  # noqa: E402
+
+__all__ = [
+    "Camera",
+    "Error",
+    "Image",
+    "Renderer",
+    "Report",
+    "Volume",
+    "__version__",
+    "compress",
+    "devices",
+    "open",
+    "view",
+]

@@ -1,0 +1,117 @@
+"""Lets the compiled part find OpenCL: a loader, and drivers that no administrator registered.
+
+What is installed comes first. Only what is missing is added, and only for this process:
+
+- libOpenCL.so.1 of the system, else the one that the wheel has;
+- PoCL from PyPI (`pip install isowave[cpu]`), where the system has no PoCL;
+- NVIDIA's driver by its name, where it is there and not registered, as in many GPU containers.
+
+OCL_ICD_VENDORS and OCL_ICD_FILENAMES, if they are set, are the user's word, and nothing is added.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import importlib.util
+import os
+import pathlib
+import tempfile
+
+PACKAGE = pathlib.Path(__file__).resolve().parent
+SYSTEM_VENDORS = pathlib.Path("/etc/OpenCL/vendors")
+LOADER = "libOpenCL.so.1"
+BUNDLED_LOADER = PACKAGE / "opencl" / LOADER
+NVIDIA_DRIVER = "libnvidia-opencl.so.1"
+
+#: What prepare() found, for isowave.Report: "loader", and "added", the drivers that it registered.
+found: dict[str, str] = {}
+
+
+def load_library(name: str) -> bool:
+    try:
+        ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
+    except OSError:
+        return False
+    return True
+
+
+def pip_pocl() -> pathlib.Path | None:
+    """The driver that the package pocl-binary-distribution brings."""
+    for package, folder in (("pocl_binary_distribution", ".."), ("pyopencl", ".")):
+        spec = importlib.util.find_spec(package)  # finds it without importing it
+        for place in (spec.submodule_search_locations or ()) if spec else ():
+            drivers = sorted((pathlib.Path(place) / folder / "pyopencl/.libs").glob("libpocl*.so*"))
+            drivers += sorted((pathlib.Path(place) / ".libs").glob("libpocl*.so*"))
+            if drivers:
+                return drivers[0].resolve()
+    return None
+
+
+def registered(vendors: pathlib.Path) -> dict[str, str]:
+    """File name and driver of each registration in a folder."""
+    try:
+        files = sorted(vendors.glob("*.icd"))
+        return {file.name: file.read_text().strip() for file in files}
+    except OSError:
+        return {}
+
+
+def unregistered(drivers: dict[str, str]) -> dict[str, str]:
+    """What is on this machine and not among the registered drivers."""
+    added = {}
+    if not any("nvidia" in driver for driver in drivers.values()) and load_library(NVIDIA_DRIVER):
+        added["isowave_nvidia.icd"] = NVIDIA_DRIVER
+    if not any("pocl" in driver for driver in drivers.values()):
+        pocl = pip_pocl()
+        if pocl:
+            added["isowave_pocl.icd"] = str(pocl)
+    return added
+
+
+def register(drivers: dict[str, str]) -> None:
+    """Points the loader at a folder with these registrations.
+
+    It stays for the next process, since programs that this one starts may outlive it.
+    """
+    text = "".join(f"{name} {driver}\n" for name, driver in drivers.items())
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    name = "opencl-" + hashlib.sha256(text.encode()).hexdigest()[:16]
+    folder = pathlib.Path(cache) / "isowave" / name
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_registrations(folder, drivers)
+    except OSError:  # a home that cannot be written to
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="isowave_opencl_"))
+        write_registrations(folder, drivers)
+    os.environ["OCL_ICD_VENDORS"] = f"{folder}/"
+
+
+def write_registrations(folder: pathlib.Path, drivers: dict[str, str]) -> None:
+    for name, driver in drivers.items():
+        file = folder / name
+        if registered(folder).get(name) == driver:
+            continue
+        part = folder / f"{name}.{os.getpid()}"
+        part.write_text(driver + "\n")
+        part.replace(file)
+
+
+def prepare() -> None:
+    """Call before the compiled part is loaded. Raises ImportError where there is no loader."""
+    if load_library(LOADER):
+        found["loader"] = LOADER
+    elif BUNDLED_LOADER.exists() and load_library(str(BUNDLED_LOADER)):
+        found["loader"] = str(BUNDLED_LOADER)
+    else:
+        raise ImportError(
+            f"isowave needs {LOADER}, the OpenCL loader: on Debian and Ubuntu, "
+            "apt install ocl-icd-libopencl1; wheels from PyPI bring one"
+        )
+    if "OCL_ICD_VENDORS" in os.environ or "OCL_ICD_FILENAMES" in os.environ:
+        return
+    drivers = registered(SYSTEM_VENDORS)
+    added = unregistered(drivers)
+    if added:
+        found["added"] = ", ".join(added.values())
+        register({**drivers, **added})

@@ -1,0 +1,23 @@
+"""The command `isowave`: `view` is Python's, everything else the program in the wheel."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from isowave import _loader
+
+PROGRAM = _loader.PACKAGE / "bin" / "isowave"
+
+
+def main() -> int:
+    """Does not return where the program takes over the process."""
+    arguments = sys.argv[1:]
+    if arguments[:1] == ["view"]:
+        from isowave.viewer import main as view
+
+        return view(arguments[1:])
+    if _loader.found["loader"] == str(_loader.BUNDLED_LOADER):
+        folders = [str(_loader.BUNDLED_LOADER.parent), os.environ.get("LD_LIBRARY_PATH", "")]
+        os.environ["LD_LIBRARY_PATH"] = ":".join(filter(None, folders))
+    os.execv(PROGRAM, ["isowave", *arguments])

@@ -1,0 +1,414 @@
+"""Renderers, cameras and pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import queue
+import re
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+
+if TYPE_CHECKING:
+    from isowave._volume import Volume
+
+Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
+ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
+
+
+@dataclasses.dataclass(frozen=True)
+class Camera:
+    """A pinhole camera in world space; vectors are (x, y, z)."""
+
+    eye: tuple[float, float, float]
+    at: tuple[float, float, float]
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    fovy: float = 60.0  #: angle between the picture's lower and upper edge [degrees]
+
+    @staticmethod
+    def orbit(volume: Volume, count: int) -> list[Camera]:
+        """Cameras around the volume's box, as those of `isowave render --orbit`.
+
+        They stand on a circle about the y axis, 20 degrees above its plane, 0.8 diagonals of the
+        box from its centre.
+        """
+        corner = np.array(volume.origin[::-1])
+        extent = (np.array(volume.shape[::-1]) - 1) * volume.spacing[::-1]
+        centre = corner + volume.direction @ (extent / 2)
+        distance = 0.8 * float(np.linalg.norm(extent))
+        elevation = math.radians(20)
+        cameras = []
+        for i in range(count):
+            azimuth = 2 * math.pi * i / count + 0.3
+            towards = (
+                math.sin(azimuth) * math.cos(elevation),
+                math.sin(elevation),
+                math.cos(azimuth) * math.cos(elevation),
+            )
+            cameras.append(Camera(vector(centre + distance * np.array(towards)), vector(centre)))
+        return cameras
+
+    @staticmethod
+    def from_pyvista(camera: Any) -> Camera:
+        """The view of a pyvista.Camera, or of a plotter's `camera`."""
+        return Camera(
+            vector(camera.position),
+            vector(camera.focal_point),
+            vector(camera.up),
+            float(camera.view_angle),
+        )
+
+
+def vector(values: Any) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def color_of(color: Color) -> tuple[float, float, float]:
+    if isinstance(color, str):
+        digits = re.fullmatch("#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", color)
+        if not digits:
+            raise ValueError(f"color {color!r}: give '#rrggbb', or red, green, blue from 0 to 1")
+        return vector(int(part, 16) / 255 for part in digits.groups())
+    if len(color) != 3 or not all(0 <= part <= 1 for part in color):
+        raise ValueError(f"color {tuple(color)}: give red, green and blue, from 0 to 1")
+    return vector(color)
+
+
+class Image:
+    """A picture, and what it shows. Arrays are None where they were not asked for.
+
+    Rows go from top to bottom. Where several rays were drawn for each pixel, depth, normals,
+    position and bounds have `samples` times as many rows and columns: one entry for each ray.
+    """
+
+    rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)
+    depth: npt.NDArray[np.float32] | None  #: distance from the eye [world units]; inf: no surface
+    normals: npt.NDArray[np.float32] | None
+    """(rows, columns, 3), (x, y, z) in world space, of length 1, away from larger values; 0 where
+    there is no surface."""
+    position: npt.NDArray[np.float32] | None  #: (rows, columns, 3), world space; nan: no surface
+    bounds: npt.NDArray[np.float32] | None
+    """How far the surface is from that of the volume before compression, at most [pixels]; inf:
+    nothing is certain."""
+
+    def __init__(
+        self, frame: dict[str, Any], camera: Camera, isovalue: float, samples: int
+    ) -> None:
+        self.rgb = frame.get("picture")
+        self.depth = frame.get("depth")
+        self.normals = frame.get("normals")
+        self.position = frame.get("positions")
+        self.bounds = frame.get("bounds")
+        #: What drawing took: passes, rays, hits, decoded_blocks, total_ms and so on.
+        self.statistics: dict[str, Any] = frame["statistics"]
+        self.camera = camera
+        self.isovalue = isovalue
+        self._samples = samples
+
+    @property
+    def complete(self) -> bool:
+        """False where the frame was stopped, or its time was over."""
+        return bool(self.statistics["complete"])
+
+    @property
+    def rgba(self) -> npt.NDArray[np.uint8]:
+        """(height, width, 4); alpha is the part of a pixel that the surface covers."""
+        rgb = self._rgb()
+        alpha = np.full(rgb.shape[:2], 255, np.uint8)
+        if self.depth is not None:
+            s = self._samples
+            hit = np.isfinite(self.depth).reshape(rgb.shape[0], s, rgb.shape[1], s)
+            alpha = np.rint(255 * hit.mean(axis=(1, 3))).astype(np.uint8)
+        return np.dstack((rgb, alpha))
+
+    def _rgb(self) -> npt.NDArray[np.uint8]:
+        if self.rgb is None:
+            raise ValueError("the picture was not asked for: render(..., outputs=('rgb', ...))")
+        return self.rgb
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]:
+        return np.asarray(self.rgba, dtype)
+
+    def _repr_png_(self) -> bytes:
+        return _core.encode_png(self._rgb())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a PNG file; whole, or not at all."""
+        _core.save_png(self._rgb(), os.fspath(path))
+
+    def __repr__(self) -> str:
+        shown = "" if self.rgb is None else f"{self.rgb.shape[1]} x {self.rgb.shape[0]}, "
+        return f"<isowave.Image {shown}isovalue {self.isovalue:g}>"
+
+
+class Progress:
+    """The picture so far, for on_pass; only until that returns."""
+
+    def __init__(self, view: _core.PassView) -> None:
+        self._view = view
+
+    @property
+    def passes(self) -> int:
+        return self._view.passes
+
+    @property
+    def completed_percent(self) -> float:
+        """Rays that have ended, of all."""
+        return self._view.completed_percent
+
+    @property
+    def rgb(self) -> npt.NDArray[np.uint8]:
+        """(height, width, 3), drawn when it is asked for."""
+        return self._view.picture()
+
+
+def needed_options(request: dict[str, Any]) -> dict[str, Any]:
+    """What a Renderer must be made with to draw such a request."""
+    bounds = request.get("max_error") is not None or "bounds" in request.get("outputs", ())
+    needed: dict[str, Any] = {
+        "bounds": bounds,
+        "time_budget": request.get("time_budget") is not None,
+    }
+    needed["levels"] = bool(bounds or request.get("voxel_pixels") or needed["time_budget"])
+    if request.get("samples", 1) != 1:
+        needed["samples"] = request["samples"]
+    return needed
+
+
+class Renderer:
+    """Draws frames of one volume on one device. Threads may share it: frames take turns.
+
+    Parameters
+    ----------
+    volume
+        What is drawn.
+    device
+        "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
+    size, samples
+        Largest picture (width, height), and rays of each of its pixels along each axis: frames may
+        have as many rays, in any shape.
+    memory_budget
+        Of device memory [bytes]; None: three quarters of it. Bounds all that is taken there.
+    cache_blocks
+        Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows.
+    levels, bounds, time_budget
+        Whether frames may use levels of detail, ask for `max_error` and bounds, have a
+        `time_budget`.
+    profiling
+        Measures stages, for statistics["stage_ms"]; each pass is waited for.
+    """
+
+    #: Of the constructor's arguments, what frames may ask for only if it was given.
+    CAPABILITIES = ("levels", "bounds", "time_budget")
+
+    def __init__(
+        self,
+        volume: Volume,
+        *,
+        device: str | int | None = None,
+        size: tuple[int, int] = (1280, 720),
+        samples: int = 1,
+        memory_budget: int | None = None,
+        cache_blocks: int = 0,
+        levels: bool = False,
+        bounds: bool = False,
+        time_budget: bool = False,
+        profiling: bool = False,
+    ) -> None:
+        self.volume = volume
+        self.size = size
+        self.max_rays = size[0] * size[1] * samples**2
+        self._can = {"levels": levels, "bounds": bounds, "time_budget": time_budget}
+        self._core = _core.Renderer(
+            "" if device is None else str(device),
+            volume._core,
+            {
+                "width": size[0],
+                "height": size[1],
+                "samples": samples,
+                "memory_budget": memory_budget,
+                "cache_blocks": cache_blocks,
+                "with_levels": levels,
+                "with_bounds": bounds,
+                "with_time_budget": time_budget,
+                "profiling": profiling,
+            },
+        )
+
+    @property
+    def device(self) -> dict[str, Any]:
+        """As an entry of isowave.devices()."""
+        return self._core.device
+
+    @property
+    def memory_bytes(self) -> int:
+        """Of device memory that it holds."""
+        return self._core.memory_bytes
+
+    def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
+        """A view from the front right and above in which the isosurface fills the picture."""
+        return Camera(*self._core.camera(isovalue, *(size or self.size)))
+
+    def render(
+        self,
+        isovalue: float,
+        *,
+        camera: Camera | None = None,
+        size: tuple[int, int] | None = None,
+        samples: int = 1,
+        color: Color | None = None,
+        background: Color | None = None,
+        outputs: Sequence[str] = ALL_OUTPUTS,
+        max_error: float | None = None,
+        voxel_pixels: float = 0.0,
+        voxel_error: float = 0.0,
+        time_budget: float | None = None,
+        on_pass: Callable[[Progress], bool | None] | None = None,
+    ) -> Image:
+        """Draws a frame. Decoded blocks are kept for the next.
+
+        Parameters
+        ----------
+        isovalue
+            The surface is where the trilinear field crosses this value.
+        camera
+            None: the surface fills the picture.
+        size
+            Width and height [pixels]; None: the renderer's largest.
+        samples
+            Rays of a pixel along each axis, 1 to 8; colours are their mean.
+        color, background
+            Of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
+        outputs
+            Which of "rgb", "depth", "normals", "position", "bounds" are brought back.
+        max_error
+            Chooses the detail such that most pixels are within so many pixels of the surface of the
+            volume before compression. Needs a renderer made with bounds=True.
+        voxel_pixels
+            Voxels of a coarser level may be so many pixels apart; 0: full detail.
+        voxel_error
+            Decoded voxels may be off by so much from the compressed ones.
+        time_budget
+            Draws what can be drawn in so many seconds. Needs time_budget=True.
+        on_pass
+            Called after each pass with the picture so far; False from it stops the frame.
+
+        Raises
+        ------
+        Error
+            A request that the renderer was not made for, in one line. The next is not affected.
+        """
+        self._check(max_error, voxel_pixels, time_budget, outputs)
+        width, height = size or self.size
+        if camera is None:
+            camera = self.camera(isovalue, (width, height))
+        request: dict[str, Any] = {
+            "eye": camera.eye,
+            "at": camera.at,
+            "up": camera.up,
+            "fovy_degrees": camera.fovy,
+            "isovalue": isovalue,
+            "width": width,
+            "height": height,
+            "samples": samples,
+            "surface": None if color is None else color_of(color),
+            "background": None if background is None else color_of(background),
+            "voxel_pixels": voxel_pixels,
+            "voxel_error": voxel_error,
+            "max_surface_error": max_error,
+            "time_budget_ms": None if time_budget is None else 1000 * time_budget,
+            "want_picture": "rgb" in outputs,
+            "want_depth": "depth" in outputs,
+            "want_normals": "normals" in outputs,
+            "want_positions": "position" in outputs,
+            "want_bounds": "bounds" in outputs,
+        }
+        callback = None if on_pass is None else lambda view: on_pass(Progress(view))
+        # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
+        # pass would cost time.
+        interrupts = (
+            time_budget is None
+            and self.device["type"] != "gpu"
+            and threading.current_thread() is threading.main_thread()
+        )
+        frame = self._core.render(request, callback, interrupts)
+        return Image(frame, camera, isovalue, samples)
+
+    def _check(
+        self,
+        max_error: float | None,
+        voxel_pixels: float,
+        time_budget: float | None,
+        outputs: Sequence[str],
+    ) -> None:
+        unknown = set(outputs) - {*ALL_OUTPUTS, "bounds"}
+        if unknown:
+            known = ", ".join((*ALL_OUTPUTS, "bounds"))
+            raise ValueError(f"outputs {', '.join(sorted(unknown))}: there are {known}")
+        asked = {
+            "bounds": ("max_error", max_error is not None or "bounds" in outputs),
+            "levels": ("voxel_pixels", voxel_pixels > 0),
+            "time_budget": ("time_budget", time_budget is not None),
+        }
+        for option, (argument, is_asked) in asked.items():
+            if is_asked and not self._can[option]:
+                raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
+
+    def passes(self, isovalue: float, **request: Any) -> Iterator[Image]:
+        """The picture after each pass, the last one finished; arguments as render().
+
+        Pictures before the last have rgb alone. The frame waits while nobody asks for the next, and
+        ends where the iterator is closed.
+        """
+        pictures: queue.Queue[Image | BaseException | None] = queue.Queue(maxsize=1)
+        closed = threading.Event()
+        camera = request.pop("camera", None) or self.camera(isovalue, request.get("size"))
+        samples = request.get("samples", 1)
+
+        def put(item: Image | BaseException | None) -> None:
+            while not closed.is_set():
+                try:
+                    pictures.put(item, timeout=0.05)
+                except queue.Full:
+                    continue
+                return
+
+        def on_pass(progress: Progress) -> bool:
+            if progress.completed_percent == 100:
+                return True  # the finished picture follows
+            statistics = {"passes": progress.passes, "complete": False}
+            statistics["completed_percent"] = progress.completed_percent
+            frame = {"picture": progress.rgb, "statistics": statistics}
+            put(Image(frame, camera, isovalue, samples))
+            return not closed.is_set()
+
+        def draw() -> None:
+            try:
+                put(self.render(isovalue, camera=camera, on_pass=on_pass, **request))
+            except BaseException as error:  # noqa: BLE001: raised by the one who iterates
+                put(error)
+            put(None)
+
+        thread = threading.Thread(target=draw, name="isowave passes", daemon=True)
+        thread.start()
+        try:
+            while True:
+                item = pictures.get()
+                if item is None:
+                    return
+                if isinstance(item, BaseException):
+                    raise item
+                yield item
+        finally:
+            closed.set()
+            thread.join()

@@ -1,0 +1,61 @@
+"""What this machine has, for bug reports."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import sys
+from typing import Any
+
+from isowave import _core, _loader
+
+PACKAGES = ("numpy", "pocl-binary-distribution", "pillow", "starlette", "uvicorn", "anywidget")
+VARIABLES = ("ISOWAVE_DEVICE", "OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "POCL_CACHE_DIR")
+
+
+def devices() -> list[dict[str, Any]]:
+    """The OpenCL devices of this machine, in the loader's order; none where there is no driver.
+
+    Each is a dict of index, name, vendor, platform, driver, type ("gpu", "cpu", "accelerator",
+    "other") and memory_bytes. `device=` of other functions takes an index, a type, or a part of a
+    name or platform.
+    """
+    return _core.devices()
+
+
+class Report:
+    """What to put into a bug report: print(isowave.Report())."""
+
+    def __init__(self) -> None:
+        self.lines = [
+            ("isowave", _core.__version__),
+            ("Python", f"{platform.python_version()}, {sys.executable}"),
+            ("system", f"{platform.platform()}, {os.cpu_count()} processors"),
+            ("OpenCL loader", _loader.found["loader"]),
+        ]
+        if "added" in _loader.found:
+            self.lines.append(("drivers added", _loader.found["added"]))
+        for package in PACKAGES:
+            try:
+                self.lines.append((package, importlib.metadata.version(package)))
+            except importlib.metadata.PackageNotFoundError:
+                pass
+        self.lines += [(name, os.environ[name]) for name in VARIABLES if name in os.environ]
+        try:
+            found = devices()
+        except _core.Error as error:
+            self.lines.append(("devices", str(error)))
+        else:
+            if not found:
+                self.lines.append(("devices", "none: pip install isowave[cpu] brings one"))
+            for device in found:
+                memory = device["memory_bytes"] / 2**30
+                text = "{name} ({type}, {platform}, driver {driver}".format(**device)
+                self.lines.append((f"device {device['index']}", f"{text}, {memory:.1f} GiB)"))
+
+    def __str__(self) -> str:
+        width = max(len(name) for name, _ in self.lines)
+        return "\n".join(f"{name:{width}}  {text}" for name, text in self.lines)
+
+    __repr__ = __str__

@@ -1,0 +1,424 @@
+"""Compressed volumes: from arrays and files to pictures."""
+
+from __future__ import annotations
+
+import html
+import os
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+from isowave._arrays import as_source
+from isowave._renderer import Camera, Image, Renderer, needed_options
+
+#: Called with what is done ("compressing") and how much of it, 0 to 1.
+Progress = Callable[[str, float], object]
+
+SUPPORTED_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
+LARGEST_SAMPLE = 1 << 24  # voxels that a histogram is made of
+
+
+def reversed_axes(values: Sequence[float]) -> tuple[float, float, float]:
+    z, y, x = (float(value) for value in values)
+    return x, y, z
+
+
+def compression_options(
+    tolerance: float | None,
+    relative_tolerance: float | None,
+    rate: int | None,
+    exact: bool,
+    levels: int,
+    map_nan: float | None,
+    num_threads: int,
+) -> dict[str, Any]:
+    return {
+        "tolerance": tolerance,
+        "relative_tolerance": relative_tolerance,
+        "rate": rate,
+        "exact": exact,
+        "levels": levels,
+        "map_nan": map_nan,
+        "num_threads": num_threads,
+        # Where nothing bounds it, the error is measured: people ask.
+        "measure_error": not exact and tolerance is None and relative_tolerance is None,
+    }
+
+
+class TqdmProgress:
+    """A bar of tqdm's for each step."""
+
+    def __init__(self, tqdm: Any) -> None:
+        self.tqdm, self.bar, self.step = tqdm, None, ""
+
+    def __call__(self, what: str, done: float) -> None:
+        if what != self.step:
+            self.close()
+            self.step = what
+            self.bar = self.tqdm(total=100, desc=what, unit="%", leave=False)
+        if self.bar is not None:
+            self.bar.update(int(100 * done) - self.bar.n)
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.close()
+
+
+def make_progress(progress: bool | Progress | None) -> Progress | None:
+    """None: a bar where tqdm is installed and somebody watches."""
+    if callable(progress):
+        return progress
+    in_notebook = "ipykernel" in sys.modules
+    if progress is False or (progress is None and not (sys.stderr.isatty() or in_notebook)):
+        return None
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return None
+    return TqdmProgress(tqdm)
+
+
+def compress(
+    array: Any,
+    *,
+    tolerance: float | None = None,
+    relative_tolerance: float | None = None,
+    rate: int | None = None,
+    exact: bool = False,
+    spacing: Sequence[float] | None = None,
+    origin: Sequence[float] | None = None,
+    direction: npt.ArrayLike | None = None,
+    levels: int = 1,
+    map_nan: float | None = None,
+    fill_value: float | None = None,
+    progress: bool | Progress | None = None,
+    num_threads: int = 0,
+) -> Volume:
+    """Compresses a three-dimensional array into memory.
+
+    Arrays in chunked stores (dask, zarr, h5py, tensorstore, and xarray of these) are read a few
+    layers at a time, each chunk once; by a tolerance or exact, a temporary file of the array's size
+    keeps them meanwhile.
+
+    Parameters
+    ----------
+    array
+        Voxels, axes (z, y, x): numpy and what converts to it, memoryview, xarray, dask, zarr, h5py,
+        tensorstore, SimpleITK, itk, nibabel, pyvista.ImageData.
+    tolerance
+        No voxel is off by more [voxel values].
+    relative_tolerance
+        The same, as a part of the range of values.
+    rate
+        Bits per voxel, 1 to 32; 8 where nothing else is given.
+    exact
+        Integers below 2^24, kept as they are.
+    spacing, origin
+        World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). What the array
+        says itself (xarray, SimpleITK...) where None, else 1 and 0.
+    direction
+        3 x 3; column a is the unit world direction (x, y, z) of index axis a, in the order x, y, z.
+    levels
+        Levels of detail, the volume itself among them; 0: all that it can have.
+    map_nan
+        What replaces NaN and infinities, which are refused without.
+    fill_value
+        What replaces masked values of masked arrays.
+    progress
+        True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to 1.
+        None: a bar on a terminal or in a notebook, where tqdm is installed.
+    num_threads
+        0: one per processor. The result is the same for any number.
+
+    Raises
+    ------
+    Error, TypeError, ValueError
+        What cannot be compressed, in one line.
+    """
+    source = as_source(
+        array, spacing=spacing, origin=origin, direction=direction, fill_value=fill_value
+    )
+    options = compression_options(
+        tolerance, relative_tolerance, rate, exact, levels, map_nan, num_threads
+    )
+    dims = source.shape[::-1]
+    grid = (
+        str(source.dtype),
+        dims,
+        reversed_axes(source.spacing),
+        reversed_axes(source.origin),
+        [tuple(column) for column in np.asarray(source.direction, float).T],
+    )
+    shown = make_progress(progress)
+    try:
+        if is_plain(array):
+            return Volume(_core.compress_array(array, *grid, options, shown))
+        keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
+        return Volume(_core.compress(source.read, *grid, options, keep, shown))
+    finally:
+        if isinstance(shown, TqdmProgress):
+            shown.close()
+
+
+def is_plain(array: Any) -> bool:
+    """Whether the compiled part can read its memory as it is."""
+    return (
+        type(array) is np.ndarray
+        and array.flags.c_contiguous
+        and array.dtype.isnative
+        and array.dtype.name in SUPPORTED_TYPES
+    )
+
+
+def open(  # noqa: A001: as gzip.open, h5py.File's habit
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float | None = None,
+    relative_tolerance: float | None = None,
+    rate: int | None = None,
+    exact: bool = False,
+    shape: Sequence[int] | None = None,
+    dtype: npt.DTypeLike | None = None,
+    spacing: Sequence[float] | None = None,
+    levels: int = 1,
+    map_nan: float | None = None,
+    progress: bool | Progress | None = None,
+    num_threads: int = 0,
+) -> Volume:
+    """Opens a volume.
+
+    A ``.zfp`` file stays where it is and is read when it is needed; it must not change. Others are
+    compressed into memory as compress() does: ``.raw`` and ``.raw.gz`` (named
+    ``NAME_XxYxZ_TYPE.raw``, or with shape (z, y, x) and dtype), ``.nrrd``, ``.nhdr``, ``.mha``,
+    ``.mhd``, ``.nii``, ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``.
+
+    spacing, (z, y, x), replaces that of the file.
+
+    Raises
+    ------
+    Error
+        The file is missing, broken or of another kind, in one line.
+    """
+    is_compressed = os.fspath(path).endswith(".zfp")
+    options = compression_options(
+        tolerance, relative_tolerance, rate, exact, levels, map_nan, num_threads
+    )
+    if is_compressed:
+        options["measure_error"] = False
+    shown = make_progress(progress)
+    try:
+        return Volume(
+            _core.open(
+                os.fspath(path),
+                options,
+                None if shape is None else tuple(int(n) for n in shape)[::-1],
+                None if dtype is None else np.dtype(dtype).name,
+                None if spacing is None else reversed_axes(spacing),
+                shown,
+            )
+        )
+    finally:
+        if isinstance(shown, TqdmProgress):
+            shown.close()
+
+
+class Volume:
+    """A compressed volume. It cannot be changed, and threads may share it.
+
+    Made by compress() and open().
+    """
+
+    def __init__(self, core: _core.Volume) -> None:
+        self._core = core
+        self._lock = threading.Lock()
+        self._renderer: Renderer | None = None
+        self._made_with: dict[str, Any] = {}
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels along (z, y, x)."""
+        x, y, z = self._core.dims
+        return z, y, x
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """World units between voxels along (z, y, x)."""
+        x, y, z = self._core.spacing
+        return z, y, x
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """World position of voxel (0, 0, 0), as (z, y, x)."""
+        x, y, z = self._core.origin
+        return z, y, x
+
+    @property
+    def direction(self) -> npt.NDArray[np.float64]:
+        """3 x 3; column a: unit world direction (x, y, z) of index axis a, in the order x, y, z."""
+        return np.array(self._core.direction).T
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the voxels before compression."""
+        return np.dtype(self._core.source_type)
+
+    @property
+    def value_range(self) -> tuple[float, float]:
+        """Least and largest voxel before compression; infinite where a file does not say."""
+        least, largest = self._core.value_range
+        return least, largest
+
+    @property
+    def nbytes(self) -> int:
+        """Of the compressed voxels."""
+        return self._core.compressed_bytes
+
+    @property
+    def bits_per_voxel(self) -> float:
+        return self._core.bits_per_voxel
+
+    @property
+    def max_error(self) -> float | None:
+        """Largest difference between a decoded voxel and the source; None: not measured."""
+        return self._core.max_voxel_error
+
+    @property
+    def num_levels(self) -> int:
+        """Levels of detail, the volume itself among them."""
+        return self._core.num_levels
+
+    def decode(self, level: int = 0) -> npt.NDArray[np.float32]:
+        """All voxels, float32, (z, y, x). level: of detail; each has half the voxels of the last."""
+        return self._core.decode(level)
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]:
+        if copy is False:
+            raise ValueError("a volume is decoded into a new array: copy=False is not possible")
+        voxels: npt.NDArray[Any] = self.decode()
+        return voxels if dtype is None else voxels.astype(dtype)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a .zfp file, which open() and the program read; whole, or not at all."""
+        self._core.save(os.fspath(path))
+
+    def histogram(self, bins: int = 256) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
+        """Counts [bins] and edges [bins + 1] of the values, as numpy.histogram gives them.
+
+        Of a large volume, of blocks that are spread over it: at most 2^24 voxels.
+        """
+        values = self._core.sample(LARGEST_SAMPLE)
+        least, largest = self.value_range
+        if not np.isfinite([least, largest]).all():
+            least, largest = float(values.min()), float(values.max())
+        counts, edges = np.histogram(np.clip(values, least, largest), bins, (least, largest))
+        return counts.astype(np.int64), edges.astype(np.float64)
+
+    def renderer(self, **options: Any) -> Renderer:
+        """A Renderer of this volume; see there for the options."""
+        return Renderer(self, **options)
+
+    def camera(
+        self,
+        isovalue: float,
+        *,
+        size: tuple[int, int] = (1280, 720),
+        device: str | int | None = None,
+    ) -> Camera:
+        """A view from the front right and above in which the isosurface fills the picture."""
+        with self._lock:
+            return self._renderer_for({"device": device}).camera(isovalue, size)
+
+    def render(
+        self,
+        isovalue: float,
+        *,
+        size: tuple[int, int] = (1280, 720),
+        camera: Camera | None = None,
+        device: str | int | None = None,
+        memory_budget: int | None = None,
+        **request: Any,
+    ) -> Image:
+        """Draws the isosurface; Renderer.render has the other arguments.
+
+        The renderer is kept for the next call.
+
+        Parameters
+        ----------
+        isovalue
+            The surface is where the trilinear field crosses this value.
+        size
+            Width and height of the picture [pixels].
+        camera
+            None: the surface fills the picture.
+        device
+            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
+        memory_budget
+            Of device memory [bytes]; None: three quarters of it.
+        """
+        wanted = {"device": device, "memory_budget": memory_budget, "size": size}
+        with self._lock:
+            renderer = self._renderer_for({**wanted, **needed_options(request)})
+            return renderer.render(isovalue, size=size, camera=camera, **request)
+
+    def _renderer_for(self, wanted: dict[str, Any]) -> Renderer:
+        """The kept renderer, or a new one where it lacks what is wanted."""
+        size = wanted.pop("size", (0, 0))
+        samples = wanted.get("samples", 1)
+        made = self._made_with
+        fits = (
+            self._renderer is not None
+            and size[0] * size[1] * samples**2 <= self._renderer.max_rays
+            and all(made.get(name) == wanted.get(name) for name in ("device", "memory_budget"))
+            and all(made.get(name) or not wanted.get(name) for name in Renderer.CAPABILITIES)
+        )
+        if self._renderer is None or not fits:
+            self._renderer = None  # its memory goes before that of the next is taken
+            largest = max(size, (1280, 720), key=lambda s: s[0] * s[1])
+            self._renderer = Renderer(self, size=largest, **wanted)
+            self._made_with = wanted
+        return self._renderer
+
+    def view(self, **options: Any) -> Any:
+        """Shows the volume in a notebook's widget or a browser's tab: isowave.view()."""
+        return view(self, **options)
+
+    def __repr__(self) -> str:
+        shape = " x ".join(str(n) for n in self.shape)
+        return (
+            f"<isowave.Volume {shape} (z, y, x) {self.dtype}, "
+            f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel>"
+        )
+
+    def _repr_html_(self) -> str:
+        least, largest = self.value_range
+        rows = {
+            "shape (z, y, x)": " x ".join(str(n) for n in self.shape),
+            "spacing": ", ".join(f"{s:g}" for s in self.spacing),
+            "values": f"{self.dtype}, {least:g} to {largest:g}",
+            "compressed": f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel",
+            "largest error": "not known" if self.max_error is None else f"{self.max_error:.3g}",
+            "levels of detail": str(self.num_levels),
+        }
+        cells = "".join(
+            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(text)}</td>"
+            for name, text in rows.items()
+        )
+        return f"<table>{cells}</table>"
+
+
+def view(volume: Volume, **options: Any) -> Any:
+    """Shows a volume: in a notebook as a widget, else in a tab of the browser.
+
+    Needs `pip install isowave[view]`, in notebooks `isowave[notebook]`. isowave.viewer has the
+    options.
+    """
+    from isowave import viewer
+
+    return viewer.view(volume, **options)

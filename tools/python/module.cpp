@@ -1,0 +1,507 @@
+// isowave._core: the library of core/api as a Python module. Axes are x, y, z here, as in C++; the
+// Python files beside this one turn them into z, y, x and have the documentation.
+//
+// The GIL is released wherever the library works. What waits for a device's lock must not hold the
+// GIL, since the thread that has the lock may wait for the GIL to report a pass; that goes for
+// destructors, too.
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <cstring>
+#include <isowave/isowave.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+using isowave::Error;
+using isowave::Vector3;
+using Index3 = std::array<std::uint32_t, 3>;
+using Color = std::array<float, 3>;
+
+/// A numpy array that owns the vector's values. T may be an array of numbers: then `shape` has its
+/// length, too.
+template <class Number, class T>
+nb::object to_numpy(std::vector<T> &&values, std::initializer_list<std::size_t> shape) {
+  auto owned = std::make_unique<std::vector<T>>(std::move(values));
+  auto *data = reinterpret_cast<Number *>(owned->data());
+  const nb::capsule owner(owned.release(),
+                          [](void *held) noexcept { delete static_cast<std::vector<T> *>(held); });
+  return nb::cast(nb::ndarray<nb::numpy, Number>(data, shape, owner));
+}
+
+/// Keeps the first exception of Python's that a callback raises, since the library makes an Error
+/// of what leaves a callback, and raises it again when the library has returned.
+class Callbacks {
+ public:
+  /// Calls work() with the GIL held. Returns false where that, or an earlier callback, has raised
+  /// something, or a signal came (Ctrl-C).
+  template <class Work>
+  bool run(const Work &work) {
+    const nb::gil_scoped_acquire gil;
+    if (raised_) return false;
+    try {
+      work();
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    } catch (...) {
+      raised_ = std::current_exception();
+    }
+    return !raised_;
+  }
+  /// Calls work() without the GIL, and raises what a callback has raised.
+  template <class Work>
+  auto without_gil(const Work &work) {
+    try {
+      const nb::gil_scoped_release no_gil;
+      return work();
+    } catch (...) {
+      if (!raised_) throw;
+    }
+    std::rethrow_exception(raised_);
+  }
+  bool raised() const { return raised_ != nullptr; }
+  void raise_again() const {
+    if (raised_) std::rethrow_exception(raised_);
+  }
+
+ private:
+  std::exception_ptr raised_;
+};
+
+/// What ends the library's work after a callback has raised something.
+struct Stopped {};
+
+/// Destroys T without the GIL.
+template <class T>
+struct DestroyWithoutGil {
+  void operator()(T *object) const {
+    const nb::gil_scoped_release no_gil;
+    delete object;
+  }
+};
+
+// ---- Volumes ----
+
+isowave::VoxelType voxel_type(const std::string &name) {
+  constexpr std::array kNames = {"uint8",  "int8",  "uint16",  "int16",
+                                 "uint32", "int32", "float32", "float64"};
+  const auto found = std::ranges::find(kNames, name);
+  if (found == kNames.end()) throw Error("voxels of type " + name + " are not supported");
+  return static_cast<isowave::VoxelType>(found - kNames.begin());
+}
+
+std::string type_name(isowave::VoxelType type) {
+  constexpr std::array kNames = {"uint8",  "int8",  "uint16",  "int16",
+                                 "uint32", "int32", "float32", "float64"};
+  return kNames.at(static_cast<std::size_t>(type));
+}
+
+isowave::Compression compression_of(const nb::dict &options) {
+  isowave::Compression result;
+  const auto get = [&](const char *name, auto &field) {
+    if (options.contains(name) && !options[name].is_none())
+      field = nb::cast<std::decay_t<decltype(field)>>(options[name]);
+  };
+  get("rate", result.rate);
+  get("tolerance", result.tolerance);
+  get("relative_tolerance", result.relative_tolerance);
+  get("exact", result.exact);
+  get("measure_error", result.measure_error);
+  get("levels", result.levels);
+  get("map_nan", result.map_nan);
+  get("num_threads", result.num_threads);
+  return result;
+}
+
+/// Reports to `progress`, if there is one, and looks for signals.
+void report_to(Callbacks &callbacks, const std::optional<nb::callable> &progress,
+               isowave::Compression &compression) {
+  compression.progress = [&callbacks, &progress](std::string_view what, double done) {
+    const bool goes_on = callbacks.run([&] {
+      if (progress) (*progress)(std::string(what), done);
+    });
+    if (!goes_on) throw Stopped();
+  };
+}
+
+struct PyVolume {
+  std::shared_ptr<const isowave::Volume> volume;
+};
+
+PyVolume compress(const nb::callable &read, const std::string &type, const Index3 &dims,
+                  const Vector3 &spacing, const Vector3 &origin,
+                  const std::array<Vector3, 3> &direction, const nb::dict &options, bool keep,
+                  const std::optional<nb::callable> &progress) {
+  Callbacks callbacks;
+  isowave::Compression compression = compression_of(options);
+  report_to(callbacks, progress, compression);
+  const auto read_layers = [&](std::uint32_t z, std::uint32_t num_layers,
+                               std::span<std::byte> out) {
+    const bool goes_on = callbacks.run([&] {
+      const auto layers =
+          nb::cast<nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>>(read(z, z + num_layers));
+      if (layers.nbytes() != out.size()) {
+        throw Error("a source gave " + std::to_string(layers.nbytes()) + " bytes for layers of " +
+                    std::to_string(out.size()));
+      }
+      std::memcpy(out.data(), layers.data(), out.size());
+    });
+    if (!goes_on) throw Stopped();
+  };
+  return callbacks.without_gil([&] {
+    return PyVolume{isowave::compress(isowave::ReadLayers(read_layers), voxel_type(type),
+                                      {dims, spacing, origin, direction}, compression, keep)};
+  });
+}
+
+PyVolume compress_array(const nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu> &array,
+                        const std::string &type, const Index3 &dims, const Vector3 &spacing,
+                        const Vector3 &origin, const std::array<Vector3, 3> &direction,
+                        const nb::dict &options, const std::optional<nb::callable> &progress) {
+  Callbacks callbacks;
+  isowave::Compression compression = compression_of(options);
+  report_to(callbacks, progress, compression);
+  const isowave::Grid grid{dims, spacing, origin, direction};
+  isowave::check_num_voxels(array.size(), grid);
+  return callbacks.without_gil([&] {
+    return PyVolume{isowave::compress(array.data(), voxel_type(type), grid, compression)};
+  });
+}
+
+PyVolume open_volume(const std::filesystem::path &path, const nb::dict &options,
+                     const std::optional<Index3> &dims, const std::optional<std::string> &type,
+                     const std::optional<Vector3> &spacing,
+                     const std::optional<nb::callable> &progress) {
+  Callbacks callbacks;
+  isowave::Compression compression = compression_of(options);
+  report_to(callbacks, progress, compression);
+  isowave::RawFile raw{dims, {}, spacing};
+  if (type) raw.type = voxel_type(*type);
+  return callbacks.without_gil(
+      [&] { return PyVolume{isowave::open_volume(path, compression, raw)}; });
+}
+
+nb::object decode(const PyVolume &self, std::uint32_t level) {
+  std::vector<float> voxels;
+  {
+    const nb::gil_scoped_release no_gil;
+    voxels = self.volume->decode(level);
+  }
+  const Index3 dims = self.volume->level_grid(level).dims;
+  return to_numpy<float>(std::move(voxels), {dims[2], dims[1], dims[0]});
+}
+
+nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
+  std::vector<float> voxels;
+  {
+    const nb::gil_scoped_release no_gil;
+    voxels = self.volume->sample(max_voxels);
+  }
+  const std::size_t count = voxels.size();
+  return to_numpy<float>(std::move(voxels), {count});
+}
+
+// ---- Devices and renderers ----
+
+nb::dict device_dict(const isowave::DeviceInfo &info) {
+  nb::dict result;
+  result["index"] = info.index;
+  result["name"] = info.name;
+  result["vendor"] = info.vendor;
+  result["platform"] = info.platform;
+  result["driver"] = info.driver;
+  result["type"] = info.type;
+  result["memory_bytes"] = info.memory_bytes;
+  return result;
+}
+
+nb::tuple camera_tuple(const isowave::Camera &camera) {
+  const auto vector = [](const Vector3 &v) { return nb::make_tuple(v[0], v[1], v[2]); };
+  return nb::make_tuple(vector(camera.eye), vector(camera.at), vector(camera.up),
+                        camera.fovy_degrees);
+}
+
+/// The picture so far; only while the callback that got it is at work.
+struct PassView {
+  const isowave::Progress *progress;
+  std::uint32_t width, height;
+
+  const isowave::Progress &get() const {
+    if (progress == nullptr) throw Error("this pass is over: look at it within on_pass");
+    return *progress;
+  }
+  nb::object picture() const {
+    std::vector<std::uint8_t> pixels;
+    {
+      const nb::gil_scoped_release no_gil;
+      pixels = get().picture();
+    }
+    return to_numpy<std::uint8_t>(std::move(pixels), {height, width, 3});
+  }
+};
+
+nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
+  nb::dict result;
+  result["passes"] = statistics.passes;
+  result["rays"] = statistics.rays;
+  result["hits"] = statistics.hits;
+  result["decoded_blocks"] = statistics.decoded_blocks;
+  result["uploaded_bytes"] = statistics.uploaded_bytes;
+  result["first_level"] = statistics.first_level;
+  result["last_level"] = statistics.last_level;
+  result["total_ms"] = statistics.total_ms;
+  result["cancelled"] = statistics.cancelled;
+  result["complete"] = statistics.complete;
+  result["stage_ms"] = statistics.stage_ms;
+  return result;
+}
+
+/// Of frame.hits: cells [rows][columns][3] and levels [rows][columns].
+void add_hits(const isowave::Frame &frame, nb::dict &result) {
+  std::vector<Index3> cells;
+  std::vector<std::uint32_t> levels;
+  for (const isowave::Hit &hit : frame.hits) {
+    cells.push_back(hit.cell);
+    levels.push_back(hit.level);
+  }
+  result["cells"] = to_numpy<std::uint32_t>(std::move(cells), {frame.rows, frame.columns, 3});
+  result["levels"] = to_numpy<std::uint32_t>(std::move(levels), {frame.rows, frame.columns});
+}
+
+nb::dict frame_dict(isowave::Frame &&frame) {
+  nb::dict result;
+  const std::size_t rows = frame.rows, columns = frame.columns;
+  if (!frame.picture.empty()) {
+    result["picture"] =
+        to_numpy<std::uint8_t>(std::move(frame.picture), {frame.size.height, frame.size.width, 3});
+  }
+  if (!frame.depth.empty())
+    result["depth"] = to_numpy<float>(std::move(frame.depth), {rows, columns});
+  if (!frame.normals.empty())
+    result["normals"] = to_numpy<float>(std::move(frame.normals), {rows, columns, 3});
+  if (!frame.positions.empty())
+    result["positions"] = to_numpy<float>(std::move(frame.positions), {rows, columns, 3});
+  if (!frame.bounds.empty())
+    result["bounds"] = to_numpy<float>(std::move(frame.bounds), {rows, columns});
+  if (!frame.hits.empty()) add_hits(frame, result);
+  nb::dict statistics = statistics_dict(frame.statistics);
+  if (frame.detail) {
+    nb::dict detail;
+    detail["voxel_pixels"] = frame.detail->voxel_pixels;
+    detail["voxel_error"] = frame.detail->voxel_error;
+    detail["reachable"] = frame.detail->reachable;
+    detail["advice"] = frame.detail->advice;
+    statistics["detail"] = detail;
+  }
+  result["statistics"] = statistics;
+  return result;
+}
+
+isowave::FrameRequest request_of(const nb::dict &options) {
+  isowave::FrameRequest request;
+  const auto get = [&](const char *name, auto &field) {
+    if (options.contains(name) && !options[name].is_none())
+      field = nb::cast<std::decay_t<decltype(field)>>(options[name]);
+  };
+  get("eye", request.camera.eye);
+  get("at", request.camera.at);
+  get("up", request.camera.up);
+  get("fovy_degrees", request.camera.fovy_degrees);
+  get("isovalue", request.isovalue);
+  get("width", request.size.width);
+  get("height", request.size.height);
+  get("samples", request.size.samples);
+  get("surface", request.appearance.surface);
+  get("background", request.appearance.background);
+  get("voxel_pixels", request.voxel_pixels);
+  get("voxel_error", request.voxel_error);
+  get("max_surface_error", request.max_surface_error);
+  get("time_budget_ms", request.time_budget_ms);
+  get("want_picture", request.want_picture);
+  get("want_depth", request.want_depth);
+  get("want_normals", request.want_normals);
+  get("want_positions", request.want_positions);
+  get("want_hits", request.want_hits);
+  get("want_bounds", request.want_bounds);
+  return request;
+}
+
+/// A renderer, with the device that it draws on.
+class PyRenderer {
+ public:
+  PyRenderer(const std::string &selector, const PyVolume &volume, const nb::dict &options) {
+    isowave::RendererOptions wanted;
+    const auto get = [&](const char *name, auto &field) {
+      if (options.contains(name) && !options[name].is_none())
+        field = nb::cast<std::decay_t<decltype(field)>>(options[name]);
+    };
+    get("width", wanted.largest.width);
+    get("height", wanted.largest.height);
+    get("samples", wanted.largest.samples);
+    get("memory_budget", wanted.memory_budget);
+    get("cache_blocks", wanted.cache_blocks);
+    get("with_levels", wanted.with_levels);
+    get("with_bounds", wanted.with_bounds);
+    get("with_time_budget", wanted.with_time_budget);
+    isowave::DeviceOptions device_options;
+    get("profiling", device_options.profiling);
+    const nb::gil_scoped_release no_gil;
+    device_ = isowave::open_device(selector, device_options);
+    renderer_.reset(new isowave::Renderer(device_, volume.volume, wanted));
+  }
+
+  /// on_pass     called after each pass with a PassView; False from it ends the frame
+  /// interrupts  signals are looked for after each pass, which waits for that
+  nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
+                  bool interrupts) {
+    isowave::FrameRequest request = request_of(options);
+    Callbacks callbacks;
+    if (on_pass || interrupts) {
+      request.on_pass = [&](const isowave::Progress &progress) {
+        bool wanted = true;
+        const bool goes_on = callbacks.run([&] {
+          if (!on_pass) return;
+          const nb::object view =
+              nb::cast(PassView{&progress, request.size.width, request.size.height});
+          const auto end = [&] { nb::cast<PassView &>(view).progress = nullptr; };
+          try {
+            const nb::object answer = (*on_pass)(view);
+            wanted = answer.is_none() || nb::cast<bool>(answer);
+          } catch (...) {
+            end();
+            throw;
+          }
+          end();
+        });
+        return goes_on && wanted;
+      };
+    }
+    isowave::Frame frame = callbacks.without_gil([&] { return renderer_->render(request); });
+    callbacks.raise_again();
+    return frame_dict(std::move(frame));
+  }
+
+  nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
+    isowave::Camera camera;
+    {
+      const nb::gil_scoped_release no_gil;
+      camera = renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
+    }
+    return camera_tuple(camera);
+  }
+
+  nb::dict device() const { return device_dict(device_->info()); }
+  double compile_ms() const {
+    const nb::gil_scoped_release no_gil;
+    return device_->compile_ms();
+  }
+  double setup_ms() const { return renderer_->setup_ms(); }
+  std::uint64_t memory_bytes() const { return renderer_->memory_bytes(); }
+
+ private:
+  std::shared_ptr<isowave::Device> device_;
+  std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>> renderer_;
+};
+
+using Picture =
+    nb::ndarray<std::uint8_t, nb::ro, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+
+isowave::Frame frame_of(const Picture &picture) {
+  isowave::Frame frame;
+  frame.size = {static_cast<std::uint32_t>(picture.shape(1)),
+                static_cast<std::uint32_t>(picture.shape(0)), 1};
+  frame.picture.assign(picture.data(), picture.data() + picture.size());
+  return frame;
+}
+
+nb::bytes encode_png(const Picture &picture) {
+  const isowave::Frame frame = frame_of(picture);
+  std::vector<std::uint8_t> bytes;
+  {
+    const nb::gil_scoped_release no_gil;
+    bytes = isowave::encode_png(frame);
+  }
+  return nb::bytes(bytes.data(), bytes.size());
+}
+
+void save_png(const Picture &picture, const std::filesystem::path &path) {
+  const isowave::Frame frame = frame_of(picture);
+  const nb::gil_scoped_release no_gil;
+  isowave::save_png(frame, path);
+}
+
+std::vector<nb::dict> list_devices() {
+  std::vector<isowave::DeviceInfo> infos;
+  {
+    const nb::gil_scoped_release no_gil;
+    infos = isowave::list_devices();
+  }
+  std::vector<nb::dict> result;
+  for (const isowave::DeviceInfo &info : infos) result.push_back(device_dict(info));
+  return result;
+}
+
+}  // namespace
+
+NB_MODULE(_core, m) {
+  nb::exception<Error>(m, "Error", PyExc_RuntimeError);
+  m.attr("__version__") = std::string(isowave::version());
+  m.def("devices", &list_devices);
+  m.def("encode_png", &encode_png, "picture"_a);
+  m.def("save_png", &save_png, "picture"_a, "path"_a);
+
+  nb::class_<PyVolume>(m, "Volume")
+      .def_prop_ro("dims", [](const PyVolume &v) { return v.volume->grid().dims; })
+      .def_prop_ro("spacing", [](const PyVolume &v) { return v.volume->grid().spacing; })
+      .def_prop_ro("origin", [](const PyVolume &v) { return v.volume->grid().origin; })
+      .def_prop_ro("direction", [](const PyVolume &v) { return v.volume->grid().direction; })
+      .def_prop_ro("source_type",
+                   [](const PyVolume &v) { return type_name(v.volume->source_type()); })
+      .def_prop_ro("value_range", [](const PyVolume &v) { return v.volume->value_range(); })
+      .def_prop_ro("bits_per_voxel", [](const PyVolume &v) { return v.volume->bits_per_voxel(); })
+      .def_prop_ro("compressed_bytes",
+                   [](const PyVolume &v) { return v.volume->compressed_bytes(); })
+      .def_prop_ro("max_voxel_error", [](const PyVolume &v) { return v.volume->max_voxel_error(); })
+      .def_prop_ro("num_levels", [](const PyVolume &v) { return v.volume->num_levels(); })
+      .def("decode", &decode, "level"_a)
+      .def("sample", &sample, "max_voxels"_a)
+      .def(
+          "save",
+          [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
+          "path"_a, nb::call_guard<nb::gil_scoped_release>());
+  m.def("compress", &compress, "read"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a, "direction"_a,
+        "options"_a, "keep"_a, "progress"_a.none());
+  m.def("compress_array", &compress_array, "array"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a,
+        "direction"_a, "options"_a, "progress"_a.none());
+  m.def("open", &open_volume, "path"_a, "options"_a, "dims"_a.none(), "type"_a.none(),
+        "spacing"_a.none(), "progress"_a.none());
+
+  nb::class_<PassView>(m, "PassView")
+      .def_prop_ro("passes", [](const PassView &v) { return v.get().passes(); })
+      .def_prop_ro("completed_percent",
+                   [](const PassView &v) { return v.get().completed_percent(); })
+      .def("picture", &PassView::picture);
+  nb::class_<PyRenderer>(m, "Renderer")
+      .def(nb::init<const std::string &, const PyVolume &, const nb::dict &>(), "device"_a,
+           "volume"_a, "options"_a)
+      .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
+      .def("camera", &PyRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
+      .def_prop_ro("device", &PyRenderer::device)
+      .def_prop_ro("compile_ms", &PyRenderer::compile_ms)
+      .def_prop_ro("setup_ms", &PyRenderer::setup_ms)
+      .def_prop_ro("memory_bytes", &PyRenderer::memory_bytes);
+}

@@ -1,0 +1,35 @@
+"""What tests of several files share."""
+
+import os
+import pathlib
+import subprocess
+
+import numpy as np
+import pytest
+
+TOP = pathlib.Path(__file__).resolve().parents[3]
+FUEL = TOP / "tests/data/fuel_64x33x32_uint8.raw.gz"
+
+
+@pytest.fixture(scope="session")
+def program():
+    """Runs the program of the build, not that of the wheel."""
+    path = os.environ.get("ISOWAVE_PROGRAM")
+    if not path:
+        pytest.skip("ISOWAVE_PROGRAM does not name the program")
+
+    def run(*arguments):
+        done = subprocess.run(
+            [path, *map(str, arguments)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
+def sphere_voxels(shape=(20, 25, 30), dtype=np.float32):
+    """Distance from the middle, in voxels along each axis alike; unequal sides."""
+    z, y, x = np.ogrid[tuple(slice(0, n) for n in shape)]
+    middle = [(n - 1) / 2 for n in shape]
+    return np.sqrt((z - middle[0]) ** 2 + (y - middle[1]) ** 2 + (x - middle[2]) ** 2).astype(dtype)

@@ -1,0 +1,350 @@
+"""The package on a device: volumes, renderers, pictures; the program's bits."""
+
+import gc
+import gzip
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import FUEL, sphere_voxels
+
+import isowave
+
+SIZE = (64, 48)
+
+
+@pytest.fixture(scope="module")
+def volume():
+    return isowave.compress(sphere_voxels(), tolerance=0.01, spacing=(3, 2, 1), origin=(30, 20, 10))
+
+
+@pytest.fixture(scope="module")
+def renderer(volume):
+    return volume.renderer(size=SIZE)
+
+
+def test_volume_says_what_it_is(volume):
+    assert volume.shape == (20, 25, 30)
+    assert volume.spacing == (3, 2, 1)
+    assert volume.origin == (30, 20, 10)
+    assert np.array_equal(volume.direction, np.eye(3))
+    assert volume.dtype == np.float32
+    voxels = sphere_voxels()
+    assert volume.value_range == (voxels.min(), voxels.max())
+    assert np.abs(volume.decode() - voxels).max() == pytest.approx(volume.max_error)
+    assert 0 < volume.max_error <= 0.01
+    assert volume.nbytes < voxels.nbytes
+    assert np.array_equal(np.asarray(volume), volume.decode())
+    assert "20 x 25 x 30" in repr(volume) and "20 x 25 x 30" in volume._repr_html_()
+
+
+@pytest.mark.parametrize(
+    "dtype", ["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"]
+)
+def test_every_type_is_compressed_without_loss_where_asked(dtype):
+    voxels = np.arange(5 * 4 * 3).reshape(5, 4, 3).astype(dtype)
+    exact = np.issubdtype(dtype, np.integer)
+    volume = isowave.compress(voxels, exact=exact, tolerance=None if exact else 1e-3)
+    assert volume.dtype == np.dtype(dtype)
+    assert np.abs(volume.decode() - voxels).max() <= (0 if exact else 1e-3)
+
+
+def test_views_are_compressed_as_their_copies():
+    base = sphere_voxels((40, 25, 30))
+    for view in (base[::2], base[::-1], base.transpose(2, 1, 0), np.asfortranarray(base)):
+        seen = isowave.compress(view, tolerance=0.01)
+        copied = isowave.compress(np.ascontiguousarray(view), tolerance=0.01)
+        assert seen.shape == view.shape
+        assert np.array_equal(seen.decode(), copied.decode())
+
+
+def test_files_are_those_of_the_program(program, tmp_path):
+    program("convert", FUEL, "--tolerance", 0.5, "--levels", 2, "-o", tmp_path / "program.zfp")
+    isowave.open(FUEL, tolerance=0.5, levels=2).save(tmp_path / "package.zfp")
+    assert (tmp_path / "program.zfp").read_bytes() == (tmp_path / "package.zfp").read_bytes()
+    opened = isowave.open(tmp_path / "program.zfp")
+    assert opened.shape == (32, 33, 64) and opened.num_levels == 2
+    assert opened.decode(1).shape == (17, 17, 33)
+
+
+def test_array_and_file_are_one_volume():
+    voxels = np.frombuffer(gzip.open(FUEL).read(), np.uint8).reshape(32, 33, 64)
+    of_array, of_file = isowave.compress(voxels, exact=True), isowave.open(FUEL, exact=True)
+    assert np.array_equal(of_array.decode(), voxels)
+    assert np.array_equal(of_file.decode(), voxels)
+    assert of_array.shape == of_file.shape
+
+
+def test_picture_has_the_programs_bits(program, tmp_path):
+    image = isowave.open(FUEL, exact=True).render(10, size=(320, 240))
+    image.save(tmp_path / "package.png")
+    program("render", FUEL, "-i", 10, "--exact", "--size", "320x240", "-o", tmp_path / "a.png",
+            "--depth", tmp_path / "a.npy")  # fmt: skip
+    assert (tmp_path / "package.png").read_bytes() == (tmp_path / "a.png").read_bytes()
+    assert image._repr_png_() == (tmp_path / "a.png").read_bytes()
+    depth = np.load(tmp_path / "a.npy")
+    assert np.array_equal(image.depth, depth)
+
+
+def test_orbit_is_the_programs(program, tmp_path):
+    volume = isowave.open(FUEL, exact=True)
+    program("render", FUEL, "-i", 10, "--exact", "--size", "64x48", "--orbit", 3, "-o",
+            tmp_path / "a.png", "--depth", tmp_path / "a.npy")  # fmt: skip
+    for i, camera in enumerate(isowave.Camera.orbit(volume, 3)):
+        image = volume.render(10, size=SIZE, camera=camera)
+        files = sorted(tmp_path.glob("a*.npy"))
+        assert len(files) == 3
+        assert np.allclose(image.depth, np.load(files[i]), rtol=1e-5)
+
+
+def test_axes(renderer):
+    """The sphere is a ball of index space: in the world its extents are those of the spacing."""
+    radius = 6.0
+    image = renderer.render(radius)
+    hit = np.isfinite(image.depth)
+    assert hit.sum() > 100
+    assert image.rgb.shape == (48, 64, 3) and image.rgb.dtype == np.uint8
+    assert image.rgba.shape == (48, 64, 4)
+    assert np.array_equal(image.rgba[..., 3] == 255, hit)
+    assert np.isnan(image.position[~hit]).all() and (image.normals[~hit] == 0).all()
+    volume = renderer.volume
+    middle = np.array(volume.origin) + np.array(volume.spacing) * (np.array(volume.shape) - 1) / 2
+    index = (image.position[hit][:, ::-1] - middle) / volume.spacing  # (z, y, x)
+    assert np.allclose(np.linalg.norm(index, axis=1), radius, atol=0.2)
+    # Positions are as far from the eye as depth says.
+    away = np.linalg.norm(image.position[hit] - image.camera.eye, axis=1)
+    assert np.allclose(away, image.depth[hit], rtol=1e-5)
+    # The field grows outwards, so normals point inwards.
+    assert np.allclose(np.linalg.norm(image.normals[hit], axis=1), 1, atol=1e-5)
+    inwards = -(index / volume.spacing)[:, ::-1]
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
+    assert (np.sum(inwards * image.normals[hit], axis=1) > 0.9).all()
+
+
+def test_direction_turns_the_world():
+    turned = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]], float)
+    volume = isowave.compress(sphere_voxels(), rate=16, spacing=(3, 2, 1), direction=turned)
+    assert np.array_equal(volume.direction, turned)
+    image = volume.render(6, size=SIZE)
+    hit = np.isfinite(image.depth)
+    middle = turned @ (np.array([1, 2, 3]) * (np.array([30, 25, 20]) - 1) / 2)
+    index = np.linalg.solve(turned * [1, 2, 3], (image.position[hit] - middle).T)
+    assert np.allclose(np.linalg.norm(index, axis=0), 6, atol=0.2)
+
+
+def test_passes_end_with_the_finished_picture(volume):
+    renderer = volume.renderer(size=SIZE, cache_blocks=16)
+    whole = renderer.render(6)
+    pictures = list(renderer.passes(6))
+    assert len(pictures) > 2
+    assert not any(picture.complete for picture in pictures[:-1])
+    assert pictures[-1].complete and np.array_equal(pictures[-1].rgb, whole.rgb)
+    assert np.array_equal(pictures[-1].depth, whole.depth)
+    for picture in renderer.passes(6):
+        assert picture.statistics["passes"] == 1
+        break  # the frame ends here
+    assert np.array_equal(renderer.render(6).rgb, whole.rgb)
+
+
+def test_on_pass_stops_and_raises(volume):
+    renderer = volume.renderer(size=SIZE, cache_blocks=16)
+    kept = []
+
+    def stop(progress):
+        kept.append(progress)
+        return progress.passes < 2
+
+    image = renderer.render(6, on_pass=stop)
+    assert not image.complete and image.statistics["cancelled"]
+    with pytest.raises(isowave.Error, match="over"):
+        kept[0].rgb
+
+    def fail(progress):
+        raise KeyError("mine")
+
+    with pytest.raises(KeyError, match="mine"):
+        renderer.render(6, on_pass=fail)
+    assert renderer.render(6).complete
+
+
+def test_errors_are_kept_and_bounds_given():
+    volume = isowave.compress(sphere_voxels((40, 44, 48)), tolerance=0.001, levels=2)
+    image = volume.render(10, size=SIZE, max_error=0.5, outputs=("rgb", "depth", "bounds"))
+    assert image.statistics["detail"]["reachable"]
+    hit = np.isfinite(image.depth)
+    assert np.isfinite(image.bounds[hit]).mean() > 0.5
+    assert image.normals is None
+    timed = volume.render(10, size=SIZE, time_budget=1000.0)
+    assert timed.complete
+
+
+def test_bad_requests_are_one_line(volume, renderer):
+    cases = [
+        lambda: renderer.render(float("nan")),
+        lambda: renderer.render(6, size=(640, 480)),
+        lambda: renderer.render(6, max_error=1.0),
+        lambda: renderer.render(6, time_budget=1.0),
+        lambda: renderer.render(6, voxel_pixels=1.0),
+        lambda: renderer.render(6, outputs=("rgb", "alpha")),
+        lambda: renderer.render(6, color="red"),
+        lambda: renderer.render(6, color=(1, 2, 3)),
+        lambda: renderer.render(6, camera=isowave.Camera((0, 0, 0), (0, 0, 0))),
+        lambda: volume.renderer(device="no such device"),
+        lambda: volume.renderer(memory_budget=1000),
+        lambda: volume.decode(1),
+        lambda: isowave.open("missing.nrrd"),
+        lambda: isowave.compress(np.zeros((4, 4))),
+        lambda: isowave.compress(np.zeros((4, 4, 4)), rate=33),
+        lambda: isowave.compress(np.zeros((4, 4, 4)), rate=4, exact=True),
+        lambda: isowave.compress(np.full((4, 4, 4), np.nan)),
+    ]
+    for case in cases:
+        with pytest.raises((isowave.Error, ValueError, TypeError)) as raised:
+            case()
+        assert str(raised.value) and "\n" not in str(raised.value)
+    assert renderer.render(6).complete
+
+
+def test_kept_renderer_grows_with_what_is_asked(volume):
+    small = volume.render(6, size=SIZE)
+    large = volume.render(6, size=(1600, 900))
+    assert large.rgb.shape == (900, 1600, 3)
+    again = volume.render(6, size=SIZE, samples=2)
+    assert again.depth.shape == (96, 128) and again.rgba.shape == (48, 64, 4)
+    assert np.array_equal(volume.render(6, size=SIZE).rgb, small.rgb)
+
+
+def test_threads_share_a_renderer(volume):
+    renderer = volume.renderer(size=SIZE)
+    expected = {isovalue: renderer.render(isovalue).rgb for isovalue in (5, 7)}
+    wrong, stop = [], threading.Event()
+
+    def draw(isovalue):
+        for _ in range(8):
+            image = renderer.render(isovalue, on_pass=lambda progress: True)
+            if not np.array_equal(image.rgb, expected[isovalue]):
+                wrong.append(isovalue)
+
+    def churn():  # makes and drops renderers and collects garbage meanwhile
+        while not stop.is_set():
+            volume.renderer(size=(16, 16)).render(6)
+            gc.collect()
+
+    threads = [threading.Thread(target=draw, args=(isovalue,)) for isovalue in (5, 7, 5, 7)]
+    churning = threading.Thread(target=churn)
+    churning.start()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    stop.set()
+    churning.join()
+    assert not wrong
+
+
+def test_gil_is_released_while_a_volume_is_compressed():
+    turns = []
+    stop = threading.Event()
+
+    def count():
+        while not stop.is_set():
+            turns.append(None)
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    isowave.compress(np.random.default_rng(0).random((128, 128, 128), np.float32), tolerance=1e-3)
+    stop.set()
+    thread.join()
+    assert len(turns) > 10
+
+
+INTERRUPTED = """
+import numpy as np, sys, isowave
+voxels = np.random.default_rng(0).random((64, 64, 64), np.float32)
+if sys.argv[1] == "compress":
+    voxels = np.random.default_rng(0).random((512, 256, 256), np.float32)
+    work = lambda: isowave.compress(voxels, tolerance=1e-4, num_threads=1)
+else:
+    renderer = isowave.compress(voxels, rate=16).renderer(size=(640, 480), cache_blocks=8, device="cpu")
+    work = lambda: renderer.render(0.5)
+print("ready", flush=True)
+try:
+    while True:
+        work()
+except KeyboardInterrupt:
+    print("stopped", flush=True)
+"""
+
+
+@pytest.mark.parametrize("what", ["compress", "render"])
+def test_ctrl_c_stops(what):
+    process = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, what], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=120)
+    assert out == "stopped\n"
+
+
+def test_progress_goes_from_nothing_to_all():
+    told = {}
+    isowave.compress(
+        sphere_voxels(),
+        tolerance=0.01,
+        progress=lambda what, done: told.setdefault(what, []).append(done),
+    )
+    assert len(told) == 2
+    for steps in told.values():
+        assert steps == sorted(steps) and steps[-1] == 1
+
+    def fail(what, done):
+        raise LookupError("enough")
+
+    with pytest.raises(LookupError, match="enough"):
+        isowave.compress(sphere_voxels(), tolerance=0.01, progress=fail)
+
+
+def test_sources_that_fail_raise_their_own_exception():
+    class Store:
+        shape, dtype, ndim = (8, 8, 8), np.dtype("uint8"), 3
+
+        def __array__(self, dtype=None, copy=None):
+            raise OSError("the disk is gone")
+
+    with pytest.raises(Exception, match="the disk is gone"):
+        isowave.compress(Store())
+
+
+def test_histogram_counts_all_voxels_of_a_small_volume(volume):
+    counts, edges = volume.histogram(16)
+    assert counts.sum() == 20 * 25 * 30
+    # Decoded values just beyond the ends belong to the last bins.
+    values = np.clip(volume.decode(), *volume.value_range)
+    expected, expected_edges = np.histogram(values, 16, volume.value_range)
+    assert np.allclose(edges, expected_edges) and np.array_equal(counts, expected)
+
+
+def test_report_names_devices_and_loader():
+    text = str(isowave.Report())
+    assert isowave.__version__ in text and "OpenCL loader" in text
+    for device in isowave.devices():
+        assert device["name"] in text
+        assert {"index", "name", "vendor", "platform", "driver", "type", "memory_bytes"} == set(
+            device
+        )
+
+
+def test_command_is_the_program():
+    command = os.path.join(os.path.dirname(sys.executable), "isowave")
+    version = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
+    assert isowave.__version__ in version.stdout
+    failed = subprocess.run([command, "info", "missing.zfp"], capture_output=True, text=True)
+    assert failed.returncode == 1 and failed.stderr.count("\n") == 1
