@@ -21,6 +21,7 @@ import pytest
 from PIL import Image
 from viewer_fakes import FakeCamera, FakeVolume
 
+from isowave import viewer
 from isowave.viewer.scene import Scene
 from isowave.viewer.server import Server
 
@@ -168,6 +169,7 @@ def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:
         samples=1,
         color=(0xDB / 255, 0xBD / 255, 0x87 / 255),
         background=(1, 1, 1),
+        outputs=("rgb",),
         max_error=None,
         time_budget=None,
         on_pass=lambda image: True,
@@ -374,7 +376,7 @@ def test_the_page_itself_leaves_out_stale_pictures(open_page: Callable[..., Any]
 
 
 def answer_from_files(page: Any, url: str) -> None:
-    root = Path(__file__).parents[1] / "isowave" / "viewer"
+    root = Path(viewer.__file__).parent
 
     def answer(route: Any) -> None:
         script = route.request.url.endswith(".js")

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from viewer_fakes import Drawn, FakeCamera, FakeVolume
 
-from isowave.viewer.pictures import count_rays, dividing_value, fit_size, narrow_factor
+from isowave.viewer.pictures import count_rays, dividing_value, fit_size
 from isowave.viewer.protocol import Ack, Budget, ProtocolError, TokenBucket, View, Wish
 from isowave.viewer.scene import Client, Scene, Session
 
@@ -117,6 +117,7 @@ def test_the_last_picture_is_lossless_to_the_bit() -> None:
         samples=1,
         color=(1, 0.5, 0),
         background=(1, 1, 1),
+        outputs=("rgb",),
         max_error=None,
         time_budget=None,
         on_pass=lambda image: True,
@@ -286,7 +287,7 @@ def test_a_time_budget_needs_no_first_picture() -> None:
     eye = Eye(scene)
     eye.wish(80.0, time_budget=50.0, max_error=0.5)
     run(scene)
-    assert [(f.size, f.time_budget, f.max_error) for f in volume.frames] == [((64, 48), 50.0, 0.5)]
+    assert [(f.size, f.time_budget, f.max_error) for f in volume.frames] == [((64, 48), 0.05, 0.5)]
 
 
 def test_the_surface_fills_the_picture_where_no_camera_is_given() -> None:
@@ -295,7 +296,7 @@ def test_the_surface_fills_the_picture_where_no_camera_is_given() -> None:
     eye = Eye(scene)
     eye.wish(80.0, size=(64, 48))
     run(scene)
-    home = volume.renderer(device=None, size=(64, 48), samples=1).camera(80.0)
+    home = volume.renderer(device=None, size=(64, 48), samples=1).camera(80.0, (64, 48))
     assert volume.frames[0].camera == home == volume.frames[1].camera
     assert eye.of_type("picture")[0]["camera"]["eye"] == list(home.eye)
     eye.ack()
@@ -548,14 +549,3 @@ def test_the_dividing_value_is_between_two_peaks() -> None:
     assert 4.0 <= dividing_value(counts, 0.0, 12.0) <= 8.0
     assert dividing_value([0, 0], 1.0, 3.0) == 2.0
     assert dividing_value([5], 1.0, 3.0) == 2.0
-
-
-def test_a_narrow_picture_shows_the_whole_box_and_no_more_than_it_must() -> None:
-    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    away, up = np.array([0.0, 0.0, 4.0]), np.array([0.0, 1.0, 0.0])
-    factor = narrow_factor(corners, away, up, 60.0, 0.5, 100.0)
-    tangent = np.tan(np.radians(30))
-    wide = np.max(np.abs(corners[:, 0]) / ((4 * factor - corners[:, 2]) * tangent * 0.5))
-    assert abs(wide - 1) < 1e-12  # a corner is at the border
-    assert narrow_factor(corners, away, up, 60.0, 2.0, 1.0) == 1.0
-    assert narrow_factor(corners, away, up, 60.0, 0.5, 0.55) == pytest.approx(1.1)

@@ -17,6 +17,8 @@ from typing import Any
 import pytest
 from viewer_fakes import FakeCamera, FakeVolume
 
+import isowave
+
 pytest.importorskip("anywidget")
 
 from isowave.viewer import widget as widget_module  # noqa: E402
@@ -161,8 +163,8 @@ view(FakeVolume(), isovalue=80, title="ball", height=420,
 @pytest.fixture
 def lab(tmp_path: Path) -> Iterator[str]:
     """A JupyterLab with a notebook that shows the widget; its URL."""
-    here = Path(__file__).parent
-    cell = NOTEBOOK_CELL.format(paths=[str(here), str(here.parent)])
+    paths = [str(Path(__file__).parent), str(Path(isowave.__file__).parents[1])]
+    cell = NOTEBOOK_CELL.format(paths=paths)
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
     notebook = {"nbformat": 4, "nbformat_minor": 5, "metadata": kernel, "cells": [
         {"cell_type": "code", "id": "a", "metadata": {}, "source": cell, "outputs": [],

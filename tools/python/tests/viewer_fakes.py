@@ -27,6 +27,13 @@ class FakeCamera:
 
 
 @dataclass
+class FakeProgress:
+    rgb: NDArray[np.uint8]
+    passes: int
+    completed_percent: float
+
+
+@dataclass
 class FakeImage:
     rgb: NDArray[np.uint8]
     statistics: Mapping[str, Any]
@@ -60,8 +67,6 @@ class FakeVolume:
     renderers: list[dict[str, Any]] = field(default_factory=list)
     shape: tuple[int, int, int] = (SIDE, SIDE, SIDE)
     spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    direction: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
     dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
     value_range: tuple[float, float] = (0.0, VALUES)
     nbytes: int = 65536
@@ -91,9 +96,9 @@ class FakeRenderer:
         width, height = options["size"]
         self.memory_bytes = 48 * width * height * options["samples"] ** 2
 
-    def camera(self, isovalue: float) -> FakeCamera:
+    def camera(self, isovalue: float, size: tuple[int, int]) -> FakeCamera:
         centre = (SIDE - 1) / 2
-        away = 2.2 * max(2.0, self._radius(isovalue))
+        away = 2.2 * max(2.0, self._radius(isovalue)) * max(1.0, size[1] / size[0])
         return FakeCamera((centre, centre, centre + away), (centre, centre, centre))
 
     def render(
@@ -105,9 +110,10 @@ class FakeRenderer:
         samples: int,
         color: tuple[float, float, float],
         background: tuple[float, float, float],
+        outputs: Sequence[str],
         max_error: float | None,
         time_budget: float | None,
-        on_pass: Callable[[FakeImage], bool],
+        on_pass: Callable[[FakeProgress], bool],
     ) -> FakeImage:
         width, height = self._options["size"]
         if size[0] * size[1] * samples**2 > width * height * self._options["samples"] ** 2:
@@ -124,12 +130,9 @@ class FakeRenderer:
             rows = size[1] * (i + 1) // self._volume.passes
             image = picture.copy()
             image[rows:] = _bytes(background)
-            statistics = {
-                "passes": i + 1,
-                "decoded_blocks": 0 if cached else 100 * (i + 1),
-                "completed_percent": 100.0 * (i + 1) / self._volume.passes,
-            }
-            if not on_pass(FakeImage(image, statistics, False)):
+            statistics = {"passes": i + 1, "decoded_blocks": 0 if cached else 100 * (i + 1)}
+            percent = 100.0 * (i + 1) / self._volume.passes
+            if not on_pass(FakeProgress(image, i + 1, percent)):
                 drawn.stopped = True
                 return FakeImage(image, statistics, False)
         self._cache.add(isovalue)

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as pillow
 
-from .interfaces import VolumeLike
-
 JPEG_QUALITY: Final = 70
 
 
@@ -30,39 +28,6 @@ def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, i
     # A side of one pixel cannot become smaller: the other one makes up for it.
     limit = max(1, max_rays // (samples * samples))
     return max(1, min(width, limit // height)), max(1, min(height, limit))
-
-
-def box_corners(volume: VolumeLike) -> NDArray[np.float64]:
-    """The corners of a volume in world space: [8, 3], (x, y, z)."""
-    steps = np.array([(i & 1, i >> 1 & 1, i >> 2 & 1) for i in range(8)], np.float64)
-    sides = (np.array(volume.shape[::-1]) - 1) * np.array(volume.spacing[::-1])
-    corners = (steps * sides) @ np.asarray(volume.direction, np.float64).T
-    return np.asarray(corners + np.array(volume.origin[::-1]), np.float64)
-
-
-def narrow_factor(
-    corners: NDArray[np.float64],
-    away: NDArray[np.float64],
-    up: NDArray[np.float64],
-    fovy: float,
-    aspect: float,
-    fitting_aspect: float,
-) -> float:
-    """How much further away the eye must be, so that what fits a wide picture fits this one.
-
-    corners         of a box around what is looked at, and away: of the eye, relative to `at`
-    aspect          width / height of this picture; fitting_aspect: of the one it fits
-    """
-    distance = float(np.linalg.norm(away))
-    toward = away / distance
-    right = np.cross(up, toward)
-    right /= np.linalg.norm(right)
-    tangent = math.tan(math.radians(fovy) / 2)
-    # A corner is inside if its offset is at most its depth times the tangent of the half angle.
-    wide = np.abs(corners @ right) / (tangent * aspect)
-    high = np.abs(corners @ np.cross(toward, right)) / tangent
-    for_the_box = float(np.max(corners @ toward + np.maximum(wide, high))) / distance
-    return max(1.0, min(for_the_box, fitting_aspect / aspect))
 
 
 def dividing_value(counts: Sequence[int], low: float, high: float) -> float:

@@ -23,9 +23,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .interfaces import ImageLike, RendererLike, VolumeLike
-from .pictures import box_corners, count_rays, dividing_value, encode_jpeg, encode_png, fit_size
-from .pictures import narrow_factor
+from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
+from .pictures import count_rays, dividing_value, encode_jpeg, encode_png, fit_size
 from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, View, Wish
 from .protocol import VERSION, check
 
@@ -97,6 +96,7 @@ class _Frame:
     size: tuple[int, int]
     samples: int
     passes: int = 0
+    percent: float = 0.0  # of its rays that have ended
     last_sent: float = field(default=-math.inf)
     stopped: bool = False
 
@@ -274,7 +274,7 @@ class Scene:
 
     def _draw(self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage) -> None:
         began = self._clock()
-        view = client.view or wish.view or self._home_view(renderer, wish)
+        view = client.view or wish.view or home_view(renderer, wish)
         with self._changed:
             if client.wish is not wish:
                 return
@@ -289,15 +289,16 @@ class Scene:
             color=wish.color,
             background=wish.background,
             max_error=wish.max_error,
-            time_budget=wish.time_budget,
+            outputs=("rgb",),
+            time_budget=None if wish.time_budget is None else wish.time_budget / 1000,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.stopped:
             self._show_what_there_is(frame, image)
             return
-        rgb = np.ascontiguousarray(image.rgb)
+        rgb = picture_of(image)
         data = encode_jpeg(rgb)
-        head = self._head(frame, image, stage.value)
+        head = self._finished_head(frame, image)
         with self._changed:
             if self._is_stale(frame):
                 return
@@ -310,9 +311,9 @@ class Scene:
                 client.due = self._clock() + REST_SECONDS
                 client.whole_seconds = self._clock() - frame.began
 
-    def _on_pass(self, frame: _Frame, so_far: ImageLike) -> bool:
+    def _on_pass(self, frame: _Frame, so_far: ProgressLike) -> bool:
         """Sends the picture so far where it is worth it. False: the frame is to stop."""
-        frame.passes += 1
+        frame.passes, frame.percent = so_far.passes, so_far.completed_percent
         now = self._clock()
         with self._changed:
             if self._is_stale(frame) or self._gives_way(frame, now):
@@ -325,10 +326,10 @@ class Scene:
             )
         if worth_it:
             frame.last_sent = now
-            data = encode_jpeg(np.ascontiguousarray(so_far.rgb))
+            data = encode_jpeg(so_far.rgb)
             with self._changed:
                 if not self._is_stale(frame):
-                    self._offer(frame.client, self._head(frame, so_far, "pass"), data, keep=False)
+                    self._offer(frame.client, self._head(frame, "pass"), data, keep=False)
         return True
 
     def _is_stale(self, frame: _Frame) -> bool:
@@ -349,10 +350,10 @@ class Scene:
         client = frame.client
         if frame.stage is not Stage.FIRST or self._clock() - client.shown < SHOW_SECONDS:
             return
-        data = encode_jpeg(np.ascontiguousarray(image.rgb))
+        data = encode_jpeg(picture_of(image))
         with self._changed:
             if client.joined:
-                self._offer(client, self._head(frame, image, "pass"), data, keep=False)
+                self._offer(client, self._head(frame, "pass"), data, keep=False)
 
     def _send_lossless(self, client: Client, wish: Wish) -> None:
         with self._changed:
@@ -426,18 +427,6 @@ class Scene:
             return fit_size((width, height), 1, self._limit()), 1
         return fit_size(wish.size, wish.samples, self._limit()), wish.samples
 
-    def _home_view(self, renderer: RendererLike, wish: Wish) -> View:
-        """The view in which the surface fills the picture."""
-        camera = renderer.camera(wish.isovalue)
-        eye, at, up = (np.asarray(v, np.float64) for v in (camera.eye, camera.at, camera.up))
-        aspect = wish.size[0] / wish.size[1]
-        made = self._made.size if self._made else wish.size
-        factor = narrow_factor(
-            box_corners(self._volume) - at, eye - at, up, camera.fovy, aspect, made[0] / made[1]
-        )
-        x, y, z = (float(v) for v in at + factor * (eye - at))
-        return View((x, y, z), _triple(at), _triple(up), float(camera.fovy))
-
     def _limit(self) -> int:
         return self._made.rays if self._made else MAX_RAYS
 
@@ -476,8 +465,19 @@ class Scene:
         client.shown = self._clock()
         self._post(client, {**head, "frame": client.sent}, data)
 
-    def _head(self, frame: _Frame, image: ImageLike, stage: str) -> dict[str, Any]:
-        view, statistics = frame.view, image.statistics
+    def _finished_head(self, frame: _Frame, image: ImageLike) -> dict[str, Any]:
+        statistics = image.statistics
+        return {
+            **self._head(frame, frame.stage.value),
+            "complete": bool(image.complete),
+            "passes": int(statistics["passes"]),
+            "percent": 100.0,
+            "decoded_blocks": int(statistics["decoded_blocks"]),
+            "detail": _plain(statistics.get("detail")),
+        }
+
+    def _head(self, frame: _Frame, stage: str) -> dict[str, Any]:
+        view = frame.view
         return {
             "type": "picture",
             "wish": frame.wish.id,
@@ -492,12 +492,12 @@ class Scene:
                 "up": list(view.up),
                 "fovy_deg": view.fovy,
             },
-            "complete": bool(image.complete) and stage != "pass",
+            "complete": False,
             "ms": round((self._clock() - frame.began) * 1e3, 2),
-            "passes": int(statistics.get("passes", frame.passes)),
-            "decoded_blocks": _whole_number(statistics.get("decoded_blocks")),
-            "percent": _finite(statistics.get("completed_percent")),
-            "detail": _plain(statistics.get("detail")),
+            "passes": frame.passes,
+            "percent": frame.percent,
+            "decoded_blocks": None,
+            "detail": None,
         }
 
     def _post_error(self, client: Client, error: Exception, wish: int | None) -> None:
@@ -638,8 +638,16 @@ class TooManyClients(ProtocolError):
     """The scene has as many clients as it may have."""
 
 
-def _triple(v: NDArray[np.float64]) -> tuple[float, float, float]:
-    return float(v[0]), float(v[1]), float(v[2])
+def home_view(renderer: RendererLike, wish: Wish) -> View:
+    """The view in which the surface fills the picture."""
+    camera = renderer.camera(wish.isovalue, wish.size)
+    return View(camera.eye, camera.at, camera.up, camera.fovy)
+
+
+def picture_of(image: ImageLike) -> NDArray[np.uint8]:
+    rgb = image.rgb
+    assert rgb is not None  # it was asked for
+    return rgb
 
 
 def first_line(error: Exception) -> str:
@@ -658,10 +666,6 @@ def _finite(value: object) -> float | None:
     if isinstance(value, (int, float, np.number)) and math.isfinite(float(value)):
         return float(value)
     return None
-
-
-def _whole_number(value: object) -> int | None:
-    return int(value) if isinstance(value, (int, np.integer)) else None
 
 
 def _plain(value: object) -> dict[str, Any] | None:
