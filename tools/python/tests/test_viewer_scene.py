@@ -11,9 +11,9 @@ import pytest
 from PIL import Image
 from viewer_fakes import Drawn, FakeCamera, FakeVolume
 
-from isowave.viewer.pictures import count_rays, dividing_value, fit_size
+from isowave.viewer.pictures import count_rays, dividing_value, fit_size, share_within
 from isowave.viewer.protocol import Ack, Budget, ProtocolError, TokenBucket, View, Wish
-from isowave.viewer.scene import Client, Scene, Session
+from isowave.viewer.scene import Client, Scene, Session, Stage
 
 
 class Clock:
@@ -74,9 +74,15 @@ def make_scene(volume: FakeVolume, clock: Clock, **options: Any) -> Scene:
 
 
 def run(scene: Scene) -> None:
+    """Until nothing is to be done but for clients at rest."""
     for _ in range(1000):
         if not scene.step():
-            return
+            due = [c.due for c in scene._clients if c.stage is Stage.WHOLE]
+            if not due:
+                return
+            clock = scene._clock
+            assert isinstance(clock, Clock)
+            clock.now = max(clock.now, min(due))
     raise AssertionError("the scene never rests")
 
 
@@ -95,8 +101,39 @@ def test_a_wish_is_drawn_small_then_whole_then_lossless() -> None:
     clock.now += 0.02
     run(scene)
     assert eye.pictures[2:] == [(1, "lossless")]
+    assert not eye.of_type("bounds")
+    clock.now += 0.5
     run(scene)
     assert len(eye.pictures) == 3
+    assert volume.frames[-1].size == (16, 12)
+    assert volume.frames[-1].outputs == ("depth", "bounds")
+    # A pixel of the whole picture is a quarter of one of the first picture.
+    assert [h["within_pixel"] for h in eye.of_type("bounds")] == [pytest.approx(2 / 3)]
+    frames = len(volume.frames)
+    clock.now += 100
+    run(scene)
+    assert len(volume.frames) == frames
+
+
+def test_whole_pictures_wait_for_wishes_that_are_on_their_way() -> None:
+    clock, volume = Clock(), FakeVolume()
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.01 if drawn.size == (16, 12) else 0.3
+
+    volume.before_pass = before_pass
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    for i in range(5):
+        eye.wish(80.0 + i)
+        while scene.step():
+            pass
+        eye.ack()
+        clock.now += 0.05
+    assert {f.size for f in volume.frames} == {(16, 12)} and len(volume.frames) == 5
+    clock.now += 0.05
+    assert scene.step()
+    assert volume.frames[-1].size == (64, 48)
 
 
 def test_the_last_picture_is_lossless_to_the_bit() -> None:
@@ -224,12 +261,13 @@ def test_clients_take_turns() -> None:
     volume.before_pass = before_pass
     for eye, isovalue in zip(eyes, (1.0, 2.0, 3.0)):
         eye.wish(isovalue)
-    for _ in range(9):
+    for _ in range(12):
         scene.step()
+        clock.now += 0.04
     order = [f.isovalue for f in volume.frames]
-    assert order[:6] == [1.0, 2.0, 3.0, 1.0, 2.0, 3.0]
+    assert order[:3] == [1.0, 2.0, 3.0] and sorted(order[3:6]) == [1.0, 2.0, 3.0]
     for eye in eyes[1:]:
-        assert eye.pictures == [(1, "first"), (1, "whole")]
+        assert eye.pictures[:2] == [(1, "first"), (1, "whole")]
 
 
 def test_each_client_sees_its_own_state() -> None:
@@ -542,6 +580,15 @@ def test_sizes_fit(size: tuple[int, int], samples: int, rays: int) -> None:
     fitted = fit_size(size, samples, rays)
     assert min(fitted) >= 1 and fitted[0] <= size[0] and fitted[1] <= size[1]
     assert count_rays(fitted, samples) <= max(rays, samples**2)
+
+
+def test_the_share_of_rays_within_a_bound() -> None:
+    inf = np.inf
+    depth = np.array([inf, inf, 5, 5, 5], np.float32)
+    bounds = np.array([0, inf, 0.5, 0.25, inf], np.float32)
+    assert share_within(depth, bounds, 0.25) == 0.25
+    assert share_within(depth, bounds, 1) == 0.5
+    assert share_within(depth[:1], bounds[:1], 1) is None
 
 
 def test_the_dividing_value_is_between_two_peaks() -> None:

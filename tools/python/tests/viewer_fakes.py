@@ -38,6 +38,8 @@ class FakeImage:
     rgb: NDArray[np.uint8]
     statistics: Mapping[str, Any]
     complete: bool
+    depth: NDArray[np.float32] | None = None
+    bounds: NDArray[np.float32] | None = None
 
 
 @dataclass
@@ -50,6 +52,7 @@ class Drawn:
     camera: FakeCamera
     max_error: float | None
     time_budget: float | None
+    outputs: tuple[str, ...]
     passes: int = 0
     stopped: bool = False
 
@@ -113,14 +116,16 @@ class FakeRenderer:
         outputs: Sequence[str],
         max_error: float | None,
         time_budget: float | None,
-        on_pass: Callable[[FakeProgress], bool],
+        on_pass: Callable[[FakeProgress], bool] | None,
     ) -> FakeImage:
         width, height = self._options["size"]
         if size[0] * size[1] * samples**2 > width * height * self._options["samples"] ** 2:
             raise RuntimeError("the renderer was not made for so many rays")
         if math.isnan(isovalue):
             raise RuntimeError("the isovalue is not a number")
-        drawn = Drawn(isovalue, size, samples, camera, max_error, time_budget)
+        if on_pass and time_budget is not None:
+            raise RuntimeError("a frame with a time budget does not show its passes")
+        drawn = Drawn(isovalue, size, samples, camera, max_error, time_budget, tuple(outputs))
         self._volume.frames.append(drawn)
         picture = self._picture(isovalue, camera, size, color, background)
         cached, image = isovalue in self._cache, picture
@@ -132,11 +137,15 @@ class FakeRenderer:
             image[rows:] = _bytes(background)
             statistics = {"passes": i + 1, "decoded_blocks": 0 if cached else 100 * (i + 1)}
             percent = 100.0 * (i + 1) / self._volume.passes
-            if not on_pass(FakeProgress(image, i + 1, percent)):
+            if on_pass and not on_pass(FakeProgress(image, i + 1, percent)):
                 drawn.stopped = True
                 return FakeImage(image, statistics, False)
         self._cache.add(isovalue)
-        return FakeImage(image, statistics, True)
+        # Three quarters of the rays meet a surface; of these, two thirds are off by 0.2 pixels.
+        part = np.arange(size[0] * size[1], dtype=np.float32).reshape(size[1], size[0]) % 4
+        depth = np.where(part == 0, np.inf, 5).astype(np.float32)
+        bounds = np.choose(part.astype(int), [0, 0.2, 0.2, np.inf]).astype(np.float32)
+        return FakeImage(image, statistics, True, depth, bounds)
 
     @staticmethod
     def _radius(isovalue: float) -> float:

@@ -18,6 +18,10 @@ class ImageLike(Protocol):
     def statistics(self) -> Mapping[str, Any]: ...
     @property
     def complete(self) -> bool: ...
+    @property
+    def depth(self) -> NDArray[np.float32] | None: ...
+    @property
+    def bounds(self) -> NDArray[np.float32] | None: ...
 
 
 class ProgressLike(Protocol):
@@ -64,7 +68,7 @@ class RendererLike(Protocol):
         outputs: Sequence[str],
         max_error: float | None,
         time_budget: float | None,
-        on_pass: Callable[[Any], bool],
+        on_pass: Callable[[Any], bool] | None,
     ) -> ImageLike: ...
 
 

@@ -50,6 +50,19 @@ def dividing_value(counts: Sequence[int], low: float, high: float) -> float:
     return float((edges[best[0] + 1] + edges[best[-1] + 1]) / 2)
 
 
+def share_within(
+    depth: NDArray[np.float32], bounds: NDArray[np.float32], limit: float
+) -> float | None:
+    """The share of the rays with a surface, or perhaps one, that are off by at most `limit`.
+
+    depth, bounds  as in Image
+    Returns None where there is no such ray.
+    """
+    surface = np.isfinite(depth) | (bounds > 0)
+    count = int(np.count_nonzero(surface))
+    return float(np.count_nonzero(bounds[surface] <= limit)) / count if count else None
+
+
 def encode_jpeg(rgb: NDArray[np.uint8]) -> bytes:
     """A picture on the way. rgb: uint8 [h, w, 3]."""
     stream = io.BytesIO()

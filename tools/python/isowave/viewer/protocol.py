@@ -12,8 +12,8 @@ looks nowhere.
     {"type": "ack", "frame": 3}
     {"type": "budget", "bytes": 600000000 | null}
 
-Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), error; view.js
-describes them.
+Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, error;
+view.js describes them.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ VERSION: Final = 1
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
+MAX_TIME_BUDGET: Final = 10_000  # ms; a frame with one is not cancelled, others wait for it
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
 MAX_ID: Final = 2**53 - 1  # what JavaScript counts to
@@ -205,7 +206,7 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         background=_triple(content["background"], 0, 1, "background"),
         samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
         max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
-        time_budget=_optional(content["time_budget"], 1, 6e5, "time_budget"),
+        time_budget=_optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget"),
     )
 
 

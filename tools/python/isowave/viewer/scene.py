@@ -4,9 +4,9 @@
     Scene     the renderer, its clients, and the thread in which all is drawn
 
 Of each client the newest wish counts; it cancels the frame of the one before. A wish is drawn in
-three stages: a first picture of a quarter of the width and height, the whole picture (sent as JPEG
-after passes), and, once the client rests, the lossless picture (PNG). Clients take turns, stage by
-stage. At most two pictures are on the way to a client; of those that wait for it only the last is
+stages: a first picture of a quarter of the width and height; the whole picture (sent as JPEG after
+passes); once the client rests, the lossless picture (PNG), and what is certain of it. Clients take
+turns, stage by stage. At most two pictures are on the way to a client; of those that wait for it only the last is
 kept, and it is always sent.
 """
 
@@ -24,14 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
-from .pictures import count_rays, dividing_value, encode_jpeg, encode_png, fit_size
+from .pictures import count_rays, dividing_value, encode_jpeg, encode_png, fit_size, share_within
 from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, View, Wish
 from .protocol import VERSION, check
 
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
 FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
 PASS_SECONDS: Final = 0.06  # between pictures of passes
+SETTLE_SECONDS: Final = 0.1  # after a first picture, for the next wish to come before the whole
 REST_SECONDS: Final = 0.12  # without a wish, until the lossless picture
+CERTAIN_SECONDS: Final = 0.4  # after the lossless picture, until its bounds are looked for
 GIVE_WAY_SECONDS: Final = 0.15  # of a whole picture, before others' first pictures come between
 QUICK_SECONDS: Final = 0.02  # a whole picture that needs no first one
 SHOW_SECONDS: Final = 0.15  # without a picture, until what a cancelled one has is shown
@@ -49,6 +51,7 @@ class Stage(Enum):
     FIRST = "first"
     WHOLE = "whole"
     LOSSLESS = "lossless"
+    CERTAIN = "certain"
     DONE = "done"
 
 
@@ -61,7 +64,7 @@ class Client:
     stage: Stage = Stage.DONE
     view: View | None = None  # of the wish, once it is known
     gave_way: bool = False  # the wish's whole picture was interrupted for another client
-    due: float = 0.0  # when the lossless picture may be made
+    due: float = -math.inf  # when the stage may begin
     lossless: tuple[dict[str, Any], NDArray[np.uint8]] | None = None  # what it is made of
     sent: int = 0  # pictures, numbered from 1
     acked: int = 0
@@ -239,13 +242,11 @@ class Scene:
         )
 
     def _seconds_to_rest(self) -> float | None:
-        due = [c.due for c in self._clients if c.stage is Stage.LOSSLESS]
+        due = [c.due for c in self._clients if c.stage is not Stage.DONE]
         return max(0.0, min(due) - self._clock()) if due else None
 
     def _has_turn(self, client: Client) -> bool:
-        if client.stage is Stage.LOSSLESS:
-            return self._clock() >= client.due
-        return client.wish is not None and client.stage is not Stage.DONE
+        return client.stage is not Stage.DONE and self._clock() >= client.due
 
     def _next_turn(self) -> tuple[Client, Wish, Stage] | None:
         """The first client in the row that something is to be done for; it goes to the end."""
@@ -264,6 +265,8 @@ class Scene:
                 self._send_lossless(client, wish)
             elif self._renderer is None:
                 raise RuntimeError(self._failure)
+            elif stage is Stage.CERTAIN:
+                self._send_bounds(self._renderer, client, wish)
             elif not self._grow(wish, stage):
                 self._draw(self._renderer, client, wish, stage)
         except Exception as error:  # of the library, or of its drivers
@@ -291,7 +294,8 @@ class Scene:
             max_error=wish.max_error,
             outputs=("rgb",),
             time_budget=None if wish.time_budget is None else wish.time_budget / 1000,
-            on_pass=lambda so_far: self._on_pass(frame, so_far),
+            # Frames with a time budget show no passes.
+            on_pass=None if wish.time_budget else lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.stopped:
             self._show_what_there_is(frame, image)
@@ -303,13 +307,14 @@ class Scene:
             if self._is_stale(frame):
                 return
             self._offer(client, head, data, keep=True)
+            now = self._clock()
             if stage is Stage.FIRST:
-                client.stage = Stage.WHOLE
+                # A pass of a whole picture may be long: not while the next wish is on its way.
+                settles = client.whole_seconds > SETTLE_SECONDS
+                client.stage, client.due = Stage.WHOLE, now + (SETTLE_SECONDS if settles else 0)
             else:
-                client.stage = Stage.LOSSLESS
-                client.lossless = head, rgb
-                client.due = self._clock() + REST_SECONDS
-                client.whole_seconds = self._clock() - frame.began
+                client.stage, client.due = Stage.LOSSLESS, now + REST_SECONDS
+                client.lossless, client.whole_seconds = (head, rgb), now - frame.began
 
     def _on_pass(self, frame: _Frame, so_far: ProgressLike) -> bool:
         """Sends the picture so far where it is worth it. False: the frame is to stop."""
@@ -364,8 +369,34 @@ class Scene:
         data = encode_png(rgb)
         with self._changed:
             if client.wish is wish:
-                client.stage, client.lossless = Stage.DONE, None
+                client.stage, client.lossless = Stage.CERTAIN, None
+                client.due = self._clock() + CERTAIN_SECONDS
                 self._offer(client, {**head, "stage": "lossless", "format": "png"}, data, keep=True)
+
+    def _send_bounds(self, renderer: RendererLike, client: Client, wish: Wish) -> None:
+        """How far the surface may be off, of the rays of a first picture: bounds take their time."""
+        if client.view is None:
+            return
+        size, samples = self._fitted(wish, Stage.FIRST)
+        pixels = size[1] / wish.size[1]  # of the first picture, to one of the whole picture
+        image = renderer.render(
+            wish.isovalue,
+            camera=self._make_camera(client.view),
+            size=size,
+            samples=samples,
+            color=wish.color,
+            background=wish.background,
+            outputs=("depth", "bounds"),
+            max_error=None if wish.max_error is None else wish.max_error * pixels,
+            time_budget=None,
+            on_pass=lambda so_far: client.wish is wish and not self._closing,
+        )
+        with self._changed:
+            if client.wish is wish:
+                client.stage = Stage.DONE
+                if image.depth is not None and image.bounds is not None and image.complete:
+                    within = share_within(image.depth, image.bounds, pixels)
+                    self._post(client, {"type": "bounds", "wish": wish.id, "within_pixel": within})
 
     # Renderers.
 
@@ -438,7 +469,7 @@ class Scene:
         skip_first = client.whole_seconds < QUICK_SECONDS or wish.time_budget is not None
         client.wish, client.view = wish, wish.view
         client.stage = Stage.WHOLE if skip_first else Stage.FIRST
-        client.gave_way, client.lossless = False, None
+        client.gave_way, client.lossless, client.due = False, None, -math.inf
 
     def _acknowledge(self, client: Client, frame: int) -> None:
         if frame > client.sent:

@@ -11,6 +11,8 @@
 //   histogram  counts of equally wide bins, range
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, camera,
 //              isovalue, complete, passes, decoded_blocks, percent, ms, detail; and its bytes
+//   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of the
+//              volume before compression; null: there is no surface
 //   error      message, wish or null: of none
 //   closed     message, retry: whether to connect again
 //
@@ -164,7 +166,7 @@ export function readHash(hash) {
     background: color("background"),
     samples: [1, 2, 3, 4].find((n) => n === number("samples", 1, 4)),
     max_error: number("error", 0.001, 1000),
-    time_budget: number("ms", 1, 600000),
+    time_budget: number("ms", 1, 10000),
   };
   if (parts.has("eye")) {
     try {
@@ -225,7 +227,7 @@ const HTML = `
     <label>Samples per pixel <select name="samples"><option value="1">1</option>
       <option value="2">4</option><option value="3">9</option><option value="4">16</option></select>
     </label>
-    <label>Time budget <span class="unit"><input name="time_budget" type="number" min="1" max="600000" step="any"
+    <label>Time budget <span class="unit"><input name="time_budget" type="number" min="1" max="10000" step="any"
       placeholder="none"> ms</span></label>
     <h2>Device</h2>
     <form class="budget"><label>Memory budget <span class="unit"><input name="budget" type="number" min="1"
@@ -378,7 +380,7 @@ class View {
    */
   receive(head, data) {
     const takers = { welcome: this.welcome, status: this.showStatus, error: this.showError,
-      histogram: this.showHistogram };
+      histogram: this.showHistogram, bounds: this.showBounds };
     if (head.type === "picture") return this.showPicture(head, data);
     takers[head.type]?.call(this, head);
   }
@@ -479,18 +481,29 @@ class View {
   }
 
   showFacts(head) {
+    const detail = this.state.max_error ? `most pixels within ${toText(this.state.max_error)} px`
+      : "at full detail";
     const certain = !head.complete ? "the time was over: not complete"
       : head.detail?.reachable === false ? head.detail.advice || "that error is out of reach"
-        : this.state.max_error ? `complete; most pixels within ${toText(this.state.max_error)} px`
-          : "complete, at full detail";
+        : `complete, ${detail}`;
     const rays = head.samples > 1 ? `, ${head.samples ** 2} rays a pixel` : "";
     this.list(".facts", {
       Size: `${head.size[0]} × ${head.size[1]}${rays}`,
       Passes: toCount(head.passes),
       "Blocks decoded": toCount(head.decoded_blocks),
       Time: `${toText(head.ms.toPrecision(3))} ms`,
-      Certain: certain,
+      Picture: certain,
     });
+  }
+
+  /** How near the surface is to that of the volume before compression. */
+  showBounds(head) {
+    if (head.wish !== this.wish || head.within_pixel === null) return;
+    const percent = Math.floor(1000 * head.within_pixel) / 10;
+    const [name, value] = [document.createElement("dt"), document.createElement("dd")];
+    [name.textContent, value.textContent] = ["Certain", `${percent} % within 1 px`];
+    value.title = "of the surface: no further from that of the volume before compression";
+    this.find(".facts").append(name, value);
   }
 
   list(selector, facts) {
