@@ -467,7 +467,7 @@ def test_a_memory_budget_is_shown_and_set(page: Any, server: Server) -> None:
     picture = page.evaluate(DRAWN)
     field.fill("600")
     page.keyboard.press("Enter")
-    page.wait_for_function("document.querySelector('main').dataset.state === 'ready'")
+    page.wait_for_function("() => document.querySelector('main').dataset.state === 'ready'")
     assert page.evaluate(DRAWN) == picture  # the old picture stays
     assert changes(page, lambda: drag(page, 50, 0))
     assert field.input_value() == "600"

@@ -95,7 +95,10 @@ class FakeRenderer:
     def __init__(self, volume: FakeVolume, options: dict[str, Any]) -> None:
         self._volume, self._options = volume, options
         self._cache: set[float] = set()
-        self.device: Mapping[str, Any] = {"name": options["device"] or "fake device"}
+        self.device: Mapping[str, Any] = {
+            "name": options["device"] or "fake device",
+            "memory_bytes": 1 << 30,
+        }
         width, height = options["size"]
         self.memory_bytes = 48 * width * height * options["samples"] ** 2
 

@@ -551,9 +551,11 @@ class Scene:
         return {
             "type": "status",
             "state": state,
-            "device": str(renderer.device.get("name", "")) if renderer else None,
+            "device": str(renderer.device["name"]) if renderer else None,
             "memory_bytes": int(renderer.memory_bytes) if renderer else None,
+            "device_memory": int(renderer.device["memory_bytes"]) if renderer else None,
             "memory_budget": self._wanted.memory_budget,
+            "nbytes": int(self._volume.nbytes),
         }
 
     def _welcome(self, client: Client) -> None:
@@ -568,7 +570,6 @@ class Scene:
                 "spacing": [float(s) for s in volume.spacing],
                 "dtype": str(volume.dtype),
                 "range": list(self._range),
-                "nbytes": int(volume.nbytes),
                 "bits_per_voxel": float(volume.bits_per_voxel),
                 "max_error": _finite(volume.max_error),
                 "isovalue": self._isovalue,

@@ -329,7 +329,8 @@ def parse_bytes(text: str) -> int:
         raise ValueError(f"'{text}' is no number of bytes, such as 600MB or 1GiB")
     number, prefix, binary = match.groups()
     power = "kmgtpe".index(prefix) + 1 if prefix else 0
-    return int(number) * (1024 if binary else 1000) ** power
+    factor: int = (1024 if binary else 1000) ** power
+    return int(number) * factor
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -5,9 +5,10 @@
 //
 // What the front end says (protocol.py checks it): hello, wish, ack, budget. What it hears:
 //
-//   welcome    title, shape [z,y,x], spacing, dtype, range [low, high], nbytes, bits_per_voxel,
+//   welcome    title, shape [z,y,x], spacing, dtype, range [low, high], bits_per_voxel,
 //              max_error of voxels, isovalue
-//   status     state: starting, ready, failed; device, memory_bytes, memory_budget
+//   status     state: starting, ready, failed; device, device_memory, memory_bytes,
+//              memory_budget, nbytes of the compressed volume
 //   histogram  counts of equally wide bins, range
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, camera,
 //              isovalue, complete, passes, decoded_blocks, percent, ms, detail; and its bytes
@@ -181,6 +182,7 @@ export function readHash(hash) {
 
 const toRgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
 const toText = (value) => String(Number(Number(value).toPrecision(6)));
+const toShort = (value) => String(Number(Number(value).toPrecision(3)));
 const toMiB = (bytes) => `${Math.round(bytes / 2 ** 20).toLocaleString("en")} MiB`;
 const toCount = (n) => (n === null || n === undefined ? "–" : n.toLocaleString("en"));
 
@@ -390,7 +392,7 @@ class View {
     const [z, y, x] = head.shape;
     this.find("h1").textContent = head.title || "Volume";
     this.find(".volume").textContent =
-      `${x} × ${y} × ${z} ${head.dtype}, ${toText(head.bits_per_voxel)} bits per voxel`;
+      `${x} × ${y} × ${z} ${head.dtype}, ${toShort(head.bits_per_voxel)} bits per voxel`;
     if (this.home.hash && head.title) document.title = `${head.title} – isowave`;
     if (!Number.isFinite(this.state.isovalue)) this.state.isovalue = head.isovalue;
     this.setRange(head.range);
@@ -417,6 +419,8 @@ class View {
     this.list(".device", ready ? {
       Device: head.device,
       "Memory held": toMiB(head.memory_bytes),
+      "Of the device's": toMiB(head.device_memory),
+      "Compressed volume": toMiB(head.nbytes),
     } : { Device: head.state === "failed" ? "none" : "starting …" });
     const budget = this.field("budget");
     if (this.root.activeElement !== budget) {
@@ -491,7 +495,7 @@ class View {
       Size: `${head.size[0]} × ${head.size[1]}${rays}`,
       Passes: toCount(head.passes),
       "Blocks decoded": toCount(head.decoded_blocks),
-      Time: `${toText(head.ms.toPrecision(3))} ms`,
+      Time: `${toShort(head.ms)} ms`,
       Picture: certain,
     });
   }
