@@ -34,6 +34,7 @@ struct Options {
   std::vector<std::uint32_t> size = {1280, 720};
   std::uint32_t samples = 1;
   bool resident = true;
+  std::string normals = "cell";
   tools::RendererFlags renderer;
 };
 
@@ -62,9 +63,11 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, R
   for (std::size_t view = 0; view < cameras.size(); ++view) {
     renderer.clear_cache();
     device.timer().collect();  // what clearing took
-    for (const PassStats &pass : renderer.render(seen_from(cameras[view], request)).passes) {
+    const FrameStats frame = renderer.render(seen_from(cameras[view], request));
+    for (const PassStats &pass : frame.passes) {
       for (const auto &[stage, ms] : pass.stage_ms) views[view][stage] += ms;
     }
+    for (const auto &[stage, ms] : frame.normals.stage_ms) views[view][stage] += ms;
   }
   return views;
 }
@@ -79,6 +82,7 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   report.grid.bits_per_block = volume.bits_per_block;
   report.isovalue = isovalue_of(options, volume);
   report.voxel_pixels = options.renderer.voxel_pixels;
+  report.normals = normals_from_string(options.normals);
   report.options = tools::to_renderer_options(
       options.renderer, {options.size.at(0), options.size.at(1), options.samples});
   report.num_views = options.orbit;
@@ -99,6 +103,9 @@ FrameReport measure(const Options &options, std::string command) {
     report.options = renderer.options();
     report.setup_ms = renderer.setup_ms();
     renderer.render(seen_from(cameras.front(), report.request()));
+    FrameRequest of_cells = report.request();
+    of_cells.normals = Normals::kCell;  // as the floor draws
+    renderer.render(seen_from(cameras.front(), of_cells));
     first_hits = renderer.hits();
     report.views = measure_views(renderer, cameras, report.request(), options.rounds);
     report.peak_bytes = device.ledger().peak();
@@ -209,6 +216,7 @@ void add_options(CLI::App &app, Options &options) {
                  "auto:N for N from "
                  "the smallest to an ample one, in equal ratios of what lies above that; the "
                  "pictures must be the same");
+  tools::add_normals_option(app, options.normals);
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")
       ->check(CLI::PositiveNumber)

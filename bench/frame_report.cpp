@@ -90,6 +90,14 @@ const Column kColumns[] = {
      [](const FrameReport &, const FrameStats &frame) {
        return sum_of(frame, &PassCounts::decoded_count);
      }},
+    {"normals", "normals_decoded_blocks", 0,
+     [](const FrameReport &, const FrameStats &frame) {
+       return double(frame.normals.decoded_blocks);
+     }},
+    {"passes", "normals_passes", 0,
+     [](const FrameReport &, const FrameStats &frame) { return double(frame.normals.passes); }},
+    {"ms", "normals_ms", 2,
+     [](const FrameReport &, const FrameStats &frame) { return frame.normals.ms; }},
     {"N_spec", "median_n_spec", 1,
      [](const FrameReport &, const FrameStats &frame) { return median_n_spec(frame); }},
     {"util %", "utilization_percent", 1,
@@ -237,6 +245,7 @@ ordered_json options_json(const FrameReport &report) {
       {"rounds", report.rounds}};
   json.update(tools::renderer_options_json(report.options));
   json["voxel_pixels"] = report.voxel_pixels;
+  json["normals"] = to_string(report.normals);
   return json;
 }
 
@@ -255,8 +264,9 @@ void print_report(const FrameReport &report) {
       "columns are a cold frame's. visible: blocks with rays, summed over the passes, of all "
       "blocks; "
       "decoded:\n"
-      "blocks; N_spec: median over the passes; util: intersected ray-block pairs per pass, of all "
-      "pixels. "
+      "blocks; normals: blocks decoded for smooth normals alone, and passes and ms for these, of "
+      "the frame's;\n"
+      "N_spec: median over the passes; util: intersected ray-block pairs per pass, of all pixels. "
       "resident\nfloor: the whole volume decoded, one kernel, no cache.\n");
   print_stages(report);
 }

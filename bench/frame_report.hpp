@@ -20,6 +20,7 @@ struct FrameReport {
   CompressedVolume grid;  ///< without its words
   float isovalue = 0;
   double voxel_pixels = 0;
+  Normals normals = Normals::kCell;
   RendererOptions options;
   std::uint32_t num_views = 0, rounds = 0;
   std::vector<ViewTimes> views;
@@ -32,7 +33,9 @@ struct FrameReport {
   nlohmann::ordered_json memory;
 
   /// Of its frames, but for the camera.
-  FrameRequest request() const { return {.isovalue = isovalue, .voxel_pixels = voxel_pixels}; }
+  FrameRequest request() const {
+    return {.isovalue = isovalue, .voxel_pixels = voxel_pixels, .normals = normals};
+  }
 };
 
 /// Per view and as medians over the views: see the legend it prints.

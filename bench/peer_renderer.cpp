@@ -22,16 +22,16 @@ class RendererSide : public PeerSide {
   Measured draw(float isovalue) override {
     Measured measured;
     Stopwatch watch;
-    renderer_.render({camera_, isovalue});
+    draw(camera_, isovalue);
     watch.lap(measured, "new_kept");
-    renderer_.render({camera_, previous_});
+    draw(camera_, previous_);
     renderer_.clear_cache();
     watch = {};
-    measured["hit_count"] = static_cast<double>(renderer_.render({camera_, isovalue}).rays_hit);
+    measured["hit_count"] = static_cast<double>(draw(camera_, isovalue).rays_hit);
     watch.lap(measured, "new");
-    renderer_.render({camera_, isovalue});
+    draw(camera_, isovalue);
     watch.lap(measured, "warm");
-    renderer_.render({turned(camera_), isovalue});
+    draw(turned(camera_), isovalue);
     watch.lap(measured, "next");
     measured["device_byte_count"] = static_cast<double>(device_.ledger().peak());
     previous_ = isovalue;
@@ -39,6 +39,11 @@ class RendererSide : public PeerSide {
   }
 
  private:
+  /// Like a mesh of triangles, with what a cell knows.
+  FrameStats draw(const Camera &camera, float isovalue) {
+    return renderer_.render({.camera = camera, .isovalue = isovalue, .normals = Normals::kCell});
+  }
+
   Camera camera_;
   float previous_ = 0;
   ocl::Device device_;

@@ -1,7 +1,7 @@
 /// intersect.cl -- a block's rays against its dual grid (Sec. 3.7, 4.3).
-#include "device/block_cells.h"
 #include "device/cached_cell.h"
 #include "device/closest_pair.h"
+#include "portable/block_cells.h"
 #include "portable/cell_intersect.h"
 #include "portable/ray_state.h"
 

@@ -7,23 +7,9 @@
 #include "device/block_requests.h"
 #include "device/level_borders.h"
 #include "device/march_block.h"
+#include "device/pass_counts.h"
 #include "device/ray_lanes.h"
 #include "device/work_group.h"
-#include "portable/window.h"
-
-/// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
-ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCounts *counts,
-                                 global PassCounts *next) {
-  next->ray_count = frame_rays(frame);
-  next->pass = counts->pass + 1;
-  next->frame_pass = counts->frame_pass;
-  next->last_frame_pass = counts->last_frame_pass;
-  next->active_count = next->spec_count = next->window_count = 0;
-  next->pair_slot_count = next->pair_count = next->ahead_count = 0;
-  next->granted_count = next->visible_count = next->requested_count = next->decoded_count = 0;
-  next->recycled_count = next->hit_count = next->next_active_count = 0;
-  next->free_count = counts->free_count;
-}
 
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
 /// behind the border.

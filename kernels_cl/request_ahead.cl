@@ -1,61 +1,11 @@
 /// request_ahead.cl -- pipeline `rays`: each ray that waits asks for the block that it stands at
 /// and its next candidates (Sec. 3.3, 3.4, 4).
 #define ISO_FOUND local
-#include "device/block_requests.h"
 #include "device/level_borders.h"
 #include "device/ray_lanes.h"
+#include "device/touched_requests.h"
 #include "portable/touched_blocks.h"
 #include "portable/window.h"
-
-#define ISO_REQUEST_STAGING 256u  ///< requests that a work-group collects before it writes them out
-
-/// The request list, and where a work-group collects what it will add to it.
-typedef struct Requests {
-  global uint *bits, *block_ids;
-  uint capacity;
-  volatile global uint *count;
-  local uint *staged;
-  volatile local uint *num_staged;
-} Requests;
-
-/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the
-/// others. In steps for all corners, so that a GPU waits for memory twice, not sixteen times. Most
-/// have been asked for by another ray: their bits tell, and cost neither a search in the table nor
-/// an atomic, for whose result one would wait.
-ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
-                                global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
-                                Requests requests) {
-  BlockEntry entries[8];
-  uint missing = touched; /* of the corners: nobody is known to have asked for them */
-  ISO_UNROLL
-  for (uint corner = 0; corner < 8; ++corner) {
-    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-    const uint word = (touched >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
-    const uint bits = ISO_CHECK_RACES ? atomic_or(&requests.bits[word], 0u) : requests.bits[word];
-    missing &= ~((uint)((bits & request_bit(frame, x, y, z)) != 0) << corner);
-  }
-  if (missing == 0) return;
-  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
-  ISO_UNROLL
-  for (uint corner = 0; corner < 8; ++corner) {
-    if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
-      slot_stamps[entries[corner].slot] = stamp;
-      missing &= ~(1u << corner);
-    }
-  }
-  for (uint corner = 0; corner < 8; ++corner) {
-    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-    if ((missing >> corner & 1u) != 0 && mark_request(frame, requests.bits, x, y, z)) {
-      const uint block_id = block_id_at(frame, x, y, z), place = atomic_inc(requests.num_staged);
-      if (place < ISO_REQUEST_STAGING) {
-        requests.staged[place] = block_id;
-      } else {
-        list_request(frame, requests.block_ids, requests.capacity, requests.bits,
-                     atomic_inc(requests.count), block_id);
-      }
-    }
-  }
-}
 
 /// Of the rays that wait, the first counts->window_count ask for the blocks that they touch in
 /// their next active blocks: N_Spec of them (Sec. 4), or, with
@@ -125,15 +75,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
         asked += num_found;
       }
     }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (item == 0) list_begin = atomic_add(requests.count, min(num_staged, ISO_REQUEST_STAGING));
-    barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint j = item; j < min(num_staged, ISO_REQUEST_STAGING); j += ISO_GROUP_SIZE) {
-      list_request(frame, request_block_ids, capacity, requested_bits, list_begin + j, staged[j]);
-    }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (item == 0) num_staged = 0;
-    barrier(CLK_LOCAL_MEM_FENCE);
+    list_staged(frame, requests, &list_begin);
   }
   if (num_pairs != 0) atomic_add(&group_pairs, num_pairs);
   if (num_ahead != 0) atomic_add(&group_ahead, num_ahead);

@@ -8,9 +8,9 @@
 /// Against rows of the whole volume, a cell's corners lie in two to four cache lines instead of
 /// four to eight, and a ray's next cell mostly in the same.
 #define ISO_FOUND local
-#include "device/block_cells.h"
 #include "device/block_stream.h"
 #include "device/block_walk.h"
+#include "portable/block_cells.h"
 #include "portable/cell_intersect.h"
 
 /// Decodes blocks [first_block, first_block + num_blocks) of the zfp stream, see block_stream.h.

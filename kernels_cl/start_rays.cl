@@ -2,9 +2,9 @@
 /// (Sec. 3.2, 3.3). A kernel of its own, since it is so much leaner than march that far more of its
 /// work-items fit a device at a time.
 #define ISO_FOUND local
-#include "device/block_cells.h"
 #include "device/level_borders.h"
 #include "device/work_group.h"
+#include "portable/block_cells.h"
 #include "portable/window.h"
 
 #define ISO_HIT_WORDS ((uint)(sizeof(HitRecord) / sizeof(uint)))

@@ -10,6 +10,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/smooth_gradient.h"
 
 namespace isowave::core {
 
@@ -123,6 +124,44 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
   return hit;
 }
 
+/// With its block's number among those of all levels.
+HitRecord among_levels(const FrameParams &frame, HitRecord hit) {
+  const uint x = hit.block_id % frame.grid.blocks_x,
+             y = hit.block_id / frame.grid.blocks_x % frame.grid.blocks_y,
+             z = hit.block_id / frame.grid.blocks_x / frame.grid.blocks_y;
+  hit.block_id = x + frame.place.blocks_x * (y + frame.place.blocks_y * (frame.place.begin_z + z));
+  return hit;
+}
+
+/// hit: its block is number block_id of the frame's own level.
+void smooth_gradient(const FrameParams &frame, const float *voxels, uint block_id, HitRecord &hit) {
+  const BlockCoords block = block_coords(&frame, block_id);
+  const Stencil s = stencil_of(block, hit.cell, last_planes(&frame));
+  const CellPoint at = {hit.x, hit.y, hit.z};
+  const StencilAxis axes[3] = {s.x, s.y, s.z};
+  float corners[8], beyond[8], gradient[3];
+  const auto voxel = [&](const int(&place)[3]) {
+    return voxels[static_cast<std::size_t>(place[0]) +
+                  frame.grid.dims_x *
+                      (static_cast<std::size_t>(place[1]) +
+                       std::size_t{frame.grid.dims_y} * static_cast<std::size_t>(place[2]))];
+  };
+  for (uint axis = 0; axis < 3; ++axis) {
+    for (int corner = 0; corner < 8; ++corner) {
+      int place[3] = {s.x.cell + (corner & 1), s.y.cell + (corner >> 1 & 1),
+                      s.z.cell + (corner >> 2)};
+      corners[corner] = voxel(place);
+      place[axis] = (corner >> axis & 1) != 0 ? axes[axis].above : axes[axis].below;
+      beyond[corner] = voxel(place);
+    }
+    gradient[axis] = smooth_derivative(corners, beyond, 1u << axis, axes[axis], at);
+  }
+  if (is_no_gradient({gradient[0], gradient[1], gradient[2]})) return;
+  hit.grad_x = gradient[0];
+  hit.grad_y = gradient[1];
+  hit.grad_z = gradient[2];
+}
+
 void check_voxels(const FrameParams &frame, std::span<const float> voxels) {
   if (voxels.size() != std::size_t{frame.grid.dims_x} * frame.grid.dims_y * frame.grid.dims_z) {
     throw std::invalid_argument("scalar renderer: the voxels do not fit the frame's dims");
@@ -207,10 +246,38 @@ HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
   HitRecord hit = no_hit();
   std::optional<bool> inside;
   for (std::size_t level = 0; level < frames.size() && !std::isfinite(hit.t); ++level) {
-    if (draws(frames[level]))
-      hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], inside);
+    if (!draws(frames[level])) continue;
+    hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], inside);
+    if (std::isfinite(hit.t)) hit = among_levels(frames[level], hit);
   }
   return hit;
+}
+
+void smooth_gradients(std::span<const FrameParams> frames,
+                      std::span<const std::vector<float>> voxels, std::span<HitRecord> hits,
+                      unsigned threads) {
+  constexpr std::size_t kRun = 1024;
+  for (std::size_t level = 0; level < frames.size(); ++level)
+    check_voxels(frames[level], voxels[level]);
+  parallel_for((hits.size() + kRun - 1) / kRun, threads, [&](std::uint64_t run, std::uint32_t) {
+    const std::size_t begin = run * kRun;
+    for (HitRecord &hit : hits.subspan(begin, std::min(kRun, hits.size() - begin))) {
+      for (std::size_t level = 0; std::isfinite(hit.t) && level < frames.size(); ++level) {
+        const uint block_id = level_block_of(&frames[level], hit.block_id);
+        if (block_id == ISO_INVALID_ID) continue;
+        smooth_gradient(frames[level], voxels[level].data(), block_id, hit);
+        break;
+      }
+    }
+  });
+}
+
+void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
+                      std::span<HitRecord> hits) {
+  check_voxels(frame, voxels);
+  for (HitRecord &hit : hits) {
+    if (std::isfinite(hit.t)) smooth_gradient(frame, voxels.data(), hit.block_id, hit);
+  }
 }
 
 std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,

@@ -12,6 +12,8 @@
 
 namespace isowave::core {
 
+/// Gradients are those of the cells (Normals::kCell).
+///
 /// voxels   [nz][ny][nx] decoded values, x fastest (decode_with_libzfp).
 /// threads  0: one per core.
 /// Returns the hits [height * width], row 0 at the top. Throws std::invalid_argument when voxels do
@@ -25,6 +27,14 @@ std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const f
 std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
                                             std::span<const std::vector<float>> voxels,
                                             Solver solver = kDefaultSolver, unsigned threads = 0);
+
+/// Gives the hits of such frames smooth gradients (Normals::kSmooth); what else they have stays.
+void smooth_gradients(std::span<const FrameParams> frames,
+                      std::span<const std::vector<float>> voxels, std::span<HitRecord> hits,
+                      unsigned threads = 0);
+/// And of a frame of one level.
+void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
+                      std::span<HitRecord> hits);
 
 /// One ray of the same: rays [level], which is the same ray in each level's index space.
 HitRecord trace_scalar_levels(std::span<const FrameParams> frames,

@@ -41,9 +41,12 @@ Twin::Twin(const CompressedVolume &volume, double voxel_pixels, double voxel_err
 }
 
 std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float isovalue,
-                                    Solver solver) const {
-  return render_scalar_levels(make_level_frames(levels_, camera, size, isovalue, voxel_pixels_),
-                              voxels_, solver);
+                                    Solver solver, Normals normals) const {
+  const std::vector<FrameParams> frames =
+      make_level_frames(levels_, camera, size, isovalue, voxel_pixels_);
+  std::vector<HitRecord> hits = render_scalar_levels(frames, voxels_, solver);
+  if (normals == Normals::kSmooth) smooth_gradients(frames, voxels_, hits);
+  return hits;
 }
 
 }  // namespace isowave::core

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/stages/smooth_normals.hpp"
 #include "core/stages/solvers.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
@@ -22,7 +23,8 @@ class Twin {
 
   /// The hits [height * width] that a renderer must find, bit for bit.
   std::vector<HitRecord> render(const Camera &camera, ImageSize size, float isovalue,
-                                Solver solver = kDefaultSolver) const;
+                                Solver solver = kDefaultSolver,
+                                Normals normals = Normals::kSmooth) const;
 
  private:
   double voxel_pixels_;

@@ -168,7 +168,8 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
       const RandomView view = random_view(levels, random);
       renderer.render({.camera = view.camera,
                        .size = view.size,
-                       .voxel_pixels = with_levels ? view.voxel_pixels : 0.0});
+                       .voxel_pixels = with_levels ? view.voxel_pixels : 0.0,
+                       .normals = Normals::kCell});
       judge_view(levels, view, renderer.hits(), (seed + view_id) * 0x9E3779B97F4A7C15u, result);
     }
     results.push_back(result);

@@ -239,6 +239,28 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
   EXPECT_EQ(test::read_file(folder / "a.png"), std::string(png.begin(), png.end()));
 }
 
+/// Where coarse levels draw, hits are at the depth that is said, too.
+TEST_P(ApiOnDevice, PositionsOfLevelsAreInTheWorld) {
+  Renderer renderer(open_device(selector()), sphere({.rate = 16, .levels = 2}),
+                    {.largest = {64, 48, 1}, .with_levels = true});
+  FrameRequest request = small_request(renderer);
+  request.voxel_pixels = 1000;
+  request.want_positions = request.want_hits = true;
+  const Frame frame = renderer.render(request);
+  EXPECT_GT(frame.statistics.hits, 100u);
+  for (std::size_t i = 0; i < frame.depth.size(); ++i) {
+    if (std::isinf(frame.depth[i])) continue;
+    EXPECT_EQ(frame.hits[i].level, 1u);
+    double squares = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double away = double{frame.positions[i][axis]} - request.camera.eye[axis];
+      squares += away * away;
+    }
+    // Both are float32 numbers of a few tens of units.
+    EXPECT_NEAR(std::sqrt(squares), frame.depth[i], 1e-4);
+  }
+}
+
 /// From as near as it may: the box of the surface's blocks is in the picture, and fills it.
 TEST_P(ApiOnDevice, SurfacesFillThePicture) {
   for (const float isovalue : {0.3f, 0.6f, 0.9f, 5.0f}) {

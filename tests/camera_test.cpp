@@ -44,7 +44,8 @@ class CameraFileTest : public testing::Test {
 TEST_F(CameraFileTest, ReadsEveryField) {
   const CameraFile file = read_camera_file(write(
       R"({"dims":[4,5,6],"spacing":[1,0.5,2],"width":640,"height":360,"fovy_deg":45.5,"cameras":[
-               {"eye":[1,2,3],"at":[4,5,7],"up":[0,1,0]},{"eye":[-1e3,0,0],"at":[0,0,0],"up":[0,0,1]}]})"));
+               {"eye":[1,2,3],"at":[4,5,7],"up":[0,1,0]},
+               {"eye":[-1e3,0,0],"at":[0,0,0],"up":[0,0,1]}]})"));
   EXPECT_EQ(file.dims, glm::uvec3(4, 5, 6));
   EXPECT_EQ(file.spacing, glm::dvec3(1, 0.5, 2));
   EXPECT_EQ(file.width, 640u);

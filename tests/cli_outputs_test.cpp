@@ -27,9 +27,9 @@ class CliOutputs : public testing::Test {
     std::string voxels(512, '\0');
     for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = char(i % 8 * 16);
     write_file(folder_ / "v_8x8x8_uint8.raw", voxels);
-    write_file(
-        folder_ / "cam.json",
-        R"({"width":16,"height":12,"fovy_deg":50,"cameras":[{"eye":[4,5,30],"at":[4,4,4],"up":[0,1,0]}]})");
+    write_file(folder_ / "cam.json",
+               R"({"width":16,"height":12,"fovy_deg":50,
+            "cameras":[{"eye":[4,5,30],"at":[4,4,4],"up":[0,1,0]}]})");
     EXPECT_EQ(run_isowave("convert " + raw() + " -o " + name("v.zfp")).status, 0);
   }
   std::string name(const std::string &file) const { return quoted(folder_ / file); }

@@ -38,7 +38,8 @@ test::ProgramResult render(const std::string &arguments) {
 std::string camera_file(const char *dims = "[41,41,41]") {
   return std::string(R"({"dims":)") + dims +
          R"(,"spacing":[1,1,1],"width":40,"height":30,"fovy_deg":50,
-    "cameras":[{"eye":[20,30,90],"at":[20,20,20],"up":[0,1,0]},{"eye":[80,20,20],"at":[20,20,20],"up":[0,1,0]}]})";
+    "cameras":[{"eye":[20,30,90],"at":[20,20,20],"up":[0,1,0]},
+               {"eye":[80,20,20],"at":[20,20,20],"up":[0,1,0]}]})";
 }
 
 /// A budget that is too small is refused with the smallest that would do, which then does, with the

@@ -17,7 +17,8 @@ compare() {
   local expected=$1 status=0
   shift
   "$top/tools/compare-bench" "$@" >out 2>error || status=$?
-  [ "$status" -eq "$expected" ] || fail "$*: exit status $status, expected $expected: $(cat out error)"
+  [ "$status" -eq "$expected" ] ||
+    fail "$*: exit status $status, expected $expected: $(cat out error)"
   if [ "$status" -eq 1 ]; then
     [ "$(wc -l <error)" -eq 1 ] || fail "$*: not one line: $(cat error)"
     [ ! -s out ] || fail "$*: output although it fails: $(cat out)"
@@ -39,7 +40,8 @@ kind, path, *rest = sys.argv[1:]
 if kind == "google":
     runs = []
     for name, text in (argument.split("=") for argument in rest):
-        common = {"name": name, "run_name": name, "run_type": "iteration", "iterations": 100, "time_unit": "us"}
+        common = {"name": name, "run_name": name, "run_type": "iteration", "time_unit": "us"}
+        common["iterations"] = 100
         if text == "failed":
             runs.append(common | {"error_occurred": True, "error_message": "wrong result"})
         elif "~" in text:
@@ -48,11 +50,15 @@ if kind == "google":
         else:
             runs += [common | {"real_time": 1000 * float(ms)} for ms in text.split(",")]
             if "," in text:
-                runs.append(common | {"run_type": "aggregate", "aggregate_name": "cv", "real_time": 0.01})
+                spread = {"run_type": "aggregate", "aggregate_name": "cv", "real_time": 0.01}
+                runs.append(common | spread)
     document = {"context": {"date": "today", "device": path}, "benchmarks": runs}
 else:
     rounds, group = [float(ms) for ms in rest[0].split(",")], float(rest[1])
-    frames = [{kind: [{"total_ms": f * ms} for ms in rounds] for kind in ("cold", "warm")} for f in (0.5, 1, 2)]
+    def view(factor):
+        times = [{"total_ms": factor * ms} for ms in rounds]
+        return {"cold": times, "warm": times}
+    frames = [view(factor) for factor in (0.5, 1, 2)]
     spread = {"median": statistics.median(rounds), "min": 0.5 * min(rounds), "max": 2 * max(rounds)}
     document = {"program": "frame_bench", "context": {"device": "d"}, "options": {"grouping": path},
                 "total_ms": {"cold": spread, "warm": spread}, "frames": frames, "setup_ms": 7.0,
@@ -60,14 +66,17 @@ else:
                 "median": {"passes": 3, "decoded_blocks": 100}, "memory": {"peak": 1 << 20}}
     if len(rest) > 2:
         floor = json.loads(rest[2])
-        document["resident_floor"] = floor and {"median": floor, "frames": 3 * [[0.9 * floor, floor, 1.1 * floor]]}
+        views = floor and 3 * [[0.9 * floor, floor, 1.1 * floor]]
+        document["resident_floor"] = floor and {"median": floor, "frames": views}
 json.dump(document, open(path, "w"))
 END
 write() { /usr/bin/python3 write.py "$@"; }
 
 # ---- Google Benchmark
-write google old.json slow=10,10.5,11 fast=10,10.5,11 noise=10,10.5,11 quartiles=10~4 once=10 gone=1 breaks=1
-write google new.json slow=12,12.1,13 fast=5,5.1,5.2 noise=9,10.9,12 quartiles=10.3~4 once=11 added=1 breaks=failed
+write google old.json slow=10,10.5,11 fast=10,10.5,11 noise=10,10.5,11 quartiles=10~4 once=10 \
+  gone=1 breaks=1
+write google new.json slow=12,12.1,13 fast=5,5.1,5.2 noise=9,10.9,12 quartiles=10.3~4 once=11 \
+  added=1 breaks=failed
 compare 0 old.json new.json
 grep -q 'device: old.json -> new.json' out || fail "the devices differ: $(cat out)"
 row slow '10.5 +12.1 +1.152 +\(1.091..1.300\) +slower'
@@ -126,13 +135,14 @@ echo '{"benchmark": "solvers", "schema": 1}' >charts.json
 echo '{"context": {}, "benchmarks": []}' >empty.json
 echo '{"context": {}, "benchmarks": [{"name": "slow"}]}' >incomplete.json
 echo '{"context": {}, "benchmarks": 5}' >five.json
-echo '{"context": {}, "benchmarks": [{"name": "slow", "iterations": 9, "real_time": NaN, "time_unit": "ms"}]}' >nan.json
-echo '{"context": {}, "benchmarks": [{"name": "slow", "iterations": 9, "real_time": 1, "time_unit": "y"}]}' >years.json
+slow='"name": "slow", "iterations": 9'
+echo '{"context": {}, "benchmarks": [{'"$slow"', "real_time": NaN, "time_unit": "ms"}]}' >nan.json
+echo '{"context": {}, "benchmarks": [{'"$slow"', "real_time": 1, "time_unit": "y"}]}' >years.json
 echo '{"program": "frame_bench"}' >frameless.json
 printf '\xff\xfe' >binary.json
 write google other.json other=1,2,3
-for bad in none.json . broken.json list.json charts.json empty.json incomplete.json five.json nan.json years.json \
-  frameless.json binary.json other.json radix.json; do
+for bad in none.json . broken.json list.json charts.json empty.json incomplete.json five.json \
+  nan.json years.json frameless.json binary.json other.json radix.json; do
   compare 1 old.json "$bad"
   compare 1 "$bad" old.json --fail
 done
@@ -149,10 +159,12 @@ if [ $# -eq 2 ]; then
   row frame/cold '.* 1.000 .*'
   row stage/march '.* 1.000'
   row 'resident floor' '.* 1.000 .*'
-  "$1" generate:gyroid_16x16x16_uint8 --size 32x24 --orbit 2 --no-resident --json no_resident.json >out
+  "$1" generate:gyroid_16x16x16_uint8 --size 32x24 --orbit 2 --no-resident \
+    --json no_resident.json >out
   ! grep -q '^resident floor' out || fail "--no-resident: $(cat out)"
   compare 0 real_frames.json no_resident.json
-  "$2" --benchmark_filter='scan/exclusive/entries:450' --benchmark_out=real_stages.json >/dev/null 2>&1
+  "$2" --benchmark_filter='scan/exclusive/entries:450' --benchmark_out=real_stages.json \
+    >/dev/null 2>&1
   compare 0 real_stages.json real_stages.json --fail
   row 'scan/exclusive/entries:450[^ ]*' '.* 1.000 .*'
 fi

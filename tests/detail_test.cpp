@@ -201,7 +201,8 @@ double error_of(const Image8 &picture, const Image8 &fine) {
 
 class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  /// Each camera twice by one renderer. Returns the hits at borders.
+  /// Each camera three times by one renderer, once with cells' normals. Returns the hits at
+  /// borders.
   std::size_t check(const CompressedVolume &volume, const std::vector<Camera> &cameras,
                     float isovalue, double voxel_pixels, RendererOptions options) {
     SCOPED_TRACE(fmt::format("{} pixels, {} slots", voxel_pixels, options.cache_slots));
@@ -212,10 +213,16 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     std::size_t at_border = 0;
     for (const Camera &camera : cameras) {
       const auto expected = twin.render(camera, options.size, isovalue);
-      for (int i = 0; i < 2; ++i) {
-        const FrameStats stats =
-            renderer.render({.camera = camera, .isovalue = isovalue, .voxel_pixels = voxel_pixels});
-        expect_same_hits(renderer.hits(), expected, options.size.width);
+      for (const Normals normals : {Normals::kSmooth, Normals::kCell, Normals::kSmooth}) {
+        const FrameStats stats = renderer.render({.camera = camera,
+                                                  .isovalue = isovalue,
+                                                  .voxel_pixels = voxel_pixels,
+                                                  .normals = normals});
+        expect_same_hits(renderer.hits(),
+                         normals == Normals::kSmooth
+                             ? expected
+                             : twin.render(camera, options.size, isovalue, kDefaultSolver, normals),
+                         options.size.width);
         EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
       }
       const auto frames = make_level_frames(infos, camera, options.size, isovalue, voxel_pixels);

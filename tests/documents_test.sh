@@ -15,20 +15,49 @@ fail() {
 
 "$top/tools/tables" --check || fail 'a document is not what was measured: run tools/tables'
 
-measure() { "$top/tools/measure" --device "${ISOWAVE_DEVICE:-cpu}" --programs "$programs" --quick "$@"; }
+device=${ISOWAVE_DEVICE:-cpu}
+measure() { "$top/tools/measure" --device "$device" --programs "$programs" --quick "$@"; }
 mkdir -p "$work/top/results"
-measure -o "$work/top/results/a.json" --only frames,error,time > "$work/out" || fail "$(cat "$work/out")"
-measure -o "$work/top/results/a.json" --volumes "$top/tests/data" --only sizes,storage > "$work/out"
-{
-  for table in front frames error time sizes storage; do
-    printf '<!-- table: %s results/a.json -->\n<!-- end -->\n' "$table"
-  done
-} > "$work/top/page.md"
+results=$work/top/results/a.json
+measured() { # OPTION...: into the results
+  measure -o "$results" "$@" > "$work/out" || fail "$(cat "$work/out")"
+}
+measured --only frames,error,time,stability,sweep
+measured --only storage,sizes,detail,solvers,pareto --volumes "$top/tests/data"
+tables=(front frames error time stability leaks storage sizes detail solvers solver_frames pareto
+  pareto_times)
+if [ -x "$programs/bench/peer_bench" ]; then
+  measured --only peer
+  tables+=(peer)
+fi
+for table in "${tables[@]}"; do
+  printf '<!-- table: %s results/a.json -->\n<!-- end -->\n' "$table"
+done > "$work/top/page.md"
+/usr/bin/python3 - "$results" << 'EOF'
+import json, sys
+sections = json.load(open(sys.argv[1]))["sections"]
+cases = [row for row in sections["stability"]["rows"] if "case" in row]
+assert len(cases) > 20 and all(case["resumed_differently"] == 0 for case in cases), cases
+def wrong(name):
+    return sum(case["missed"][name] + case["false"][name] for case in cases)
+assert wrong("bernstein") == 0 < wrong("linear"), "the default alone is right"
+detail = {(row["rays"], row["voxel_pixels"]): row for row in sections["detail"]["rows"]}
+assert detail[4, 0]["rms"] < detail[1, 0]["rms"], "more rays, less error"
+coarse, one, four = [detail[key]["decoded_blocks"] for key in ((4, 1), (1, 0), (4, 0))]
+assert coarse < one < four, detail
+EOF
+if grep -qF "$top/tests/data" "$results"; then fail 'the folder of the volumes is named'; fi
+"$top/tools/charts" "$results" -o "$work" > "$work/out"
+for chart in a_cells a_frames a_pareto a_budgets; do
+  [ -s "$work/$chart.png" ] || fail "$chart.png is missing"
+done
+
 tables() { "$top/tools/tables" --top "$work/top" "$@"; }
 if tables --check 2> /dev/null; then fail 'empty tables are no difference'; fi
 tables || fail 'tables cannot be made'
 tables --check || fail 'tables differ from what they were made of'
-[ "$(grep -c '^|---' "$work/top/page.md")" -eq 6 ] || fail "$(cat "$work/top/page.md")"
+made=$(grep -c '^|---' "$work/top/page.md")
+[ "$made" -eq "${#tables[@]}" ] || fail "$(cat "$work/top/page.md")"
 
 # must_fail NAME WORDS: --check fails in one line that has the words.
 must_fail() {
@@ -56,24 +85,40 @@ again
 sed -i 's/<!-- end -->//' "$work/top/page.md"
 must_fail 'a table without an end' 'without its line'
 again
-sed 's/"commit": "[^"]*"/"commit": "other"/' "$work/right/results/a.json" > "$work/top/results/b.json"
+other_commit='s/"commit": "[^"]*"/"commit": "other"/'
+sed "$other_commit" "$work/right/results/a.json" > "$work/top/results/b.json"
 sed -i '$!b;s/$/\n<!-- table: frames results\/b.json -->\n<!-- end -->/' "$work/top/page.md"
 must_fail 'another commit on the same page' 'commit other'
 again
 sed -i 's/table: time/table: tides/' "$work/top/page.md"
 must_fail 'a table that there is not' 'no table tides'
+again
+sed -i 's/"residual_p99"/"residual"/' "$work/top/results/a.json"
+must_fail 'rows that lack a number' 'section stability'
+again
+sed -i 's/"stability": {/"tides": {/' "$work/top/results/a.json"
+must_fail 'a missing section' 'no section stability'
 
 # refused NAME OPTION...: one line, and nothing is written.
 refused() {
-  if measure -o "$work/new.json" "${@:2}" > /dev/null 2> "$work/error"; then fail "$1 was accepted"; fi
+  if measure -o "$work/new.json" "${@:2}" > /dev/null 2> "$work/error"; then
+    fail "$1 was accepted"
+  fi
   [ "$(wc -l < "$work/error")" -eq 1 ] || fail "$1: $(cat "$work/error")"
   [ ! -e "$work/new.json" ] || fail "$1: something was written"
 }
 refused 'an unknown section' --only frames,tides
 refused 'a missing folder' --only sizes --volumes "$work/none"
-refused 'volumes that are not named' --only sizes
+for section in bits oracles certified sizes detail solvers pareto; do
+  refused "$section without volumes" --only "$section"
+done
+mkdir -p "$work/others/bench"
+for program in isowave bench/frame_bench bench/isowave_bench; do
+  ln -s "$programs/$program" "$work/others/$program"
+done
+refused 'a comparison without its program' --only peer --programs "$work/others"
 refused 'programs that are not there' --only frames --programs "$work"
 refused 'an unknown device' --only frames --device no_such_device
-sed 's/"commit": "[^"]*"/"commit": "other"/' "$work/right/results/a.json" > "$work/other.json"
+sed "$other_commit" "$work/right/results/a.json" > "$work/other.json"
 if measure -o "$work/other.json" --only frames 2> "$work/error"; then fail 'commits were mixed'; fi
 grep -q 'give another -o' "$work/error" || fail "$(cat "$work/error")"

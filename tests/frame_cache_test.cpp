@@ -26,11 +26,13 @@ std::uint32_t sum_of(const FrameStats &stats, uint PassCounts::*count) {
 }
 
 std::uint32_t num_decoded(const FrameStats &stats) {
-  return sum_of(stats, &PassCounts::decoded_count);
+  return sum_of(stats, &PassCounts::decoded_count) +
+         static_cast<std::uint32_t>(stats.normals.decoded_blocks);
 }
 
 std::uint32_t num_recycled(const FrameStats &stats) {
-  return sum_of(stats, &PassCounts::recycled_count);
+  return sum_of(stats, &PassCounts::recycled_count) +
+         static_cast<std::uint32_t>(stats.normals.recycled_blocks);
 }
 
 /// Close-ups of what lies behind the faces of the volume: hardly any block is in two of them.
@@ -52,7 +54,7 @@ std::vector<Camera> close_ups(const glm::dvec3 &dims) {
 class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
   /// How many blocks a view reads at most: the dual grids of all that its rays look into, which
-  /// pipeline `blocks` asks for.
+  /// pipeline `blocks` asks for, and those of its normals.
   std::vector<std::uint32_t> blocks_read(const TestVolume &volume, ImageSize size,
                                          const std::vector<Camera> &cameras) {
     Renderer ample(device_, volume.compressed,

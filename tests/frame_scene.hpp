@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/stages/smooth_normals.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -74,9 +75,19 @@ struct TestVolume {
   TestVolume(ArrayReader &&reader, std::uint32_t rate) : TestVolume(reader, rate) {}
 };
 
+/// As a renderer draws them.
+inline std::vector<HitRecord> twin_hits(const FrameParams &frame, std::span<const float> voxels,
+                                        Normals normals = Normals::kSmooth,
+                                        Solver solver = kDefaultSolver) {
+  std::vector<HitRecord> hits = render_scalar(frame, voxels, solver);
+  if (normals == Normals::kSmooth) smooth_gradients(frame, voxels, hits);
+  return hits;
+}
 inline std::vector<HitRecord> twin_hits(const TestVolume &volume, const Camera &camera,
-                                        ImageSize size, float isovalue) {
-  return render_scalar(make_frame_params(volume.info(), camera, size, isovalue), volume.voxels);
+                                        ImageSize size, float isovalue,
+                                        Normals normals = Normals::kSmooth) {
+  return twin_hits(make_frame_params(volume.info(), camera, size, isovalue), volume.voxels,
+                   normals);
 }
 
 /// A camera at `eye` that looks along `direction`.

@@ -39,7 +39,7 @@ TestVolume medium_volume() {
 
 std::uint64_t num_decoded(const FrameStats &stats) {
   return std::accumulate(
-      stats.passes.begin(), stats.passes.end(), std::uint64_t{0},
+      stats.passes.begin(), stats.passes.end(), stats.normals.decoded_blocks,
       [](std::uint64_t sum, const PassStats &pass) { return sum + pass.counts.decoded_count; });
 }
 
@@ -52,15 +52,20 @@ class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     return {device_, volume, GetParam().with(options)};
   }
 
-  /// Two views, each twice, by one renderer.
+  /// Two views, each three times by one renderer, once with cells' normals.
   void check(const TestVolume &volume, const RendererOptions &options) {
     SCOPED_TRACE(fmt::format("{} slots, window of {}", options.cache_slots, options.window_blocks));
     Renderer renderer = renderer_of(volume.compressed, options);
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
       const auto expected = twin_hits(volume, camera, options.size, kIsovalue);
-      for (int i = 0; i < 2; ++i) {
-        const FrameStats stats = renderer.render({camera, kIsovalue});
-        expect_same_hits(renderer.hits(), expected, options.size.width);
+      for (const Normals normals : {Normals::kSmooth, Normals::kCell, Normals::kSmooth}) {
+        const FrameStats stats =
+            renderer.render({.camera = camera, .isovalue = kIsovalue, .normals = normals});
+        expect_same_hits(renderer.hits(),
+                         normals == Normals::kSmooth
+                             ? expected
+                             : twin_hits(volume, camera, options.size, kIsovalue, normals),
+                         options.size.width);
         EXPECT_EQ(stats.uploaded_blocks, num_decoded(stats));
         if (!volume.compressed.is_indexed()) {
           EXPECT_EQ(stats.uploaded_bytes,

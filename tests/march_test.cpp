@@ -38,7 +38,8 @@ class MarchOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const test::TestVolume volume(dims, test::gyroid_field(11), 8);
     const Camera camera = orbit_cameras(volume.info(), 1).front();
     RaysWorld world(device_, volume, camera, size, kIsovalue, spec_count, num_slots, group_size);
-    const std::vector<HitRecord> expected = test::twin_hits(volume, camera, size, kIsovalue);
+    const std::vector<HitRecord> expected =
+        test::twin_hits(volume, camera, size, kIsovalue, Normals::kCell);
     EXPECT_GT(test::num_hits(expected), 0u);
     expect_passes(world, expected);
   }
@@ -144,7 +145,8 @@ TEST_P(MarchOnDevice, DoubtsAreSettledByTheNextPass) {
   const CameraCase c = camera_cases(dims)[11];
   ASSERT_EQ(c.name, "diagonal of a face");
   RaysWorld world(device_, volume, c.camera, {23, 17}, 0.0f, 8);
-  EXPECT_GT(expect_passes(world, test::twin_hits(volume, c.camera, {23, 17}, 0.0f)), 0u);
+  EXPECT_GT(expect_passes(world, test::twin_hits(volume, c.camera, {23, 17}, 0.0f, Normals::kCell)),
+            0u);
 }
 
 TEST_P(MarchOnDevice, GroupSizesDoNotMatter) {

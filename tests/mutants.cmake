@@ -6,8 +6,10 @@
 
 add_library(mutant_main OBJECT mutant_main.cpp)
 target_link_libraries(mutant_main PRIVATE isowave_reference)
-target_compile_options(mutant_main PRIVATE -w $<$<CONFIG:Release>:-O1>)  # what a bug leaves unused is no matter
-target_precompile_headers(mutant_main PRIVATE <CL/opencl.hpp> <algorithm> <fmt/format.h> <glm/glm.hpp> <thread> <vector>)
+# -w: what a bug leaves unused is no matter.
+target_compile_options(mutant_main PRIVATE -w $<$<CONFIG:Release>:-O1>)
+target_precompile_headers(mutant_main PRIVATE
+  <CL/opencl.hpp> <algorithm> <fmt/format.h> <glm/glm.hpp> <thread> <vector>)
 
 # copy_with_bug(<name> <pattern> <file> <line as it stands> <line with the bug>): files of
 # kernels_cl into mutants/<name>/kernels_cl.
@@ -21,15 +23,18 @@ function(copy_with_bug name pattern file from to)
   endif()
   string(REPLACE "${from}" "${to}" text "${text}")
   file(CONFIGURE OUTPUT ${folder}/${file} CONTENT "${text}" @ONLY)
-  file(GLOB_RECURSE originals ${PROJECT_SOURCE_DIR}/kernels_cl/*.h ${PROJECT_SOURCE_DIR}/kernels_cl/*.cl)
+  file(GLOB_RECURSE originals
+       ${PROJECT_SOURCE_DIR}/kernels_cl/*.h ${PROJECT_SOURCE_DIR}/kernels_cl/*.cl)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${originals})
 endfunction()
 
 # add_mutant(<name> <header of portable/> <line as it stands> <line with the bug>)
 function(add_mutant name header from to)
   copy_with_bug(${name} "\\.h$" portable/${header} "${from}" "${to}")
-  add_executable(mutant_${name} $<TARGET_OBJECTS:mutant_main> ${PROJECT_SOURCE_DIR}/reference/scalar_renderer.cpp)
-  target_include_directories(mutant_${name} BEFORE PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name})
+  add_executable(mutant_${name}
+    $<TARGET_OBJECTS:mutant_main> ${PROJECT_SOURCE_DIR}/reference/scalar_renderer.cpp)
+  target_include_directories(mutant_${name} BEFORE PRIVATE
+    ${CMAKE_CURRENT_BINARY_DIR}/mutants/${name})
   target_link_libraries(mutant_${name} PRIVATE isowave_reference)
   target_compile_options(mutant_${name} PRIVATE $<TARGET_PROPERTY:mutant_main,COMPILE_OPTIONS>)
   target_precompile_headers(mutant_${name} REUSE_FROM mutant_main)
@@ -58,12 +63,17 @@ add_mutant(open_interval solve_bernstein.h
 add_mutant(open_end solve_bernstein.h "in3 = c.b3 >= 0.0f;" "in3 = c.b3 > 0.0f;")
 add_mutant(one_crossing_only solve_bernstein.h
   "if (in0 == in1 && in0 == in2 && in0 == in3) return 0;" "if (in0 == in3) return 0;")
-add_mutant(second_extremum solve_bernstein.h "at.second = s_a < s_b ? s_b : s_a;" "at.second = -1.0f;")
-add_mutant(lost_extrema solve_bernstein.h "if (at.discriminant > 0.0f)" "if (at.discriminant > 0.05f)")
-add_mutant(unbracketed_newton solve_bernstein.h "if (!(next > lo && next < hi))" "if (next != next)")
-add_mutant(stops_early solve_bernstein.h "#define ISO_ROOT_STEP 0x1p-23f" "#define ISO_ROOT_STEP 0x1p-4f")
+add_mutant(second_extremum solve_bernstein.h
+  "at.second = s_a < s_b ? s_b : s_a;" "at.second = -1.0f;")
+add_mutant(lost_extrema solve_bernstein.h
+  "if (at.discriminant > 0.0f)" "if (at.discriminant > 0.05f)")
+add_mutant(unbracketed_newton solve_bernstein.h
+  "if (!(next > lo && next < hi))" "if (next != next)")
+add_mutant(stops_early solve_bernstein.h
+  "#define ISO_ROOT_STEP 0x1p-23f" "#define ISO_ROOT_STEP 0x1p-4f")
 add_mutant(last_corner cell_intersect.h "(w[7] >= 0.0f) != in;" "0;")
-add_mutant(entry_for_exit cell_intersect.h "c.b2 = (lerp(a.z, bb0, bb1)" "c.b2 = (lerp(b.z, bb0, bb1)")
+add_mutant(entry_for_exit cell_intersect.h
+  "c.b2 = (lerp(a.z, bb0, bb1)" "c.b2 = (lerp(b.z, bb0, bb1)")
 
 # What only devices have: each line is for the watertight test of devices.
 add_library(device_mutant_main OBJECT device_mutant_main.cpp)
@@ -77,7 +87,8 @@ function(add_device_mutant name pipelines file from to)
   file(GLOB_RECURSE kernels ${folder}/kernels_cl/*.cl)
   add_custom_command(
     OUTPUT ${folder}/kernels.cpp
-    COMMAND ${CMAKE_COMMAND} -D "output=${folder}/kernels.cpp" -D "folder=${folder}/kernels_cl" -D "kernels=${kernels}" -P ${embed_kernels_script}
+    COMMAND ${CMAKE_COMMAND} -D "output=${folder}/kernels.cpp" -D "folder=${folder}/kernels_cl"
+            -D "kernels=${kernels}" -P ${embed_kernels_script}
     DEPENDS ${kernels} ${folder}/kernels_cl/${file} ${embed_kernels_script} VERBATIM)
   # The linker takes these kernels, and not those of isowave_kernels behind them.
   add_executable(mutant_${mutant} $<TARGET_OBJECTS:device_mutant_main> ${folder}/kernels.cpp)
@@ -89,7 +100,8 @@ endfunction()
 
 add_device_mutant(none_at_all "rays;blocks" macrocells.cl "/// macrocells.cl" "/// macrocells.cl")
 set_tests_properties(mutant.device_none_at_all PROPERTIES WILL_FAIL TRUE)
-add_device_mutant(own_voxels_only "rays;blocks" macrocells.cl "    range = join(range, (corner & 4 ?"
+add_device_mutant(own_voxels_only "rays;blocks" macrocells.cl
+  "    range = join(range, (corner & 4 ?"
   "    if (corner == 0) range = join(range, (corner & 4 ?")
 add_device_mutant(half_of_macrocells "rays;blocks" device/block_walk.h
   "(bit < 32 ? low >> bit : high >> (bit - 32)) & 1u" "(bit < 32 ? low >> bit : 0u) & 1u")

@@ -18,7 +18,9 @@ not_needed=(embree GMP ITK CLI11 Boost GTest benchmark spdlog)
 
 # needs_little PROGRAM: it links nothing that a renderer does not need.
 needs_little() {
-  if ldd "$1" | grep -iE 'embree|gmp|itk|boost|spdlog|gtest'; then fail "$1 links what a renderer does not need"; fi
+  if ldd "$1" | grep -iE 'embree|gmp|itk|boost|spdlog|gtest'; then
+    fail "$1 links what a renderer does not need"
+  fi
 }
 
 # draws_as_program EXAMPLE: the picture that the program draws, bit for bit.
@@ -26,30 +28,39 @@ draws_as_program() {
   "$1" "$volume" 10 "$work/example.png"
   "$program" render "$volume" -i 10 -o "$work/program.png" > /dev/null
   cmp "$work/example.png" "$work/program.png" || fail "$1 and $program draw different pictures"
-  if "$1" "$work/missing.nrrd" 10 "$work/none.png" 2> "$work/error"; then fail "a missing file is no error"; fi
+  if "$1" "$work/missing.nrrd" 10 "$work/none.png" 2> "$work/error"; then
+    fail "a missing file is no error"
+  fi
   [ "$(wc -l < "$work/error")" = 1 ] || fail "an error of $(wc -l < "$work/error") lines"
 }
 
 cmake --install "$build" --prefix "$work/prefix" > /dev/null
 headers=$(find "$work/prefix" -name '*.hpp')
 [ -n "$headers" ] || fail 'no headers are installed'
-if grep -nE '#include [<"](CL/|glm/|fmt/|core/|kernels_cl/)' $headers; then fail 'a public header includes a private one'; fi
+if grep -nE '#include [<"](CL/|glm/|fmt/|core/|kernels_cl/)' $headers; then
+  fail 'a public header includes a private one'
+fi
 for header in $headers; do
   echo "#include \"$header\"" > "$work/alone.cpp"
   # shellcheck disable=SC2086
-  g++ -std=c++20 $user_flags -fsyntax-only -I"$work/prefix/include" "$work/alone.cpp" || fail "$header does not stand alone"
+  g++ -std=c++20 $user_flags -fsyntax-only -I"$work/prefix/include" "$work/alone.cpp" ||
+    fail "$header does not stand alone"
 done
 
 configure() { # configure SOURCE BUILD OPTION...
   local disabled=()
   for package in "${not_needed[@]}"; do disabled+=("-DCMAKE_DISABLE_FIND_PACKAGE_$package=ON"); done
-  cmake -G Ninja -S "$1" -B "$2" "${disabled[@]}" "${@:3}" > "$work/log" 2>&1 || { cat "$work/log"; fail "$1 cannot be configured"; }
+  cmake -G Ninja -S "$1" -B "$2" "${disabled[@]}" "${@:3}" > "$work/log" 2>&1 || {
+    cat "$work/log"
+    fail "$1 cannot be configured"
+  }
 }
 compile() {
   cmake --build "$1" > "$work/log" 2>&1 || { cat "$work/log"; fail "$1 does not build"; }
 }
 
-configure "$source/tools/example" "$work/installed" -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_CXX_FLAGS="$user_flags"
+configure "$source/tools/example" "$work/installed" \
+  -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_CXX_FLAGS="$user_flags"
 compile "$work/installed"
 needs_little "$work/installed/example"
 draws_as_program "$work/installed/example"

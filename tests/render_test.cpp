@@ -20,7 +20,8 @@ using test::twin_hits;
 
 class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  /// Draws all isovalues from all cameras with one renderer. Returns the number of hits.
+  /// Draws all isovalues from all cameras with one renderer, with normals of both kinds. Returns
+  /// the number of hits.
   std::uint64_t check(const TestVolume &volume, const std::vector<Camera> &cameras,
                       const std::vector<float> &isovalues, ImageSize size,
                       RendererOptions options = {}) {
@@ -35,6 +36,10 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         expect_same_hits(renderer.hits(), expected, size.width);
         EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
         hits += stats.rays_hit;
+        renderer.render({.camera = cameras[view], .isovalue = isovalue, .normals = Normals::kCell});
+        expect_same_hits(renderer.hits(),
+                         twin_hits(volume, cameras[view], size, isovalue, Normals::kCell),
+                         size.width);
       }
     }
     return hits;
@@ -136,7 +141,7 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
         ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), voxel_error);
       renderer.render({.camera = camera, .isovalue = 0.1f, .voxel_error = voxel_error});
       expect_same_hits(renderer.hits(),
-                       render_scalar(make_frame_params(info, camera, kSmall, 0.1f), voxels),
+                       twin_hits(make_frame_params(info, camera, kSmall, 0.1f), voxels),
                        kSmall.width);
     }
     for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
@@ -159,7 +164,7 @@ TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
       SCOPED_TRACE(fmt::format("value error {}, isovalue {}", voxel_error, isovalue));
       renderer.render({.camera = camera, .isovalue = isovalue, .voxel_error = voxel_error});
       const FrameParams frame = make_frame_params(volume.info(), camera, kMedium, isovalue);
-      expect_same_hits(renderer.hits(), render_scalar(frame, voxels), kMedium.width);
+      expect_same_hits(renderer.hits(), twin_hits(frame, voxels), kMedium.width);
     }
   }
 }

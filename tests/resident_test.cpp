@@ -36,7 +36,7 @@ class ResidentOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       for (std::size_t view = 0; view < cameras.size(); ++view) {
         SCOPED_TRACE(fmt::format("isovalue {}, view {}", isovalue, view));
         EXPECT_GT(resident.render(cameras[view], isovalue), 0.0);
-        const auto expected = twin_hits(volume, cameras[view], size, isovalue);
+        const auto expected = twin_hits(volume, cameras[view], size, isovalue, Normals::kCell);
         expect_same_hits(resident.hits(), expected, size.width);
         hits += test::num_hits(expected);
       }

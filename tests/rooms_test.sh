@@ -29,9 +29,12 @@ while IFS=: read -r file include; do
 done < <(grep -roE '^#include "core/[^"]*"' core)
 while IFS=: read -r file include; do
   name=$(sed 's|.*"\(.*\)"|\1|' <<<"$include")
-  [ -f "kernels_cl/portable/$name" ] || fail "$file: $include: a portable header includes portable ones alone"
+  [ -f "kernels_cl/portable/$name" ] ||
+    fail "$file: $include: a portable header includes portable ones alone"
 done < <(grep -roE '^#include "[^"]*"' kernels_cl/portable)
 while IFS=: read -r file include; do
   fail "$file: $include: the host includes portable headers alone"
-done < <(grep -rnoE '^#include "kernels_cl/(device|probes)?/?[a-z_]*\.[a-z]*"' core reference tests tools bench --include=*.?pp | grep -v 'kernels_cl/portable/' | sed 's/:[0-9]*:/:/')
+done < <(grep -rnoE '^#include "kernels_cl/(device|probes)?/?[a-z_]*\.[a-z]*"' \
+  core reference tests tools bench --include=*.?pp |
+  grep -v 'kernels_cl/portable/' | sed 's/:[0-9]*:/:/')
 exit "$failed"

@@ -7,11 +7,12 @@ set -euo pipefail
 
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-unset ISOWAVE_DEVICE RUSTICL_ENABLE # Oclgrind's library takes the loader's place: it is the only device
+# Oclgrind's library takes the loader's place: it is the only device.
+unset ISOWAVE_DEVICE RUSTICL_ENABLE
 
 status=0
-oclgrind --build-options '-cl-opt-disable -DISO_CHECK_RACES=1' --data-races --uninitialized --max-errors 100000 "$@" 2> "$log" ||
-  status=$?
+oclgrind --build-options '-cl-opt-disable -DISO_CHECK_RACES=1' --data-races --uninitialized \
+  --max-errors 100000 "$@" 2> "$log" || status=$?
 cat "$log" >&2
 if grep -q '^[[:space:]]*Kernel: ' "$log"; then
   echo 'run_under_oclgrind: Oclgrind reports the above' >&2

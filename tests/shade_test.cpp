@@ -107,7 +107,7 @@ TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
         fmt::format("{}x{}, {} x {} rays", size.width, size.height, size.samples, size.samples));
     renderer.render({camera_, 0.1f, size});
     const FrameParams frame = make_frame_params(volume_.info(), camera_, size, 0.1f);
-    const auto hits = render_scalar(frame, volume_.voxels);
+    const auto hits = test::twin_hits(frame, volume_.voxels);
     test::expect_same_hits(renderer.hits(), hits, size.ray_columns());
     const Image8 got = renderer.shade();
     EXPECT_EQ(got.width, size.width);

@@ -116,6 +116,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
   Certificate certificate;
   const auto draw = [&](FieldBound bound) {
     FrameRequest of_bound = request;
+    of_bound.normals = Normals::kCell;
     of_bound.bound = bound;
     of_bound.on_pass = {};
     for (const PassStats &pass : renderer.render(of_bound).passes)

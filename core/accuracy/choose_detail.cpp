@@ -129,6 +129,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
   DetailChoice choice;
   const auto try_out = [&](const Detail &detail) {
     FrameRequest sample = with_detail(request, {detail.voxel_pixels / stride, detail.voxel_error});
+    sample.normals = Normals::kCell;
     sample.size = small;
     sample.on_pass = {};
     renderer.render(sample);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -10,24 +9,18 @@
 
 #include "core/accuracy/certify.hpp"
 #include "core/accuracy/choose_detail.hpp"
-#include "core/api/convert.hpp"
 #include "core/api/device_implementation.hpp"
+#include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
-#include "core/base/parallel_for.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/time_budget.hpp"
-#include "core/view/detail.hpp"
 
 namespace isowave {
 
 namespace {
 
 using core::guarded;
-
-core::ImageSize core_size(const ImageSize &size) {
-  return {size.width, size.height, size.samples};
-}
 
 core::RendererOptions core_options(const RendererOptions &options, const Volume &volume) {
   core::RendererOptions result;
@@ -39,111 +32,6 @@ core::RendererOptions core_options(const RendererOptions &options, const Volume 
   result.with_kept_picture = options.with_time_budget;
   return result;
 }
-
-core::Appearance core_appearance(const Appearance &appearance) {
-  return {to_glm(appearance.surface), to_glm(appearance.background), appearance.ambient,
-          appearance.diffuse, appearance.specular};
-}
-
-core::FrameRequest core_request(const FrameRequest &request) {
-  core::FrameRequest result;
-  const Camera &camera = request.camera;
-  result.camera = {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees};
-  result.isovalue = request.isovalue;
-  result.size = core_size(request.size);
-  result.voxel_pixels = request.voxel_pixels;
-  result.voxel_error = request.voxel_error;
-  result.bound = static_cast<core::FieldBound>(request.bound);
-  return result;
-}
-
-FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t num_rays) {
-  FrameStatistics result;
-  result.passes = static_cast<std::uint32_t>(stats.passes.size());
-  result.rays = num_rays;
-  result.hits = stats.rays_hit;
-  for (const core::PassStats &pass : stats.passes) {
-    result.decoded_blocks += pass.counts.decoded_count;
-    for (const auto &[stage, ms] : pass.stage_ms) result.stage_ms[stage] += ms;
-  }
-  result.uploaded_bytes = stats.uploaded_bytes;
-  result.first_level = static_cast<std::uint32_t>(stats.first_level);
-  result.last_level = static_cast<std::uint32_t>(stats.last_level);
-  result.total_ms = stats.total_ms;
-  result.cancelled = stats.cancelled;
-  result.complete = !stats.cancelled;
-  return result;
-}
-
-/// Finds the level of detail that a block id belongs to, and its place there.
-class HitCells {
- public:
-  HitCells(const core::CompressedVolume &volume, bool with_levels)
-      : grids_(core::make_level_grids(core::level_infos(volume, with_levels))) {}
-
-  Hit operator()(const core::HitRecord &record) const {
-    Hit hit;
-    hit.t = record.t;
-    if (std::isinf(record.t)) return hit;
-    const std::uint32_t columns = grids_[0].place.blocks_x, rows = grids_[0].place.blocks_y;
-    const std::uint32_t layer = record.block_id / columns / rows;
-    while (hit.level + 1 < grids_.size() && grids_[hit.level + 1].place.begin_z <= layer)
-      ++hit.level;
-    hit.cell = {4 * (record.block_id % columns) + record.cell % 4,
-                4 * (record.block_id / columns % rows) + record.cell / 4 % 4,
-                4 * (layer - grids_[hit.level].place.begin_z) + record.cell / 16};
-    hit.position = {record.x, record.y, record.z};
-    hit.gradient = {record.grad_x, record.grad_y, record.grad_z};
-    return hit;
-  }
-
- private:
-  std::vector<core::FrameParams> grids_;
-};
-
-/// Where hits are.
-class WorldPositions {
- public:
-  WorldPositions(const core::CompressedVolume &volume, bool with_levels)
-      : cells_(volume, with_levels), infos_(core::level_infos(volume, with_levels)) {}
-
-  std::array<float, 3> operator()(const core::HitRecord &record) const {
-    if (std::isinf(record.t)) {
-      constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-      return {kNone, kNone, kNone};
-    }
-    const Hit hit = cells_(record);
-    const core::VolumeInfo &info = infos_[hit.level];
-    const glm::dvec3 index = glm::dvec3(hit.cell[0], hit.cell[1], hit.cell[2]) +
-                             glm::dvec3(hit.position[0], hit.position[1], hit.position[2]);
-    const glm::vec3 world(info.origin + info.index_to_world() * index);
-    return {world.x, world.y, world.z};
-  }
-
- private:
-  HitCells cells_;
-  std::vector<core::VolumeInfo> infos_;
-};
-
-/// Away from larger values, of length 1.
-class WorldNormals {
- public:
-  explicit WorldNormals(const core::VolumeInfo &info)
-      : to_world_(glm::transpose(glm::inverse(info.index_to_world()))) {}
-
-  std::array<float, 3> operator()(const core::HitRecord &hit) const {
-    glm::dvec3 gradient(hit.grad_x, hit.grad_y, hit.grad_z);
-    const double largest =
-        std::max({std::abs(gradient.x), std::abs(gradient.y), std::abs(gradient.z)});
-    if (std::isinf(hit.t) || largest == 0) return {};
-    gradient = to_world_ * (gradient / largest);
-    const glm::vec3 normal(-gradient / glm::length(gradient));
-    return {normal.x, normal.y, normal.z};
-  }
-
- private:
-  glm::dmat3 to_world_;
-};
 
 }  // namespace
 
@@ -252,17 +140,8 @@ void Renderer::Implementation::fetch(const FrameRequest &request, const core::Fr
   if (!(request.want_depth || request.want_normals || request.want_positions || request.want_hits ||
         request.want_bounds))
     return;
-  const bool with_levels = renderer.options().with_levels;
   const std::vector<core::HitRecord> records = renderer.hits();
-  const auto to_each = [&](auto &out, const auto &make) {
-    out.resize(records.size());
-    core::parallel_for(records.size(), 0,
-                       [&](std::uint64_t i, std::uint32_t) { out[i] = make(records[i]); });
-  };
-  if (request.want_depth) frame.depth = core::depth_of(records);
-  if (request.want_normals) to_each(frame.normals, WorldNormals(compressed.info));
-  if (request.want_positions) to_each(frame.positions, WorldPositions(compressed, with_levels));
-  if (request.want_hits) to_each(frame.hits, HitCells(compressed, with_levels));
+  fill_frame(request, records, compressed, renderer.options().with_levels, frame);
   if (request.want_bounds)
     frame.bounds = core::certify(renderer, compressed, drawn, records).bounds;
 }
@@ -272,11 +151,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   core::FrameRequest wanted = core_request(request);
   Frame frame;
   const core::FrameStats stats = draw_hits(request, wanted, frame);
-  frame.size = request.size;
-  const core::ImageSize size = core_size(request.size);
-  frame.rows = size.ray_rows();
-  frame.columns = size.ray_columns();
-  frame.statistics = public_statistics(stats, size.num_rays());
+  describe_frame(request, stats, frame);
   fetch(request, wanted, frame);
   return frame;
 }
@@ -318,9 +193,7 @@ Frame Renderer::render(const FrameRequest &request) {
 Camera Renderer::camera(float isovalue, std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
     const std::lock_guard lock(implementation_->device->implementation().mutex);
-    const core::Camera camera = implementation_->renderer.camera(
-        {&isovalue, 1}, size ? std::optional(core_size(*size)) : std::nullopt);
-    return Camera{from_glm(camera.eye), from_glm(camera.at), from_glm(camera.up), camera.fovy_deg};
+    return public_camera(implementation_->renderer.camera({&isovalue, 1}));
   });
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/stages/smooth_normals.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/level_bounds.hpp"
@@ -29,18 +30,31 @@ struct PassStats {
       stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
+/// What smooth normals took after the passes that found the hits.
+struct NormalsStats {
+  std::uint32_t passes = 0;
+  std::uint64_t decoded_blocks = 0;        ///< for them alone
+  std::uint64_t recycled_blocks = 0;       ///< see PassCounts::recycled_count
+  double ms = 0;                           ///< wall clock, of total_ms
+  std::map<std::string, double> stage_ms;  ///< as PassStats::stage_ms
+};
+
 struct FrameStats {
-  std::vector<PassStats> passes;
+  std::vector<PassStats> passes;                ///< that looked for hits
+  NormalsStats normals;                         ///< Normals::kSmooth
   std::size_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
   std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
   std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
-  bool cancelled =
-      false;  ///< on_pass said so while rays were left; the hit buffer holds the picture so far
+  /// on_pass said so before the picture was finished; the hit buffer holds the picture so far.
+  /// Where the last pass has left no rays, that has all hits, some with the gradients of their
+  /// cells.
+  bool cancelled = false;
 };
 
-/// Called after each pass, the last included; Renderer::hits() and shade() show the picture so far.
+/// Called after each pass, the last included, and those for smooth normals, of which 100 % of the
+/// rays are completed; Renderer::hits() and shade() show the picture so far.
 /// Return false to stop. With a callback, or with profiling, the host waits after each pass;
 /// without, it stays a pass ahead.
 using OnPass = std::function<bool(const PassStats &)>;
@@ -62,6 +76,7 @@ struct FrameRequest {
   /// volume's voxels were before compression, trilinear between them: decoded values are lowered or
   /// raised by the bound of their error.
   FieldBound bound = FieldBound::kNone;
+  Normals normals = Normals::kSmooth;  ///< gradients of the hits; nothing else depends on them
   OnPass on_pass{};
 };
 

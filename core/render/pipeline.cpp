@@ -140,8 +140,9 @@ void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
       level.decode({level.stream, level.frame}, {levels[i].stream, levels[i].frame}, rays.counts,
                    cache);
     }
-  } catch (...) {  // blocks have slots, but no values
+  } catch (...) {  // blocks have slots, but no values, and nobody opens the next pass
     cache.clear();
+    rays.reset_counts();
     throw;
   }
 }

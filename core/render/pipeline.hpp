@@ -58,7 +58,7 @@ struct FrameState {
 
   /// Cache and decode: the blocks asked for, asked.requested_count, of those levels, get slots and
   /// values. Asynchronous but where the stream stays on the host: see ZfpDecode. Where that throws,
-  /// the cache is empty.
+  /// cache and counts are as they were made.
   void provide_blocks(const CountsBuffer &asked, LevelRange of);
 };
 

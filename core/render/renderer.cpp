@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/render/stall_guard.hpp"
@@ -62,9 +63,9 @@ std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, Strea
   return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
 }
 
-bool turned_over(const std::vector<PassStats> &passes, std::uint32_t most) {
-  std::uint64_t num_recycled = 0;
-  for (const PassStats &pass : passes) num_recycled += pass.counts.recycled_count;
+bool turned_over(const FrameStats &stats, std::uint32_t most) {
+  std::uint64_t num_recycled = stats.normals.recycled_blocks;
+  for (const PassStats &pass : stats.passes) num_recycled += pass.counts.recycled_count;
   return num_recycled > most;
 }
 
@@ -74,38 +75,100 @@ FrameStats Renderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   const Uploads uploaded_before = uploads();
   const OnPass &on_pass = request.on_pass;
-  const bool in_step = on_pass || device_.timer().source() != ocl::TimerSource::kOff;
+  const bool is_smooth = request.normals == Normals::kSmooth;
   FrameStats stats;
   begin_frame(request);
   stats.first_level = state_.drawing.first;
   stats.last_level = state_.drawing.end - 1;
   StallGuard guard(state_.levels[0].info.dims);
+  // Normals that begin right behind the pass that the last frame was through with need not wait for
+  // the host. Should this frame need more, they have touched nothing.
+  bool has_begun_normals = false,
+       may_begin_normals = is_smooth && is_one_pass_ && !in_step(on_pass);
   for (bool finished = false; !finished && !stats.cancelled;) {
     pipeline_->enqueue_pass();
     readback_.push(state_.rays.counts);
-    if (!in_step && readback_.in_flight() < PassReadback::kMaxInFlight)
+    if (std::exchange(may_begin_normals, false)) {
+      enqueue_normals(true);
+      has_begun_normals = true;
+    } else if (!in_step(on_pass) && readback_.in_flight() < PassReadback::kMaxInFlight) {
       continue;  // read one pass behind: the device never waits for us
+    }
     const PassStats pass = stats_of(readback_.pop());
     stats.rays_hit += pass.counts.hit_count;
     stats.passes.push_back(pass);
     finished = pass.counts.next_active_count == 0;
-    stats.cancelled = on_pass && !on_pass(pass) && !finished;
+    stats.cancelled = on_pass && !on_pass(pass) && (is_smooth || !finished);
     guard.check(pass.counts);
+    if (has_begun_normals && !finished) {
+      readback_.drain();
+      state_.rays.unopen_pass();
+      has_begun_normals = false;
+    }
   }
+  is_one_pass_ = stats.passes.size() == 1;
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
   // for it.
-  if (!stats.cancelled) {
-    pipeline_->end_frame();
-    if (turned_over(stats.passes,
-                    most_recycled(state_.cache.num_slots, device_.info().type, options_.stream)))
-      state_.cache.clear();
-  }
+  if (stats.passes.back().counts.next_active_count == 0) pipeline_->end_frame();
+  if (is_smooth && !stats.cancelled) finish_normals(on_pass, has_begun_normals, stats);
+  if (!stats.cancelled && turned_over(stats, most_recycled(state_.cache.num_slots,
+                                                           device_.info().type, options_.stream)))
+    state_.cache.clear();
   state_.rays.frame = state_.levels[0].frame;  // for shading
   const Uploads uploaded = uploads();
   stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
   stats.uploaded_bytes = uploaded.bytes - uploaded_before.bytes;
   stats.total_ms = ms_since(begin);
   return stats;
+}
+
+/// Begins with all hits, or goes on with those that wait.
+void Renderer::enqueue_normals(bool begins) {
+  state_.rays.open_pass();
+  if (!begins) state_.provide_blocks(state_.rays.previous_counts, state_.drawing);
+  const auto stage = device_.timer().stage("normals");
+  smooth_normals_(state_.cache, state_.rays, begins);
+  readback_.push(state_.rays.counts);
+}
+
+/// Enqueues and awaits what is left of the passes for smooth normals. has_begun: the first is
+/// enqueued.
+void Renderer::finish_normals(const OnPass &on_pass, bool has_begun, FrameStats &stats) {
+  const auto begin = std::chrono::steady_clock::now();
+  has_open_requests_ = true;
+  if (!has_begun) {
+    enqueue_normals(true);
+    if (readback_.in_flight() == PassReadback::kMaxInFlight)
+      readback_.pop();  // of the pass beyond the last
+  }
+  StallGuard guard(state_.levels[0].info.dims);
+  for (bool finished = false; !finished && !stats.cancelled;) {
+    if (!in_step(on_pass) && readback_.in_flight() < PassReadback::kMaxInFlight)
+      enqueue_normals(false);
+    const PassStats pass = stats_of(readback_.pop());
+    NormalsStats &normals = stats.normals;
+    ++normals.passes;
+    normals.decoded_blocks += pass.counts.decoded_count;
+    normals.recycled_blocks += pass.counts.recycled_count;
+    for (const auto &[stage, ms] : pass.stage_ms) normals.stage_ms[stage] += ms;
+    finished = pass.counts.next_active_count == 0;
+    PassStats shown = pass;
+    shown.completed_percent = 100;
+    stats.cancelled = on_pass && !on_pass(shown) && !finished;
+    guard.check(pass.counts);
+    has_open_requests_ = !finished;
+    if (!finished && !stats.cancelled && readback_.in_flight() == 0) enqueue_normals(false);
+  }
+  stats.normals.ms = ms_since(begin);
+}
+
+/// Answers what is left of the requests of a frame whose normals were cut short, and forgets its
+/// rays.
+void Renderer::answer_requests() {
+  if (!std::exchange(has_open_requests_, false)) return;
+  state_.rays.forget_rays();
+  enqueue_normals(false);
+  readback_.drain();
 }
 
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
@@ -120,6 +183,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       size_(options_.size),
       pipeline_(make_pipeline(options_.pipeline, state_, plan_.limits.pairs, options_.solver,
                               options_.closest)),
+      smooth_normals_(device, state_.rays.num_rays, options_.group_size, state_.levels.size() > 1),
       shade_(device, options_.size.num_rays()),
       readback_(device) {
   if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
@@ -151,6 +215,8 @@ void Renderer::compile_kernels() {
     for (int pass = 0; pass < 2; ++pass)
       pipeline_->enqueue_pass();  // the first has nothing to decode
     pipeline_->end_frame();
+    if (options_.with_shading) enqueue_normals(true);
+    readback_.drain();
   }
   state_.cache.classify(rays);
   for (Level &level : state_.levels) level.decode.compile(level.stream, rays.counts, state_.cache);
@@ -186,6 +252,7 @@ void Renderer::begin_frame(const FrameRequest &request) {
       make_level_frames(infos, request.camera, size, isovalue, request.voxel_pixels);
   const std::vector<DecodedValues> values = decoded_values(request);
   readback_.drain();  // of what the frame before had enqueued beyond its last pass
+  answer_requests();
   decode_as(values, request.bound);
   has_picture_ = false;
   size_ = size;

@@ -1,7 +1,7 @@
 #pragma once
 // Draws isosurfaces of one compressed volume on one device: the main loop of the program.
 //
-// camera -> rays -> [ pass of a pipeline ]* -> hits -> picture
+// camera -> rays -> [ pass of a pipeline ]* -> hits -> [ pass for smooth normals ]* -> picture
 //
 // core/render/pipeline.hpp has the pipelines.
 
@@ -121,6 +121,12 @@ class Renderer {
   };
   Uploads uploads() const;
   PassStats stats_of(const PassCounts &counts);
+  void enqueue_normals(bool begins);
+  void finish_normals(const OnPass &on_pass, bool has_begun, FrameStats &stats);
+  void answer_requests();
+  bool in_step(const OnPass &on_pass) const {
+    return on_pass || device_.timer().source() != ocl::TimerSource::kOff;
+  }
 
   ocl::Device &device_;
   std::chrono::steady_clock::time_point setup_begin_;
@@ -133,8 +139,11 @@ class Renderer {
   ImageSize size_;                         ///< of the frame at work, or the last
   bool has_picture_ = false;               ///< the hit buffer has the frame's hits so far
   std::optional<float>
-      cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty
+      cached_isovalue_;             ///< of the cache's bits of voxels inside; none: it is empty
+  bool is_one_pass_ = false;        ///< the last frame was: it found all blocks that it needed
+  bool has_open_requests_ = false;  ///< rays wait for their normals
   std::unique_ptr<Pipeline> pipeline_;
+  SmoothNormals smooth_normals_;
   Shade shade_;
   std::optional<KeptPicture> kept_;
   PassReadback readback_;

@@ -32,7 +32,9 @@ struct RendererOptions {
   bool with_levels = false;        ///< frames may use the volume's levels of detail
   bool with_bounds = false;        ///< frames may draw bounds of the volume
   bool with_kept_picture = false;  ///< Renderer::keep_picture() will be called
-  bool with_shading = true;        ///< shade() will be called: else its kernel is built when it is
+  /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built when
+  /// they are needed.
+  bool with_shading = true;
 };
 
 /// Slots (325 MiB with their share of the tables) that no budget was asked for are enough: a cold

@@ -21,6 +21,10 @@ Camera surface_camera(Macrocells &macrocells, const VolumeInfo &info,
     box->begin = glm::min(box->begin, blocks->begin);
     box->end = glm::max(box->end, blocks->end);
   }
+  return surface_camera(info, box, size);
+}
+
+Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size) {
   const glm::dvec3 last(info.dims - 1u);
   const glm::dvec3 begin = box ? 4.0 * glm::dvec3(box->begin) : glm::dvec3(0);
   const glm::dvec3 end = box ? glm::min(4.0 * glm::dvec3(box->end), last) : last;

@@ -1,6 +1,7 @@
 #pragma once
 // The view that is taken where nobody asks for another.
 
+#include <optional>
 #include <span>
 
 #include "core/stages/macrocells.hpp"
@@ -20,6 +21,9 @@ namespace isowave::core {
 /// Waits       yes
 Camera surface_camera(Macrocells &macrocells, const VolumeInfo &info,
                       std::span<const float> isovalues, ImageSize size);
+
+/// The same of the box of those blocks; none: of the whole volume.
+Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size);
 
 /// The same without a renderer: builds the blocks' ranges on the device, and forgets them.
 Camera surface_camera(ocl::Device &device, const CompressedVolume &volume,

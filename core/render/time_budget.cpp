@@ -15,6 +15,11 @@ constexpr double kGrowth = 4;
 
 void add(FrameStats &sum, FrameStats step) {
   step.passes.insert(step.passes.begin(), sum.passes.begin(), sum.passes.end());
+  step.normals.passes += sum.normals.passes;
+  step.normals.decoded_blocks += sum.normals.decoded_blocks;
+  step.normals.recycled_blocks += sum.normals.recycled_blocks;
+  step.normals.ms += sum.normals.ms;
+  for (const auto &[stage, ms] : sum.normals.stage_ms) step.normals.stage_ms[stage] += ms;
   step.uploaded_blocks += sum.uploaded_blocks;
   step.uploaded_bytes += sum.uploaded_bytes;
   sum = std::move(step);
@@ -59,14 +64,15 @@ TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
       return !may_be_cancelled || now + pass_ms - begin <= budget_ms;
     };
     const FrameStats stats = renderer_.render(in_time);
-    const bool whole = !stats.cancelled;
+    const bool whole = !stats.cancelled,
+               has_all_hits = stats.passes.back().counts.next_active_count == 0;
     const double now = now_(), step_ms = now - step_begin;
     frame.steps.push_back({*of_step.size, of_step.voxel_pixels, step_ms,
                            stats.passes.back().completed_percent, stats.cancelled});
     add(frame.stats, stats);
     frame.complete = whole && step == 0;
     last_ms_[step] = whole ? step_ms : 2 * step_ms;
-    if (!whole) renderer_.fill_from_kept();
+    if (!has_all_hits) renderer_.fill_from_kept();
     if (step == 0) break;
     renderer_.keep_picture();
     const std::size_t next =

@@ -8,25 +8,11 @@
 #include <utility>
 
 #include "core/view/frame.hpp"
+#include "core/volume/range_thresholds.hpp"
 #include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/block_grid.h"
 
 namespace isowave::core {
-
-namespace {
-
-constexpr std::uint32_t kNumThresholds = 256;
-constexpr std::uint32_t kMaxSamples = 1u << 14;  ///< blocks decoded for the quantile table
-
-/// One block in so many is decoded for the quantile table.
-std::uint64_t sample_stride(std::uint64_t num_blocks) {
-  return (num_blocks + kMaxSamples - 1) / kMaxSamples;
-}
-std::uint64_t num_samples(std::uint64_t num_blocks) {
-  return num_blocks / sample_stride(num_blocks);
-}
-
-}  // namespace
 
 ocl::BufferSizes MacrocellBuffers::sizes(const Limits &limits) {
   ocl::BufferSizes sizes{ocl::buffer_size<cl_ushort>("block ranges", limits.num_blocks)};
@@ -116,7 +102,8 @@ std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
 }
 
 ocl::BufferSizes Macrocells::sampling_sizes(std::uint64_t num_blocks) {
-  return {ocl::buffer_size<ValueRange>("range samples", 8 * num_samples(num_blocks))};
+  return {ocl::buffer_size<ValueRange>("range samples",
+                                       8 * std::uint64_t{range_sample(num_blocks).count})};
 }
 
 ocl::BufferSizes Macrocells::layer_sizes(std::uint64_t layer_blocks) {
@@ -144,52 +131,24 @@ void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
   });
 }
 
-/// From the block minima and maxima of an even sample of blocks: half of them quantiles, so that
-/// one outlier does not coarsen the rest; half at even distances, so that the noise of a plateau,
-/// which has most of the values, does not either.
+/// From the block minima and maxima of an even sample of blocks.
 std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint32_t num_blocks,
                                                  Partials &decode) {
-  const auto stride = static_cast<std::uint32_t>(sample_stride(num_blocks));
-  const auto count = static_cast<std::uint32_t>(num_samples(num_blocks));
+  const RangeSample sample = range_sample(num_blocks);
   ocl::Buffer<ValueRange> partials(device, sampling_sizes(num_blocks)["range samples"]);
-  decode(0, stride, count, partials);
+  decode(0, sample.stride, sample.count, partials);
   const std::vector<ValueRange> samples = partials.read();
   std::vector<float> values;
-  values.reserve(2 * std::size_t{count});
+  values.reserve(2 * std::size_t{sample.count});
   for (std::size_t i = 0; i < samples.size(); i += 8) {  // entry 0 of 8: the whole block
     values.push_back(samples[i].min);
     values.push_back(samples[i].max);
   }
-  std::sort(values.begin(), values.end());
-  values.erase(std::unique(values.begin(), values.end()), values.end());
-
-  std::vector<float> thresholds(kNumThresholds, std::numeric_limits<float>::infinity());
-  thresholds[0] = -std::numeric_limits<float>::infinity();
-  if (values.size() <= kNumThresholds - 2) {
-    std::ranges::copy(values, thresholds.begin() + 1);
-    return thresholds;
-  }
-  constexpr std::size_t kNumQuantiles = kNumThresholds / 2,
-                        kNumEven = kNumThresholds - 2 - kNumQuantiles;
-  for (std::size_t i = 0; i < kNumQuantiles;
-       ++i) {  // the smallest and the largest are always among them
-    thresholds[1 + i] = values[i * (values.size() - 1) / (kNumQuantiles - 1)];
-  }
-  const std::size_t outliers = values.size() / 100;
-  for (std::size_t i = 0; i < kNumEven; ++i) {
-    const float part = (static_cast<float>(i) + 0.5f) / kNumEven;
-    thresholds[1 + kNumQuantiles + i] =
-        (1 - part) * values[outliers] + part * values[values.size() - 1 - outliers];
-  }
-  std::ranges::sort(thresholds);
-  return thresholds;
+  return range_thresholds(std::move(values));
 }
 
 void Macrocells::select(const FrameParams &frame, double voxel_error, const DeviceStream *moved) {
-  const auto index_of = [&](double value) {
-    return static_cast<std::uint32_t>(std::ranges::lower_bound(thresholds_, value) -
-                                      thresholds_.begin());
-  };
+  const auto index_of = [&](double value) { return threshold_index(thresholds_, value); };
   const double isovalue = double{frame.surface.isovalue};
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
   const std::array of = {isovalue, voxel_error, double{layout.value_offset},

@@ -12,6 +12,7 @@
 #include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
 #include "core/stream/device_stream.hpp"
+#include "core/volume/block_box.hpp"
 
 namespace isowave::core {
 
@@ -32,11 +33,6 @@ struct MacrocellBuffers {
   ocl::Buffer<cl_ushort> ranges;
   std::vector<ocl::Buffer<uint>> masks;  ///< [selections]
   std::size_t selection = 0;             ///< the one in use, at all levels
-};
-
-/// Blocks from `begin` to before `end`.
-struct BlockBox {
-  glm::ivec3 begin, end;
 };
 
 class Macrocells {

@@ -45,6 +45,7 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
   params.ambient = appearance.ambient;
   params.diffuse = appearance.diffuse;
   params.specular = appearance.specular;
+  params.above = appearance.above;
   return params;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// Hit buffer -> framebuffer: headlight Blinn-Phong on the gradient of the trilinear field.
+// Hit buffer -> framebuffer: a headlight, Blinn-Phong, and a light above it, on the hits'
+// gradients.
 
 #include <glm/glm.hpp>
 #include <vector>
@@ -15,7 +16,8 @@ namespace isowave::core {
 struct Appearance {
   glm::vec3 surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   glm::vec3 background{1.0f, 1.0f, 1.0f};
-  float ambient = 0.15f, diffuse = 0.75f, specular = 0.25f;
+  float ambient = 0.15f, diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
+  float above = 0.45f;                                     ///< diffuse, of a light above it
 };
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);

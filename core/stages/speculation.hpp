@@ -13,15 +13,16 @@ class Speculation {
 
   /// Opens a pass: the rays left by the last one become active.
   ///
-  /// Out    rays.active_ray_ids; counts.active_count, spec_count; the other counts of a pass: 0
+  /// Out    rays.active_ray_ids; counts.active_count, spec_count; the other counts of a pass: 0;
+  ///        next_counts, opened
   /// Waits  no
   void begin_pass(Wavefront &rays) {
     std::swap(rays.active_ray_ids, rays.next_active_ray_ids);
-    begin_pass_({1, 1}, rays.frame, rays.counts);
+    begin_pass_({1, 1}, rays.frame, rays.counts, rays.next_counts);
   }
 
  private:
-  ocl::Kernel<FrameParams, ocl::Out<PassCounts>> begin_pass_;
+  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::Out<PassCounts>> begin_pass_;
 };
 
 }  // namespace isowave::core

@@ -51,7 +51,7 @@ struct Wavefront {
     next_counts.write({&start, 1});
   }
 
-  /// Pipeline `rays`: no ray goes on from the last pass.
+  /// No ray goes on from the last pass.
   ///
   /// Waits  yes
   void forget_rays() {
@@ -60,11 +60,18 @@ struct Wavefront {
     counts.write({&last, 1});
   }
 
-  /// Pipeline `rays`: the counts and the rays left by one pass go to the next.
+  /// The counts and the rays left by one pass go to the next (pipeline `rays`, smooth normals).
   void open_pass() {
     std::swap(previous_counts, counts);
     std::swap(counts, next_counts);
     std::swap(active_ray_ids, next_active_ray_ids);
+  }
+
+  /// Takes open_pass() back, of a pass that has touched nothing of these.
+  void unopen_pass() {
+    std::swap(active_ray_ids, next_active_ray_ids);
+    std::swap(counts, next_counts);
+    std::swap(previous_counts, counts);
   }
 
   std::uint64_t num_rays;  ///< R
@@ -74,8 +81,8 @@ struct Wavefront {
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;
   CountsBuffer counts;              ///< [1] of the pass at work
-  CountsBuffer previous_counts;     ///< [1] of the pass before (pipeline `rays`)
-  CountsBuffer next_counts;         ///< [1] of the next pass, opened by this one (pipeline `rays`)
+  CountsBuffer previous_counts;     ///< [1] of the pass before, where open_pass() is called
+  CountsBuffer next_counts;         ///< [1] of the next such pass, opened by this one
   ocl::Buffer<HitRecord> hits;      ///< [R] by pixel: the picture so far
   ocl::Buffer<uint> ray_block_ids;  ///< [R] by pixel: where a ray goes on from: RayStand (R_BID)
   ocl::Buffer<uint>

@@ -1,10 +1,9 @@
 #include "core/stream/stream_window.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 
 #include "core/base/error.hpp"
+#include "core/base/host_memory.hpp"
 #include "core/base/parallel_for.hpp"
 
 namespace isowave::core {
@@ -82,8 +81,7 @@ void StreamWindow::copy_payload(std::uint64_t max_copy) {
 }
 
 std::uint64_t StreamWindow::default_max_copy() {
-  const auto pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGESIZE);
-  return pages > 0 && page_bytes > 0 ? std::uint64_t(pages) * std::uint64_t(page_bytes) / 4 : 0;
+  return host_memory() / 4;
 }
 
 StreamWindow::~StreamWindow() {

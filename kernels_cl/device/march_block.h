@@ -3,8 +3,8 @@
 #ifndef ISOWAVE_MARCH_BLOCK_H
 #define ISOWAVE_MARCH_BLOCK_H
 
-#include "block_cells.h"
 #include "block_walk.h"
+#include "portable/block_cells.h"
 #include "portable/block_table.h"
 #include "portable/cell_intersect.h"
 

@@ -19,6 +19,21 @@ ISO_INLINE uint as_read_stamp(uint stamp) {
   return stamp & ~1u;
 }
 
+/// Stamps a slot that a waiting ray needs, with needed_stamp() of the pass.
+ISO_INLINE void stamp_needed(volatile global uint *slot_stamps, uint slot, uint stamp) {
+  if (ISO_CHECK_RACES) {
+    atomic_max(&slot_stamps[slot], stamp);
+  } else {
+    slot_stamps[slot] = stamp;
+  }
+}
+/// Stamps a slot that was read, with read_stamp() of the pass, in a kernel that also stamps what is
+/// needed: that wins.
+ISO_INLINE void stamp_read(volatile global uint *slot_stamps, uint slot, uint stamp) {
+  if (ISO_CHECK_RACES || (int)(slot_stamps[slot] - stamp) < 0)
+    atomic_max(&slot_stamps[slot], stamp);
+}
+
 #define ISO_CLASS_RANKS (ISO_EVICTION_RANKS / 8)
 #define ISO_RANKS_OF_FRAME \
   (2 * ISO_CLASS_RANKS)  ///< those below are of slots that the frame at work has used

@@ -23,19 +23,23 @@ ISO_INLINE uint group_scan(local uint *sums, uint value, uint *total) {
   return inclusive - value;
 }
 
-/// Appends an entry to list [*count]. All items must call it.
+/// Appends an entry to list [*count]. All items must call it. Returns its place.
 /// goes_on: this work-item has one. counters [2] of the work-group: 0 on entry and on return.
-ISO_INLINE void append_entry(int goes_on, uint entry, volatile local uint *counters,
+ISO_INLINE uint append_entry(int goes_on, uint entry, volatile local uint *counters,
                              volatile global uint *count, global uint *list) {
   uint place = 0;
   if (goes_on) place = atomic_inc(&counters[0]);
   barrier(CLK_LOCAL_MEM_FENCE);
   if (get_local_id(0) == 0 && counters[0] != 0) counters[1] = atomic_add(count, counters[0]);
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (goes_on) list[counters[1] + place] = entry;
+  if (goes_on) {
+    place += counters[1];
+    list[place] = entry;
+  }
   barrier(CLK_LOCAL_MEM_FENCE);
   if (get_local_id(0) == 0) counters[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
+  return place;
 }
 
 #endif

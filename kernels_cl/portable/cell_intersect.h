@@ -16,6 +16,7 @@
 #ifndef ISOWAVE_CELL_INTERSECT_H
 #define ISOWAVE_CELL_INTERSECT_H
 
+#include "block_grid.h"
 #include "grid_dda.h"
 #include "solver.h"
 
@@ -142,8 +143,7 @@ ISO_INLINE HitRecord make_hit(const FrameParams *frame, const Ray *r, const floa
   /* Two-float differences first: t_exit - t_enter may be far below an ulp of t. */
   const float length = (exit.t.hi - enter.t.hi) + (exit.t.lo - enter.t.lo);
   hit.t = (enter.t.hi + fma(s, length, enter.t.lo)) * frame->view.t_scale;
-  hit.block_id = (uint)(x >> 2) +
-                 frame->grid.blocks_x * ((uint)(y >> 2) + frame->grid.blocks_y * (uint)(z >> 2));
+  hit.block_id = block_id_at(frame, (uint)(x >> 2), (uint)(y >> 2), (uint)(z >> 2));
   hit.cell = (uint)((x & 3) + 4 * (y & 3) + 16 * (z & 3));
   hit.x = lerp(s, a.x, b.x);
   hit.y = lerp(s, a.y, b.y);

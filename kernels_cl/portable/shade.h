@@ -1,6 +1,10 @@
 /// shade.h -- a pixel's colour, the mean of its rays', each from its hit: a headlight at the eye,
-/// Blinn-Phong, both sides of the surface alike. Portable: OpenCL C 1.2 and C++, so that pictures
-/// of devices and of the twin are the same files. No pow.
+/// Blinn-Phong, and a light above it; both sides of the surface alike. Portable: OpenCL C 1.2 and
+/// C++, so that pictures of devices and of the twin are the same files. No pow.
+///
+/// The light above turns with the camera, for which way is up in a scan is not known: it stands
+/// halfway between the viewer and the picture's upper edge. It tells slopes that face up from those
+/// that face down, which the headlight lights alike.
 #ifndef ISOWAVE_SHADE_H
 #define ISOWAVE_SHADE_H
 
@@ -15,9 +19,14 @@ typedef struct ShadeParams {
   float view[9];  ///< row-major: ray direction in index space -> world space (up to a factor)
   float surface_r, surface_g, surface_b;
   float background_r, background_g, background_b;
-  float ambient, diffuse, specular;  ///< weights; the highlight is white
+  float ambient, diffuse, specular;  ///< weights of the headlight; its highlight is white
+  float above;                       ///< weight of the light above
 } ShadeParams;
-ISO_CHECK_SIZE(ShadeParams, 108);
+ISO_CHECK_SIZE(ShadeParams, 112);
+
+/// Cosines of surface and viewer below which the side that is seen is in doubt, and slopes count
+/// less: at silhouettes, normals turn from one side to the other.
+#define ISO_GRAZING 0.125f
 
 typedef struct Color {
   float r, g, b;  ///< display values, [0,1]
@@ -43,7 +52,7 @@ ISO_INLINE uint to_byte(float c) {
 ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint ray_id,
                            float t, float gx, float gy, float gz) {
   const Ray ray = make_ray(frame, ray_id);
-  float nx, ny, nz, vx, vy, vz, lengths, cosine, highlight, light;
+  float nx, ny, nz, vx, vy, vz, ux, uy, uz, n, lengths, cosine, facing, slope, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
   int i;
   if (t == INFINITY) return make_color(p->background_r, p->background_g, p->background_b);
@@ -60,13 +69,26 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
   vx = fma(p->view[0], ray.x.d, fma(p->view[1], ray.y.d, p->view[2] * ray.z.d));
   vy = fma(p->view[3], ray.x.d, fma(p->view[4], ray.y.d, p->view[5] * ray.z.d));
   vz = fma(p->view[6], ray.x.d, fma(p->view[7], ray.y.d, p->view[8] * ray.z.d));
-  lengths = sqrt(fma(nx, nx, fma(ny, ny, nz * nz))) * sqrt(fma(vx, vx, fma(vy, vy, vz * vz)));
+  ux = fma(p->view[0], frame->view.up_x,
+           fma(p->view[1], frame->view.up_y, p->view[2] * frame->view.up_z));
+  uy = fma(p->view[3], frame->view.up_x,
+           fma(p->view[4], frame->view.up_y, p->view[5] * frame->view.up_z));
+  uz = fma(p->view[6], frame->view.up_x,
+           fma(p->view[7], frame->view.up_y, p->view[8] * frame->view.up_z));
+  n = sqrt(fma(nx, nx, fma(ny, ny, nz * nz)));
+  lengths = n * sqrt(fma(vx, vx, fma(vy, vy, vz * vz)));
   /* The light is at the eye, so the half vector is the view vector and one cosine does for both
    * terms. */
-  cosine = lengths > 0.0f ? fabs(fma(nx, vx, fma(ny, vy, nz * vz))) / lengths : 1.0f;
+  facing = lengths > 0.0f ? -fma(nx, vx, fma(ny, vy, nz * vz)) / lengths : 1.0f;
+  cosine = fabs(facing);
+  lengths = n * sqrt(fma(ux, ux, fma(uy, uy, uz * uz)));
+  slope = lengths > 0.0f ? fma(nx, ux, fma(ny, uy, nz * uz)) / lengths : 0.0f;
+  facing /= cosine > ISO_GRAZING ? cosine : ISO_GRAZING; /* the side that is seen, 1 or -1 */
+  slope = fma(slope, facing, cosine) * 0.70710678f;
   highlight = cosine;
   for (i = 0; i < 5; ++i) highlight *= highlight; /* cosine^32 */
   light = fma(p->diffuse, cosine, p->ambient);
+  if (slope > 0.0f) light = fma(p->above, slope, light);
   highlight *= p->specular;
   return make_color(fma(p->surface_r, light, highlight), fma(p->surface_g, light, highlight),
                     fma(p->surface_b, light, highlight));

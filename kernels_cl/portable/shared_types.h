@@ -164,11 +164,11 @@ ISO_CHECK_SIZE(BlockRays, 8);
 /// One pixel's hit (design: a hit is cell + local position; t is derived from it).
 typedef struct HitRecord {
   float t;        ///< distance from the eye [world units]; INFINITY: no hit
-  uint block_id;  ///< bx + blocks_x * (by + blocks_y * bz)
+  uint block_id;  ///< bx + blocks_x * (by + blocks_y * bz); of several levels, see LevelPlace
   uint cell;      ///< x + 4 y + 16 z in the block
   float x, y, z;  ///< position in the dual cell, [0,1]^3
   float grad_x, grad_y,
-      grad_z;  ///< gradient of the trilinear field there [value per voxel], index space
+      grad_z;  ///< gradient there, see smooth_gradient.h [value per voxel], index space
 } HitRecord;
 ISO_CHECK_SIZE(HitRecord, 36);
 

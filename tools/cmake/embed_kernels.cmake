@@ -11,7 +11,8 @@ function(embed_kernels target)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${folder}/*.h)
   add_custom_command(
     OUTPUT ${generated}
-    COMMAND ${CMAKE_COMMAND} -D "output=${generated}" -D "folder=${folder}" -D "kernels=${ARGN}" -P ${embed_kernels_script}
+    COMMAND ${CMAKE_COMMAND} -D "output=${generated}" -D "folder=${folder}" -D "kernels=${ARGN}"
+            -P ${embed_kernels_script}
     DEPENDS ${ARGN} ${headers} ${embed_kernels_script}
     COMMENT "Embedding OpenCL kernels" VERBATIM)
   add_library(${target} OBJECT ${generated})

@@ -47,22 +47,24 @@ foreach(kernel IN LISTS kernels)
   string(REPLACE "@CLOSE@" "]" result "${result}")
   string(REPLACE "@SEMICOLON@" ";" result "${result}")
   # Compilers limit the length of one literal (C++ promises 65,536 characters): adjacent pieces are
-  # joined.
+  # joined. And what they count at compile time: the suffix of the last piece knows the length.
   string(LENGTH "${result}" length)
   set(pieces "")
   set(begin 0)
   while(begin LESS length)
     string(SUBSTRING "${result}" ${begin} 12000 piece)
-    string(APPEND pieces "R\"~kernel~(${piece})~kernel~\"\n")
+    string(APPEND pieces "\nR\"~kernel~(${piece})~kernel~\"")
     math(EXPR begin "${begin} + 12000")
   endwhile()
-  string(APPEND table "    {\"${stem}\", ${pieces}},\n")
+  string(APPEND table "    {\"${stem}\", ${pieces}sv},\n")
 endforeach()
 
 file(WRITE ${output} "// Made by tools/cmake/embed_kernels.cmake.
 #include \"core/ocl/kernel_sources.hpp\"
 
 namespace isowave::core::ocl {
+
+using std::string_view_literals::operator\"\"sv;
 
 std::span<const KernelSource> kernel_sources() {
   static constexpr KernelSource sources[] = {

@@ -4,15 +4,19 @@ include(CMakePackageConfigHelpers)
 
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/isowave)
 install(TARGETS isowave_library EXPORT isowaveTargets
-        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/api/isowave DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library
-        FILES_MATCHING PATTERN *.hpp)
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/api/isowave
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library FILES_MATCHING PATTERN *.hpp)
 install(EXPORT isowaveTargets NAMESPACE isowave:: DESTINATION ${package_folder} COMPONENT library)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/isowaveConfig.cmake.in
-                              ${PROJECT_BINARY_DIR}/isowaveConfig.cmake INSTALL_DESTINATION ${package_folder})
+                              ${PROJECT_BINARY_DIR}/isowaveConfig.cmake
+                              INSTALL_DESTINATION ${package_folder})
 # Before 1.0, minor versions may break what users wrote.
-write_basic_package_version_file(${PROJECT_BINARY_DIR}/isowaveConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/isowaveConfig.cmake ${PROJECT_BINARY_DIR}/isowaveConfigVersion.cmake
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/isowaveConfigVersion.cmake
+                                 COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/isowaveConfig.cmake
+              ${PROJECT_BINARY_DIR}/isowaveConfigVersion.cmake
         DESTINATION ${package_folder} COMPONENT library)
 if(ISOWAVE_BUILD_PROGRAM)
   install(TARGETS isowave COMPONENT program)
@@ -20,12 +24,14 @@ if(ISOWAVE_BUILD_PROGRAM)
   set(shell_files ${PROJECT_BINARY_DIR}/isowave.1)
   set(commands COMMAND isowave man > ${PROJECT_BINARY_DIR}/isowave.1)
   foreach(shell bash zsh fish)
-    list(APPEND shell_files ${PROJECT_BINARY_DIR}/completion.${shell})
-    list(APPEND commands COMMAND isowave completion ${shell} > ${PROJECT_BINARY_DIR}/completion.${shell})
+    set(file ${PROJECT_BINARY_DIR}/completion.${shell})
+    list(APPEND shell_files ${file})
+    list(APPEND commands COMMAND isowave completion ${shell} > ${file})
   endforeach()
   add_custom_command(OUTPUT ${shell_files} ${commands} DEPENDS isowave VERBATIM)
   add_custom_target(isowave_shell_files ALL DEPENDS ${shell_files})
-  install(FILES ${PROJECT_BINARY_DIR}/isowave.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
+  install(FILES ${PROJECT_BINARY_DIR}/isowave.1
+          DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
   install(FILES ${PROJECT_BINARY_DIR}/completion.bash RENAME isowave
           DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT program)
   install(FILES ${PROJECT_BINARY_DIR}/completion.zsh RENAME _isowave

@@ -192,7 +192,10 @@ Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const 
 }
 
 FrameRequest request_of(const ParetoSubject &subject, const Point &point, std::size_t view) {
-  return with_detail({subject.cameras[view], subject.isovalue}, point.details[view]);
+  FrameRequest request =
+      with_detail({subject.cameras[view], subject.isovalue}, point.details[view]);
+  request.normals = Normals::kCell;
+  return request;
 }
 
 /// Draws one view of the point once: the first frame of an isovalue, or of a precision, does more.
@@ -281,7 +284,7 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   subject.value_range = double{finest.value_range[1]} - double{finest.value_range[0]};
   Renderer renderer(device, finest, {.size = subject.size});
   for (const Camera &camera : subject.cameras) {
-    renderer.render({camera, options.isovalue});
+    renderer.render({.camera = camera, .isovalue = options.isovalue, .normals = Normals::kCell});
     subject.truth.emplace_back(view_of(renderer));
   }
   return subject;

@@ -324,6 +324,8 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
     std::vector<double> ms;
     ordered_json entry;
   };
+  const FrameRequest request{
+      .camera = subject.camera, .isovalue = subject.isovalue, .normals = Normals::kCell};
   std::vector<Run> runs;
   for (const Solver solver : compared_solvers()) {
     if (solver.max_steps != solver_from_string(to_string(solver)).max_steps &&
@@ -336,7 +338,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
             std::make_unique<Renderer>(device, subject.volume, renderer_options),
             {},
             solver_json(solver)};
-    run.renderer->render({subject.camera, subject.isovalue});
+    run.renderer->render(request);
     run.entry.update(accuracy_json(judge_frame(oracle, subject.frame, run.renderer->hits())));
     if (!options.pictures.empty() && solver.max_steps != 1) {
       write_failure_picture(options, subject, oracle, solver, *run.renderer);
@@ -344,8 +346,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
     runs.push_back(std::move(run));
   }
   for (std::uint32_t round = 0; round < options.rounds; ++round) {
-    for (Run &run : runs)
-      run.ms.push_back(run.renderer->render({subject.camera, subject.isovalue}).total_ms);
+    for (Run &run : runs) run.ms.push_back(run.renderer->render(request).total_ms);
   }
   ordered_json entries = ordered_json::array();
   for (Run &run : runs) {

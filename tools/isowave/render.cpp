@@ -50,6 +50,7 @@ struct RenderArgs {
   std::optional<double> max_surface_error;  ///< pixels
   std::optional<double> time_budget;        ///< ms
   double voxel_pixels = 0;                  ///< of whole frames
+  std::string normals = "smooth";
 };
 
 /// "#RRGGBB" -> [0,1]^3.
@@ -102,6 +103,7 @@ class DeviceFrames : public FrameSource {
         time_budget_(args.time_budget) {
     base_.voxel_pixels = args.voxel_pixels;
     base_.voxel_error = args.frame.voxel_error;
+    base_.normals = normals_from_string(args.normals);
     if (time_budget_) timed_frames_.emplace(renderer_);
   }
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
@@ -216,11 +218,12 @@ class TwinFrames : public FrameSource {
       : scene_(scene),
         appearance_(appearance),
         solver_(args.renderer.solver),
+        normals_(normals_from_string(args.normals)),
         twin_(scene.volume, args.voxel_pixels, args.frame.voxel_error) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
-    hits_ = twin_.render(camera, scene_.size, isovalue, solver_);
+    hits_ = twin_.render(camera, scene_.size, isovalue, solver_, normals_);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
@@ -236,6 +239,7 @@ class TwinFrames : public FrameSource {
   const Scene &scene_;
   Appearance appearance_;
   Solver solver_;
+  Normals normals_;
   Twin twin_;
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
@@ -299,6 +303,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
                                  {"reference", options.reference}};
   json.update(renderer_options_json(options.renderer));
   json["voxel_pixels"] = options.voxel_pixels;
+  json["normals"] = options.normals;
   return json;
 }
 
@@ -394,7 +399,7 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
   if (options.image.empty() && options.refined.empty() && options.progress_dir.empty())
-    refuse_options(command, {"--color", "--background"}, "no picture is written: give --output");
+    refuse_options(command, {"--color", "--background", "--normals"}, "no picture is written: give --output");
   if (options.stats.empty())
     refuse_options(command, {"--no-stage-times"}, "no statistics are written: give --stats");
   check_renderer_options(command, options.renderer_flags);
@@ -445,6 +450,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   wanted.with_kept_picture = options.time_budget.has_value();
   wanted.with_shading =
       !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
+  if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
   // Whoever chooses has levels of detail to choose from.
   const bool chooses_levels = options.max_surface_error ||
                               (options.time_budget && options.renderer_flags.pipeline != "blocks");
@@ -491,7 +497,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
 void group_render_options(CLI::App &command) {
   group_options(command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
-                 "--color", "--background", "--device"});
+                 "--color", "--background", "--normals", "--device"});
   group_volume_options(command);
   group_compression_options(command);
   group_options(command, "Precision and time",
@@ -524,6 +530,7 @@ void add_render(CLI::App &app) {
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
+  add_normals_option(*command, options->normals);
   command->add_option("--output,-o", options->image,
                       "PNG; NAME_isoV_viewK.png when there are several frames [VOLUME_isoV.png in "
                       "the current folder, where no other output is asked for]");

@@ -30,6 +30,15 @@ ordered_json pass_json(const PassStats &pass) {
   return result;
 }
 
+ordered_json normals_json(const NormalsStats &normals) {
+  ordered_json result = {{"passes", normals.passes},
+                         {"decoded_blocks", normals.decoded_blocks},
+                         {"recycled_blocks", normals.recycled_blocks},
+                         {"ms", normals.ms}};
+  if (!normals.stage_ms.empty()) result["stage_ms"] = normals.stage_ms;
+  return result;
+}
+
 }  // namespace
 
 ordered_json device_json(const ocl::DeviceInfo &info) {
@@ -66,6 +75,7 @@ ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera,
                          {"passes", stats.passes.size()},
                          {"total_ms", stats.total_ms},
                          {"rays_hit", stats.rays_hit},
+                         {"normals", normals_json(stats.normals)},
                          {"uploaded_blocks", stats.uploaded_blocks},
                          {"uploaded_bytes", stats.uploaded_bytes},
                          {"cancelled", stats.cancelled}};

@@ -58,6 +58,14 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->capture_default_str();
 }
 
+void add_normals_option(CLI::App &app, std::string &normals) {
+  app.add_option("--normals", normals,
+                 "what surfaces are lit by: smooth (central differences of voxels) or cell (the "
+                 "gradient of each trilinear cell, which shows as facets)")
+      ->check(CLI::IsMember({"smooth", "cell"}))
+      ->capture_default_str();
+}
+
 void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
   if (flags.speculation == "off")
     refuse_options(app, {"--max-speculation"}, "--speculation off is 1");

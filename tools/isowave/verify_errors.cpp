@@ -47,7 +47,8 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
       const Camera &camera = scene.cameras[view];
       const DetailChoice choice =
           choose_detail(renderer, scene.volume, {camera, isovalue}, max_surface_error);
-      const FrameRequest request = with_detail({camera, isovalue}, choice.detail);
+      FrameRequest request = with_detail({camera, isovalue}, choice.detail);
+      request.normals = Normals::kCell;
       renderer.render(request);
       const std::vector<HitRecord> drawn = renderer.hits();
       const Certificate certificate = certify(renderer, scene.volume, request, drawn);

@@ -88,7 +88,8 @@ class FrameDrawer {
     if (!renderer_) return render_scalar(frame, voxels_, solver_);
     renderer_->render({.camera = scene_.cameras[view],
                        .isovalue = frame.surface.isovalue,
-                       .voxel_error = voxel_error_});
+                       .voxel_error = voxel_error_,
+                       .normals = Normals::kCell});
     return renderer_->hits();
   }
   std::string name() const { return device_ ? device_->info().name : "scalar reference"; }

@@ -19,11 +19,18 @@ namespace isowave {
 /// were before compression.
 enum class FieldBound { kNone, kLower, kUpper };
 
+/// Which gradient of the field hits have, and so which normals.
+enum class Normals {
+  kSmooth,  ///< central differences, trilinear between voxels
+  kCell     ///< of the trilinear field itself, which jumps from cell to cell
+};
+
 /// Colours are sRGB, 0 to 1.
 struct Appearance {
   std::array<float, 3> surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   std::array<float, 3> background{1, 1, 1};
-  float ambient = 0.15f, diffuse = 0.75f, specular = 0.25f;  ///< of a headlight at the eye
+  float ambient = 0.15f, diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
+  float above = 0.45f;  ///< of a light halfway between the eye and the picture's upper edge
 };
 
 /// The picture so far, for FrameRequest::on_pass.
@@ -50,6 +57,7 @@ struct FrameRequest {
   /// Decoded voxels may be off by so much from the compressed ones; 0: not at all [voxel values].
   double voxel_error = 0;
   FieldBound bound = FieldBound::kNone;  ///< needs RendererOptions::with_bounds
+  Normals normals = Normals::kSmooth;    ///< nothing but the hits' gradients depends on them
   /// Instead: chooses voxel_pixels and voxel_error such that most pixels are within so many pixels
   /// of the true surface, that of the volume before compression. Needs with_bounds.
   std::optional<double> max_surface_error{};
@@ -61,7 +69,8 @@ struct FrameRequest {
   bool want_depth = false, want_normals = false, want_positions = false, want_hits = false;
   bool want_bounds = false;  ///< of the error of each pixel; needs RendererOptions::with_bounds
 
-  /// Called after each pass. Return false to stop; the frame is the picture so far.
+  /// Called after each pass, those for smooth normals included. Return false to stop; the frame is
+  /// the picture so far.
   std::function<bool(const Progress &)> on_pass{};
 };
 
@@ -71,13 +80,16 @@ struct Hit {
   std::uint32_t level = 0;                           ///< of detail; 0: the finest
   std::array<std::uint32_t, 3> cell{};  ///< voxel at its lowest corner: it ends one further
   std::array<float, 3> position{};      ///< in the cell, 0 to 1
-  std::array<float, 3> gradient{};      ///< of the field there [voxel value per voxel]
+  std::array<float, 3> gradient{};      ///< FrameRequest::normals [voxel value per voxel]
 };
 
 struct FrameStatistics {
   std::uint32_t passes = 0;
   std::uint64_t rays = 0, hits = 0;
-  std::uint64_t decoded_blocks = 0;               ///< of 4^3 voxels
+  std::uint64_t decoded_blocks = 0;               ///< of 4^3 voxels, all
+  std::uint32_t normals_passes = 0;               ///< of these, for smooth normals
+  std::uint64_t normals_decoded_blocks = 0;       ///< of these, for smooth normals
+  double normals_ms = 0;                          ///< of total_ms
   std::uint64_t uploaded_bytes = 0;               ///< of a compressed volume that stays on the host
   std::uint32_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
   double total_ms = 0;     ///< wall clock, from camera to finished hits on the device

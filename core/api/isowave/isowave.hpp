@@ -14,6 +14,7 @@
 #include "isowave/device.hpp"
 #include "isowave/error.hpp"
 #include "isowave/frame.hpp"
+#include "isowave/host_renderer.hpp"
 #include "isowave/renderer.hpp"
 #include "isowave/version.hpp"
 #include "isowave/volume.hpp"

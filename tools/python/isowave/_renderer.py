@@ -386,7 +386,7 @@ class Renderer:
         def on_pass(progress: Progress) -> bool:
             if progress.completed_percent == 100:
                 return True  # the finished picture follows
-            statistics = {"passes": progress.passes, "complete": False}
+            statistics: dict[str, Any] = {"passes": progress.passes, "complete": False}
             statistics["completed_percent"] = progress.completed_percent
             frame = {"picture": progress.rgb, "statistics": statistics}
             put(Image(frame, camera, isovalue, samples))

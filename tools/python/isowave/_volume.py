@@ -28,6 +28,11 @@ def reversed_axes(values: Sequence[float]) -> tuple[float, float, float]:
     return x, y, z
 
 
+def dims_of(shape: Sequence[int]) -> tuple[int, int, int]:
+    z, y, x = (int(n) for n in shape)
+    return x, y, z
+
+
 def compression_options(
     tolerance: float | None,
     relative_tolerance: float | None,
@@ -77,7 +82,7 @@ def make_progress(progress: bool | Progress | None) -> Progress | None:
     if progress is False or (progress is None and not (sys.stderr.isatty() or in_notebook)):
         return None
     try:
-        from tqdm.auto import tqdm
+        from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
     except ImportError:
         return None
     return TqdmProgress(tqdm)
@@ -146,14 +151,10 @@ def compress(
     options = compression_options(
         tolerance, relative_tolerance, rate, exact, levels, map_nan, num_threads
     )
-    dims = source.shape[::-1]
-    grid = (
-        str(source.dtype),
-        dims,
-        reversed_axes(source.spacing),
-        reversed_axes(source.origin),
-        [tuple(column) for column in np.asarray(source.direction, float).T],
-    )
+    nz, ny, nx = source.shape
+    columns: list[_core.Vector] = [column.tolist() for column in source.direction.T]
+    spacing_xyz, origin_xyz = reversed_axes(source.spacing), reversed_axes(source.origin)
+    grid = (str(source.dtype), (nx, ny, nz), spacing_xyz, origin_xyz, columns)
     shown = make_progress(progress)
     try:
         if is_plain(array):
@@ -216,7 +217,7 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
             _core.open(
                 os.fspath(path),
                 options,
-                None if shape is None else tuple(int(n) for n in shape)[::-1],
+                None if shape is None else dims_of(shape),
                 None if dtype is None else np.dtype(dtype).name,
                 None if spacing is None else reversed_axes(spacing),
                 shown,
@@ -260,7 +261,8 @@ class Volume:
     @property
     def direction(self) -> npt.NDArray[np.float64]:
         """3 x 3; column a: unit world direction (x, y, z) of index axis a, in the order x, y, z."""
-        return np.array(self._core.direction).T
+        columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
+        return np.ascontiguousarray(columns.T)
 
     @property
     def dtype(self) -> np.dtype[Any]:

@@ -268,10 +268,10 @@ def test_masks():
     mask[5, 1, 2] = True
     masked = np.ma.array(voxels, mask=mask)
     check_refused(masked, "fill_value=")
-    expected = np.where(mask, np.float32(-7), voxels)
-    check_source(as_source(masked, fill_value=-7), expected)
-    check_source(as_source(masked, fill_value=np.nan), np.where(mask, np.float32("nan"), voxels))
-    np.testing.assert_array_equal(masked.data, voxels)  # the caller's memory is as it was
+    for fill_value in (-7, np.nan):
+        expected = np.where(mask, np.float32(fill_value), voxels)
+        check_source(as_source(masked, fill_value=fill_value), expected)
+    np.testing.assert_array_equal(voxels, make_voxels("float32"))  # the caller's, as it was
     check_refused(masked, "not a value of float32", fill_value=1e300)
 
 
@@ -801,6 +801,26 @@ def test_xarray_over_dask():
     check_source(source, make_voxels(), spacing=(3.0, 1.0, 1.0), origin=(10.0, 0.0, 0.0))
 
 
+@pytest.mark.parametrize(
+    "encoding, layers",
+    [
+        ({"preferred_chunks": {"z": 4, "y": 5}}, 4),
+        ({"preferred_chunks": {"z": 100}}, 7),
+        ({"chunksizes": (3, 5, 3), "original_shape": (NZ, NY, NX)}, 3),
+        ({"chunksizes": (3, 5, 3), "original_shape": (9, NY, NX)}, 1),  # of a variable cut since
+        ({"chunksizes": None, "original_shape": (NZ, NY, NX)}, 1),
+        ({"preferred_chunks": {"z": (4, 3)}}, 1),
+        ({"preferred_chunks": {"z": 0}}, 1),
+    ],
+)
+def test_xarray_chunks_of_a_file(encoding, layers):
+    xarray = pytest.importorskip("xarray")
+    given = labelled(xarray)
+    given.encoding.update(encoding)
+    assert as_source(given).chunk_layers == layers
+    check_source(as_source(given), make_voxels())
+
+
 @pytest.mark.parametrize("slab", SLABS)
 def test_xarray_over_a_zarr_store(slab):
     xarray, zarr = pytest.importorskip("xarray"), pytest.importorskip("zarr", minversion="3")
@@ -965,15 +985,18 @@ def to_file(nibabel, image, path):
 
 def check_equals_file(nibabel, image, path):
     """The image in memory, the image of its file, and the program's reader agree."""
+    try:
+        unsaved = as_source(image)  # first, because saving changes the image's header
+    except ValueError:
+        unsaved = None
     info, error = to_file(nibabel, image, path)
-    sources = [image, nibabel.load(path)]
+    loaded = nibabel.load(path)
     if info is None:
-        assert error
-        for given in sources:
-            check_refused(given)
+        assert error and unsaved is None
+        check_refused(image)
+        check_refused(loaded)
         return
-    for given in sources:
-        source = as_source(given)
+    for given, source in ((image, unsaved), (image, as_source(image)), (loaded, as_source(loaded))):
         assert list(source.shape[::-1]) == info["dims"]
         assert list(source.spacing[::-1]) == info["spacing"]
         assert list(source.origin[::-1]) == info["origin"]
@@ -982,7 +1005,7 @@ def check_equals_file(nibabel, image, path):
         voxels = read_all(source, 4)
         assert [voxels.min(), voxels.max()] == info["value_range"]
         np.testing.assert_array_equal(voxels, np.asarray(given.dataobj).squeeze().T)
-    assert str(as_source(nibabel.load(path)).dtype) == info["type"]
+    assert str(as_source(loaded).dtype) == info["type"]
 
 
 def make_affine(seed=0, shear=0.0):
@@ -1018,6 +1041,12 @@ def nifti_images(nibabel):
         rewritten = nibabel.Nifti1Image(data, make_affine(seed))
         rewritten.affine[:3, 3] += 5
         yield f"changed affine {seed}", rewritten
+    mirrored = make_affine() @ np.diag([1, 1, -1, 1])
+    for name, affine in (("turned", make_affine()), ("mirrored", mirrored)):
+        image = nibabel.Nifti1Image(data, affine)
+        image.set_qform(affine, code=1)
+        image.set_sform(None, code=0)
+        yield name, image
     for unit in ("meter", "mm", "micron"):
         image = nibabel.Nifti1Image(data, make_affine())
         image.header.set_xyzt_units(unit, "sec")
@@ -1118,10 +1147,7 @@ print([name for name in {PACKAGES} if name in sys.modules])
     [
         ("xarray", "xarray.DataArray(voxels)"),
         ("zarr", "zarr.array(voxels)"),
-        (
-            "h5py",
-            "h5py.File('a', 'w', driver='core', backing_store=False).create_dataset('a', data=voxels)",
-        ),
+        ("h5py", "make_h5py()"),
         ("tensorstore", "tensorstore.array(voxels)"),
         ("SimpleITK", "SimpleITK.GetImageFromArray(voxels)"),
         ("nibabel", "nibabel.Nifti1Image(voxels, numpy.eye(4))"),
@@ -1138,13 +1164,17 @@ def make_vtk():
     image.SetDimensions(3, 5, 7)
     image.AllocateScalars(4, 1)
     return image
+def make_h5py():
+    file = h5py.File('a', 'w', driver='core', backing_store=False)
+    return file.create_dataset('a', data=voxels)
+def packages():
+    return {{name.partition('.')[0] for name in sys.modules}}
 voxels = numpy.zeros((7, 5, 3), 'int16')
 made = {make}
-before = set(sys.modules)
+before = packages()
 source = as_source(made)
 source.read(0, source.shape[0])
-names = {{name.partition('.')[0] for name in sys.modules}} - {{name.partition('.')[0] for name in before}}
-print(sorted(names & set({PACKAGES + ['vtkmodules']})))
+print(sorted((packages() - before) & set({PACKAGES + ['vtkmodules']})))
 """
     assert run_python(code).strip() == "[]"
 

@@ -1,4 +1,4 @@
-"""The errors of arrays that cannot be read: one line each, that says what, where and what would help."""
+"""Errors of arrays that cannot be read: one line each. It says what, where and what would help."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class LayerReader:
     shape       (nz, ny, nx)
     stored      type of the store's voxels
     dtype       type of what is returned: read_type() of it
-    row_edges   layers at which chunk rows begin, ascending, from 0, with nz behind them; None
+    row_edges   layers at which chunk rows begin: 0 first, then ascending, all below nz. None
                 where any layers are as cheap as any others (memory, files without chunks)
     fill_value  of masked voxels, a number of dtype; None: they are refused
     what        names the array in messages

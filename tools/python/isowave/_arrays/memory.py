@@ -9,6 +9,7 @@ import numpy as np
 from .errors import bad_type, type_name
 from .found import Found
 from .grid import checked_shape
+from .voxels import read_type
 
 _CPU_DEVICES = (1, 3, 11, 13)
 """DLPack's kDLCPU, kDLCUDAHost, kDLROCMHost, kDLCUDAManaged: the CPU reads these."""
@@ -16,6 +17,7 @@ _CPU_DEVICES = (1, 3, 11, 13)
 
 def numpy_array(array: Any, what: str) -> Found:
     """Adapts a numpy.ndarray of any strides, byte order and subclass."""
+    read_type(array.dtype, what)  # before masks of fields are looked at
     is_masked = False
     if isinstance(array, np.ma.MaskedArray):
         is_masked = bool(np.ma.getmask(array).any())

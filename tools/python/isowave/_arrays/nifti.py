@@ -33,7 +33,7 @@ _LEAST_INFLATED_LAYERS = 32
 
 
 def nibabel_image(image: Any, has_spacing: bool) -> Found:
-    """Adapts an image of nibabel: an array in memory, or one that is read from its file by slabs."""
+    """Adapts an image of nibabel: an array in memory, or one that its file gives by slabs."""
     what = type_name(image)
     sizes = tuple(image.shape)
     if len(sizes) > 3 and any(size != 1 for size in sizes[3:]):
@@ -47,7 +47,8 @@ def nibabel_image(image: Any, has_spacing: bool) -> Found:
     surplus = (0,) * (len(sizes) - 3)
 
     def fetch(begin: int, end: int) -> Any:
-        layers = data[(slice(None), slice(None), slice(begin, end), *surplus)]
+        index = (slice(None), slice(None), slice(begin, end), *surplus)
+        layers = data[index]
         # A masked array must stay one.
         return (layers if isinstance(layers, np.ndarray) else np.asarray(layers)).T
 

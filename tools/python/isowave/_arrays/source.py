@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -96,24 +97,24 @@ _ADAPTERS: dict[tuple[str, str], Adapter] = {
 def as_source(
     obj: Any,
     *,
-    spacing: Any = None,
-    origin: Any = None,
-    direction: Any = None,
-    fill_value: Any = None,
+    spacing: float | Sequence[float] | NDArray[Any] | None = None,
+    origin: Sequence[float] | NDArray[Any] | None = None,
+    direction: Sequence[Sequence[float]] | NDArray[Any] | None = None,
+    fill_value: float | None = None,
 ) -> ArraySource:
     """Returns a source of the voxels of any array-like; imports nothing that is not imported.
 
     obj         an array of 3 axes (z, y, x): numpy, a buffer, nested lists, xarray, dask, zarr, an
                 OME-Zarr group, h5py, tensorstore, SimpleITK, itk, nibabel (x, y, z there), a
-                pyvista or VTK ImageData, or what has __array__ or __dlpack__ on the CPU. dask,
-                zarr, h5py, tensorstore, files behind xarray and nibabel are read by layers.
+                pyvista or VTK ImageData, or what has __array__ or __dlpack__ on the CPU. Chunked
+                stores, and files behind xarray and nibabel, are read by layers, never whole.
     spacing     (z, y, x) or one number, world units between voxels; None: what obj says, else 1
     origin      (z, y, x), world position of voxel (0, 0, 0); None: what obj says, else 0
     direction   3 x 3, columns of length 1 in (x, y, z); None: what obj says, else the identity
     fill_value  what masked voxels become; needed if there are some
 
-    Voxels of bool become uint8, float16 float32, and whole numbers of 64 bits float64, each
-    exactly (voxels.py has the table).
+    bool is read as uint8, float16 as float32, int64 and uint64 as float64. A 64-bit integer that
+    float64 does not hold is refused, with its position, when its layer is read.
 
     Raises ValueError (shape, grid, metadata) or TypeError (no array, no such voxels), one line.
     """

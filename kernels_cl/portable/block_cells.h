@@ -1,10 +1,12 @@
 /// block_cells.h -- a ray among the cells of one block, and pixels in an order in which neighbours
-/// share blocks. OpenCL C 1.2.
+/// share blocks. Portable: OpenCL C 1.2 and C++.
 #ifndef ISOWAVE_BLOCK_CELLS_H
 #define ISOWAVE_BLOCK_CELLS_H
 
-#include "portable/block_grid.h"
-#include "portable/grid_dda.h"
+#include "block_grid.h"
+#include "grid_dda.h"
+
+ISO_NAMESPACE_BEGIN
 
 /// A ray's way through the cells of one block:
 ///
@@ -28,12 +30,18 @@ ISO_INLINE CellWalk start_at_cell(const Ray *ray, int x, int y, int z, RayEvent 
   return at;
 }
 
+/// The cell along one axis of block b, of those before the domain's last plane, in which the ray is
+/// just after `enter`.
+ISO_INLINE int locate_in_block(RayAxis a, int axis, RayEvent enter, int b, int last_plane) {
+  const int first = 4 * b, end = first + 3 < last_plane ? first + 3 : last_plane - 1;
+  return locate(a, axis, enter, 1, first, end);
+}
+
 /// At the cell of block b in which the ray is just after `enter`, by which it entered the block.
 ISO_INLINE CellWalk enter_cells(const Ray *ray, BlockCoords b, RayEvent enter, LastPlanes last) {
-  const int x0 = 4 * (int)b.x, y0 = 4 * (int)b.y, z0 = 4 * (int)b.z;
-  return start_at_cell(ray, locate(ray->x, 0, enter, 1, x0, min(x0 + 3, last.x - 1)),
-                       locate(ray->y, 1, enter, 1, y0, min(y0 + 3, last.y - 1)),
-                       locate(ray->z, 2, enter, 1, z0, min(z0 + 3, last.z - 1)), enter, last);
+  return start_at_cell(ray, locate_in_block(ray->x, 0, enter, (int)b.x, last.x),
+                       locate_in_block(ray->y, 1, enter, (int)b.y, last.y),
+                       locate_in_block(ray->z, 2, enter, (int)b.z, last.z), enter, last);
 }
 
 /// Goes on to the next cell. Returns 0 if the ray leaves the block instead.
@@ -59,14 +67,15 @@ ISO_INLINE ulong changing_cells(const ulong *inside) {
   const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul,
               not_z3 = 0x0000FFFFFFFFFFFFul;
   ulong v[8], any = 0, all = ~0ul;
-  for (int i = 0; i < 8; ++i) v[i] = inside[i];
-  for (int i = 0; i < 8; i += 2) v[i + 1] = (v[i] >> 1 & not_x3) | (v[i + 1] << 3 & ~not_x3);
-  for (int i = 0; i < 8; i += 4) {
+  int i;
+  for (i = 0; i < 8; ++i) v[i] = inside[i];
+  for (i = 0; i < 8; i += 2) v[i + 1] = (v[i] >> 1 & not_x3) | (v[i + 1] << 3 & ~not_x3);
+  for (i = 0; i < 8; i += 4) {
     v[i + 2] = (v[i] >> 4 & not_y3) | (v[i + 2] << 12 & ~not_y3);
     v[i + 3] = (v[i + 1] >> 4 & not_y3) | (v[i + 3] << 12 & ~not_y3);
   }
-  for (int i = 0; i < 4; ++i) v[i + 4] = (v[i] >> 16 & not_z3) | (v[i + 4] << 48 & ~not_z3);
-  for (int i = 0; i < 8; ++i) {
+  for (i = 0; i < 4; ++i) v[i + 4] = (v[i] >> 16 & not_z3) | (v[i + 4] << 48 & ~not_z3);
+  for (i = 0; i < 8; ++i) {
     any |= v[i];
     all &= v[i];
   }
@@ -90,5 +99,7 @@ ISO_INLINE uint tiled_pixel(const FrameParams *frame, PixelBox box, uint i) {
   const uint y = box.begin_y + 4 * (tile / tiles_x) + (i >> 3 & 3);
   return x < box.end_x && y < box.end_y ? x + frame->view.width * y : ISO_INVALID_ID;
 }
+
+ISO_NAMESPACE_END
 
 #endif

@@ -1,0 +1,144 @@
+#include "isowave/host_renderer.hpp"
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+
+#include "core/api/convert.hpp"
+#include "core/api/frame_parts.hpp"
+#include "core/api/guarded.hpp"
+#include "core/api/volume_implementation.hpp"
+#include "core/host/host_renderer.hpp"
+
+namespace isowave {
+
+namespace {
+
+using core::guarded;
+
+void check(const FrameRequest &request) {
+  if (request.max_surface_error)
+    throw core::Error("bounds of the error are for devices alone: leave out max_surface_error");
+  if (request.want_bounds)
+    throw core::Error("bounds of the error are for devices alone: leave out want_bounds");
+  if (request.time_budget_ms)
+    throw core::Error("a time budget is for devices alone: leave out time_budget_ms");
+  core::HostRenderer::check(core_request(request));
+}
+
+/// The frame at work, for on_pass.
+class HostProgress : public Progress {
+ public:
+  HostProgress(const core::HostRenderer &renderer, const core::Appearance &appearance)
+      : renderer_(renderer), appearance_(appearance) {}
+
+  void end_pass(const core::PassStats &pass) {
+    ++passes_;
+    completed_percent_ = pass.completed_percent;
+  }
+  std::uint32_t passes() const override { return passes_; }
+  double completed_percent() const override { return completed_percent_; }
+  std::vector<std::uint8_t> picture() const override { return renderer_.shade(appearance_).pixels; }
+
+ private:
+  const core::HostRenderer &renderer_;
+  core::Appearance appearance_;
+  std::uint32_t passes_ = 0;
+  double completed_percent_ = 0;
+};
+
+}  // namespace
+
+struct HostRenderer::Implementation {
+  Implementation(std::shared_ptr<const Volume> volume_drawn, const HostRendererOptions &options)
+      : volume(std::move(volume_drawn)),
+        renderer(volume->implementation().volume, {options.memory_limit, options.num_threads}) {}
+
+  Frame draw(const FrameRequest &request);
+
+  std::shared_ptr<const Volume> volume;
+  mutable std::mutex mutex;  ///< one frame at a time
+  core::HostRenderer renderer;
+};
+
+Frame HostRenderer::Implementation::draw(const FrameRequest &request) {
+  check(request);
+  core::FrameRequest wanted = core_request(request);
+  HostProgress progress(renderer, core_appearance(request.appearance));
+  if (request.on_pass) {
+    wanted.on_pass = [&](const core::PassStats &pass) {
+      progress.end_pass(pass);
+      return request.on_pass(progress);
+    };
+  }
+  Frame frame;
+  describe_frame(request, renderer.render(wanted), frame);
+  if (request.want_picture)
+    frame.picture = renderer.shade(core_appearance(request.appearance)).pixels;
+  fill_frame(request, renderer.hits(), volume->implementation().volume, false, frame);
+  return frame;
+}
+
+HostRenderer::HostRenderer(std::shared_ptr<const Volume> volume,
+                           const HostRendererOptions &options) {
+  guarded("making a renderer", [&] {
+    if (!volume) throw core::Error("a renderer needs a volume");
+    implementation_ = std::make_unique<Implementation>(std::move(volume), options);
+  });
+}
+
+HostRenderer::~HostRenderer() = default;
+HostRenderer::HostRenderer(HostRenderer &&) noexcept = default;
+HostRenderer &HostRenderer::operator=(HostRenderer &&) noexcept = default;
+
+Frame HostRenderer::render(const FrameRequest &request) {
+  return guarded("rendering", [&] {
+    const std::lock_guard lock(implementation_->mutex);
+    return implementation_->draw(request);
+  });
+}
+
+Frame HostRenderer::cast_rays(std::span<const Ray> rays, float isovalue, Normals normals) {
+  return guarded("casting rays", [&] {
+    std::vector<core::WorldRay> world_rays(rays.size());
+    std::ranges::transform(rays, world_rays.begin(), [](const Ray &ray) {
+      return core::WorldRay{to_glm(ray.origin), to_glm(ray.direction)};
+    });
+    const std::lock_guard lock(implementation_->mutex);
+    const std::vector<core::HitRecord> hits = implementation_->renderer.cast_rays(
+        world_rays, isovalue, static_cast<core::Normals>(normals));
+    Frame frame;
+    frame.rows = 1;
+    frame.columns = static_cast<std::uint32_t>(hits.size());
+    const FrameRequest wanted{
+        .want_depth = true, .want_normals = true, .want_positions = true, .want_hits = true};
+    fill_frame(wanted, hits, volume()->implementation().volume, false, frame);
+    return frame;
+  });
+}
+
+bool HostRenderer::can_draw(const FrameRequest &request) {
+  try {
+    check(request);
+    return true;
+  } catch (const Error &) {
+    return false;
+  }
+}
+
+Camera HostRenderer::camera(float isovalue, const ImageSize &size) const {
+  return guarded("looking for the surface", [&] {
+    const std::lock_guard lock(implementation_->mutex);
+    return public_camera(implementation_->renderer.camera(isovalue, core_size(size)));
+  });
+}
+
+const std::shared_ptr<const Volume> &HostRenderer::volume() const {
+  return implementation_->volume;
+}
+
+std::uint64_t HostRenderer::memory_bytes() const {
+  return implementation_->renderer.memory_bytes();
+}
+
+}  // namespace isowave

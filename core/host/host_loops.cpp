@@ -1,0 +1,306 @@
+#include "core/host/host_loops.hpp"
+
+#include "core/stages/solvers.hpp"
+#include "kernels_cl/portable/block_cells.h"
+#include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/smooth_gradient.h"
+#include "kernels_cl/portable/zfp_codec.h"
+
+// All that a loop calls becomes part of it, and so is compiled for the processor that it is for.
+#define ISO_WHOLE_LOOP __attribute__((flatten))
+#if defined(__x86_64__)
+#define ISO_HAS_WIDE_LOOPS 1
+#define ISO_WIDE_LOOP __attribute__((flatten, target("avx2,bmi,bmi2,fma,popcnt")))
+#endif
+
+namespace isowave::core {
+
+namespace {
+
+/// Eight at a time: what compilers keep in vectors.
+inline BlockRange range_of_block(const float *values) {
+  float low[8], high[8];
+  for (int lane = 0; lane < 8; ++lane) low[lane] = high[lane] = values[lane];
+  for (int i = 8; i < 64; i += 8) {
+    for (int lane = 0; lane < 8; ++lane) {
+      const float value = values[i + lane];
+      low[lane] = value < low[lane] ? value : low[lane];
+      high[lane] = value > high[lane] ? value : high[lane];
+    }
+  }
+  BlockRange range = {low[0], high[0]};
+  for (int lane = 1; lane < 8; ++lane) {
+    range.min = low[lane] < range.min ? low[lane] : range.min;
+    range.max = high[lane] > range.max ? high[lane] : range.max;
+  }
+  return range;
+}
+
+/// Without the padding of a block at the volume's end.
+inline BlockRange range_within(const EncodedBlock &block, const float *values) {
+  BlockRange range = {values[0], values[0]};
+  for (uint z = 0; z < block.size_z; ++z) {
+    for (uint y = 0; y < block.size_y; ++y) {
+      for (uint x = 0; x < block.size_x; ++x) {
+        const float value = values[x + 4 * y + 16 * z];
+        range.min = value < range.min ? value : range.min;
+        range.max = value > range.max ? value : range.max;
+      }
+    }
+  }
+  return range;
+}
+
+inline BlockRange decode(const EncodedBlock &block, float *values) {
+  zfp_decode_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
+  if (block.whole_numbers) {
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
+  }
+  return block.size_x == 4 && block.size_y == 4 && block.size_z == 4 ? range_of_block(values)
+                                                                     : range_within(block, values);
+}
+
+inline ulong inside(const float *values, float isovalue) {
+  ulong bits = 0;
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+    bits |= static_cast<ulong>(values[v] - isovalue >= 0.0f) << v;
+  return bits;
+}
+
+inline float voxel_at(const FrameParams &frame, const HostField &field, int x, int y, int z) {
+  const auto vx = static_cast<uint>(x), vy = static_cast<uint>(y), vz = static_cast<uint>(z);
+  const ulong block = level_block_at(&frame, vx >> 2, vy >> 2, vz >> 2);
+  return field.values[block * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
+}
+
+/// The corners of dual cell (x,y,z) minus the isovalue, corner x + 2y + 4z.
+inline void load_corners(const FrameParams &frame, const HostField &field, int x, int y, int z,
+                         float *w) {
+  for (int corner = 0; corner < 8; ++corner) {
+    w[corner] = voxel_at(frame, field, x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)) -
+                frame.surface.isovalue;
+  }
+}
+
+/// Gives a hit the smooth gradient, where there is one.
+inline void smooth_gradient(const FrameParams &frame, const HostField &field, LastPlanes last,
+                            HitRecord *hit) {
+  const Stencil s = stencil_of(block_coords(&frame, hit->block_id), hit->cell, last);
+  const StencilAxis axes[3] = {s.x, s.y, s.z};
+  float corners[8], beyond[8], derivatives[3];
+  for (uint axis = 0; axis < 3; ++axis) {
+    for (int corner = 0; corner < 8; ++corner) {
+      int at[3] = {s.x.cell + (corner & 1), s.y.cell + (corner >> 1 & 1), s.z.cell + (corner >> 2)};
+      corners[corner] = voxel_at(frame, field, at[0], at[1], at[2]);
+      at[axis] = (corner >> axis & 1) != 0 ? axes[axis].above : axes[axis].below;
+      beyond[corner] = voxel_at(frame, field, at[0], at[1], at[2]);
+    }
+    derivatives[axis] =
+        smooth_derivative(corners, beyond, 1u << axis, axes[axis], {hit->x, hit->y, hit->z});
+  }
+  if (is_no_gradient({derivatives[0], derivatives[1], derivatives[2]})) return;
+  hit->grad_x = derivatives[0];
+  hit->grad_y = derivatives[1];
+  hit->grad_z = derivatives[2];
+}
+
+/// The first hit of a ray in a block's changing cells. enter: by which it enters the block.
+inline bool trace_block(const FrameParams &frame, const HostField &field, const Ray &ray,
+                        const GridWalk &block, RayEvent enter, LastPlanes last, HitRecord *hit) {
+  const BlockCoords b = {static_cast<uint>(block.x), static_cast<uint>(block.y),
+                         static_cast<uint>(block.z)};
+  const ulong changing = field.changing[level_block_at(&frame, b.x, b.y, b.z)];
+  CellWalk at = enter_cells(&ray, b, enter, last);
+  do {
+    if ((changing >> cell_in_block(&at.cell) & 1u) == 0) continue;
+    const int x = at.cell.x, y = at.cell.y, z = at.cell.z;
+    float w[8];
+    CellChange change;
+    load_corners(frame, field, x, y, z, w);
+    if (!change_in_cell(kDefaultSolver, &ray, w, x, y, z, at.enter, at.exit, &change)) continue;
+    *hit = make_hit(&frame, &ray, w, x, y, z, at.enter, at.exit,
+                    refine(kDefaultSolver, change.cubic, change.bracket));
+    return true;
+  } while (next_cell(&at, &ray, last));
+  return false;
+}
+
+/// The block of a macrocell that the ray is in just after `enter`, by which it entered that.
+inline GridWalk enter_macrocell(const Ray &ray, const GridWalk &macrocell, RayEvent enter,
+                                LastPlanes last) {
+  const auto block = [&](RayAxis a, int axis, int coarse, int last_plane) {
+    const int first = coarse * ISO_MACROCELL_BLOCKS, end = first + ISO_MACROCELL_BLOCKS - 1,
+              domain_end = (last_plane - 1) / 4;
+    return locate(a, axis, enter, 4, first, end < domain_end ? end : domain_end);
+  };
+  return walk_from(&ray, block(ray.x, 0, macrocell.x, last.x), block(ray.y, 1, macrocell.y, last.y),
+                   block(ray.z, 2, macrocell.z, last.z), 4, last);
+}
+
+/// The box of active blocks.
+struct ActiveBox {
+  LastPlanes begin, end;    ///< planes
+  LastPlanes first, final;  ///< macrocells
+};
+
+inline ActiveBox active_box(const Surface &surface, LastPlanes last) {
+  const auto end = [](int blocks, int last_plane) {
+    return 4 * blocks < last_plane ? 4 * blocks : last_plane;
+  };
+  constexpr int kBlocks = ISO_MACROCELL_BLOCKS;
+  return {{4 * surface.active_begin_x, 4 * surface.active_begin_y, 4 * surface.active_begin_z},
+          {end(surface.active_end_x, last.x), end(surface.active_end_y, last.y),
+           end(surface.active_end_z, last.z)},
+          {surface.active_begin_x / kBlocks, surface.active_begin_y / kBlocks,
+           surface.active_begin_z / kBlocks},
+          {(surface.active_end_x - 1) / kBlocks, (surface.active_end_y - 1) / kBlocks,
+           (surface.active_end_z - 1) / kBlocks}};
+}
+
+/// Walks from macrocell to macrocell, in those with an active block from block to block, and in
+/// active blocks from cell to cell.
+inline bool trace_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
+                      LastPlanes last, const Ray &ray, HitRecord *hit) {
+  constexpr int kVoxels = 4 * ISO_MACROCELL_BLOCKS;
+  const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
+  RayEvent enter;
+  if (!box_entry(&ray, box.begin, box.end, &enter)) return false;
+  GridWalk coarse =
+      walk_from(&ray, locate(ray.x, 0, enter, kVoxels, box.first.x, box.final.x),
+                locate(ray.y, 1, enter, kVoxels, box.first.y, box.final.y),
+                locate(ray.z, 2, enter, kVoxels, box.first.z, box.final.z), kVoxels, last);
+  while (coarse.x >= box.first.x && coarse.x <= box.final.x && coarse.y >= box.first.y &&
+         coarse.y <= box.final.y && coarse.z >= box.first.z && coarse.z <= box.final.z) {
+    const ulong mask =
+        field.masks[static_cast<ulong>(coarse.x) +
+                    columns * (static_cast<ulong>(coarse.y) +
+                               static_cast<ulong>(rows) * static_cast<ulong>(coarse.z))];
+    RayEvent exit;
+    if (mask == 0) {
+      exit = walk_exit(&coarse, &ray);
+    } else {
+      GridWalk block = enter_macrocell(ray, coarse, enter, last);
+      for (bool left = false; !left; enter = exit) {
+        if ((mask >> cell_in_block(&block) & 1u) != 0 &&
+            trace_block(frame, field, ray, block, enter, last, hit))
+          return true;
+        exit = walk_exit(&block, &ray);
+        left = leaves(&block, &coarse, exit) != 0;
+        walk_step(&block, &ray, exit, 4, last);
+      }
+    }
+    walk_step(&coarse, &ray, exit, kVoxels, last);
+    enter = exit;
+  }
+  return false;
+}
+
+inline uint trace(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                  bool is_smooth, HitRecord *hits) {
+  const LastPlanes last = last_planes(&frame);
+  const ActiveBox box = active_box(frame.surface, last);
+  uint num_hits = 0;
+  for (uint y = tile.begin_y; y < tile.end_y; ++y) {
+    for (uint x = tile.begin_x; x < tile.end_x; ++x) {
+      const uint ray_id = x + frame.view.width * y;
+      const Ray ray = make_ray(&frame, ray_id);
+      if (!trace_ray(frame, field, box, last, ray, hits + ray_id)) continue;
+      if (is_smooth) smooth_gradient(frame, field, last, hits + ray_id);
+      ++num_hits;
+    }
+  }
+  return num_hits;
+}
+
+inline void cast(const FrameParams &frame, const HostField &field, const IndexRay *rays,
+                 uint num_rays, bool is_smooth, HitRecord *hits) {
+  const LastPlanes last = last_planes(&frame);
+  const ActiveBox box = active_box(frame.surface, last);
+  for (uint i = 0; i < num_rays; ++i) {
+    const IndexRay &r = rays[i];
+    const Ray ray = {make_ray_axis(r.origin[0], r.direction[0]),
+                     make_ray_axis(r.origin[1], r.direction[1]),
+                     make_ray_axis(r.origin[2], r.direction[2])};
+    if (!trace_ray(frame, field, box, last, ray, hits + i)) continue;
+    hits[i].t *= r.t_scale;
+    if (is_smooth) smooth_gradient(frame, field, last, hits + i);
+  }
+}
+
+inline void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
+                  const HitRecord *hits, std::uint8_t *rgb) {
+  const uint columns = frame.view.width / samples;
+  for (uint column = 0; column < columns; ++column) {
+    const uint rgba = shade_pixel(&frame, &params, samples, column, row, hits);
+    for (uint channel = 0; channel < 3; ++channel)
+      rgb[3 * column + channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
+  }
+}
+
+ISO_WHOLE_LOOP BlockRange decode_anywhere(const EncodedBlock &block, float *values) {
+  return decode(block, values);
+}
+ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
+  return inside(values, isovalue);
+}
+ISO_WHOLE_LOOP uint trace_anywhere(const FrameParams &frame, const HostField &field,
+                                   const RayTile &tile, bool is_smooth, HitRecord *hits) {
+  return trace(frame, field, tile, is_smooth, hits);
+}
+ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &field,
+                                  const IndexRay *rays, uint num_rays, bool is_smooth,
+                                  HitRecord *hits) {
+  cast(frame, field, rays, num_rays, is_smooth, hits);
+}
+ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
+                                   uint samples, uint row, const HitRecord *hits,
+                                   std::uint8_t *rgb) {
+  shade(frame, params, samples, row, hits, rgb);
+}
+
+#ifdef ISO_HAS_WIDE_LOOPS
+ISO_WIDE_LOOP BlockRange decode_wide(const EncodedBlock &block, float *values) {
+  return decode(block, values);
+}
+ISO_WIDE_LOOP ulong inside_wide(const float *values, float isovalue) {
+  return inside(values, isovalue);
+}
+ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                              bool is_smooth, HitRecord *hits) {
+  return trace(frame, field, tile, is_smooth, hits);
+}
+ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, const IndexRay *rays,
+                             uint num_rays, bool is_smooth, HitRecord *hits) {
+  cast(frame, field, rays, num_rays, is_smooth, hits);
+}
+ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
+                              uint row, const HitRecord *hits, std::uint8_t *rgb) {
+  shade(frame, params, samples, row, hits, rgb);
+}
+
+bool is_wide() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
+         __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma") &&
+         __builtin_cpu_supports("popcnt");
+}
+#endif
+
+constexpr HostLoops kLoops[] = {
+    {decode_anywhere, inside_anywhere, trace_anywhere, cast_anywhere, shade_anywhere},
+#ifdef ISO_HAS_WIDE_LOOPS
+    {decode_wide, inside_wide, trace_wide, cast_wide, shade_wide},
+#endif
+};
+
+}  // namespace
+
+std::span<const HostLoops> all_host_loops() {
+#ifdef ISO_HAS_WIDE_LOOPS
+  static const bool wide = is_wide();
+  return std::span(kLoops).first(wide ? 2 : 1);
+#else
+  return kLoops;
+#endif
+}
+
+}  // namespace isowave::core

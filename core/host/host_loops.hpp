@@ -1,0 +1,81 @@
+#pragma once
+// The inner loops of drawing on the host: decoding blocks, and walking rays through them. Each is
+// compiled twice, and chosen when the program runs: for any processor of its kind, and for those
+// with fused multiply-add, which the C library otherwise does in software. The same bits either
+// way.
+
+#include <cstdint>
+#include <span>
+
+#include "kernels_cl/portable/shade.h"
+
+namespace isowave::core {
+
+/// The smallest and the largest voxel of a block.
+struct BlockRange {
+  float min, max;
+};
+
+/// A block of a compressed stream.
+struct EncodedBlock {
+  const uint *words;  ///< two more than its last bit is in are read
+  ulong first_bit;
+  uint num_bits;
+  int min_exponent;             ///< of BlockPrecision
+  bool whole_numbers;           ///< of BlockPrecision
+  uint size_x, size_y, size_z;  ///< voxels within the volume, 1 to 4
+};
+
+/// A decoded volume, and where an isovalue is crossed in it.
+struct HostField {
+  const float *values;    ///< [block][64] x + 4y + 16z
+  const ulong *changing;  ///< [block] bit x + 4y + 16z: do the corners of the cell differ?
+  const ulong *masks;     ///< [macrocell] bit x + 4y + 16z: has the block a cell that does?
+};
+
+struct RayTile {
+  uint begin_x, begin_y, end_x, end_y;  ///< of the frame's rays
+};
+
+/// A ray of any origin, in index space.
+struct IndexRay {
+  float origin[3];     ///< [voxels]
+  float direction[3];  ///< [voxels per t]; the largest component is from 1/2 to below 1
+  float t_scale;       ///< power of two: t of the kernels -> t of whoever asks
+};
+
+struct HostLoops {
+  /// Decodes a block to values [64].
+  ///
+  /// Returns  the range of the voxels within the volume
+  BlockRange (*decode)(const EncodedBlock &block, float *values);
+  /// Which voxels of a block are inside, bit x + 4y + 16z.
+  ulong (*inside)(const float *values, float isovalue);
+  /// Writes the hits of a tile of the frame's rays into hits [height * width], those of rays that
+  /// hit something alone.
+  ///
+  /// frame      its surface's box is that of the field's active blocks
+  /// is_smooth  hits have smooth gradients (Normals::kSmooth)
+  /// Returns    how many there are
+  uint (*trace)(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                bool is_smooth, HitRecord *hits);
+  /// Writes the hits of rays into hits [num_rays], those of rays that hit something alone.
+  ///
+  /// frame      as for trace(); its view is not used
+  void (*cast)(const FrameParams &frame, const HostField &field, const IndexRay *rays,
+               uint num_rays, bool is_smooth, HitRecord *hits);
+  /// Shades a row of the picture of the frame's hits [height * width].
+  ///
+  /// samples  rays of a pixel along each axis
+  /// rgb      [width / samples][3]
+  void (*shade)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
+                const HitRecord *hits, std::uint8_t *rgb);
+};
+
+/// The loops that this processor can run, the fastest last.
+std::span<const HostLoops> all_host_loops();
+inline const HostLoops &host_loops() {
+  return all_host_loops().back();
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,80 @@
+#pragma once
+// Draws isosurfaces of a compressed volume on the host, without OpenCL: pictures with the bits of a
+// device's, for as long as there is none, or its kernels are being compiled.
+//
+// The whole volume is decoded once. Rays skip what the isovalue cannot be in: macrocells of 4^3
+// blocks, blocks, and cells whose corners are on one side.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/host/host_blocks.hpp"
+#include "core/render/frame_request.hpp"
+#include "core/stages/shade.hpp"
+
+namespace isowave::core {
+
+struct HostRendererOptions {
+  /// Bytes that it may take; 0: a quarter of the host's memory.
+  std::uint64_t memory_limit = 0;
+  std::uint32_t num_threads = 0;  ///< 0: one per processor
+};
+
+/// A ray in world space: origin + t direction, t from 0 on.
+struct WorldRay {
+  glm::dvec3 origin, direction;
+};
+
+/// Not thread-safe.
+class HostRenderer {
+ public:
+  /// Decodes the finest level of the volume.
+  ///
+  /// volume  need not outlive the renderer
+  /// Throws  Error: the limit does not suffice; a file that the volume is in cannot be read
+  HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options = {});
+
+  /// Draws one frame: the hits that core::Renderer finds, bit for bit. on_pass is called after each
+  /// band of rows, from the top, by the calling thread.
+  ///
+  /// request  without levels of detail, voxel_error and bound; a size
+  /// Throws   Error: others; what make_frame_params() throws
+  FrameStats render(const FrameRequest &request);
+
+  /// The first hit of each ray. t counts in lengths of its direction. Leaves the last frame as it
+  /// is.
+  ///
+  /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
+  ///         1e7 voxels away from the volume's origin
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue, Normals normals);
+
+  /// Throws  Error: a request that render() refuses
+  static void check(const FrameRequest &request);
+
+  /// The view that core::Renderer::camera() takes of this isovalue, for a picture of that size.
+  ///
+  /// Throws  Error: NaN
+  Camera camera(float isovalue, ImageSize size) const;
+
+  /// The hits of the last frame [size.ray_rows()][size.ray_columns()], row 0 at the top; of rows
+  /// that were not drawn, none.
+  const std::vector<HitRecord> &hits() const { return hits_; }
+  /// The picture of hits(), RGB.
+  Image8 shade(const Appearance &appearance = {}) const;
+
+  std::uint64_t memory_bytes() const;  ///< of the decoded volume; pictures come on top
+
+ private:
+  std::uint64_t draw_band(std::uint32_t begin_row, std::uint32_t end_row, std::uint32_t tile_rows);
+
+  VolumeInfo info_;
+  std::uint32_t num_threads_;
+  HostBlocks blocks_;
+  FrameParams frame_{};
+  std::uint32_t samples_ = 1;
+  Normals normals_ = Normals::kSmooth;
+  std::vector<HitRecord> hits_;
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,30 @@
+#include "core/stages/smooth_normals.hpp"
+
+#include "core/base/error.hpp"
+
+namespace isowave::core {
+
+std::string_view to_string(Normals normals) {
+  return normals == Normals::kSmooth ? "smooth" : "cell";
+}
+
+Normals normals_from_string(std::string_view name) {
+  for (const Normals normals : {Normals::kSmooth, Normals::kCell}) {
+    if (name == to_string(normals)) return normals;
+  }
+  throw Error("unknown normals '{}': there are smooth and cell", name);
+}
+
+SmoothNormals::SmoothNormals(ocl::Device &device, std::uint64_t num_pixels,
+                             std::uint32_t group_size, bool levels)
+    : range_(ocl::Range::strided(num_pixels, group_size, device, 4)),
+      kernel_(device, "smooth_normals", group_defines(group_size), levels) {}
+
+void SmoothNormals::operator()(BlockCache &cache, Wavefront &rays, bool begins) {
+  kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, begins ? 1u : 0u,
+                   cache.table, cache.values, rays.previous_counts, rays.counts, rays.next_counts,
+                   rays.active_ray_ids, rays.next_active_ray_ids, rays.hits, cache.slot_stamps,
+                   cache.requested_bits, cache.request_block_ids, cache.capacity, cache.state);
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,50 @@
+#pragma once
+// The last wave of a frame: hits get smooth gradients (kernels_cl/smooth_normals.cl).
+
+#include <string_view>
+
+#include "core/stages/block_cache.hpp"
+#include "core/stages/levelled_kernel.hpp"
+
+namespace isowave::core {
+
+/// Which gradient hits have.
+enum class Normals {
+  kSmooth,  ///< central differences, trilinear between voxels (portable/smooth_gradient.h)
+  kCell     ///< of the trilinear field itself, which jumps from cell to cell
+};
+
+/// "smooth", "cell".
+std::string_view to_string(Normals normals);
+/// Throws  Error naming both
+Normals normals_from_string(std::string_view name);
+
+class SmoothNormals {
+ public:
+  /// levels: frames may have several levels of detail.
+  SmoothNormals(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
+                bool levels = false);
+
+  /// The hits whose blocks are cached get their gradients; rays of the others ask for blocks, as
+  /// far as they are in the pass's window.
+  ///
+  /// begins  all hits, unless the pass before has left rays: then nothing happens. Not begins: of
+  ///         the rays that the pass before has left, when its requests have been provided
+  /// In      rays.hits; previous_counts: of the pass before; counts: opened; active_ray_ids, unless
+  ///         it begins
+  /// Out     gradients of rays.hits; next_active_ray_ids of the rays that wait; counts.active_count
+  ///         (0 if it begins), window_count, requested_count, next_active_count; the cache's
+  ///         requests, and the block that it must serve
+  /// Waits   no
+  void operator()(BlockCache &cache, Wavefront &rays, bool begins);
+
+ private:
+  ocl::Range range_;
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, ocl::In<BlockEntry>, ocl::In<float>,
+                 ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
+                 ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
+                 ocl::Out<uint>, uint, ocl::Out<CacheState>>
+      kernel_;
+};
+
+}  // namespace isowave::core

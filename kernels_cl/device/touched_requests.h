@@ -1,0 +1,75 @@
+/// touched_requests.h -- work-groups ask for blocks that their rays touch: collected first, so that
+/// a group makes room for all of them at once. OpenCL C 1.2.
+#ifndef ISOWAVE_TOUCHED_REQUESTS_H
+#define ISOWAVE_TOUCHED_REQUESTS_H
+
+#include "block_requests.h"
+
+#define ISO_REQUEST_STAGING 256u  ///< requests that a work-group collects before it writes them out
+
+/// The request list, and where a work-group collects what it will add to it.
+typedef struct Requests {
+  global uint *bits, *block_ids;
+  uint capacity;
+  volatile global uint *count;
+  local uint *staged;               ///< [ISO_REQUEST_STAGING]
+  volatile local uint *num_staged;  ///< 0 at first
+} Requests;
+
+/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the
+/// others. In steps for all corners, so that a GPU waits for memory twice, not sixteen times. Most
+/// have been asked for by another ray: their bits tell, and cost neither a search in the table nor
+/// an atomic, for whose result one would wait.
+ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
+                                global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
+                                Requests requests) {
+  BlockEntry entries[8];
+  uint missing = touched; /* of the corners: nobody is known to have asked for them */
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    const uint word = (touched >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
+    const uint bits = ISO_CHECK_RACES ? atomic_or(&requests.bits[word], 0u) : requests.bits[word];
+    missing &= ~((uint)((bits & request_bit(frame, x, y, z)) != 0) << corner);
+  }
+  if (missing == 0) return;
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
+      stamp_needed(slot_stamps, entries[corner].slot, stamp);
+      missing &= ~(1u << corner);
+    }
+  }
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    if ((missing >> corner & 1u) != 0 && mark_request(frame, requests.bits, x, y, z)) {
+      const uint block_id = block_id_at(frame, x, y, z), place = atomic_inc(requests.num_staged);
+      if (place < ISO_REQUEST_STAGING) {
+        requests.staged[place] = block_id;
+      } else {
+        list_request(frame, requests.block_ids, requests.capacity, requests.bits,
+                     atomic_inc(requests.count), block_id);
+      }
+    }
+  }
+}
+
+/// Adds what the work-group has collected to the list. All items must call it.
+/// list_begin: scratch of the work-group.
+ISO_INLINE void list_staged(const FrameParams *frame, Requests requests, local uint *list_begin) {
+  const uint item = get_local_id(0);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0)
+    *list_begin = atomic_add(requests.count, min(*requests.num_staged, ISO_REQUEST_STAGING));
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint j = item; j < min(*requests.num_staged, ISO_REQUEST_STAGING); j += ISO_GROUP_SIZE) {
+    list_request(frame, requests.block_ids, requests.capacity, requests.bits, *list_begin + j,
+                 requests.staged[j]);
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0) *requests.num_staged = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+}
+
+#endif

@@ -1,0 +1,192 @@
+/// smooth_normals.cl -- the last wave of a frame: hits get the gradient of smooth_gradient.h, as
+/// far as its blocks are cached; the other rays ask for what is missing.
+///
+///   [ a pipeline's passes ] -> smooth_normals -> [ cache -> decode -> smooth_normals ]*
+///
+/// All but the gradients of hits keep their bits.
+#define ISO_FOUND local
+#include "device/level_borders.h"
+#include "device/pass_counts.h"
+#include "device/touched_requests.h"
+#include "device/work_group.h"
+#include "portable/block_cells.h"
+#include "portable/smooth_gradient.h"
+
+/// Looks for those of the 2^3 blocks from `base` on whose bits (corner x + 2y + 4z) are set in
+/// `wanted`. Returns which of them are cached, and in slots [8], ISO_GROUP_SIZE apart, where. All
+/// are read before one is looked at: a GPU waits once.
+ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *table,
+                           BlockCoords base, uint wanted, local uint *slots) {
+  uint keys[8], found[8], have = 0;
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    keys[corner] = ISO_INVALID_ID;
+    found[corner] = ISO_BLOCK_ABSENT;
+    if ((wanted >> corner & 1u) != 0) {
+      const uint home = table_home(frame, base.x + (corner & 1), base.y + (corner >> 1 & 1),
+                                   base.z + (corner >> 2));
+      keys[corner] = table[home].block_id;
+      found[corner] = table[home].slot;
+    }
+  }
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = base.x + (corner & 1), y = base.y + (corner >> 1 & 1),
+               z = base.z + (corner >> 2);
+    uint slot = found[corner];
+    if (keys[corner] != ISO_INVALID_ID && keys[corner] != block_id_at(frame, x, y, z))
+      slot = cached_slot(frame, table, x, y, z);
+    slots[corner * ISO_GROUP_SIZE] = slot;
+    have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
+  }
+  return have;
+}
+
+/// Where a stencil's voxels are: in slots [8] of the blocks from `base` on, ISO_GROUP_SIZE apart.
+typedef struct CachedStencil {
+  global const float *values;
+  local const uint *slots;
+  BlockCoords base;
+} CachedStencil;
+
+ISO_INLINE float stencil_voxel(const CachedStencil *cached, int x, int y, int z) {
+  const uint vx = (uint)x - 4 * cached->base.x, vy = (uint)y - 4 * cached->base.y,
+             vz = (uint)z - 4 * cached->base.z;
+  const uint slot = cached->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+  return cached->values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
+}
+
+/// See smooth_derivative(). All blocks are cached.
+ISO_INLINE Gradient cached_gradient(const CachedStencil *cached, const Stencil *s, CellPoint at) {
+  float corners[8], beyond[8];
+  Gradient gradient;
+  ISO_UNROLL
+  for (int i = 0; i < 8; ++i) {
+    corners[i] =
+        stencil_voxel(cached, s->x.cell + (i & 1), s->y.cell + (i >> 1 & 1), s->z.cell + (i >> 2));
+  }
+  ISO_UNROLL
+  for (int i = 0; i < 8; ++i) {
+    beyond[i] = stencil_voxel(cached, (i & 1) != 0 ? s->x.above : s->x.below,
+                              s->y.cell + (i >> 1 & 1), s->z.cell + (i >> 2));
+  }
+  gradient.x = smooth_derivative(corners, beyond, 1, s->x, at);
+  ISO_UNROLL
+  for (int i = 0; i < 8; ++i) {
+    beyond[i] = stencil_voxel(cached, s->x.cell + (i & 1), (i & 2) != 0 ? s->y.above : s->y.below,
+                              s->z.cell + (i >> 2));
+  }
+  gradient.y = smooth_derivative(corners, beyond, 2, s->y, at);
+  ISO_UNROLL
+  for (int i = 0; i < 8; ++i) {
+    beyond[i] = stencil_voxel(cached, s->x.cell + (i & 1), s->y.cell + (i >> 1 & 1),
+                              (i & 4) != 0 ? s->z.above : s->z.below);
+  }
+  gradient.z = smooth_derivative(corners, beyond, 4, s->z, at);
+  return gradient;
+}
+
+/// Stamps what a gradient in block b was made of. The stamp of a block stands for the next ones
+/// along the axes, too (last_use() in block_cache.cl): what is left are those before b.
+ISO_INLINE void stamp_stencil(global uint *slot_stamps, uint stamp, BlockCoords b,
+                              const CachedStencil *cached) {
+  const uint own = (b.x - cached->base.x) + 2 * (b.y - cached->base.y) + 4 * (b.z - cached->base.z);
+  stamp_read(slot_stamps, cached->slots[own * ISO_GROUP_SIZE], stamp);
+  for (uint step = 1; step < 8; step *= 2) {
+    if ((own & step) != 0)
+      stamp_read(slot_stamps, cached->slots[(own - step) * ISO_GROUP_SIZE], stamp);
+  }
+}
+
+/// frame_params, frames, num_frames  as start_rays
+/// begins  1: all hits; nothing happens where prev->next_active_count rays are still on their way
+///         to one. 0: those of the list
+/// prev    counts of the pass before
+/// In      active_ray_ids [prev->next_active_count], unless it begins
+/// Out     gradients of hits [pixel]; next_active_ray_ids [counts->next_active_count]: the rays
+///         that wait, of which the first counts->window_count ask for blocks: request_block_ids
+///         [counts->requested_count, at most capacity]; slot_stamps of the blocks that were read,
+///         or are needed; *next_counts, opened
+/// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box, or the list
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_normals(
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint begins,
+    global const BlockEntry *table, global const float *cache_values, global const PassCounts *prev,
+    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
+    global uint *next_active_ray_ids, global HitRecord *hits, global uint *slot_stamps,
+    global uint *requested_bits, global uint *request_block_ids, uint capacity,
+    global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
+  local uint slots[8 * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+  local uint num_staged, list_begin, counters[2], num_waiting;
+  const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
+                             staged,         &num_staged};
+  const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
+                        frame->screen.end_y};
+  const uint item = get_local_id(0), num_left = prev->next_active_count;
+  const int too_early = begins && num_left != 0;
+  const uint num_rays = too_early ? 0 : (begins ? num_tiled_pixels(box) : num_left);
+  const uint window = begins ? first_window(frame)
+                             : next_window(frame, prev->window_count, num_left,
+                                           prev->requested_count, counts->decoded_count);
+  if (get_global_id(0) == 0 && !too_early) {
+    open_next_counts(frame, counts, next_counts);
+    open_requests(cache);
+    counts->active_count = begins ? 0 : num_left;
+    counts->window_count = window;
+    counts->free_count = cache->free_count;
+  }
+  if (item == 0) num_staged = counters[0] = num_waiting = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
+       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+    const uint i = begin + item;
+    uint pixel = ISO_INVALID_ID, block_id = ISO_INVALID_ID;
+    if (i < num_rays)
+      pixel = begins ? tiled_pixel(frame, box, i) : unpack_entry(active_ray_ids[i]).pixel;
+    if (pixel != ISO_INVALID_ID) block_id = hits[pixel].block_id;
+    int waits = 0;
+    if (block_id != ISO_INVALID_ID) {
+      ISO_FRAME_OF(level, block_id);
+      const BlockCoords b = block_coords(level, block_id);
+      const Stencil stencil = stencil_of(b, hits[pixel].cell, last_planes(level));
+      const CachedStencil cached = {cache_values, slots + item, stencil_base(&stencil)};
+      const uint touched = stencil_blocks(&stencil);
+      waits = (touched & ~find_slots(level, table, cached.base, touched, slots + item)) != 0;
+      if (!waits) {
+        const CellPoint at = {hits[pixel].x, hits[pixel].y, hits[pixel].z};
+        const Gradient gradient = cached_gradient(&cached, &stencil, at);
+        if (!is_no_gradient(gradient)) {
+          hits[pixel].grad_x = gradient.x;
+          hits[pixel].grad_y = gradient.y;
+          hits[pixel].grad_z = gradient.z;
+        }
+        stamp_stencil(slot_stamps, read_stamp(counts->pass), b, &cached);
+      } else {
+        atomic_inc(&num_waiting);
+      }
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    uint any_waits = num_waiting != 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (; any_waits != 0; any_waits = 0) { /* none, mostly: a CPU pays for each barrier */
+      const uint place = append_entry(waits, pack_entry(pixel, 0, 0), counters,
+                                      &counts->next_active_count, next_active_ray_ids);
+      if (waits && place < window) {
+        ISO_FRAME_OF(level, block_id);
+        const Stencil stencil =
+            stencil_of(block_coords(level, block_id), hits[pixel].cell, last_planes(level));
+        const BlockCoords base = stencil_base(&stencil);
+        const uint touched = stencil_blocks(&stencil);
+        request_touched(level, table, slot_stamps, needed_stamp(counts->pass), base, touched,
+                        requests);
+        if (place == 0) {
+          cache->first_block_id = block_id_at(level, base.x, base.y, base.z);
+          cache->first_touched = touched;
+        }
+      }
+      list_staged(frame, requests, &list_begin);
+      if (item == 0) num_waiting = 0;
+      barrier(CLK_LOCAL_MEM_FENCE);
+    }
+  }
+}

@@ -1,0 +1,532 @@
+// Drawing on the host: the bits of the twin, which skips nothing, and of devices; what it refuses,
+// and how it stops.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <isowave/isowave.hpp>
+#include <thread>
+
+#include "core/base/error.hpp"
+#include "core/base/host_memory.hpp"
+#include "core/host/host_renderer.hpp"
+#include "core/io/open_volume.hpp"
+#include "core/render/renderer.hpp"
+#include "reference/random.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/ray_cases.hpp"
+#include "tests/run_program.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave::core {
+namespace {
+
+using test::expect_same_hits;
+using test::TestVolume;
+using test::twin_hits;
+using testing::HasSubstr;
+
+constexpr ImageSize kOdd{23, 17};  // middle rows and columns run along axes
+
+template <class Call>
+std::string error_of(const Call &call) {
+  try {
+    call();
+  } catch (const isowave::Error &error) {
+    EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
+    return error.what();
+  }
+  return "no error";
+}
+
+/// Draws all isovalues from all cameras. Returns the number of hits.
+std::uint64_t check(const TestVolume &volume, const std::vector<Camera> &cameras,
+                    const std::vector<float> &isovalues, ImageSize size = kOdd) {
+  std::uint64_t hits = 0;
+  HostRenderer renderer(volume.compressed);
+  for (const float isovalue : isovalues) {
+    for (std::size_t view = 0; view < cameras.size(); ++view) {
+      SCOPED_TRACE(fmt::format("isovalue {}, view {}", isovalue, view));
+      const FrameStats stats =
+          renderer.render({.camera = cameras[view], .isovalue = isovalue, .size = size});
+      const auto expected = twin_hits(volume, cameras[view], size, isovalue);
+      expect_same_hits(renderer.hits(), expected, size.ray_columns());
+      EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
+      const FrameParams frame = make_frame_params(volume.info(), cameras[view], size, isovalue);
+      EXPECT_EQ(
+          renderer.shade().pixels,
+          shade_scalar(frame, make_shade_params(volume.info(), {}), expected, size.samples).pixels);
+      hits += stats.rays_hit;
+    }
+  }
+  return hits;
+}
+
+std::vector<Camera> hard_cameras(const glm::uvec3 &dims) {
+  std::vector<Camera> cameras;
+  for (const CameraCase &c : camera_cases(dims)) cameras.push_back(c.camera);
+  return cameras;
+}
+
+TEST(HostRenderer, HardRaysThroughOddVolumes) {
+  for (const glm::uvec3 dims : {glm::uvec3(21, 18, 23), {33, 9, 17}, {37, 38, 39}}) {
+    SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
+    EXPECT_GT(check({dims, test::gyroid_field(9), 8}, hard_cameras(dims), {0.0f, 0.7f}), 2000u);
+    EXPECT_GT(check({dims, test::sphere_field(dims), 12}, hard_cameras(dims), {0.4f}), 500u);
+    EXPECT_GT(check({dims, test::noise_field(5), 16}, hard_cameras(dims), {0.6f}), 500u);
+  }
+}
+
+TEST(HostRenderer, OneCellOneBlockAndThinVolumes) {
+  for (const glm::uvec3 dims :
+       {glm::uvec3(2, 2, 2), {4, 4, 4}, {5, 5, 5}, {5, 2, 9}, {2, 13, 6}, {17, 16, 2}}) {
+    SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
+    const TestVolume volume(dims, test::noise_field(4), 16);
+    EXPECT_GT(check(volume, orbit_cameras(volume.info(), 5), {0.1f}), 50u);
+  }
+}
+
+/// Voxels of large plateaus, kept exactly, and isovalues that they equal, pass, or that are beyond
+/// all.
+TEST(HostRenderer, IsovaluesThatAreVoxels) {
+  const glm::uvec3 dims(30, 27, 33);
+  VolumeInfo info = test::grid_info(dims);
+  info.type = VoxelType::kUint8;
+  const TestVolume volume(info, test::sample(dims, test::plateau_field()),
+                          ErrorGoal{.exact = true});
+  EXPECT_GT(check(volume, orbit_cameras(info, 3), {51, 102, 102.5f, 255}), 1000u);
+  EXPECT_EQ(check(volume, orbit_cameras(info, 1), {-1, 0, 256, INFINITY, -INFINITY}), 0u);
+}
+
+TEST(HostRenderer, HugeAndTinyValues) {
+  const glm::uvec3 dims(19, 22, 21);
+  for (const double scale : {1e-20, 1e30}) {
+    SCOPED_TRACE(scale);
+    const auto field = test::gyroid_field(8);
+    const TestVolume volume(
+        dims, [&](const glm::dvec3 &p) { return scale * field(p); }, 24);
+    EXPECT_GT(check(volume, orbit_cameras(volume.info(), 3), {static_cast<float>(0.2 * scale)}),
+              200u);
+  }
+}
+
+TEST(HostRenderer, SpacingAndSamples) {
+  VolumeInfo info = test::grid_info({14, 31, 23}, {1, 0.25, 3});
+  info.origin = {100, -7, 3};
+  const TestVolume volume(info, test::sample(info.dims, test::gyroid_field(10)), 8);
+  for (const std::uint32_t samples : {2u, 3u, 5u})
+    EXPECT_GT(check(volume, orbit_cameras(info, 2), {0.1f}, {19, 11, samples}), 200u);
+}
+
+TEST(HostRenderer, BlocksOfTheirOwnLengths) {
+  const glm::uvec3 dims(26, 31, 29);
+  const TestVolume volume(test::grid_info(dims), test::sample(dims, test::gyroid_field(11)),
+                          ErrorGoal{.tolerance = 0.01});
+  ASSERT_TRUE(volume.compressed.is_indexed());
+  EXPECT_GT(check(volume, orbit_cameras(volume.info(), 3), {0.3f}), 500u);
+}
+
+/// Thousands of blocks, so that threads decode several runs, and whole macrocells are empty.
+TEST(HostRenderer, RealVolumes) {
+  for (const auto &[name, isovalue] :
+       {std::pair("head_41x41x41_uint8.raw.gz", 60.0f), {"fuel_64x33x32_uint8.raw.gz", 10.0f}}) {
+    const auto reader = open_volume(std::string(ISOWAVE_TEST_DATA "/") + name);
+    const TestVolume volume(*reader, 6);
+    EXPECT_GT(check(volume, orbit_cameras(volume.info(), 3), {isovalue}, {96, 64}), 1000u) << name;
+  }
+  const glm::uvec3 dims(130, 127, 101);
+  const TestVolume volume(dims, test::sphere_field(dims), 4);
+  EXPECT_GT(check(volume, orbit_cameras(volume.info(), 2), {0.8f, 0.2f}, {96, 64}), 1000u);
+}
+
+TEST(HostRenderer, FilesAndMemoryGiveTheSame) {
+  const glm::uvec3 dims(70, 41, 53);
+  const test::TemporaryFolder folder;
+  for (const auto &goal :
+       {std::optional<ErrorGoal>(), std::optional(ErrorGoal{.tolerance = 0.02})}) {
+    const std::vector<float> voxels = test::sample(dims, test::gyroid_field(13));
+    const TestVolume volume = goal ? TestVolume(test::grid_info(dims), voxels, *goal)
+                                   : TestVolume(test::grid_info(dims), voxels, 7);
+    write_zfp_file(volume.compressed, folder / "a.zfp");
+    HostRenderer from_file(open_zfp_file(folder / "a.zfp")), from_memory(volume.compressed);
+    const FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.2f, kOdd};
+    EXPECT_GT(from_file.render(request).rays_hit, 100u);
+    from_memory.render(request);
+    expect_same_hits(from_file.hits(), from_memory.hits(), kOdd.width);
+  }
+}
+
+/// The loops for any processor, and for this one.
+TEST(HostLoops, AllGiveTheSameBits) {
+  const auto reader = open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz");
+  const TestVolume volume(*reader, 6);
+  HostBlocks blocks(volume.compressed, 0);
+  blocks.select(10);
+  FrameParams frame =
+      make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 10);
+  const auto expected = render_scalar(frame, volume.voxels);
+  frame.surface = blocks.surface();
+  const ShadeParams shading = make_shade_params(volume.info(), {});
+  const Image8 picture = shade_scalar(frame, shading, expected);
+  std::vector<HitRecord> smooth = expected;
+  smooth_gradients(frame, volume.voxels, smooth);
+  for (const HostLoops &loops : all_host_loops()) {
+    std::vector<HitRecord> hits(64 * 48, no_hit());
+    EXPECT_EQ(loops.trace(frame, blocks.field(), {0, 0, 64, 48}, true, hits.data()),
+              test::num_hits(expected));
+    expect_same_hits(hits, smooth, 64);
+    std::ranges::fill(hits, no_hit());
+    EXPECT_EQ(loops.trace(frame, blocks.field(), {0, 0, 64, 48}, false, hits.data()),
+              test::num_hits(expected));
+    expect_same_hits(hits, expected, 64);
+    std::vector<std::uint8_t> row(3 * 64);
+    loops.shade(frame, shading, 1, 23, hits.data(), row.data());
+    EXPECT_EQ(std::memcmp(row.data(), picture.pixels.data() + 23 * row.size(), row.size()), 0);
+    for (std::uint32_t id = 0; id < volume.compressed.block_count(); ++id) {
+      float values[64];
+      loops.decode({volume.compressed.words.data(), volume.compressed.block_begin(id),
+                    volume.compressed.block_bits(id), volume.compressed.precision.min_exponent,
+                    false, 4, 4, 4},
+                   values);
+      ASSERT_EQ(std::memcmp(values, blocks.field().values + 64 * id, sizeof(values)), 0) << id;
+      EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
+    }
+  }
+}
+
+TEST(HostRenderer, BandsGrowFromTheTopAndCanBeStopped) {
+  const glm::uvec3 dims(40, 40, 40);
+  const TestVolume volume(dims, test::gyroid_field(9), 8);
+  // Each band has a tile for each of eight turns of a thread.
+  HostRenderer renderer(volume.compressed, {.num_threads = 1});
+  const ImageSize size{128, 100};
+  FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.2f, size};
+  renderer.render(request);
+  const std::vector<HitRecord> whole = renderer.hits();
+  double done = 0;
+  request.on_pass = [&](const PassStats &pass) {
+    EXPECT_GT(pass.completed_percent, done);
+    done = pass.completed_percent;
+    const auto rows = static_cast<std::size_t>(std::lround(done * size.height / 100));
+    const std::size_t drawn = rows * size.width;
+    EXPECT_EQ(std::memcmp(renderer.hits().data(), whole.data(), drawn * sizeof(HitRecord)), 0);
+    EXPECT_EQ(
+        test::num_hits({renderer.hits().begin() + std::ptrdiff_t(drawn), renderer.hits().end()}),
+        0u);
+    EXPECT_EQ(renderer.shade().pixels.size(), 3 * size.num_pixels());
+    return true;
+  };
+  const FrameStats watched = renderer.render(request);
+  EXPECT_EQ(done, 100);
+  EXPECT_EQ(watched.passes.size(), 7u);
+  EXPECT_FALSE(watched.cancelled);
+  expect_same_hits(renderer.hits(), whole, size.width);
+
+  request.on_pass = [&](const PassStats &pass) { return pass.completed_percent < 40; };
+  const FrameStats stopped = renderer.render(request);
+  EXPECT_TRUE(stopped.cancelled);
+  EXPECT_EQ(stopped.passes.size(), 3u);
+  request.on_pass = [&](const PassStats &) -> bool { throw Error("my own"); };
+  EXPECT_EQ(error_of([&] { renderer.render(request); }), "my own");
+  request.on_pass = [&](const PassStats &pass) { return pass.completed_percent < 100; };
+  EXPECT_FALSE(renderer.render(request).cancelled) << "nothing was left";
+  expect_same_hits(renderer.hits(), whole, size.width);
+}
+
+/// Rays of any origin and direction, the last ones along axes and in planes of cells.
+std::vector<WorldRay> any_rays(const glm::uvec3 &dims, std::size_t count) {
+  Random random(11);
+  const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
+  const auto within = [&](double least, double most) { return random.in(least, most); };
+  std::vector<WorldRay> rays;
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 from =
+                         extent * glm::dvec3(random.in(-1, 2), random.in(-1, 2), random.in(-1, 2)),
+                     to = extent * glm::dvec3(random.in(0, 1), random.in(0, 1), random.in(0, 1));
+    // Numbers that float32 holds, the largest component between 1/2 and 1.
+    const glm::vec3 towards(to - from);
+    const float largest = std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)});
+    glm::vec3 direction = towards / largest * 0.75f;
+    glm::vec3 origin(from);
+    if (i % 4 == 3) {
+      const auto axis = static_cast<int>(i / 4 % 3);
+      direction[axis] = 0;
+      if (glm::length(direction) < 0.5f) direction[(axis + 1) % 3] = 0.75f;
+      origin = glm::round(origin);
+    }
+    rays.push_back({origin, direction});
+  }
+  return rays;
+}
+
+TEST(HostRenderer, RaysOfAnyOriginHitWhatTheTwinFinds) {
+  const glm::uvec3 dims(33, 29, 37);
+  const TestVolume volume(dims, test::gyroid_field(9), 12);
+  HostRenderer renderer(volume.compressed);
+  const std::vector<WorldRay> rays = any_rays(dims, 4000);
+  FrameParams frame = make_grid_params(volume.info());
+  frame.view.t_scale = 1;
+  frame.surface.isovalue = 0.2f;
+  std::vector<HitRecord> expected;
+  for (const WorldRay &ray : rays) {
+    const glm::vec3 o(ray.origin), d(ray.direction);
+    expected.push_back(
+        trace_scalar(frame, volume.voxels, kDefaultSolver,
+                     {make_ray_axis(o.x, d.x), make_ray_axis(o.y, d.y), make_ray_axis(o.z, d.z)}));
+    const float largest = std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+    ASSERT_TRUE(largest >= 0.5f && largest < 1.0f);
+  }
+  EXPECT_GT(test::num_hits(expected), 1000u);
+  expect_same_hits(renderer.cast_rays(rays, 0.2f, Normals::kCell), expected, 1);
+  smooth_gradients(frame, volume.voxels, expected);
+  expect_same_hits(renderer.cast_rays(rays, 0.2f, Normals::kSmooth), expected, 1);
+
+  // t counts in lengths of the direction.
+  std::vector<WorldRay> longer = rays;
+  for (WorldRay &ray : longer) ray.direction *= 8.0;
+  for (HitRecord &hit : expected) hit.t /= 8;
+  expect_same_hits(renderer.cast_rays(longer, 0.2f, Normals::kSmooth), expected, 1);
+  EXPECT_TRUE(renderer.cast_rays({}, 0.2f, Normals::kSmooth).empty());
+}
+
+TEST(HostRenderer, RaysThatCannotBeTracedAreOneLine) {
+  const TestVolume volume({20, 20, 20}, test::gyroid_field(9), 8);
+  HostRenderer renderer(volume.compressed);
+  const auto error_of_ray = [&](const WorldRay &ray, float isovalue = 0.2f) {
+    const std::vector<WorldRay> rays = {{{0, 0, 0}, {1, 0, 0}}, ray};
+    return error_of([&] { renderer.cast_rays(rays, isovalue, Normals::kCell); });
+  };
+  EXPECT_THAT(error_of_ray({{0, 0, 0}, {0, 0, 0}}), HasSubstr("ray 1 has no direction"));
+  EXPECT_THAT(error_of_ray({{0, 0, 0}, {0, NAN, 1}}), HasSubstr("ray 1 has no direction"));
+  EXPECT_THAT(error_of_ray({{0, INFINITY, 0}, {1, 0, 0}}), HasSubstr("ray 1 begins"));
+  EXPECT_THAT(error_of_ray({{0, 2e7, 0}, {1, 0, 0}}), HasSubstr("ray 1 begins 2e+07 voxels"));
+  EXPECT_THAT(error_of_ray({{0, 0, 0}, {1, 0, 0}}, NAN), HasSubstr("NaN"));
+}
+
+TEST(HostRenderer, MemoryIsStatedAndLimited) {
+  const TestVolume volume({34, 21, 18}, test::gyroid_field(9), 8);
+  // 9 x 6 x 5 blocks of 64 float32, their two float32 of range and two words of 64 bits; 3 x 2 x 2
+  // macrocells of such a word; 256 thresholds.
+  const std::uint64_t bytes = 9 * 6 * 5 * (256 + 8 + 16) + 3 * 2 * 2 * 8 + 256 * 4;
+  EXPECT_EQ(HostRenderer(volume.compressed, {.memory_limit = bytes}).memory_bytes(), bytes);
+  EXPECT_THAT(error_of([&] { HostRenderer(volume.compressed, {.memory_limit = bytes - 1}); }),
+              testing::AllOf(HasSubstr("takes 1 MiB"), HasSubstr("0 MiB are allowed")));
+  CompressedVolume huge;
+  huge.info = test::grid_info(glm::uvec3(65'536, 65'536, 1'000));
+  EXPECT_THAT(error_of([&] { HostRenderer{huge}; }),
+              HasSubstr(fmt::format("{} MiB are allowed", host_memory() / 4 >> 20)));
+}
+
+TEST(HostRenderer, RequestsThatFailAreOneLine) {
+  const TestVolume volume({20, 20, 20}, test::gyroid_field(9), 8);
+  HostRenderer renderer(volume.compressed);
+  const FrameRequest good{orbit_cameras(volume.info(), 1)[0], 0.2f, kOdd};
+  EXPECT_THAT(error_of([&] { renderer.shade(); }), HasSubstr("no picture"));
+  renderer.render(good);
+  const std::vector<HitRecord> hits = renderer.hits();
+  const auto expect_error = [&](const char *text, const auto &change) {
+    FrameRequest bad = good;
+    change(bad);
+    EXPECT_THAT(error_of([&] { renderer.render(bad); }), HasSubstr(text));
+    expect_same_hits(renderer.hits(), hits, kOdd.width);
+  };
+  expect_error("NaN", [](FrameRequest &r) { r.isovalue = NAN; });
+  expect_error("eye", [](FrameRequest &r) { r.camera.at = r.camera.eye; });
+  expect_error("0 x 17", [](FrameRequest &r) { r.size = {0, 17}; });
+  expect_error("rays a pixel", [](FrameRequest &r) { r.size = {23, 17, 9}; });
+  expect_error("leave out voxel_pixels", [](FrameRequest &r) { r.voxel_pixels = 1; });
+  expect_error("leave out voxel_error", [](FrameRequest &r) { r.voxel_error = 0.5; });
+  expect_error("leave out bound", [](FrameRequest &r) { r.bound = FieldBound::kUpper; });
+  EXPECT_THAT(error_of([&] { renderer.camera(NAN, kOdd); }), HasSubstr("NaN"));
+}
+
+std::shared_ptr<const Volume> public_volume() {
+  return isowave::open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz",
+                              {.tolerance = 0.5, .levels = 0});
+}
+
+isowave::FrameRequest public_request(const Camera &camera) {
+  return {.camera = {{camera.eye.x, camera.eye.y, camera.eye.z},
+                     {camera.at.x, camera.at.y, camera.at.z},
+                     {camera.up.x, camera.up.y, camera.up.z},
+                     camera.fovy_deg},
+          .isovalue = 10,
+          .size = {64, 48, 2},
+          .want_depth = true,
+          .want_normals = true,
+          .want_hits = true};
+}
+
+TEST(ApiHostRenderer, RefusesInOneLineWhatDevicesAloneCan) {
+  isowave::HostRenderer renderer(public_volume());
+  const isowave::FrameRequest good{.camera = renderer.camera(10), .isovalue = 10, .size = {64, 48}};
+  EXPECT_TRUE(isowave::HostRenderer::can_draw(good));
+  const std::vector<std::uint8_t> picture = renderer.render(good).picture;
+  const auto expect_error = [&](const char *text, const auto &change) {
+    isowave::FrameRequest bad = good;
+    change(bad);
+    EXPECT_THAT(error_of([&] { renderer.render(bad); }), HasSubstr(text));
+    EXPECT_FALSE(isowave::HostRenderer::can_draw(bad)) << text;
+    EXPECT_EQ(renderer.render(good).picture, picture) << text;
+  };
+  using Request = isowave::FrameRequest;
+  expect_error("leave out voxel_pixels", [](Request &r) { r.voxel_pixels = 1; });
+  expect_error("leave out voxel_error", [](Request &r) { r.voxel_error = 1; });
+  expect_error("leave out bound", [](Request &r) { r.bound = isowave::FieldBound::kLower; });
+  expect_error("leave out max_surface_error", [](Request &r) { r.max_surface_error = 1; });
+  expect_error("leave out want_bounds", [](Request &r) { r.want_bounds = true; });
+  expect_error("leave out time_budget_ms", [](Request &r) { r.time_budget_ms = 1; });
+  EXPECT_THAT(error_of([] { isowave::HostRenderer(nullptr); }), HasSubstr("needs a volume"));
+  EXPECT_THAT(error_of([] { isowave::HostRenderer(public_volume(), {.memory_limit = 1000}); }),
+              HasSubstr("raise the limit"));
+}
+
+TEST(ApiHostRenderer, CastRaysInTheWorld) {
+  Grid grid{.dims = {21, 21, 21}, .spacing = {1, 2, 3}, .origin = {5, 6, 7}};
+  std::vector<float> voxels;
+  for (int i = 0; i < 21 * 21 * 21; ++i) voxels.push_back(static_cast<float>(i / 441));  // z
+  isowave::HostRenderer renderer(compress(voxels, grid, {.tolerance = 1e-4}));
+  // The surface is the plane z = 7 + 3 * 10.5.
+  const std::vector<isowave::Ray> rays = {{{10, 20, 0}, {0, 0, 1}},
+                                          {{10, 20, 0}, {0, 0, 10}},
+                                          {{10, 20, 100}, {0.5, 0.25, -2}},
+                                          {{10, 20, 0}, {0, 0, -1}},
+                                          {{100, 20, 0}, {0, 0, 1}}};
+  const Frame hits = renderer.cast_rays(rays, 10.5f);
+  ASSERT_EQ(hits.rows, 1u);
+  ASSERT_EQ(hits.columns, 5u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double t = (38.5 - rays[i].origin[2]) / rays[i].direction[2];
+    EXPECT_NEAR(hits.depth[i], t, 1e-3 * t);
+    EXPECT_NEAR(hits.positions[i][2], 38.5, 1e-3);
+    EXPECT_NEAR(hits.positions[i][0], rays[i].origin[0] + t * rays[i].direction[0], 1e-3);
+    EXPECT_NEAR(hits.normals[i][2], -1, 1e-3);
+    EXPECT_EQ(hits.hits[i].cell[2], 10u);
+  }
+  for (std::size_t i = 3; i < 5; ++i) {
+    EXPECT_TRUE(std::isinf(hits.depth[i]));
+    EXPECT_TRUE(std::isnan(hits.positions[i][0]));
+  }
+  EXPECT_THAT(error_of([&] { renderer.cast_rays(std::vector<isowave::Ray>(1), 1); }),
+              HasSubstr("direction"));
+}
+
+TEST(ApiHostRenderer, FramesCanBeWatchedAndStopped) {
+  isowave::HostRenderer renderer(public_volume(), {.num_threads = 1});
+  isowave::FrameRequest request{.camera = renderer.camera(10), .isovalue = 10, .size = {128, 96}};
+  const Frame whole = renderer.render(request);
+  EXPECT_EQ(whole.statistics.passes, 1u);
+  std::vector<std::uint8_t> last;
+  std::uint32_t passes = 0;
+  request.on_pass = [&](const isowave::Progress &progress) {
+    EXPECT_EQ(progress.passes(), ++passes);
+    last = progress.picture();
+    return true;
+  };
+  EXPECT_EQ(renderer.render(request).picture, whole.picture);
+  EXPECT_EQ(last, whole.picture);
+  EXPECT_EQ(passes, 6u);
+  request.on_pass = [](const isowave::Progress &progress) {
+    return progress.completed_percent() < 50;
+  };
+  const Frame stopped = renderer.render(request);
+  EXPECT_TRUE(stopped.statistics.cancelled);
+  EXPECT_FALSE(stopped.statistics.complete);
+  EXPECT_EQ(stopped.statistics.passes, 3u);
+  EXPECT_NE(stopped.picture, whole.picture);
+  const std::size_t half = whole.picture.size() / 2;
+  EXPECT_TRUE(std::equal(whole.picture.begin(), whole.picture.begin() + std::ptrdiff_t(half),
+                         stopped.picture.begin()));
+}
+
+TEST(ApiHostRenderer, ThreadsShareARenderer) {
+  isowave::HostRenderer renderer(public_volume());
+  std::vector<isowave::FrameRequest> requests;
+  std::vector<std::vector<float>> depths;
+  for (const float isovalue : {10.0f, 60.0f}) {
+    requests.push_back({.camera = renderer.camera(isovalue),
+                        .isovalue = isovalue,
+                        .size = {64, 48},
+                        .want_depth = true});
+    depths.push_back(renderer.render(requests.back()).depth);
+  }
+  EXPECT_NE(depths[0], depths[1]);
+  std::atomic<int> num_equal = 0;
+  std::vector<std::jthread> threads;
+  for (std::size_t i = 0; i < 4; ++i) {
+    threads.emplace_back([&, i] {
+      for (int frame = 0; frame < 5; ++frame)
+        num_equal += renderer.render(requests[i % 2]).depth == depths[i % 2];
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(num_equal, 20);
+}
+
+class HostRendererOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
+INSTANTIATE_TEST_SUITE_P(Devices, HostRendererOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+TEST_P(HostRendererOnDevice, SmallFramesAreTheDevices) {
+  const glm::uvec3 dims(9, 10, 11);
+  const TestVolume volume(dims, test::sphere_field(dims));
+  ocl::Device device(GetParam());
+  const ImageSize size{12, 8};
+  Renderer renderer(device, volume.compressed, {.size = size});
+  HostRenderer host(volume.compressed);
+  const FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.5f, size};
+  EXPECT_EQ(renderer.render(request).rays_hit, host.render(request).rays_hit);
+  expect_same_hits(host.hits(), renderer.hits(), size.width);
+  EXPECT_EQ(host.shade().pixels, renderer.shade().pixels);
+}
+
+TEST_P(HostRendererOnDevice, WholeFramesAreThoseOfTheFrontDoor) {
+  const auto volume = public_volume();
+  isowave::Renderer renderer(isowave::open_device(std::to_string(GetParam().index)), volume,
+                             {.largest = {64, 48, 2}, .with_levels = true});
+  isowave::HostRenderer host(volume);
+  const isowave::FrameRequest request =
+      public_request(orbit_cameras(test::grid_info({64, 33, 32}), 1)[0]);
+  const Frame expected = renderer.render(request), got = host.render(request);
+  EXPECT_GT(expected.statistics.hits, 1000u);
+  EXPECT_EQ(got.statistics.hits, expected.statistics.hits);
+  EXPECT_EQ(got.statistics.rays, expected.statistics.rays);
+  EXPECT_EQ(got.rows, expected.rows);
+  EXPECT_EQ(got.picture, expected.picture);
+  EXPECT_EQ(got.depth, expected.depth);
+  EXPECT_EQ(got.normals, expected.normals);
+  ASSERT_EQ(got.hits.size(), expected.hits.size());
+  for (std::size_t i = 0; i < got.hits.size(); ++i) {
+    EXPECT_EQ(got.hits[i].t, expected.hits[i].t) << i;
+    EXPECT_EQ(got.hits[i].cell, expected.hits[i].cell) << i;
+    EXPECT_EQ(got.hits[i].position, expected.hits[i].position) << i;
+    EXPECT_EQ(got.hits[i].gradient, expected.hits[i].gradient) << i;
+  }
+}
+
+/// By the blocks that a device's 8-bit ranges take as active.
+TEST_P(HostRendererOnDevice, CamerasAreTheDevices) {
+  const glm::uvec3 dims(61, 50, 47);
+  const TestVolume fields[] = {{dims, test::sphere_field(dims), 9},
+                               {dims, test::gyroid_field(40), 5},
+                               {glm::uvec3(5, 2, 9), test::noise_field(4), 16}};
+  ocl::Device device(GetParam());
+  const ImageSize size{64, 48};
+  for (const TestVolume &volume : fields) {
+    Renderer renderer(device, volume.compressed, {.size = size});
+    const HostRenderer host(volume.compressed);
+    for (const float isovalue :
+         {-INFINITY, -9.0f, -0.99f, 0.0f, 0.31f, 0.5f, 0.93f, 1.2f, 7.0f, INFINITY}) {
+      const Camera expected = renderer.camera({&isovalue, 1}), got = host.camera(isovalue, size);
+      EXPECT_EQ(got.eye, expected.eye) << isovalue;
+      EXPECT_EQ(got.at, expected.at) << isovalue;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isowave::core

@@ -1,0 +1,69 @@
+#!/usr/bin/env bash
+# python_test.sh <source folder> <build folder> <program>: the Python package as users install it.
+# Makes a wheel and installs it into a virtual environment, with what its tests need from PyPI;
+# types, stubs, the package's tests; and where nothing of OpenCL is installed.
+set -euo pipefail
+source=$1 build=$2 program=$3
+work=$build/python_test
+tests=$source/tools/python/tests
+
+fail() {
+  echo "python_test: $*" >&2
+  exit 1
+}
+quietly() {
+  "$@" > "$work/log" 2>&1 || { cat "$work/log" >&2; fail "failed: $*"; }
+}
+
+mkdir -p "$work"
+rm -rf "$work/dist"
+quietly "$source/tools/wheel" -o "$work/dist" /usr/bin/python3
+wheel=$(echo "$work"/dist/isowave-*.whl)
+[ "$(stat -c %s "$wheel")" -lt 2500000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes"
+unzip -l "$wheel" | grep -iE 'embree|gmp|itk' && fail 'the wheel has what a renderer does not need'
+
+[ -x "$work/venv/bin/python" ] || /usr/bin/python3 -m venv "$work/venv"
+python=$work/venv/bin/python
+quietly "$python" -m pip install --quiet --upgrade pip
+quietly "$python" -m pip install --quiet -r "$tests/requirements.txt" -r "$tests/requirements-viewer.txt"
+quietly "$python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
+
+"$python" -m mypy --config-file "$source/pyproject.toml" "$source/tools/python/isowave"
+# Outside of the sources, whose folder has no compiled part.
+cd "$work"
+"$python" -m mypy.stubtest isowave._core > "$work/log" 2>&1 || { cat "$work/log"; fail 'the stubs are wrong'; }
+ISOWAVE_PROGRAM=$program "$python" -m pytest -q -p no:cacheprovider "$tests"
+
+# On a machine without any OpenCL: PoCL comes from PyPI, the loader with the wheel.
+if ! unshare --mount true 2> /dev/null; then
+  echo 'python_test: not tested where no OpenCL is installed: hiding it needs a mount namespace'
+  exit 0
+fi
+rm -rf "$work/fresh"
+/usr/bin/python3 -m venv "$work/fresh"
+quietly "$work/fresh/bin/python" -m pip install --quiet "$wheel[cpu]"
+loader=$(ldconfig -p | sed -n 's/.*libOpenCL.so.1 .*=> //p' | head -1)
+cat > "$work/picture.py" << 'END'
+import sys
+
+import isowave
+
+volume = isowave.open(sys.argv[1], exact=True)
+image = volume.render(10, size=(320, 240), device="cpu")
+image.save(sys.argv[2])
+print(isowave.Report())
+END
+cat > "$work/hidden.sh" << 'END'
+mount -t tmpfs none /etc/OpenCL
+: > /tmp/not_a_loader
+mount --bind /tmp/not_a_loader "$1"
+shift
+exec "$@"
+END
+fuel=$source/tests/data/fuel_64x33x32_uint8.raw.gz
+unshare --mount bash "$work/hidden.sh" "$loader" env HOME="$work" XDG_CACHE_HOME="$work/cache" \
+  "$work/fresh/bin/python" "$work/picture.py" "$fuel" "$work/hidden.png" > "$work/report" 2>&1 ||
+  { cat "$work/report"; fail 'no picture where OpenCL is hidden'; }
+grep -q 'opencl/libOpenCL.so.1' "$work/report" || fail "not the wheel's loader: $(cat "$work/report")"
+"$program" render "$fuel" -i 10 --exact --size 320x240 --device cpu -o "$work/program.png" > /dev/null
+cmp "$work/hidden.png" "$work/program.png" || fail "the wheel's picture is not the program's"

@@ -1,0 +1,286 @@
+"""Sections of tools/measure that ask what is right. Each returns the rows of its section."""
+
+import gzip
+import json
+import math
+import os
+import shlex
+import statistics
+import subprocess
+
+from measuring.run import (
+    CPU_VOLUMES,
+    GPU_VOLUMES,
+    TOP,
+    Failed,
+    as_arguments,
+    short_name,
+    what_was_measured,
+)
+
+
+def watertight(run):
+    run.run(
+        "isowave",
+        "verify",
+        solver="bernstein",
+        rays=100,
+        watertight=1000 if run.options.quick else 2000000,
+        device=run.options.device,
+        json="w.json",
+    )
+    totals = {}
+    for case in run.read_json("w.json")["solvers"][0]["watertight"]:
+        total = totals.setdefault((case["by"], "levels" in case["surface"]), [0, 0])
+        total[0] += case["rays"]
+        total[1] += case["leaks"]
+    return [
+        {"by": by, "levels": with_levels, "rays": rays, "leaks": leaks}
+        for (by, with_levels), (rays, leaks) in totals.items()
+    ]
+
+
+def stability(run):
+    """A row for each case of the suite, and one for each surface of the twin's watertight test."""
+    run.run(
+        "isowave",
+        "verify",
+        rays=50 if run.options.quick else 5000,
+        watertight=1000 if run.options.quick else 300000,
+        device=run.options.device,
+        json="y.json",
+    )
+    solvers = run.read_json("y.json")["solvers"]
+    rows = []
+    for cases in zip(*(solver["cases"] for solver in solvers), strict=True):
+        by_solver = {solver["solver"]: case for solver, case in zip(solvers, cases, strict=True)}
+        default = by_solver["bernstein"]
+        row = {
+            "case": default["name"],
+            "description": default["description"],
+            "rays": default["rays"],
+            "hits": default["hits"],
+            "missed": {name: case["missed"] for name, case in by_solver.items()},
+            "false": {name: case["false"] for name, case in by_solver.items()},
+            "residual_p99": default["residual_voxels"]["p99"],
+            "resumed_differently": sum(case["resumed_differently"] for case in cases),
+        }
+        rows.append(row)
+    surfaces = {}
+    for solver in solvers:
+        for case in solver["watertight"]:
+            if case["by"] != "twin":
+                continue
+            row = {"surface": case["surface"], "rays": case["rays"], "leaks": {}}
+            row = surfaces.setdefault(case["surface"], row)
+            row["leaks"][solver["solver"]] = case["leaks"]
+    return rows + list(surfaces.values())
+
+
+def bits(run):
+    rows = []
+    program = {"ISOWAVE": str(run.options.programs / "isowave")}
+    for choice in ({}, {"pipeline": "blocks"}, {"stream": "host", "memory_budget": "100MB"}):
+        script = [str(TOP / "tools/test-volumes"), str(run.options.volumes)]
+        arguments = as_arguments(choice)
+        options = ["--device", run.options.device, *arguments]
+        said = subprocess.run(
+            [*script, *options], capture_output=True, text=True, env={**os.environ, **program}
+        )
+        run.commands.append(shlex.join(["tools/test-volumes", "FOLDER", *options]))
+        same = said.stdout.count("same bits: ")
+        different = said.stdout.count("DIFFERENT: ")
+        if same + different == 0:
+            why = (said.stderr.strip() or "nothing drawn").splitlines()[-1]
+            raise Failed(f"tools/test-volumes: {why}")
+        rows.append({"arguments": arguments, "frames": same + different, "differ": different})
+    return rows
+
+
+def oracles(run):
+    rows = []
+    for path, isovalues in run.real_volumes():
+        run.run(
+            "isowave",
+            "verify",
+            path,
+            isovalue=isovalues[1],
+            size="640x360",
+            device=run.options.device,
+            json="v.json",
+        )
+        judged = {frame["oracle"]: frame for frame in run.read_json("v.json")["frames"]}
+        row = {
+            "volume": short_name(path),
+            "isovalue": isovalues[1],
+            "rays": judged["roots"]["rays"],
+            "hits": judged["roots"]["hits"],
+            "missed": {oracle: frame["missed"] for oracle, frame in judged.items()},
+            "false": {oracle: frame["false"] for oracle, frame in judged.items()},
+            "unstable": {oracle: frame["unstable"] for oracle, frame in judged.items()},
+            "residual_p99": judged["roots"]["residual_voxels"]["p99"],
+        }
+        rows.append(row)
+    return rows
+
+
+def certified(run):
+    rows = []
+    for storage in (("--rate", "8"), ("--tolerance-relative", "0.004")):
+        for path, isovalues in run.real_volumes():
+            run.run(
+                "isowave",
+                "verify",
+                path,
+                *storage,
+                isovalue=list(isovalues),
+                size="640x360",
+                orbit=2,
+                max_surface_error=1,
+                device=run.options.device,
+                json="c.json",
+            )
+            frames = run.read_json("c.json")["frames"]
+            drawn = max(sum(frame["pixels"] for frame in frames), 1)
+            slack = [frame["slack"]["p50"] for frame in frames if frame["slack"]]
+            row = {
+                "volume": short_name(path),
+                "storage": list(storage),
+                "frames": len(frames),
+                "proven": sum(frame["certified"] for frame in frames) / drawn,
+                "unbounded": sum(frame["uncertain"] for frame in frames) / drawn,
+                "exceeded": sum(frame["exceeded"] for frame in frames),
+                "bound_over_error": statistics.median(slack),
+            }
+            rows.append(row)
+    return rows
+
+
+def sizes(run):
+    def convert(path, **storage):
+        run.run("isowave", "convert", path, output="z.zfp", **storage)
+        info = run.info("z.zfp", remember=False)
+        return info["file_bytes"], info["max_voxel_error"]
+
+    rows = []
+    for path, _ in run.real_volumes():
+        if path.suffix != ".gz":
+            continue
+        voxels = gzip.decompress(path.read_bytes())
+        packed = len(gzip.compress(voxels, 9))
+        row = {"volume": short_name(path), "raw": len(voxels), "gzip": packed, "rates": []}
+        for rate in (2, 4, 8):
+            size, error = convert(path, rate=rate)
+            bounded = convert(path, tolerance=repr(error))[0] if error > 0 else None
+            row["rates"].append({"rate": rate, "bytes": size, "error": error, "bounded": bounded})
+        row["exact"] = convert(path, exact=True)[0] if "float" not in path.name else None
+        rows.append(row)
+    run.commands = ["isowave convert VOLUME -o z.zfp --rate 2 (4, 8), --tolerance ERROR, --exact"]
+    return rows
+
+
+VIEWS = 2
+# Rays a pixel along each axis, and --voxel-pixels. The first is what the others are compared with.
+DETAIL_PICTURES = ((4, 0), (1, 0), (1, 0.5), (1, 1), (2, 0), (2, 0.25), (2, 0.5), (2, 1))
+
+
+def picture_errors(run, wanted, got):
+    """(root mean square of 8-bit colours, FLIP), over all views."""
+    squares, flips = [], []
+    for a, b in zip(wanted, got, strict=True):
+        said = run.run("isowave", "compare", a, b, json=True, remember=False)
+        compared = json.loads(said)
+        psnr = compared["psnr_db"]
+        squares.append(0.0 if psnr is None else 255.0**2 * 10 ** (-psnr / 10))
+        flips.append(compared["flip"])
+    return math.sqrt(statistics.mean(squares)), statistics.mean(flips)
+
+
+def detail(run):
+    """A row for each picture of few rays, compared with one of 16 rays a pixel."""
+    rows = []
+    for path, isovalues in run.real_volumes("aneurism", "bonsai", "engine", "cthead", "ch2"):
+        run.run("isowave", "convert", path, output="d.zfp", rate=16, levels="all", no_verify=True)
+        wanted = None
+        for samples, distance in DETAIL_PICTURES:
+            name = f"{short_name(path)}_{samples}_{distance}"
+            run.run(
+                "isowave",
+                "render",
+                "d.zfp",
+                isovalue=isovalues[1],
+                size="16x12" if run.options.quick else "64x48",
+                orbit=VIEWS,
+                samples=samples,
+                voxel_pixels=distance,
+                device=run.options.device,
+                no_stage_times=True,
+                output=f"{name}.png",
+                stats="s.json",
+            )
+            pictures = sorted(run.work.glob(f"{name}_*.png"))
+            if len(pictures) != VIEWS:
+                raise Failed(f"{name}: {len(pictures)} pictures of {VIEWS} views")
+            if wanted is None:
+                wanted = pictures
+                continue
+            frames = run.read_json("s.json")["frames"]
+            rms, flip = picture_errors(run, wanted, pictures)
+            row = {
+                "volume": short_name(path),
+                "isovalue": isovalues[1],
+                "rays": samples**2,
+                "voxel_pixels": distance,
+                "rms": rms,
+                "flip": flip,
+                "decoded_blocks": sum(
+                    one["decoded_blocks"] for frame in frames for one in frame["per_pass"]
+                ),
+            }
+            rows.append(row)
+    return rows
+
+
+def pareto(run):
+    """A row for each volume: what `isowave bench pareto` writes of it."""
+    names = ("aneurism", "bonsai", "cthead", "isabel")
+    subjects = [(path, isovalues[1]) for path, isovalues in run.real_volumes(*names)]
+    options = {"size": "1280x720", "views": 3, "rounds": 5}
+    sweep = {"voxel_pixels": "0,1", "voxel_error": "0,0.04"}
+    if run.options.quick:
+        options = {"size": "48x32", "views": 1, "rounds": 1, "pipeline": "rays"}
+        sweep["storage"] = "rate:4,tolerance:2"
+    else:
+        largest = CPU_VOLUMES[0] if run.options.on_cpu else GPU_VOLUMES[0]
+        subjects.append((f"generate:{largest}_uint8", 128))
+    rows = []
+    for volume, isovalue in subjects:
+        run.run(
+            "isowave",
+            "bench",
+            "pareto",
+            volume,
+            isovalue=isovalue,
+            **options,
+            **sweep,
+            device=run.options.device,
+            json="o.json",
+        )
+        rows.append(what_was_measured(run.read_json("o.json")))
+    return rows
+
+
+def solvers(run):
+    """One row: what `isowave bench solvers` writes."""
+    names = ("aneurism", "bonsai", "engine", "cthead")
+    subjects = [f"{path}:{isovalues[1]}" for path, isovalues in run.real_volumes(*names)]
+    options = {"size": "1280x720", "rounds": 15}
+    if run.options.quick:
+        options = {"size": "96x64", "rounds": 2}
+    else:
+        subjects.append(f"{run.volume(run.fields()[0])}:128")
+        if run.options.on_cpu:
+            options = {"size": "640x360", "rounds": 7}
+    device = run.options.device
+    run.run("isowave", "bench", "solvers", *subjects, **options, device=device, json="b.json")
+    return [what_was_measured(run.read_json("b.json"))]

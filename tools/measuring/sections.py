@@ -1,0 +1,32 @@
+"""The sections that tools/measure knows: name -> function, and what each needs."""
+
+from measuring import accuracy, speed
+
+SECTIONS = {
+    section.__name__: section
+    for section in (
+        speed.frames,
+        speed.speculation,
+        speed.slots,
+        speed.budgets,
+        speed.sweep,
+        speed.levels,
+        speed.storage,
+        speed.error,
+        speed.time,
+        speed.kernels,
+        accuracy.watertight,
+        accuracy.stability,
+        speed.peer,
+        accuracy.bits,
+        accuracy.oracles,
+        accuracy.certified,
+        accuracy.sizes,
+        accuracy.detail,
+        accuracy.solvers,
+        accuracy.pareto,
+    )
+}
+NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto")
+# Built only with -DISOWAVE_BUILD_PEER=ON.
+NEED_PEER = ("peer",)

@@ -1,0 +1,423 @@
+"""The tables that tools/tables writes: each takes the rows of a section of tools/measure, and gives
+its own, the head first."""
+
+import pathlib
+import statistics
+
+
+def ms(value):
+    return f"{value:.2f}" if value < 20 else f"{value:.0f}"
+
+
+def percent(part):
+    return f"{100 * part:.1f} %"
+
+
+def mebibytes(count):
+    return f"{count / 2**20:,.0f} MiB"
+
+
+def name_of(field):
+    """mixing_layer_512x512x512 -> mixing layer 512^3"""
+    name, dims = field.rsplit("_", 1)
+    sides = dims.split("x")
+    cube = len(set(sides)) == 1
+    return f"{name.replace('_', ' ')} {sides[0] + '^3' if cube else ' x '.join(sides)}"
+
+
+def option(row, name):
+    """The value of an option among the row's arguments; None where it is not given."""
+    arguments = row["arguments"]
+    return arguments[arguments.index(name) + 1] if name in arguments else None
+
+
+def thrice(row):
+    return [ms(row[kind]["median"]) for kind in ("cold", "next", "warm")]
+
+
+def frames(rows):
+    times = ("cold ms", "next", "warm", "floor")
+    yield "volume", "pipeline", *times, "blocks decoded", "device memory"
+    for row in rows:
+        cold = row["cold"]
+        yield (
+            name_of(row["volume"]),
+            option(row, "--pipeline"),
+            f"{ms(cold['median'])} ({ms(cold['min'])} to {ms(cold['max'])})",
+            *thrice(row)[1:],
+            ms(row["floor"]) if row["floor"] else "",
+            f"{row['decoded_blocks']:,.0f}",
+            mebibytes(row["memory"]),
+        )
+
+
+def front(rows):
+    yield "volume", "voxels", "device memory", "cold", "next", "warm", "floor"
+    for row in rows:
+        if option(row, "--pipeline") != "rays":
+            continue
+        x, y, z = (int(side) for side in row["volume"].rsplit("_", 1)[1].split("x"))
+        yield (
+            name_of(row["volume"]),
+            f"{x * y * z / 1e9:.2f} G",
+            mebibytes(row["memory"]),
+            *thrice(row),
+            ms(row["floor"]) if row["floor"] else "too large",
+        )
+
+
+def speculation(rows):
+    yield "pipeline", "speculation", "cold ms", "next", "warm", "passes", "blocks decoded"
+    for row in rows:
+        yield (
+            option(row, "--pipeline"),
+            f"`{option(row, '--speculation')}`",
+            *thrice(row),
+            f"{row['passes']:.0f}",
+            f"{row['decoded_blocks']:,.0f}",
+        )
+
+
+def slots(rows):
+    yield "volume", "pipeline", "slots", "stream", "cold ms", "next", "warm", "blocks decoded"
+    for row in rows:
+        yield (
+            name_of(row["volume"]),
+            option(row, "--pipeline") or "rays",
+            f"{int(option(row, '--cache-slots')):,}",
+            option(row, "--stream") or "device",
+            *thrice(row),
+            f"{row['decoded_blocks']:,.0f}",
+        )
+
+
+def budgets(rows):
+    yield "volume", "budget", "booked", "cold ms", "next", "warm", "blocks decoded"
+    for row in rows:
+        yield (
+            name_of(row["volume"]),
+            option(row, "--memory-budget"),
+            mebibytes(row["memory"]),
+            *thrice(row),
+            f"{row['decoded_blocks']:,.0f}",
+        )
+
+
+def levels(rows):
+    yield "volume", "rays a pixel", "`--voxel-pixels`", "cold ms", "next", "warm", "blocks decoded"
+    for row in rows:
+        samples = int(option(row, "--samples") or 1)
+        yield (
+            name_of(row["volume"]),
+            f"{samples * samples}",
+            option(row, "--voxel-pixels"),
+            *thrice(row),
+            f"{row['decoded_blocks']:,.0f}",
+        )
+
+
+def storage(rows):
+    yield "stored with", "largest error", "bits a voxel", "cold ms", "next", "warm"
+    for row in rows:
+        yield (
+            f"`{' '.join(row['storage'])}`",
+            f"{row['max_voxel_error']:.3g}",
+            f"{row['bits_per_voxel']:.2f}",
+            *thrice(row),
+        )
+
+
+def error(rows):
+    yield (
+        "volume",
+        "P",
+        "chosen `--voxel-pixels`",
+        "ms",
+        "blocks decoded",
+        "proven",
+        "no bound",
+        "choose / prove, ms",
+    )
+    for row in rows:
+        chosen = row["voxel_pixels"]
+        span = f"{chosen[0]:.3g}" + (f" to {chosen[-1]:.3g}" if len(chosen) > 1 else "")
+        yield (
+            name_of(row["volume"]),
+            f"{row['max_surface_error']:g}",
+            span,
+            ms(row["total_ms"]),
+            f"{row['decoded_blocks']:,.0f}",
+            percent(row["proven"]),
+            percent(row["unbounded"]),
+            f"{row['choice_ms']:.0f} / {row['bound_ms']:.0f}",
+        )
+
+
+def time(rows):
+    times = ("budget, ms", "median ms", "largest ms")
+    yield "volume", *times, "whole pictures", "rows of the last step"
+    for row in rows:
+        last = ", ".join(f"{height} ({count})" for height, count in row["last_rows"].items())
+        yield (
+            name_of(row["volume"]),
+            f"{row['budget_ms']:g}",
+            ms(row["median_ms"]),
+            ms(row["max_ms"]),
+            f"{row['complete']} of {row['frames']}",
+            last,
+        )
+
+
+def kernels(rows):
+    yield "case of `isowave_bench`", "ms", "G items/s"
+    for row in rows:
+        rate = row["items_per_second"]
+        yield f"`{row['name']}`", f"{row['ms']:.3f}", f"{rate / 1e9:.2f}" if rate else ""
+
+
+def watertight(rows):
+    yield "drawn by", "levels of detail", "rays", "leaks"
+    for row in rows:
+        yield row["by"], "yes" if row["levels"] else "no", f"{row['rays']:,}", f"{row['leaks']:,}"
+
+
+def bits(rows):
+    yield "options", "frames", "with a bit that differs"
+    for row in rows:
+        yield f"`{' '.join(row['arguments'])}`" if row["arguments"] else "", row["frames"], row[
+            "differ"
+        ]
+
+
+def oracles(rows):
+    yield (
+        "volume, isovalue",
+        "rays",
+        "hits",
+        "roots: missed, false",
+        "cells: missed, false",
+        "mesh: missed, false",
+        "unstable",
+        "distance of hits, p99, voxels",
+    )
+    for row in rows:
+        judged = [
+            f"{row['missed'][oracle]}, {row['false'][oracle]}"
+            for oracle in ("roots", "cells", "mesh")
+        ]
+        yield (
+            f"{row['volume']}, {row['isovalue']}",
+            f"{row['rays']:,}",
+            f"{row['hits']:,}",
+            *judged,
+            max(row["unstable"].values()),
+            f"{row['residual_p99']:.1e}",
+        )
+
+
+def certified(rows):
+    yield (
+        "volume",
+        "stored with",
+        "frames",
+        "proven",
+        "no bound",
+        "bound / error, median",
+        "bounds exceeded",
+    )
+    for row in rows:
+        yield (
+            row["volume"],
+            f"`{' '.join(row['storage'])}`",
+            row["frames"],
+            percent(row["proven"]),
+            percent(row["unbounded"]),
+            f"{row['bound_over_error']:.1f}",
+            row["exceeded"],
+        )
+
+
+def sizes(rows):
+    yield ("volume", "rate 2: bytes / bounded", "rate 4", "rate 8", "`--exact`", "gzip -9", "raw")
+    for row in rows:
+        rates = [
+            f"{rate['bytes']:,} / {rate['bounded']:,}" if rate["bounded"] else f"{rate['bytes']:,}"
+            for rate in row["rates"]
+        ]
+        exact = f"{row['exact']:,}" if row["exact"] else ""
+        yield row["volume"], *rates, exact, f"{row['gzip']:,}", f"{row['raw']:,}"
+
+
+def stability(rows):
+    cases = [row for row in rows if "case" in row]
+    solvers = cases[0]["missed"]
+    yield "case", "what is hard", "hits", *solvers, "residual p99"
+    for row in cases:
+        wrong = [f"{row['missed'][name]:,} / {row['false'][name]:,}" for name in solvers]
+        hits = f"{row['hits']:,} of {row['rays']:,}"
+        yield row["case"], row["description"], hits, *wrong, f"{row['residual_p99']:.0e}"
+
+
+def leaks(rows):
+    surfaces = [row for row in rows if "surface" in row]
+    solvers = surfaces[0]["leaks"]
+    yield "surface", "rays", *solvers
+    for row in surfaces:
+        yield row["surface"], f"{row['rays']:,}", *(f"{row['leaks'][name]:,}" for name in solvers)
+
+
+def peer(rows):
+    sides = {
+        "rays": "pipeline rays",
+        "blocks": "pipeline blocks",
+        "mesh_low": "Flying Edges, Embree (low quality)",
+        "mesh_medium": "Flying Edges, Embree (medium quality)",
+    }
+    kinds = ("new", "new_kept", "warm", "next")
+    yield (
+        "volume",
+        "side",
+        "new isovalue, nothing decoded, ms",
+        "new isovalue, cache kept",
+        "same view",
+        "next view",
+        "memory of the process",
+    )
+    for row in rows:
+        spreads = [row["ms"].get(kind) for kind in kinds]
+        times = [
+            f"{ms(one['median'])} ({ms(one['min'])} to {ms(one['max'])})" if one else ""
+            for one in spreads
+        ]
+        yield name_of(row["volume"]), sides[row["side"]], *times, mebibytes(row["peak"])
+
+
+def detail(rows):
+    pictures = list(dict.fromkeys((row["rays"], row["voxel_pixels"]) for row in rows))
+    titles = [f"{rays} ray{'s' * (rays > 1)}, {distance:g}" for rays, distance in pictures]
+    yield "volume, isovalue", *titles
+    volumes = {}
+    for row in rows:
+        cell = f"{row['rms']:.2f} ({row['flip']:.3f}), {row['decoded_blocks']:,}"
+        cells = volumes.setdefault(f"{row['volume']}, {row['isovalue']:g}", {})
+        cells[row["rays"], row["voxel_pixels"]] = cell
+    for volume, cells in volumes.items():
+        yield volume, *(cells[picture] for picture in pictures)
+
+
+def subject(row):
+    """Such as "bonsai, 40", of a file's or a synthetic volume's name."""
+    name = pathlib.PurePath(row["volume"]).name.removeprefix("generate:")
+    if name.startswith("mixing_layer"):
+        return f"mixing layer, {row['isovalue']:g}"
+    return f"{name.split('_')[0].split('.')[0]}, {row['isovalue']:g}"
+
+
+def solvers(rows):
+    cells = rows[0]["cells"]
+    yield "solver", "steps", "ns a test", "missed", "false", "error p99, voxels"
+    for entry in cells["entries"]:
+        counts = [f"{entry[name]:,}" for name in ("missed", "false")]
+        ns = f"{entry['ns']:.4f}" if entry["ns"] < 1 else f"{entry['ns']:.1f}"
+        yield entry["solver"], entry["steps"], ns, *counts, f"{entry['p99']:.0e}"
+
+
+def solver_frames(rows):
+    frames_of = rows[0]["frames"]
+    yield "solver", "steps", *(f"{subject(frame)}" for frame in frames_of)
+    for entries in zip(*(frame["entries"] for frame in frames_of)):
+        cells = [f"{entry['ms']:.3g}: {entry['missed'] + entry['false']:,}" for entry in entries]
+        yield entries[0]["solver"], entries[0]["steps"], *cells
+
+
+def pareto(rows):
+    yield (
+        "volume, isovalue",
+        "stored with",
+        "MB",
+        "ms cold",
+        "wrong pixels",
+        "depth p99, voxels",
+        "normals p99, degrees",
+        "FLIP",
+    )
+    for row in rows:
+        for point in row["points"]:
+            if choice(point) != ("rays", "bernstein", 0, 0):
+                continue
+            yield (
+                subject(row),
+                f"`--{point['storage'].replace(':', ' ')}`",
+                f"{point['bytes'] / 1e6:.3g}",
+                ms(point["ms"]),
+                f"{100 * point['wrong_pixels']:.2g} %",
+                f"{point['depth_p99']:.2g}",
+                f"{point['normal_p99']:.2g}",
+                f"{point['flip']:.4f}",
+            )
+
+
+def choice(point):
+    """What distinguishes swept points of one volume and storage."""
+    return point["pipeline"], point["solver"], point["voxel_pixels"], point["voxel_error"]
+
+
+def ratios(points, changed, value, default):
+    """Median ratios of ms of the points that have the value beside those that have the default."""
+    swept = {(p["storage"], *choice(p)): p for p in points if p["max_surface_error"] is None}
+    found = []
+    for key, point in swept.items():
+        other = list(key)
+        other[changed] = default
+        if key[changed] == value and tuple(other) in swept:
+            found.append(point["ms"] / swept[tuple(other)]["ms"])
+    return f"{statistics.median(found):.2f}" if found else ""
+
+
+def pareto_times(rows):
+    yield (
+        "volume, isovalue",
+        "`blocks` / `rays`",
+        "`linear` / `bernstein`",
+        "`--voxel-error` / all planes",
+        "`--max-surface-error` / fastest point that is no worse",
+    )
+    for row in rows:
+        points = row["points"]
+        planes = max(p["voxel_error"] or 0 for p in points)
+        chosen = [p["over_front"] for p in points if p.get("over_front")]
+        yield (
+            subject(row),
+            ratios(points, 1, "blocks", "rays"),
+            ratios(points, 2, "linear", "bernstein"),
+            ratios(points, 4, planes, 0),
+            f"{min(chosen):.2f} to {max(chosen):.2f}" if chosen else "",
+        )
+
+
+# Name of a table -> (section of the JSON, table). `front` is the front page's, of the same frames.
+TABLES = {
+    table.__name__: (section, table)
+    for section, *tables in (
+        ("frames", frames, front),
+        ("speculation", speculation),
+        ("slots", slots),
+        ("budgets", budgets),
+        ("levels", levels),
+        ("storage", storage),
+        ("error", error),
+        ("time", time),
+        ("kernels", kernels),
+        ("watertight", watertight),
+        ("stability", stability, leaks),
+        ("peer", peer),
+        ("bits", bits),
+        ("oracles", oracles),
+        ("certified", certified),
+        ("sizes", sizes),
+        ("detail", detail),
+        ("solvers", solvers, solver_frames),
+        ("pareto", pareto, pareto_times),
+    )
+    for table in tables
+}

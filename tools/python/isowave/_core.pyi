@@ -1,0 +1,102 @@
+"""The compiled part (module.cpp). Axes are x, y, z here."""
+
+from collections.abc import Callable
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+class Error(RuntimeError): ...
+
+Vector = tuple[float, float, float] | list[float]
+
+def devices() -> list[dict[str, Any]]: ...
+def encode_png(picture: NDArray[np.uint8]) -> bytes: ...
+def save_png(picture: NDArray[np.uint8], path: str | PathLike[str]) -> None: ...
+
+class Volume:
+    @property
+    def dims(self) -> list[int]: ...
+    @property
+    def spacing(self) -> list[float]: ...
+    @property
+    def origin(self) -> list[float]: ...
+    @property
+    def direction(self) -> list[list[float]]: ...
+    @property
+    def source_type(self) -> str: ...
+    @property
+    def value_range(self) -> list[float]: ...
+    @property
+    def bits_per_voxel(self) -> float: ...
+    @property
+    def compressed_bytes(self) -> int: ...
+    @property
+    def max_voxel_error(self) -> float | None: ...
+    @property
+    def num_levels(self) -> int: ...
+    def decode(self, level: int) -> NDArray[np.float32]: ...
+    def sample(self, max_voxels: int) -> NDArray[np.float32]: ...
+    def save(self, path: str | PathLike[str]) -> None: ...
+
+def compress(
+    read: Callable[[int, int], NDArray[Any]],
+    type: str,
+    dims: tuple[int, int, int],
+    spacing: Vector,
+    origin: Vector,
+    direction: list[Vector],
+    options: dict[str, Any],
+    keep: bool,
+    progress: Callable[[str, float], object] | None,
+) -> Volume: ...
+def compress_array(
+    array: NDArray[Any],
+    type: str,
+    dims: tuple[int, int, int],
+    spacing: Vector,
+    origin: Vector,
+    direction: list[Vector],
+    options: dict[str, Any],
+    progress: Callable[[str, float], object] | None,
+) -> Volume: ...
+def open(
+    path: str | PathLike[str],
+    options: dict[str, Any],
+    dims: tuple[int, int, int] | None,
+    type: str | None,
+    spacing: Vector | None,
+    progress: Callable[[str, float], object] | None,
+) -> Volume: ...
+
+class PassView:
+    @property
+    def passes(self) -> int: ...
+    @property
+    def completed_percent(self) -> float: ...
+    def picture(self) -> NDArray[np.uint8]: ...
+
+class Renderer:
+    def __init__(self, device: str, volume: Volume, options: dict[str, Any]) -> None: ...
+    def render(
+        self,
+        request: dict[str, Any],
+        on_pass: Callable[[PassView], bool | None] | None,
+        interrupts: bool,
+    ) -> dict[str, Any]: ...
+    def camera(
+        self, isovalue: float, width: int, height: int
+    ) -> tuple[
+        tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float
+    ]: ...
+    @property
+    def device(self) -> dict[str, Any]: ...
+    @property
+    def compile_ms(self) -> float: ...
+    @property
+    def setup_ms(self) -> float: ...
+    @property
+    def memory_bytes(self) -> int: ...
