@@ -6,11 +6,15 @@ import gc
 import json
 import os
 import random
+import signal
 import socket as sockets
 import struct
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -19,7 +23,9 @@ from viewer_fakes import FakeCamera, FakeVolume
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+import isowave
 from isowave.viewer import server as server_module
+from isowave.viewer import view
 from isowave.viewer.scene import Scene
 from isowave.viewer.server import Limits, Server, main, make_parser, parse_bytes, parse_size
 
@@ -356,6 +362,56 @@ def test_a_port_that_is_taken_is_one_line(server: Server) -> None:
     scene = Scene(FakeVolume(), start=False)
     with pytest.raises(OSError, match=f"port {server.port} of 127.0.0.1: Address already in use"):
         Server(scene, port=server.port)
+
+
+def failing(options: dict[str, Any]) -> Exception:
+    return RuntimeError("no such device: nonsense")
+
+
+def test_a_view_that_cannot_draw_ends_with_the_reason(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(RuntimeError, match="no such device: nonsense"):
+        view(FakeVolume(refuse=failing), block=True, notebook=False, open_browser=False)
+    monkeypatch.setattr(isowave, "open", lambda path: FakeVolume(refuse=failing))
+    assert main(["ball.nrrd", "--no-browser", "--device", "nonsense"]) == 1
+    output = capsys.readouterr()
+    assert output.out.count("http://127.0.0.1:") == 2
+    assert output.err == "isowave view: no such device: nonsense\n"
+
+
+def test_a_view_that_does_not_block_is_a_server() -> None:
+    server = view(FakeVolume(), isovalue=80, block=False, notebook=False, open_browser=False)
+    assert isinstance(server, Server)
+    assert httpx.get(server.url).status_code == 200
+    server.close()
+
+
+def test_the_command_ends_with_ctrl_c(tmp_path: Path) -> None:
+    script = tmp_path / "run.py"
+    script.write_text(
+        "import isowave, sys, signal\n"
+        "from viewer_fakes import FakeVolume\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "isowave.open = lambda path: FakeVolume()\n"
+        "from isowave.viewer import main\n"
+        "sys.exit(main(['ball.nrrd', '--no-browser']))\n"
+    )
+    here = str(Path(__file__).parent)
+    path = os.pathsep.join([here, *sys.path])
+    with subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        url = process.stdout.readline().strip()
+        assert httpx.get(url).status_code == 200
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=TIMEOUT)
+    assert (process.returncode, error) == (0, "")
 
 
 def test_the_command_says_in_one_line_what_is_wrong(

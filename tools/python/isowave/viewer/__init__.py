@@ -33,7 +33,8 @@ def view(
               height       of the widget [CSS pixels]
               host, port, open_browser: of the server; port 0: a free one
 
-    Raises ImportError with the command that installs what is missing.
+    Raises ImportError with the command that installs what is missing; RuntimeError where it blocks
+    and the volume cannot be drawn.
     """
     if notebook is None:
         notebook = _in_notebook()
@@ -51,11 +52,9 @@ def view(
     print(served.url, flush=True)
     if block is False or (block is None and _is_interactive()):
         return served
-    try:
-        served.wait()
-    except KeyboardInterrupt:
-        pass
-    served.close()
+    failure = server.wait_and_close(served)
+    if failure is not None:
+        raise RuntimeError(failure)
     return None
 
 

@@ -195,6 +195,12 @@ class Scene:
         with self._changed:
             return len(self._clients)
 
+    @property
+    def failure(self) -> str | None:
+        """Why no renderer could be made at all, in one line; None: one was, or will be."""
+        with self._changed:
+            return self._failure if self._failed and self._fallback is None else None
+
     def close(self) -> None:
         """Ends the frame at hand, the thread and the renderer."""
         with self._changed:

@@ -115,8 +115,11 @@ class Server:
         return f"isowave viewer at {self.url}"
 
     def wait(self) -> None:
-        """Returns when the server has ended, or raises KeyboardInterrupt."""
-        while self._thread.is_alive():
+        """Returns when the server has ended, or no renderer could be made.
+
+        Raises KeyboardInterrupt.
+        """
+        while self._thread.is_alive() and self.scene.failure is None:
             self._thread.join(0.5)
 
     def close(self) -> None:
@@ -403,9 +406,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"isowave view: {str(error).splitlines()[0]}", file=sys.stderr)
         return 1
     print(f"{server.url}\nCtrl-C ends it.", flush=True)
+    failure = wait_and_close(server)
+    if failure is not None:
+        print(f"isowave view: {failure}", file=sys.stderr)
+    return 0 if failure is None else 1
+
+
+def wait_and_close(server: Server) -> str | None:
+    """Serves until Ctrl-C; returns at once why it cannot, if so."""
     try:
         server.wait()
     except KeyboardInterrupt:
         pass
+    failure = server.scene.failure
     server.close()
-    return 0
+    return failure
