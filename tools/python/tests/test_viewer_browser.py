@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import struct
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -579,6 +580,64 @@ def test_the_page_comes_back_after_its_server(open_page: Callable[..., Any]) -> 
     with Server(fake_scene(FakeVolume()), port=first.port, token=first.token):
         page.get_by_text("The connection is lost").wait_for(state="hidden")
         assert changes(page, lambda: drag(page, 70, 0))
+
+
+def test_nothing_that_is_done_in_the_page_is_malformed(page: Any) -> None:
+    """Extremes: the server would close the connection."""
+    page.get_by_role("application").focus()
+    page.evaluate("""() => {
+        const picture = document.querySelector("main").shadowRoot.querySelector(".picture");
+        const zoom = (deltaY) => picture.dispatchEvent(
+            new WheelEvent("wheel", { deltaY, ctrlKey: true, cancelable: true }));
+        for (let i = 0; i < 2000; i++) zoom(-1000);
+        for (let i = 0; i < 3000; i++) zoom(1000);
+        for (let i = 0; i < 500; i++) picture.dispatchEvent(
+            new KeyboardEvent("keydown", { key: "ArrowUp", bubbles: true }));
+    }""")
+    for name in ("Isovalue", "Largest error", "Time budget", "Memory budget"):
+        for value in ("1e300", "-1e300", "1e-300"):
+            page.get_by_label(name, exact=name == "Isovalue").last.fill(value)
+            page.keyboard.press("Enter")
+    page.get_by_label("Isovalue", exact=True).last.fill("77")
+    page.get_by_role("button", name="Reset view").click()
+    page.wait_for_timeout(100)
+    rests(page)
+    assert page.evaluate("document.querySelector('main').dataset.state") == "ready"
+    assert state(page)["iso"] == "77"
+    assert page.problems == []
+
+
+def test_while_the_device_is_prepared_the_page_says_so(open_page: Callable[..., Any]) -> None:
+    may_begin = threading.Event()
+
+    def slow(options: dict[str, Any]) -> None:
+        may_begin.wait(60)
+
+    with Server(fake_scene(FakeVolume(refuse=slow))) as server:
+        page = open_page()
+        page.goto(server.url)
+        page.get_by_text("Preparing the device").wait_for()
+        keep(page, "preparing")
+        may_begin.set()
+        rests(page)
+        assert not page.get_by_text("Preparing the device").is_visible()
+
+
+def test_a_budget_that_is_too_small_says_what_would_do(open_page: Callable[..., Any]) -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return RuntimeError("needs 20 MiB") if options["memory_budget"] == 1 << 20 else None
+
+    with Server(fake_scene(FakeVolume(refuse=refuse))) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        page.get_by_label("Memory budget").fill("1")
+        page.keyboard.press("Enter")
+        page.get_by_text("needs 20 MiB").wait_for()
+        page.wait_for_function("() => document.querySelector('main').dataset.state === 'ready'")
+        assert page.get_by_text("needs 20 MiB").is_visible()
+        assert changes(page, lambda: drag(page, 60, 0))
+        assert not page.get_by_text("needs 20 MiB").is_visible()
 
 
 def test_an_error_of_the_renderer_is_shown_and_passes(open_page: Callable[..., Any]) -> None:

@@ -206,6 +206,7 @@ def test_in_jupyterlab(lab: str) -> None:
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.set_default_timeout(1000 * TIMEOUT)
         page.goto(lab)
+        page.get_by_text("| Idle").wait_for()  # the kernel's status; before, keys are lost
         page.locator(".jp-Notebook .cm-content").first.click()
         page.keyboard.press("Shift+Enter")
         view = page.locator("[data-stage=lossless]")

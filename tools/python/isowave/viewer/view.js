@@ -12,8 +12,8 @@
 //   histogram  counts of equally wide bins, range
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, camera,
 //              isovalue, complete, passes, decoded_blocks, percent, ms, detail; and its bytes
-//   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of the
-//              volume before compression; null: there is no surface
+//   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of
+//              the volume before compression; null: there is no surface
 //   error      message, wish or null: of none
 //   closed     message, retry: whether to connect again
 //
@@ -25,15 +25,19 @@
 /** @typedef {{isovalue: number, camera: ?Camera, color: string, background: ?string,
  *    samples: number, max_error: ?number, time_budget: ?number}} State what the URL keeps */
 /** @typedef {Record<string, any>} Message */
-/** @typedef {{send: (message: Message) => void, wheel: (view: View) => boolean,
- *    hash: boolean}} Home */
+/**
+ * @typedef {{send: (message: Message) => void, wheel: (view: View) => boolean, hash: boolean,
+ *    isDark: () => boolean}} Home where a view is. wheel: whether the wheel is the view's
+ */
 
 const VERSION = 1;
+const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
 const ORBIT_STEP = Math.PI / 36; // of an arrow key
 const PAN_STEP = 0.05; // of the picture's height
 const ZOOM_STEP = 1.15;
+const DARK = "(prefers-color-scheme: dark)";
 const THUMB = 12; // width of the slider's thumb, CSS pixels
 
 // Vectors.
@@ -197,7 +201,7 @@ const HTML = `
   </section>
   <section class="iso" aria-label="Isovalue">
     <label class="number">Isovalue
-      <input name="isovalue" type="number" step="any" required></label>
+      <input name="isovalue" type="number" step="any" min="-3.4e38" max="3.4e38" required></label>
     <div class="histogram">
       <canvas aria-hidden="true"></canvas>
       <input name="slider" type="range" aria-label="Isovalue on the histogram" min="0" max="1">
@@ -224,15 +228,18 @@ const HTML = `
     <label>Surface <input name="color" type="color"></label>
     <label>Background <input name="background" type="color"></label>
     <h2>Quality</h2>
-    <label>Largest error <span class="unit"><input name="max_error" type="number" min="0.001" max="1000"
+    <label>Largest error <span class="unit"><input name="max_error" type="number"
+      min="0.001" max="1000"
       step="any" placeholder="none"> px</span></label>
     <label>Samples per pixel <select name="samples"><option value="1">1</option>
       <option value="2">4</option><option value="3">9</option><option value="4">16</option></select>
     </label>
-    <label>Time budget <span class="unit"><input name="time_budget" type="number" min="1" max="10000" step="any"
+    <label>Time budget <span class="unit"><input name="time_budget" type="number"
+      min="1" max="10000" step="any"
       placeholder="none"> ms</span></label>
     <h2>Device</h2>
-    <form class="budget"><label>Memory budget <span class="unit"><input name="budget" type="number" min="1"
+    <form class="budget"><label>Memory budget <span class="unit"><input name="budget" type="number"
+      min="1"
       max="9000000" step="1" placeholder="default"> MiB</span></label></form>
     <dl class="device"></dl>
     <h2>This picture</h2>
@@ -246,13 +253,13 @@ const HTML = `
 
 const CSS = `
 :host { display: block; container-type: size; position: relative; overflow: hidden;
-  --back: #f3f4f6; --card: #ffffff; --text: #1b2128; --soft: #55606b; --line: #d9dde2;
-  --edge: #7c8791; --accent: #0b63a5; --field: #ffffff; --bad: #a3231c; --bars: #9aa5b1;
-  color: var(--text); background: var(--back); color-scheme: light;
+  --back: light-dark(#f3f4f6, #14171a); --card: light-dark(#ffffff, #1b1f24);
+  --text: light-dark(#1b2128, #e5e9ed); --soft: light-dark(#55606b, #a2adb8);
+  --line: light-dark(#d9dde2, #30363d); --edge: light-dark(#7c8791, #7d8894);
+  --field: light-dark(#ffffff, #14171a); --accent: light-dark(#0b63a5, #74b7f0);
+  --bars: light-dark(#9aa5b1, #5c6873); --bad: light-dark(#a3231c, #ff9d92);
+  color: var(--text); background: var(--back); color-scheme: light dark;
   font: 13px/1.45 system-ui, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
-@media (prefers-color-scheme: dark) { :host { color-scheme: dark;
-  --back: #14171a; --card: #1b1f24; --text: #e5e9ed; --soft: #a2adb8; --line: #30363d;
-  --edge: #7d8894; --accent: #74b7f0; --field: #14171a; --bad: #ff9d92; --bars: #5c6873; } }
 * { box-sizing: border-box; }
 [hidden] { display: none !important; }
 .frame { display: grid; height: 100%; grid: minmax(0, 1fr) auto / minmax(0, 1fr) auto;
@@ -272,7 +279,8 @@ const CSS = `
 .iso .number { display: block; width: 104px; flex: none; }
 .iso .number input { width: 100%; margin-top: 2px; }
 .histogram { position: relative; flex: 1; min-width: 0; }
-.histogram canvas { display: block; width: 100%; height: 44px; }
+.histogram canvas { color: var(--accent); outline: 0 solid var(--bars); display: block;
+  width: 100%; height: 44px; }
 .histogram input { position: absolute; inset: 0 0 auto; width: 100%; height: 44px; margin: 0;
   appearance: none; background: none; cursor: ew-resize; border-radius: 3px; }
 .histogram input::-webkit-slider-thumb { appearance: none; width: ${THUMB}px; height: 44px;
@@ -281,7 +289,8 @@ const CSS = `
 .histogram input::-moz-range-thumb { width: ${THUMB}px; height: 44px; border: 0; border-radius: 0;
   background: linear-gradient(var(--accent), var(--accent)) center / 2px 100% no-repeat,
     radial-gradient(circle at 50% 50%, var(--accent) 5px, transparent 5.8px); }
-.ends { display: flex; padding: 0 ${THUMB / 2}px; justify-content: space-between; color: var(--soft); font-size: 11px;
+.ends { display: flex; justify-content: space-between; padding: 0 ${THUMB / 2}px;
+  color: var(--soft); font-size: 11px;
   font-variant-numeric: tabular-nums; }
 .panel { grid-area: panel; width: 268px; padding: 12px 14px; overflow: auto;
   background: var(--card); border-left: 1px solid var(--line); }
@@ -308,7 +317,8 @@ input::placeholder { color: var(--soft); opacity: 1; }
 input[type=color] { height: 26px; padding: 2px; border: 1px solid var(--edge);
   border-radius: 4px; background: var(--field); cursor: pointer; }
 input:invalid { border-color: var(--bad); outline-color: var(--bad); }
-textarea { width: 100%; height: auto; padding: 4px 8px; resize: vertical; font: 12px/1.4 ui-monospace, monospace; }
+textarea { width: 100%; height: auto; padding: 4px 8px; resize: vertical;
+  font: 12px/1.4 ui-monospace, monospace; }
 :focus-visible { outline: 2px solid var(--accent); outline-offset: 2px; }
 .picture:focus-visible, .histogram input:focus-visible { outline-offset: -2px; }
 dl { display: grid; grid-template-columns: auto 1fr; gap: 2px 10px; margin: 4px 0; }
@@ -350,7 +360,6 @@ class View {
     this.find = (selector) => this.root.querySelector(selector);
     this.picture = this.find(".picture");
     this.field = (name) => this.find(`[name=${name}]`);
-    this.dark = matchMedia("(prefers-color-scheme: dark)");
     /** @type {State} */
     this.state = { isovalue: NaN, camera: null, color: "#dbbd87", background: null, samples: 1,
       max_error: null, time_budget: null };
@@ -372,7 +381,7 @@ class View {
   connected() {
     this.shown.frame = -1;
     this.volume = null;
-    this.say("Starting …");
+    this.note("Starting …", "passing");
     this.home.send({ type: "hello", version: VERSION });
   }
 
@@ -396,7 +405,6 @@ class View {
     if (this.home.hash && head.title) document.title = `${head.title} – isowave`;
     if (!Number.isFinite(this.state.isovalue)) this.state.isovalue = head.isovalue;
     this.setRange(head.range);
-    this.note("");
     this.push();
   }
 
@@ -415,7 +423,8 @@ class View {
   showStatus(head) {
     const ready = head.state === "ready";
     this.host.dataset.state = head.state;
-    if (head.state === "starting") this.say("Preparing the device …");
+    if (head.state === "starting") this.note("Preparing the device …", "passing");
+    else this.clearNote("passing");
     this.list(".device", ready ? {
       Device: head.device,
       "Memory held": toMiB(head.memory_bytes),
@@ -434,7 +443,7 @@ class View {
       this.answered = this.failed = true;
       this.progress(100);
     }
-    this.note(head.message);
+    this.note(head.message, head.wish === null ? "error" : "drawing");
   }
 
   async showPicture(head, data) {
@@ -446,7 +455,7 @@ class View {
       if (fresh) this.draw(head, bitmap, data);
       bitmap.close();
     } catch {
-      this.note("A picture could not be read.");
+      this.note("A picture could not be read.", "drawing");
     }
     if (connection === this.connection) this.home.send({ type: "ack", frame: head.frame });
   }
@@ -471,7 +480,7 @@ class View {
   showNewest(head, data) {
     this.answered = true;
     this.failed = false;
-    this.note("");
+    this.clearNote("passing", "drawing");
     if (!this.state.camera) this.state.camera = head.camera;
     const rest = head.stage === "whole" || head.stage === "lossless";
     this.progress(rest ? 100 : head.percent ?? 50);
@@ -531,7 +540,7 @@ class View {
     if (!this.histogram || !this.range || !(width > 0)) return;
     Object.assign(canvas, { width, height });
     const context = canvas.getContext("2d");
-    const style = getComputedStyle(this.host);
+    const { color, outlineColor } = getComputedStyle(canvas); // the bars', in this scheme
     const { counts, range: [from, to] } = this.histogram;
     const [low, high] = this.range;
     const inset = (THUMB / 2) * ratio; // the thumb's middle goes from here to there
@@ -541,7 +550,7 @@ class View {
       const [a, b] = [i, i + 1].map((k) => from + ((to - from) * k) / counts.length);
       const bar = (Math.log1p(count) / most) * (height - ratio);
       const inside = b > this.state.isovalue;
-      context.fillStyle = style.getPropertyValue(inside ? "--accent" : "--bars");
+      context.fillStyle = inside ? color : outlineColor;
       context.globalAlpha = inside ? 0.55 : 1;
       context.fillRect(x(a), height - bar, Math.max(1, x(b) - x(a)), bar);
     });
@@ -555,17 +564,15 @@ class View {
     this.scheduled = requestAnimationFrame(() => {
       this.scheduled = 0;
       const waited = performance.now() - this.sentAt;
-      if (!this.answered && waited < MAX_IN_WAIT_MS) {
-        this.held = setTimeout(() => this.sendHeldBack(), MAX_IN_WAIT_MS - waited);
-      } else {
-        this.sendWish();
-      }
+      const left = (this.answered ? MIN_WAIT_MS : MAX_IN_WAIT_MS) - waited;
+      if (left > 0) this.held = setTimeout(() => this.sendHeldBack(), left);
+      else this.sendWish();
     });
   }
 
   /** What push() held back: a picture has come, or has not for long enough. */
   sendHeldBack() {
-    if (!this.held) return;
+    if (!this.held || performance.now() - this.sentAt < MIN_WAIT_MS - 1) return;
     clearTimeout(this.held);
     this.held = 0;
     this.sendWish();
@@ -595,16 +602,23 @@ class View {
   /** Changes the state, shows it, wishes for it. */
   change(changes) {
     Object.assign(this.state, changes);
+    this.clearNote("error");
     this.showState();
     this.push();
   }
 
-  move(camera) {
-    if (this.state.camera) this.change({ camera: camera(this.state.camera) });
+  /** Moves the camera, but not to where it looks nowhere. */
+  move(moved) {
+    if (!this.state.camera) return;
+    try {
+      this.change({ camera: checkCamera(moved(this.state.camera)) });
+    } catch {
+      // As near or as far as numbers go.
+    }
   }
 
   backgroundShown() {
-    return this.state.background ?? (this.dark.matches ? "#14171a" : "#ffffff");
+    return this.state.background ?? (this.home.isDark() ? "#14171a" : "#ffffff");
   }
 
   // What the elements show.
@@ -629,10 +643,20 @@ class View {
     if (this.root.activeElement !== field) field.value = value;
   }
 
-  note(text) {
+  /**
+   * @param {string} text
+   * @param {"passing" | "drawing" | "error"} kind what makes it go: the device is ready; a picture
+   *    of the newest wish; the next thing that somebody does. Passing ones give way to others.
+   */
+  note(text, kind) {
     const note = this.find(".note");
-    note.textContent = text;
-    note.hidden = !text;
+    if (kind === "passing" && !note.hidden && this.noteKind !== "passing") return;
+    Object.assign(note, { textContent: text, hidden: false });
+    this.noteKind = kind;
+  }
+
+  clearNote(...kinds) {
+    if (kinds.includes(this.noteKind)) this.find(".note").hidden = true;
   }
 
   say(text) {
@@ -665,7 +689,7 @@ class View {
     on(this.root, "keydown", (e) => e.stopPropagation()); // notebooks have keys of their own
     this.listenToPicture(on);
     this.listenToFields(on);
-    on(this.dark, "change", () => this.change({}));
+    on(matchMedia(DARK), "change", () => this.change({}));
     if (this.home.hash) {
       on(window, "hashchange", () => this.change(readHash(location.hash)));
     }
@@ -845,7 +869,7 @@ class View {
       this.change({ camera: readCamera(text) });
       return true;
     } catch (error) {
-      if (this.find("form.paste").hidden) this.note(error.message);
+      if (this.find("form.paste").hidden) this.note(error.message, "error");
       this.find(".problem").textContent = error.message;
       return false;
     }
@@ -869,7 +893,9 @@ export function connect(host, url) {
   const send = (message) => {
     if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
   };
-  const view = new View(host, { send, wheel: () => true, hash: true });
+  const view = new View(host, {
+    send, wheel: () => true, hash: true, isDark: () => matchMedia(DARK).matches,
+  });
   const open = () => {
     socket = new WebSocket(url);
     view.connection = socket;
@@ -889,7 +915,7 @@ export function connect(host, url) {
       const final = code === 1008 || code === 1003 || code === 1009;
       const wait = Math.min(10000, 250 * 2 ** failures++);
       view.note(final ? `Disconnected: ${reason || "a message was too long"}. Reload the page.`
-        : reason || "The connection is lost. Trying again …");
+        : reason || "The connection is lost. Trying again …", "drawing");
       if (!final) setTimeout(open, wait);
     };
   };
@@ -903,14 +929,17 @@ function render({ model, el }) {
   const name = crypto.getRandomValues(new Uint32Array(4)).join("-");
   const send = (message) => model.send({ view: name, message });
   const wheel = (view) => view.root.activeElement === view.picture; // else the notebook scrolls
+  const light = document.body.dataset.jpThemeLight; // JupyterLab's theme, whatever the system's
+  const isDark = () => (light ? light === "false" : matchMedia(DARK).matches);
+  if (light) host.style.colorScheme = isDark() ? "dark" : "light";
   const resize = () => { host.style.height = `${model.get("height")}px`; };
   resize();
   el.append(host);
-  const view = new View(host, { send, wheel, hash: false });
+  const view = new View(host, { send, wheel, hash: false, isDark });
   const receive = ({ view: to, message }, buffers) => {
     if (to !== name) return;
     if (message.type !== "closed") return view.receive(message, buffers?.[0]);
-    view.note(`Disconnected: ${message.message}. Run the cell again.`);
+    view.note(`Disconnected: ${message.message}. Run the cell again.`, "drawing");
   };
   model.on("msg:custom", receive);
   model.on("change:height", resize);
