@@ -323,9 +323,13 @@ def test_a_time_budget_needs_no_first_picture() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)
     eye = Eye(scene)
-    eye.wish(80.0, time_budget=50.0, max_error=0.5)
+    eye.wish(80.0, time_budget=50.0)
     run(scene)
-    assert [(f.size, f.time_budget, f.max_error) for f in volume.frames] == [((64, 48), 0.05, 0.5)]
+    assert [(f.size, f.time_budget, f.max_error) for f in volume.frames] == [((64, 48), 0.05, None)]
+    eye.ack()
+    eye.wish(80.0, max_error=0.5)
+    run(scene)
+    assert (volume.frames[-1].time_budget, volume.frames[-1].max_error) == (None, 0.5)
 
 
 def test_the_surface_fills_the_picture_where_no_camera_is_given() -> None:

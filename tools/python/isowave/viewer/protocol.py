@@ -66,7 +66,7 @@ class Wish:
     background: tuple[float, float, float]
     samples: int  # rays of a pixel along each axis
     max_error: float | None  # of the surface [pixels]; None: full detail
-    time_budget: float | None  # of a picture [ms]; None: as long as it takes
+    time_budget: float | None  # of a picture [ms], without max_error; None: as long as it takes
 
 
 @dataclass(frozen=True)
@@ -195,6 +195,8 @@ def _read_hello(content: dict[str, Any]) -> Hello:
 
 def _read_wish(content: dict[str, Any]) -> Wish:
     size = content["size"]
+    if content["max_error"] is not None and content["time_budget"] is not None:
+        raise ProtocolError("a picture keeps max_error or time_budget, not both")
     if not isinstance(size, list) or len(size) != 2:
         raise ProtocolError("size must be two integers")
     return Wish(

@@ -171,7 +171,7 @@ export function readHash(hash) {
     background: color("background"),
     samples: [1, 2, 3, 4].find((n) => n === number("samples", 1, 4)),
     max_error: number("error", 0.001, 1000),
-    time_budget: number("ms", 1, 10000),
+    time_budget: parts.has("error") ? undefined : number("ms", 1, 10000),
   };
   if (parts.has("eye")) {
     try {
@@ -602,6 +602,9 @@ class View {
   /** Changes the state, shows it, wishes for it. */
   change(changes) {
     Object.assign(this.state, changes);
+    // A frame keeps an error or a time; what was given last counts.
+    if (changes.time_budget) this.state.max_error = null;
+    else if (changes.max_error) this.state.time_budget = null;
     this.clearNote("error");
     this.showState();
     this.push();
