@@ -22,9 +22,9 @@ results=$work/top/results/a.json
 measured() { # OPTION...: into the results
   measure -o "$results" "$@" > "$work/out" || fail "$(cat "$work/out")"
 }
-measured --only frames,error,time,stability,sweep
+measured --only frames,normals,error,time,stability,sweep
 measured --only storage,sizes,detail,solvers,pareto --volumes "$top/tests/data"
-tables=(front frames error time stability leaks storage sizes detail solvers solver_frames pareto
+tables=(front frames normals error time stability leaks storage sizes detail solvers solver_frames pareto
   pareto_times)
 if [ -x "$programs/bench/peer_bench" ]; then
   measured --only peer

@@ -241,7 +241,6 @@ TEST(HostRenderer, BandsGrowFromTheTopAndCanBeStopped) {
 std::vector<WorldRay> any_rays(const glm::uvec3 &dims, std::size_t count) {
   Random random(11);
   const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
-  const auto within = [&](double least, double most) { return random.in(least, most); };
   std::vector<WorldRay> rays;
   for (std::size_t i = 0; i < count; ++i) {
     const glm::dvec3 from =
@@ -393,7 +392,7 @@ TEST(ApiHostRenderer, CastRaysInTheWorld) {
   // The surface is the plane z = 7 + 3 * 10.5.
   const std::vector<isowave::Ray> rays = {{{10, 20, 0}, {0, 0, 1}},
                                           {{10, 20, 0}, {0, 0, 10}},
-                                          {{10, 20, 100}, {0.5, 0.25, -2}},
+                                          {{10, 20, 100}, {0.25, 0.25, -2}},
                                           {{10, 20, 0}, {0, 0, -1}},
                                           {{100, 20, 0}, {0, 0, 1}}};
   const Frame hits = renderer.cast_rays(rays, 10.5f);

@@ -193,7 +193,8 @@ Frame Renderer::render(const FrameRequest &request) {
 Camera Renderer::camera(float isovalue, std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
     const std::lock_guard lock(implementation_->device->implementation().mutex);
-    return public_camera(implementation_->renderer.camera({&isovalue, 1}));
+    return public_camera(implementation_->renderer.camera(
+        {&isovalue, 1}, size ? std::optional(core_size(*size)) : std::nullopt));
   });
 }
 

@@ -6,6 +6,7 @@ SECTIONS = {
     section.__name__: section
     for section in (
         speed.frames,
+        speed.normals,
         speed.speculation,
         speed.slots,
         speed.budgets,

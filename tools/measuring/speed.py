@@ -63,6 +63,14 @@ def frames(run):
     return rows
 
 
+def normals(run):
+    return [
+        frame_row(run, field, normals=kind, cache_slots=slots_for(field))
+        for field in run.fields()
+        for kind in ("cell", "smooth")
+    ]
+
+
 def speculation(run):
     return [
         frame_row(run, run.fields()[0], speculation=kind, pipeline=pipeline)

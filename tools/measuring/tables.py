@@ -66,6 +66,26 @@ def front(rows):
         )
 
 
+def normals(rows):
+    """Each volume has a row for each kind of normals, the cells' own first."""
+    yield "volume", "normals", "cold ms", "next", "warm", "blocks decoded", "cold", "next", "warm"
+    for row in rows:
+        kind = option(row, "--normals")
+        if kind == "cell":
+            cell = row
+        more = [
+            f"{100 * (row[turn]['median'] / cell[turn]['median'] - 1):+.0f} %"
+            for turn in ("cold", "next", "warm")
+        ]
+        yield (
+            name_of(row["volume"]),
+            f"`{kind}`",
+            *thrice(row),
+            f"{row['decoded_blocks']:,.0f}",
+            *(["", "", ""] if kind == "cell" else more),
+        )
+
+
 def speculation(rows):
     yield "pipeline", "speculation", "cold ms", "next", "warm", "passes", "blocks decoded"
     for row in rows:
@@ -400,6 +420,7 @@ TABLES = {
     table.__name__: (section, table)
     for section, *tables in (
         ("frames", frames, front),
+        ("normals", normals),
         ("speculation", speculation),
         ("slots", slots),
         ("budgets", budgets),

@@ -260,6 +260,9 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["rays"] = statistics.rays;
   result["hits"] = statistics.hits;
   result["decoded_blocks"] = statistics.decoded_blocks;
+  result["normals_passes"] = statistics.normals_passes;
+  result["normals_decoded_blocks"] = statistics.normals_decoded_blocks;
+  result["normals_ms"] = statistics.normals_ms;
   result["uploaded_bytes"] = statistics.uploaded_bytes;
   result["first_level"] = statistics.first_level;
   result["last_level"] = statistics.last_level;
@@ -337,7 +340,44 @@ isowave::FrameRequest request_of(const nb::dict &options) {
   get("want_positions", request.want_positions);
   get("want_hits", request.want_hits);
   get("want_bounds", request.want_bounds);
+  bool smooth_normals = true;
+  get("smooth_normals", smooth_normals);
+  request.normals = smooth_normals ? isowave::Normals::kSmooth : isowave::Normals::kCell;
   return request;
+}
+
+/// Draws by a Renderer or a HostRenderer.
+///
+/// on_pass     called after each pass with a PassView; False from it ends the frame
+/// interrupts  signals are looked for after each pass, which waits for that
+template <class AnyRenderer>
+nb::dict draw(AnyRenderer &renderer, const nb::dict &options,
+              const std::optional<nb::callable> &on_pass, bool interrupts) {
+  isowave::FrameRequest request = request_of(options);
+  Callbacks callbacks;
+  if (on_pass || interrupts) {
+    request.on_pass = [&](const isowave::Progress &progress) {
+      bool wanted = true;
+      const bool goes_on = callbacks.run([&] {
+        if (!on_pass) return;
+        const nb::object view =
+            nb::cast(PassView{&progress, request.size.width, request.size.height});
+        const auto end = [&] { nb::cast<PassView &>(view).progress = nullptr; };
+        try {
+          const nb::object answer = (*on_pass)(view);
+          wanted = answer.is_none() || nb::cast<bool>(answer);
+        } catch (...) {
+          end();
+          throw;
+        }
+        end();
+      });
+      return goes_on && wanted;
+    };
+  }
+  isowave::Frame frame = callbacks.without_gil([&] { return renderer.render(request); });
+  callbacks.raise_again();
+  return frame_dict(std::move(frame));
 }
 
 /// A renderer, with the device that it draws on.
@@ -364,35 +404,9 @@ class PyRenderer {
     renderer_.reset(new isowave::Renderer(device_, volume.volume, wanted));
   }
 
-  /// on_pass     called after each pass with a PassView; False from it ends the frame
-  /// interrupts  signals are looked for after each pass, which waits for that
   nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
                   bool interrupts) {
-    isowave::FrameRequest request = request_of(options);
-    Callbacks callbacks;
-    if (on_pass || interrupts) {
-      request.on_pass = [&](const isowave::Progress &progress) {
-        bool wanted = true;
-        const bool goes_on = callbacks.run([&] {
-          if (!on_pass) return;
-          const nb::object view =
-              nb::cast(PassView{&progress, request.size.width, request.size.height});
-          const auto end = [&] { nb::cast<PassView &>(view).progress = nullptr; };
-          try {
-            const nb::object answer = (*on_pass)(view);
-            wanted = answer.is_none() || nb::cast<bool>(answer);
-          } catch (...) {
-            end();
-            throw;
-          }
-          end();
-        });
-        return goes_on && wanted;
-      };
-    }
-    isowave::Frame frame = callbacks.without_gil([&] { return renderer_->render(request); });
-    callbacks.raise_again();
-    return frame_dict(std::move(frame));
+    return draw(*renderer_, options, on_pass, interrupts);
   }
 
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
@@ -415,6 +429,49 @@ class PyRenderer {
  private:
   std::shared_ptr<isowave::Device> device_;
   std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>> renderer_;
+};
+
+/// Draws on the host.
+class PyHostRenderer {
+ public:
+  PyHostRenderer(const PyVolume &volume, std::uint64_t memory_limit) {
+    const nb::gil_scoped_release no_gil;
+    renderer_ = std::make_unique<isowave::HostRenderer>(
+        volume.volume, isowave::HostRendererOptions{.memory_limit = memory_limit});
+  }
+
+  nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
+                  bool interrupts) {
+    return draw(*renderer_, options, on_pass, interrupts);
+  }
+
+  /// rays [count][6]: origin and direction
+  nb::dict cast_rays(const nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig> &rays,
+                     float isovalue, bool smooth) {
+    static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
+    const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
+    isowave::Frame frame;
+    {
+      const nb::gil_scoped_release no_gil;
+      frame = renderer_->cast_rays({first, rays.shape(0)}, isovalue,
+                                   smooth ? isowave::Normals::kSmooth : isowave::Normals::kCell);
+    }
+    return frame_dict(std::move(frame));
+  }
+
+  nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
+    isowave::Camera camera;
+    {
+      const nb::gil_scoped_release no_gil;
+      camera = renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
+    }
+    return camera_tuple(camera);
+  }
+
+  std::uint64_t memory_bytes() const { return renderer_->memory_bytes(); }
+
+ private:
+  std::unique_ptr<isowave::HostRenderer> renderer_;
 };
 
 using Picture =
@@ -490,6 +547,12 @@ NB_MODULE(_core, m) {
   m.def("open", &open_volume, "path"_a, "options"_a, "dims"_a.none(), "type"_a.none(),
         "spacing"_a.none(), "progress"_a.none());
 
+  nb::class_<PyHostRenderer>(m, "HostRenderer")
+      .def(nb::init<const PyVolume &, std::uint64_t>(), "volume"_a, "memory_limit"_a)
+      .def("render", &PyHostRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
+      .def("cast_rays", &PyHostRenderer::cast_rays, "rays"_a, "isovalue"_a, "smooth"_a)
+      .def("camera", &PyHostRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
+      .def_prop_ro("memory_bytes", &PyHostRenderer::memory_bytes);
   nb::class_<PassView>(m, "PassView")
       .def_prop_ro("passes", [](const PassView &v) { return v.get().passes(); })
       .def_prop_ro("completed_percent",

@@ -185,6 +185,68 @@ def needed_options(request: dict[str, Any]) -> dict[str, Any]:
     return needed
 
 
+def is_smooth(normals: str) -> bool:
+    if normals not in ("smooth", "cell"):
+        raise ValueError(f"normals {normals!r}: give 'smooth' or 'cell'")
+    return normals == "smooth"
+
+
+def request_for(
+    isovalue: float,
+    camera: Camera,
+    size: tuple[int, int],
+    *,
+    samples: int = 1,
+    color: Color | None = None,
+    background: Color | None = None,
+    normals: str = "smooth",
+    outputs: Sequence[str] = ALL_OUTPUTS,
+    max_error: float | None = None,
+    voxel_pixels: float = 0.0,
+    voxel_error: float = 0.0,
+    time_budget: float | None = None,
+) -> dict[str, Any]:
+    """What the compiled part is asked for; arguments as Renderer.render()."""
+    return {
+        "eye": camera.eye,
+        "at": camera.at,
+        "up": camera.up,
+        "fovy_degrees": camera.fovy,
+        "isovalue": isovalue,
+        "width": size[0],
+        "height": size[1],
+        "samples": samples,
+        "surface": None if color is None else color_of(color),
+        "background": None if background is None else color_of(background),
+        "smooth_normals": is_smooth(normals),
+        "voxel_pixels": voxel_pixels,
+        "voxel_error": voxel_error,
+        "max_surface_error": max_error,
+        "time_budget_ms": None if time_budget is None else 1000 * time_budget,
+        "want_picture": "rgb" in outputs,
+        "want_depth": "depth" in outputs,
+        "want_normals": "normals" in outputs,
+        "want_positions": "position" in outputs,
+        "want_bounds": "bounds" in outputs,
+    }
+
+
+def camera_of(request: dict[str, Any]) -> Camera:
+    return Camera(request["eye"], request["at"], request["up"], request["fovy_degrees"])
+
+
+def draw(
+    renderer: _core.Renderer | _core.HostRenderer,
+    request: dict[str, Any],
+    on_pass: Callable[[Progress], bool | None] | None = None,
+    interrupts: bool = True,
+) -> dict[str, Any]:
+    """The frame's arrays. interrupts: Ctrl-C is looked for after each pass."""
+    callback = None if on_pass is None else lambda view: on_pass(Progress(view))
+    is_main = threading.current_thread() is threading.main_thread()
+    return renderer.render(request, callback, interrupts and is_main)
+
+
 class Renderer:
     """Draws frames of one volume on one device. Threads may share it: frames take turns.
 
@@ -268,6 +330,7 @@ class Renderer:
         samples: int = 1,
         color: Color | None = None,
         background: Color | None = None,
+        normals: str = "smooth",
         outputs: Sequence[str] = ALL_OUTPUTS,
         max_error: float | None = None,
         voxel_pixels: float = 0.0,
@@ -289,6 +352,9 @@ class Renderer:
             Rays of a pixel along each axis, 1 to 8; colours are their mean.
         color, background
             Of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
+        normals
+            "smooth": by central differences; "cell": of the trilinear field itself, which jump from
+            cell to cell. They light the picture.
         outputs
             Which of "rgb", "depth", "normals", "position", "bounds" are brought back.
         max_error
@@ -309,40 +375,26 @@ class Renderer:
             A request that the renderer was not made for, in one line. The next is not affected.
         """
         self._check(max_error, voxel_pixels, time_budget, outputs)
-        width, height = size or self.size
-        if camera is None:
-            camera = self.camera(isovalue, (width, height))
-        request: dict[str, Any] = {
-            "eye": camera.eye,
-            "at": camera.at,
-            "up": camera.up,
-            "fovy_degrees": camera.fovy,
-            "isovalue": isovalue,
-            "width": width,
-            "height": height,
-            "samples": samples,
-            "surface": None if color is None else color_of(color),
-            "background": None if background is None else color_of(background),
-            "voxel_pixels": voxel_pixels,
-            "voxel_error": voxel_error,
-            "max_surface_error": max_error,
-            "time_budget_ms": None if time_budget is None else 1000 * time_budget,
-            "want_picture": "rgb" in outputs,
-            "want_depth": "depth" in outputs,
-            "want_normals": "normals" in outputs,
-            "want_positions": "position" in outputs,
-            "want_bounds": "bounds" in outputs,
-        }
-        callback = None if on_pass is None else lambda view: on_pass(Progress(view))
+        picture_size = size or self.size
+        request = request_for(
+            isovalue,
+            camera or self.camera(isovalue, picture_size),
+            picture_size,
+            samples=samples,
+            color=color,
+            background=background,
+            normals=normals,
+            outputs=outputs,
+            max_error=max_error,
+            voxel_pixels=voxel_pixels,
+            voxel_error=voxel_error,
+            time_budget=time_budget,
+        )
         # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
         # pass would cost time.
-        interrupts = (
-            time_budget is None
-            and self.device["type"] != "gpu"
-            and threading.current_thread() is threading.main_thread()
-        )
-        frame = self._core.render(request, callback, interrupts)
-        return Image(frame, camera, isovalue, samples)
+        interrupts = time_budget is None and self.device["type"] != "gpu"
+        frame = draw(self._core, request, on_pass, interrupts)
+        return Image(frame, camera_of(request), isovalue, samples)
 
     def _check(
         self,
