@@ -27,7 +27,7 @@ import isowave
 from isowave.viewer import server as server_module
 from isowave.viewer import view
 from isowave.viewer.scene import Scene
-from isowave.viewer.server import Limits, Server, main, make_parser, parse_bytes, parse_size
+from isowave.viewer.server import Limits, Server, main, make_parser, parse_bytes, parse_size, serve
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
 HELLO = '{"type": "hello", "version": 1}'
@@ -362,6 +362,29 @@ def test_a_port_that_is_taken_is_one_line(server: Server) -> None:
     scene = Scene(FakeVolume(), start=False)
     with pytest.raises(OSError, match=f"port {server.port} of 127.0.0.1: Address already in use"):
         Server(scene, port=server.port)
+
+
+def test_the_browser_gets_a_url_that_works_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened, was_opened = list[str](), threading.Event()
+
+    def open_browser(url: str) -> None:
+        opened.append(url)
+        was_opened.set()
+
+    monkeypatch.setattr(server_module.webbrowser, "open", open_browser)
+    monkeypatch.setenv("DISPLAY", ":0")
+    with serve(FakeVolume(), isovalue=80) as server:
+        assert was_opened.wait(TIMEOUT)
+        assert server.token not in opened[0]
+        assert httpx.get(opened[0] + "x").status_code == 403
+        first = httpx.get(opened[0])
+        assert (first.status_code, first.headers["location"]) == (303, f"/{server.token}/")
+        assert httpx.get(opened[0]).status_code == 403
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    with serve(FakeVolume(), isovalue=80):
+        pass
+    assert len(opened) == 1  # without a display, no browser of the terminal
 
 
 def failing(options: dict[str, Any]) -> Exception:

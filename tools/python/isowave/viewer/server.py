@@ -3,6 +3,7 @@
     GET /TOKEN/          the page            GET /TOKEN/view.js   what it runs
         /TOKEN/ws        the websocket: messages as text; of the server also pictures, as bytes:
                          4 bytes length of the head (little endian), the head (JSON), the picture
+        /CODE            leads to the page, once: for a browser whose command line others can see
 
 Anything else, a wrong token and a foreign Origin are answered with 403.
 """
@@ -13,6 +14,7 @@ import argparse
 import asyncio
 import hmac
 import json
+import os
 import re
 import secrets
 import socket
@@ -87,11 +89,12 @@ class Server:
         limits: Limits = Limits(),
     ) -> None:
         self.scene = scene
+        self._codes: set[str] = set()
         self.token = token or secrets.token_urlsafe(24)
         self._socket = _listen(host, port)
         self.host, self.port = host, int(self._socket.getsockname()[1])
         config = uvicorn.Config(
-            _application(scene, self.token, limits),
+            _application(scene, self.token, self._codes, limits),
             ws_max_size=MAX_MESSAGE_BYTES,
             ws_per_message_deflate=False,
             limit_concurrency=limits.connections,
@@ -110,6 +113,12 @@ class Server:
         """Where the page is. Whoever has it may look at the volume."""
         host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/{self.token}/"
+
+    def url_for_once(self) -> str:
+        """A URL that leads to the page when it is opened first, and then no more."""
+        code = secrets.token_urlsafe(24)
+        self._codes.add(code)
+        return self.url.removesuffix(f"{self.token}/") + code
 
     def __repr__(self) -> str:
         return f"isowave viewer at {self.url}"
@@ -142,19 +151,28 @@ class Server:
 class _Gate:
     """Lets nobody in but those with the token, from a page of ours or from no page."""
 
-    def __init__(self, app: ASGIApp, token: str) -> None:
-        self._app, self._token = app, token.encode()
+    def __init__(self, app: ASGIApp, token: str, codes: set[str]) -> None:
+        self._app, self._token, self._codes = app, token.encode(), codes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             return
         if self._may_enter(scope):
             await self._app(scope, receive, send)
+        elif scope["type"] == "http" and self._takes_code(scope):
+            page = {**HEADERS, "Location": f"/{self._token.decode()}/"}
+            await Response("", 303, page)(scope, receive, send)
         elif scope["type"] == "http":
             response = Response("isowave: open the whole URL that was printed\n", 403, HEADERS)
             await response(scope, receive, send)
         else:  # before it is accepted, this is answered with 403
             await WebSocket(scope, receive, send).close()
+
+    def _takes_code(self, scope: Scope) -> bool:
+        given = str(scope["path"])[1:].encode(errors="replace")
+        known = [code for code in self._codes if hmac.compare_digest(code.encode(), given)]
+        self._codes.difference_update(known)
+        return bool(known)
 
     def _may_enter(self, scope: Scope) -> bool:
         token = str(scope["path"]).split("/")[1:2] or [""]
@@ -176,7 +194,7 @@ def _host_of(origin: str) -> str | None:
     return parts.netloc.lower() if parts.scheme in ("http", "https") else None
 
 
-def _application(scene: Scene, token: str, limits: Limits) -> ASGIApp:
+def _application(scene: Scene, token: str, codes: set[str], limits: Limits) -> ASGIApp:
     def page(request: Request) -> Response:
         policy = POLICY.format(host=request.headers["host"])
         headers = {**HEADERS, "Content-Security-Policy": policy}
@@ -199,7 +217,7 @@ def _application(scene: Scene, token: str, limits: Limits) -> ASGIApp:
             Route("/{rest:path}", nothing),
         ]
     )
-    return _Gate(app, token)
+    return _Gate(app, token, codes)
 
 
 class _Connection:
@@ -315,13 +333,15 @@ def serve(
     open_browser: bool = True,
     **options: Any,
 ) -> Server:
-    """Serves a view of a volume and opens it in a browser.
+    """Serves a view of a volume and opens it in a browser, where there is a display.
 
     options  as for Scene: isovalue, title, device, memory_budget, size, samples, max_clients
     """
     server = Server(Scene(volume, **options), host=host, port=port)
-    if open_browser:
-        threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+    # Without a display, Python would open a browser of the terminal.
+    if open_browser and any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")):
+        url = server.url_for_once()
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     return server
 
 
@@ -406,6 +426,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"isowave view: {str(error).splitlines()[0]}", file=sys.stderr)
         return 1
     print(f"{server.url}\nCtrl-C ends it.", flush=True)
+    if "SSH_CONNECTION" in os.environ:
+        way = f"{server.port}:127.0.0.1:{server.port}"
+        print(f"From your machine: ssh -N -L {way} {socket.gethostname()}", flush=True)
     failure = wait_and_close(server)
     if failure is not None:
         print(f"isowave view: {failure}", file=sys.stderr)
