@@ -1,0 +1,86 @@
+"""Looks at a volume: in a browser (`isowave[view]`) or in a notebook (`isowave[notebook]`)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .interfaces import VolumeLike
+    from .server import Server
+    from .widget import Widget
+
+__all__ = ["main", "view"]
+
+
+def view(
+    volume: VolumeLike,
+    *,
+    notebook: bool | None = None,
+    block: bool | None = None,
+    **options: Any,
+) -> Widget | Server | None:
+    """Shows a volume: as a widget in a notebook, elsewhere in a browser tab.
+
+    notebook  whether to make a widget; None: where a Jupyter kernel runs and anywidget is there
+    block     in a browser: whether to return only when Ctrl-C ends it, and then None;
+              None: unless Python is interactive
+    options   isovalue     at first; None: the one that divides the histogram best
+              device, memory_budget [bytes], size (width, height) [pixels], samples: as for Renderer
+              title        above the picture
+              max_clients  that look at the same time
+              height       of the widget [CSS pixels]
+              host, port, open_browser: of the server; port 0: a free one
+
+    Raises ImportError with the command that installs what is missing; RuntimeError where it blocks
+    and the volume cannot be drawn.
+    """
+    if notebook is None:
+        notebook = _in_notebook()
+    if notebook:
+        try:
+            from . import widget
+        except ImportError as error:
+            raise ImportError(_missing(error, "notebook")) from None
+        return widget.show(volume, **options)
+    try:
+        from . import server
+    except ImportError as error:
+        raise ImportError(_missing(error, "view")) from None
+    served = server.serve(volume, **options)
+    print(served.url, flush=True)
+    if block is False or (block is None and _is_interactive()):
+        return served
+    failure = server.wait_and_close(served)
+    if failure is not None:
+        raise RuntimeError(failure)
+    return None
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command `isowave view`. Returns its exit status."""
+    try:
+        from .server import main as run
+    except ImportError as error:
+        print(f"isowave view: {_missing(error, 'view')}", file=sys.stderr)
+        return 1
+    return run(argv)
+
+
+def _missing(error: ImportError, extra: str) -> str:
+    return f"{error.name or error} is missing: pip install 'isowave[{extra}]'"
+
+
+def _is_interactive() -> bool:
+    return bool(hasattr(sys, "ps1") or sys.flags.interactive or "IPython" in sys.modules)
+
+
+def _in_notebook() -> bool:
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython is not None else None
+    if getattr(shell, "kernel", None) is None:
+        return False
+    from importlib.util import find_spec
+
+    return find_spec("anywidget") is not None

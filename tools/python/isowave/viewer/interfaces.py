@@ -1,0 +1,95 @@
+"""What the viewer needs of isowave's classes. Tests have others that do as much."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class ImageLike(Protocol):
+    """What the viewer needs of isowave.Image."""
+
+    @property
+    def rgb(self) -> NDArray[np.uint8] | None: ...
+    @property
+    def statistics(self) -> Mapping[str, Any]: ...
+    @property
+    def complete(self) -> bool: ...
+    @property
+    def depth(self) -> NDArray[np.float32] | None: ...
+    @property
+    def bounds(self) -> NDArray[np.float32] | None: ...
+
+
+class ProgressLike(Protocol):
+    """What the viewer needs of what on_pass gets."""
+
+    @property
+    def passes(self) -> int: ...
+    @property
+    def completed_percent(self) -> float: ...
+    @property
+    def rgb(self) -> NDArray[np.uint8]: ...
+
+
+class CameraLike(Protocol):
+    """What the viewer needs of isowave.Camera."""
+
+    @property
+    def eye(self) -> tuple[float, float, float]: ...
+    @property
+    def at(self) -> tuple[float, float, float]: ...
+    @property
+    def up(self) -> tuple[float, float, float]: ...
+    @property
+    def fovy(self) -> float: ...
+
+
+class RendererLike(Protocol):
+    """What the viewer needs of isowave.Renderer."""
+
+    @property
+    def device(self) -> Mapping[str, Any]: ...
+    @property
+    def memory_bytes(self) -> int: ...
+    def camera(self, isovalue: float, size: tuple[int, int]) -> CameraLike: ...
+    def render(
+        self,
+        isovalue: float,
+        *,
+        camera: Any,
+        size: tuple[int, int],
+        samples: int,
+        color: tuple[float, float, float],
+        background: tuple[float, float, float],
+        outputs: Sequence[str],
+        max_error: float | None,
+        time_budget: float | None,
+        on_pass: Callable[[Any], bool] | None,
+    ) -> ImageLike: ...
+
+
+class VolumeLike(Protocol):
+    """What the viewer needs of isowave.Volume."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]: ...
+    @property
+    def spacing(self) -> tuple[float, float, float]: ...
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+    @property
+    def value_range(self) -> tuple[float, float]: ...
+    @property
+    def nbytes(self) -> int: ...
+    @property
+    def bits_per_voxel(self) -> float: ...
+    @property
+    def max_error(self) -> float | None: ...
+    @property
+    def num_levels(self) -> int: ...
+    def histogram(self, bins: int = 256) -> tuple[NDArray[Any], NDArray[Any]]: ...
+    def renderer(self, **options: Any) -> RendererLike: ...

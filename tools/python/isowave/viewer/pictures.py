@@ -1,0 +1,77 @@
+"""Sizes, encodings and first isovalues: what the scene computes without a renderer."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as pillow
+
+JPEG_QUALITY: Final = 70
+
+
+def count_rays(size: tuple[int, int], samples: int) -> int:
+    """Rays of a picture: samples x samples a pixel."""
+    return size[0] * size[1] * samples * samples
+
+
+def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, int]:
+    """The size [pixels], made smaller in its shape where it has more rays than there may be."""
+    if count_rays(size, samples) <= max_rays:
+        return size
+    scale = math.sqrt(max_rays / count_rays(size, samples))
+    width, height = (max(1, int(side * scale)) for side in size)
+    # A side of one pixel cannot become smaller: the other one makes up for it.
+    limit = max(1, max_rays // (samples * samples))
+    return max(1, min(width, limit // height)), max(1, min(height, limit))
+
+
+def dividing_value(counts: Sequence[int], low: float, high: float) -> float:
+    """The value that divides a histogram into two classes of the least variance (Otsu 1979).
+
+    counts  of equally wide bins from low to high
+    """
+    weights = np.asarray(counts, np.float64)
+    edges = np.linspace(low, high, len(weights) + 1)
+    middles = (edges[:-1] + edges[1:]) / 2
+    below, above = np.cumsum(weights)[:-1], np.cumsum(weights[::-1])[::-1][1:]
+    sums = np.cumsum(weights * middles)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = below * above * (sums[:-1] / below - (sums[-1] - sums[:-1]) / above) ** 2
+    between = np.where(np.isfinite(between), between, -1.0)
+    if len(between) == 0 or between.max() <= 0:
+        return float((low + high) / 2)
+    # An empty stretch divides equally well anywhere: its middle is farthest from both classes.
+    best = np.flatnonzero(between >= between.max() * (1 - 1e-12))
+    return float((edges[best[0] + 1] + edges[best[-1] + 1]) / 2)
+
+
+def share_within(
+    depth: NDArray[np.float32], bounds: NDArray[np.float32], limit: float
+) -> float | None:
+    """The share of the rays with a surface, or perhaps one, that are off by at most `limit`.
+
+    depth, bounds  as in Image
+    Returns None where there is no such ray.
+    """
+    surface = np.isfinite(depth) | (bounds > 0)
+    count = int(np.count_nonzero(surface))
+    return float(np.count_nonzero(bounds[surface] <= limit)) / count if count else None
+
+
+def encode_jpeg(rgb: NDArray[np.uint8]) -> bytes:
+    """A picture on the way. rgb: uint8 [h, w, 3]."""
+    stream = io.BytesIO()
+    pillow.fromarray(rgb).save(stream, "jpeg", quality=JPEG_QUALITY)
+    return stream.getvalue()
+
+
+def encode_png(rgb: NDArray[np.uint8]) -> bytes:
+    """The lossless picture. rgb: uint8 [h, w, 3]."""
+    stream = io.BytesIO()
+    pillow.fromarray(rgb).save(stream, "png", compress_level=1)
+    return stream.getvalue()

@@ -1,0 +1,234 @@
+"""The messages of the viewer: what a front end (view.js) may say, and what makes it be refused.
+
+A front end sends JSON objects; `parse` and `check` turn them into the classes below or raise
+`ProtocolError`, whose text is one line that a person can read. Anything that is not exactly one of
+these messages is an error: unknown and missing keys, NaN, numbers out of range, a camera that
+looks nowhere.
+
+    {"type": "hello", "version": 1}
+    {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
+     "color": [r, g, b], "background": [r, g, b], "samples": 1, "max_error": 0.5 | null,
+     "time_budget": 100 | null}
+    {"type": "ack", "frame": 3}
+    {"type": "budget", "bytes": 600000000 | null}
+
+Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, error;
+view.js describes them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+VERSION: Final = 1
+MAX_MESSAGE_BYTES: Final = 8192
+MAX_SIDE: Final = 8192  # pixels of a picture along each axis
+MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
+MAX_TIME_BUDGET: Final = 10_000  # ms; a frame with one is not cancelled, others wait for it
+MAX_FLOAT32: Final = 3.4028234663852886e38
+MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
+MAX_ID: Final = 2**53 - 1  # what JavaScript counts to
+
+
+class ProtocolError(ValueError):
+    """A message that no front end of ours sends. Its text says why, in one line."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera, in world space (x, y, z). fovy: the full vertical angle [degrees]."""
+
+    eye: tuple[float, float, float]
+    at: tuple[float, float, float]
+    up: tuple[float, float, float]
+    fovy: float
+
+
+@dataclass(frozen=True)
+class Hello:
+    """The first message of a front end."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a front end wants to see. Of a client's wishes only the newest counts."""
+
+    id: int  # grows with each wish of a client
+    isovalue: float
+    size: tuple[int, int]  # width, height [pixels]
+    view: View | None  # None: the view in which the surface fills the picture
+    color: tuple[float, float, float]  # of the surface, sRGB, 0 to 1
+    background: tuple[float, float, float]
+    samples: int  # rays of a pixel along each axis
+    max_error: float | None  # of the surface [pixels]; None: full detail
+    time_budget: float | None  # of a picture [ms], without max_error; None: as long as it takes
+
+
+@dataclass(frozen=True)
+class Ack:
+    """The front end has shown the picture with this number, or left it out for a newer one."""
+
+    frame: int
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A new memory budget for the renderer, which all clients share. None: the default one."""
+
+    bytes: int | None
+
+
+Message = Hello | Wish | Ack | Budget
+
+
+class TokenBucket:
+    """Limits how often something happens: `rate` times a second, `burst` times at once."""
+
+    def __init__(
+        self, rate: float, burst: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._rate, self._burst, self._clock = rate, burst, clock
+        self._tokens, self._then = burst, clock()
+
+    def take(self) -> bool:
+        """Whether it may happen now."""
+        now = self._clock()
+        self._tokens = min(self._burst, self._tokens + (now - self._then) * self._rate)
+        self._then = now
+        if self._tokens < 1:
+            return False
+        self._tokens -= 1
+        return True
+
+
+def parse(text: str) -> dict[str, Any]:
+    """A message's JSON object, still to be checked. Raises ProtocolError."""
+    if len(text) > MAX_MESSAGE_BYTES or len(text.encode("utf-8", "replace")) > MAX_MESSAGE_BYTES:
+        raise ProtocolError(f"a message is longer than {MAX_MESSAGE_BYTES} bytes")
+    try:
+        content = json.loads(text, parse_constant=_no_constant, object_pairs_hook=_no_duplicates)
+    except ProtocolError:
+        raise
+    except (ValueError, RecursionError):
+        raise ProtocolError("a message is not JSON") from None
+    if not isinstance(content, dict):
+        raise ProtocolError("a message is not a JSON object")
+    return content
+
+
+def check(content: object) -> Message:
+    """The message that a JSON object is. Raises ProtocolError."""
+    if not isinstance(content, dict):
+        raise ProtocolError("a message is not an object")
+    kind = content.get("type")
+    reader = _READERS.get(kind) if isinstance(kind, str) else None
+    if reader is None:
+        raise ProtocolError("a message has no known type")
+    keys, read = reader
+    if content.keys() != keys.keys():
+        raise ProtocolError(f"a message of type {kind} has other keys than {', '.join(keys)}")
+    return read(content)
+
+
+def _no_constant(name: str) -> object:
+    raise ProtocolError(f"a message contains {name}")
+
+
+def _no_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(pairs)
+    if len(result) != len(pairs):
+        raise ProtocolError("a message contains a key twice")
+    return result
+
+
+def _integer(value: object, low: int, high: int, what: str) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+        raise ProtocolError(f"{what} must be an integer from {low} to {high}")
+    return value
+
+
+def _number(value: object, low: float, high: float, what: str) -> float:
+    # Python's integers have no bounds: they are compared before they become floats.
+    if not isinstance(value, (int, float)) or isinstance(value, bool) or not low <= value <= high:
+        raise ProtocolError(f"{what} must be a number from {low:g} to {high:g}")
+    return float(value)
+
+
+def _triple(value: object, low: float, high: float, what: str) -> tuple[float, float, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise ProtocolError(f"{what} must be three numbers")
+    x, y, z = (_number(v, low, high, what) for v in value)
+    return x, y, z
+
+
+def _view(value: object) -> View | None:
+    if value is None:
+        return None
+    if not isinstance(value, dict) or value.keys() != {"eye", "at", "up", "fovy_deg"}:
+        raise ProtocolError("camera must have eye, at, up and fovy_deg, and nothing else")
+    eye, at, up = (_triple(value[k], -MAX_LENGTH, MAX_LENGTH, k) for k in ("eye", "at", "up"))
+    fovy = _number(value["fovy_deg"], 1e-3, 179.999, "fovy_deg")
+    forward = tuple(a - e for a, e in zip(at, eye))
+    length, height = math.hypot(*forward), math.hypot(*up)
+    if length <= 1e-12 * max(map(abs, at + eye)) or length == 0:
+        raise ProtocolError("camera: eye and at are the same point")
+    cosine = sum(f / length * (u / height if height else 0) for f, u in zip(forward, up))
+    if height == 0 or abs(cosine) > 1 - 1e-12:
+        raise ProtocolError("camera: up is parallel to the view, or zero")
+    return View(eye, at, up, fovy)
+
+
+def _optional(value: object, low: float, high: float, what: str) -> float | None:
+    return None if value is None else _number(value, low, high, what)
+
+
+def _read_hello(content: dict[str, Any]) -> Hello:
+    if _integer(content["version"], 0, MAX_ID, "version") != VERSION:
+        raise ProtocolError("the page is of another version of isowave: reload it")
+    return Hello()
+
+
+def _read_wish(content: dict[str, Any]) -> Wish:
+    size = content["size"]
+    if content["max_error"] is not None and content["time_budget"] is not None:
+        raise ProtocolError("a picture keeps max_error or time_budget, not both")
+    if not isinstance(size, list) or len(size) != 2:
+        raise ProtocolError("size must be two integers")
+    return Wish(
+        id=_integer(content["id"], 0, MAX_ID, "id"),
+        isovalue=_number(content["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
+        size=(_integer(size[0], 1, MAX_SIDE, "size"), _integer(size[1], 1, MAX_SIDE, "size")),
+        view=_view(content["camera"]),
+        color=_triple(content["color"], 0, 1, "color"),
+        background=_triple(content["background"], 0, 1, "background"),
+        samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
+        max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
+        time_budget=_optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget"),
+    )
+
+
+def _read_ack(content: dict[str, Any]) -> Ack:
+    return Ack(_integer(content["frame"], 0, MAX_ID, "frame"))
+
+
+def _read_budget(content: dict[str, Any]) -> Budget:
+    value = content["bytes"]
+    return Budget(None if value is None else _integer(value, 1, MAX_ID, "bytes"))
+
+
+_READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Message]]]] = {
+    "hello": (dict.fromkeys(("type", "version")), _read_hello),
+    "wish": (
+        dict.fromkeys(
+            "type id isovalue size camera color background samples max_error time_budget".split()
+        ),
+        _read_wish,
+    ),
+    "ack": (dict.fromkeys(("type", "frame")), _read_ack),
+    "budget": (dict.fromkeys(("type", "bytes")), _read_budget),
+}

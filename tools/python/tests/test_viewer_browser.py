@@ -1,0 +1,664 @@
+"""The page in headless Chromium, driven as a person would.
+
+ISOWAVE_CHROMIUM     the browser; else `chromium` of the PATH
+ISOWAVE_SCREENSHOTS  a folder for pictures of the page, to be looked at
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import os
+import shutil
+import struct
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from viewer_fakes import FakeCamera, FakeVolume
+
+from isowave import viewer
+from isowave.viewer.scene import Scene
+from isowave.viewer.server import Server
+
+playwright = pytest.importorskip("playwright.sync_api")
+CHROMIUM = os.environ.get("ISOWAVE_CHROMIUM") or shutil.which("chromium")
+if not CHROMIUM:
+    pytest.skip("no Chromium: apt-get install chromium", allow_module_level=True)
+
+WIDTH, HEIGHT = 1000, 640
+# Tells which pictures were shown, from the beginning.
+WATCH = """
+window.shownPictures = [];
+document.addEventListener("isowave:shown", (e) => window.shownPictures.push(e.detail));
+"""
+DRAWN = "() => document.querySelector('main').shadowRoot.querySelector('.picture').toDataURL()"
+
+
+def fake_scene(volume: FakeVolume, **options: Any) -> Scene:
+    return Scene(
+        volume,
+        isovalue=80,
+        title="ball.nrrd",
+        make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy),
+        **options,
+    )
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    with Server(fake_scene(FakeVolume())) as server:
+        yield server
+
+
+@pytest.fixture
+def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
+    """Opens pages, each with a browser context of its own, and closes them."""
+    contexts = []
+
+    def open_page(**options: Any) -> Any:
+        options.setdefault("viewport", {"width": WIDTH, "height": HEIGHT})
+        context = browser.new_context(accept_downloads=True, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.add_init_script(WATCH)
+        page.set_default_timeout(60000)  # for machines that are busy with other things
+        page.problems, page.requested = [], []
+        page.on("console", lambda m: m.type == "error" and page.problems.append(m.text))
+        page.on("pageerror", lambda e: page.problems.append(str(e)))
+        page.on("request", lambda r: page.requested.append(r.url))
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+
+
+def rests(page: Any) -> None:
+    """Waits until the lossless picture of the last wish is shown and nothing is wished for."""
+    page.wait_for_function(
+        """() => {
+        const { wish, shown, stage } = document.querySelector("main").dataset;
+        if (wish !== window.lastWish) { window.lastWish = wish; return false; }
+        return wish === shown && stage === "lossless";
+    }""",
+        polling=60,
+    )
+
+
+@pytest.fixture
+def page(open_page: Callable[..., Any], server: Server) -> Any:
+    page = open_page()
+    page.goto(server.url)
+    rests(page)
+    return page
+
+
+def keep(page: Any, name: str) -> None:
+    folder = os.environ.get("ISOWAVE_SCREENSHOTS")
+    if folder:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=str(Path(folder) / f"{name}.png"))
+
+
+def drag(page: Any, dx: float, dy: float, **how: Any) -> None:
+    page.mouse.move(300, 250)
+    page.mouse.down(**how)
+    page.mouse.move(300 + dx, 250 + dy, steps=5)
+    page.mouse.up(**how)
+
+
+def changes(page: Any, act: Callable[[], None]) -> bool:
+    """Whether the picture is another one after something was done."""
+    before = page.evaluate(DRAWN)
+    act()
+    page.wait_for_timeout(100)  # what is done becomes a wish with the next frame of the page
+    rests(page)
+    return bool(page.evaluate(DRAWN) != before)
+
+
+def state(page: Any) -> dict[str, str]:
+    hash_text = page.evaluate("location.hash").lstrip("#")
+    return dict(part.split("=") for part in hash_text.split("&"))
+
+
+def eye(page: Any) -> np.ndarray[Any, Any]:
+    return np.array([float(x) for x in state(page)["eye"].split(",")])
+
+
+def test_the_page_loads_without_errors_or_foreign_requests(
+    page: Any, server: Server, record_property: Callable[[str, object], None]
+) -> None:
+    keep(page, "page")
+    assert page.problems == []
+    origin = f"http://127.0.0.1:{server.port}/{server.token}/"
+    assert page.requested and all(u.startswith((origin, "data:")) for u in page.requested)
+    assert page.title() == "ball.nrrd – isowave"
+    first_ms = page.evaluate("document.querySelector('main').dataset.firstMs")
+    record_property("first_picture_ms", first_ms)
+    stages = [p["stage"] for p in page.evaluate("window.shownPictures")]
+    assert stages[0] == "first" and stages[-2:] == ["whole", "lossless"]
+
+
+def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Screenshot").click()
+    assert download.value.suggested_filename == "isowave_80.png"
+    shot = Image.open(io.BytesIO(Path(download.value.path()).read_bytes()))
+    assert shot.format == "PNG"
+    volume = FakeVolume()
+    renderer = volume.renderer(device=None, size=shot.size, samples=1)
+    names = ("eye", "at", "up")
+    at = {k: tuple(float(x) for x in state(page)[k].split(",")) for k in names}
+    expected = renderer.render(
+        80.0,
+        camera=FakeCamera(at["eye"], at["at"], at["up"], float(state(page)["fovy"])),  # type: ignore
+        size=shot.size,
+        samples=1,
+        color=(0xDB / 255, 0xBD / 255, 0x87 / 255),
+        background=(1, 1, 1),
+        outputs=("rgb",),
+        max_error=None,
+        time_budget=None,
+        on_pass=lambda image: True,
+    )
+    difference = np.asarray(shot).astype(int) - expected.rgb
+    # The URL keeps nine digits of the camera: a ray in a million may cross a border of the ball.
+    assert np.count_nonzero(np.abs(difference).max(axis=2) > 1) <= 3
+
+
+def test_a_drag_turns_the_surface(
+    page: Any, record_property: Callable[[str, object], None]
+) -> None:
+    before = eye(page)
+    assert changes(page, lambda: drag(page, 120, 40))
+    record_property(
+        "first_picture_ms", page.evaluate("document.querySelector('main').dataset.firstMs")
+    )
+    centre = np.full(3, 31.5)
+    assert np.linalg.norm(eye(page) - centre) == pytest.approx(np.linalg.norm(before - centre))
+    # What is dragged to the right and down is seen from further left and above.
+    assert eye(page)[0] < before[0] and eye(page)[1] > before[1]
+    keep(page, "turned")
+
+
+def test_other_drags_move_the_surface(page: Any) -> None:
+    before = eye(page)
+    assert changes(page, lambda: drag(page, 80, 0, button="right"))
+    moved = eye(page)
+    assert moved[0] < before[0] and moved[1:] == pytest.approx(before[1:])
+    page.keyboard.down("Shift")
+    assert changes(page, lambda: drag(page, -80, 0))
+    page.keyboard.up("Shift")
+    assert eye(page) == pytest.approx(before, abs=1e-5)
+
+
+def test_the_wheel_zooms_and_a_double_click_resets(page: Any) -> None:
+    home, picture = eye(page), page.evaluate(DRAWN)
+
+    def wheel() -> None:
+        page.mouse.move(300, 300)
+        page.mouse.wheel(0, -300)
+
+    assert changes(page, wheel)
+    assert abs(eye(page)[2] - 31.5) < abs(home[2] - 31.5)
+    assert changes(page, lambda: page.mouse.dblclick(300, 300))
+    assert page.evaluate(DRAWN) == picture
+    assert eye(page) == pytest.approx(home)
+
+
+def test_keys_do_all_that_the_mouse_does(page: Any) -> None:
+    home, picture = eye(page), page.evaluate(DRAWN)
+    page.get_by_role("application").focus()
+    for keys in ("ArrowLeft", "ArrowUp", "Shift+ArrowRight", "+", "-", "+"):
+        assert changes(page, lambda: page.keyboard.press(keys)), keys
+    assert changes(page, lambda: page.keyboard.press("0"))
+    assert page.evaluate(DRAWN) == picture and eye(page) == pytest.approx(home)
+    assert not changes(page, lambda: page.keyboard.press("x"))
+
+
+def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> None:
+    page.evaluate("document.activeElement.blur()")
+    seen = []
+    focused = """() => {
+        const e = document.querySelector("main").shadowRoot.activeElement;
+        if (!e) return null;
+        const style = getComputedStyle(e);
+        const named = e.ariaLabel || e.labels?.[0]?.innerText || e.innerText || e.title;
+        return { name: e.name || e.className || e.localName, label: Boolean(named?.trim()),
+          visible: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2 };
+    }"""
+    for _ in range(30):
+        page.keyboard.press("Tab")
+        at = page.evaluate(focused)
+        if at is None:
+            break
+        assert at["label"] and at["visible"], at
+        seen.append(at["name"])
+    expected = "picture toggle isovalue slider reset shot copy paste color background max_error"
+    expected += " samples time_budget budget summary"
+    assert seen == expected.split()
+
+
+def test_the_slider_and_the_number_are_one(page: Any) -> None:
+    slider = page.get_by_label("Isovalue on the histogram")
+    number = page.get_by_label("Isovalue", exact=True).last
+    slider.focus()
+    assert changes(page, lambda: page.keyboard.press("ArrowRight"))
+    assert state(page)["iso"] == "81" and number.input_value() == "81"
+    box = slider.bounding_box()
+
+    def click_at_a_third() -> None:
+        page.mouse.click(box["x"] + 6 + (box["width"] - 12) / 3, box["y"] + 20)
+
+    assert changes(page, click_at_a_third)
+    assert state(page)["iso"] == "85"
+    assert changes(page, lambda: number.fill("100.5"))
+    assert state(page)["iso"] == "100.5"
+    assert abs(float(slider.input_value()) - 100.5) <= 0.5
+    # What is no number is no wish, and is marked.
+    wish = page.evaluate("document.querySelector('main').dataset.wish")
+    number.fill("")
+    page.wait_for_timeout(100)
+    assert page.evaluate("document.querySelector('main').dataset.wish") == wish
+    assert number.evaluate("e => e.matches(':invalid')")
+
+
+def test_colours_and_quality(page: Any) -> None:
+    assert changes(page, lambda: page.get_by_label("Surface", exact=True).fill("#3366cc"))
+    assert changes(page, lambda: page.get_by_label("Background").fill("#203040"))
+    keep(page, "colours")
+
+    def quality() -> None:
+        page.get_by_label("Largest error").fill("0.5")
+        page.keyboard.press("Enter")
+        page.get_by_label("Samples per pixel").select_option("4")
+
+    quality()
+    page.wait_for_timeout(100)
+    rests(page)
+    assert {**state(page), "color": "3366cc", "background": "203040"} == state(page)
+    assert [state(page)[k] for k in ("samples", "error")] == ["2", "0.5"]
+    assert "4 rays a pixel" in page.locator(".facts").inner_text()
+    assert "within 0.5 px" in page.locator(".facts").inner_text()
+    # A frame keeps an error or a time; what was given last counts.
+    page.get_by_label("Time budget").fill("200")
+    page.keyboard.press("Enter")
+    page.wait_for_timeout(100)
+    rests(page)
+    assert state(page)["ms"] == "200" and "error" not in state(page)
+    assert page.get_by_label("Largest error").input_value() == ""
+
+
+def test_three_clients_keep_their_isovalues(open_page: Callable[..., Any], server: Server) -> None:
+    pages = [open_page() for _ in range(3)]
+    camera = "eye=31.5,31.5,120&at=31.5,31.5,31.5&up=0,1,0&fovy=60"
+    for page, isovalue in zip(pages, (40, 90, 140)):
+        page.goto(f"{server.url}#iso={isovalue}&{camera}")
+    for page in pages:
+        rests(page)
+    before = [page.evaluate(DRAWN) for page in pages]
+    assert len(set(before)) == 3
+    # One changes, the others stay as they are; and their slider, too.
+    drag(pages[0], 60, 60)
+    pages[0].get_by_label("Isovalue", exact=True).last.fill("60")
+    pages[0].wait_for_timeout(100)
+    rests(pages[0])
+    for page, isovalue, picture in list(zip(pages, (60, 90, 140), before))[1:]:
+        assert page.evaluate(DRAWN) == picture
+        assert state(page)["iso"] == str(isovalue)
+    assert state(pages[0])["iso"] == "60"
+    assert server.scene.num_clients >= 3
+
+
+def test_stale_pictures_are_never_shown_after_fresh_ones(page: Any) -> None:
+    page.mouse.move(200, 200)
+    page.mouse.down()
+    for i in range(60):
+        page.mouse.move(200 + 5 * i, 200 + 3 * (i % 20))
+    page.mouse.up()
+    slider = page.get_by_label("Isovalue on the histogram")
+    slider.focus()
+    for i in range(30):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(100)
+    rests(page)
+    shown = [(p["wish"], p["frame"]) for p in page.evaluate("window.shownPictures")]
+    assert shown == sorted(set(shown)) and len(shown) > 5
+    assert state(page)["iso"] == "110"
+
+
+def test_the_page_itself_leaves_out_stale_pictures(open_page: Callable[..., Any]) -> None:
+    """A server that sends pictures in a wrong order: this test."""
+    page, sockets, acks = open_page(), list[Any](), list[int]()
+
+    def take(socket: Any, text: str) -> None:
+        message = json.loads(text)
+        if message["type"] == "hello":
+            sockets.append(socket)
+            socket.send(json.dumps({
+                "type": "welcome", "shape": [2, 2, 2], "spacing": [1, 1, 1], "dtype": "uint8",
+                "range": [0, 255], "bits_per_voxel": 8, "isovalue": 1, "title": "",
+            }))  # fmt: skip
+        elif message["type"] == "ack":
+            acks.append(message["frame"])
+
+    def picture(wish: int, frame: int, stage: str = "first") -> bytes:
+        camera = {"eye": [0, 0, 9], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_deg": 60}
+        head = {"type": "picture", "wish": wish, "frame": frame, "stage": stage}
+        head |= {"format": "png", "size": [4, 4], "samples": 1, "camera": camera, "isovalue": 1}
+        head |= {"complete": True, "ms": 1, "passes": 1, "percent": None, "detail": None}
+        data, text = io.BytesIO(), json.dumps(head).encode()
+        Image.new("RGB", (4, 4), (wish, frame, 0)).save(data, "png")
+        return struct.pack("<I", len(text)) + text + data.getvalue()
+
+    page.route_web_socket("**/ws", lambda s: s.on_message(lambda text: take(s, text)))
+    answer_from_files(page, "http://viewer.test/")
+    page.goto("http://viewer.test/")
+    page.wait_for_function("document.querySelector('main')?.dataset.wish === '1'")
+    order = [(1, 1), (1, 3), (1, 2), (1, 3), (2, 5), (1, 6), (2, 4), (2, 8)]
+    for wish, frame in order:
+        sockets[0].send(picture(wish, frame))
+    sockets[0].send(struct.pack("<I", 2) + b"{}")  # nothing that is known
+    page.wait_for_function("window.shownPictures.at(-1)?.frame === 8")
+    shown = [(p["wish"], p["frame"]) for p in page.evaluate("window.shownPictures")]
+    assert shown == sorted(set(shown)) and set(shown) <= set(order)
+    assert (1, 6) not in shown and (2, 4) not in shown
+    # What was left out is acknowledged, too.
+    page.wait_for_timeout(200)
+    assert sorted(acks) == sorted(frame for _, frame in order)
+
+
+def answer_from_files(page: Any, url: str) -> None:
+    root = Path(viewer.__file__).parent
+
+    def answer(route: Any) -> None:
+        script = route.request.url.endswith(".js")
+        route.fulfill(
+            body=(root / ("view.js" if script else "page.html")).read_text(),
+            content_type="text/javascript" if script else "text/html",
+        )
+
+    page.route(url + "**", answer)
+
+
+def test_the_url_restores_the_state(
+    page: Any, open_page: Callable[..., Any], server: Server
+) -> None:
+    assert changes(page, lambda: drag(page, 90, -50))
+    assert changes(page, lambda: page.get_by_label("Isovalue", exact=True).last.fill("120"))
+    url, picture, was = page.url, page.evaluate(DRAWN), state(page)
+    page.reload()
+    rests(page)
+    assert state(page) == was and page.evaluate(DRAWN) == picture
+    other = open_page()
+    other.goto(url)
+    rests(other)
+    assert state(other) == was and other.evaluate(DRAWN) == picture
+    # A hash that is typed while the page is open, too; and nonsense is left out.
+    page.evaluate("location.hash = '#iso=33&eye=1,2&samples=99&color=red&error=-1'")
+    page.wait_for_timeout(100)
+    rests(page)
+    assert state(page)["iso"] == "33" and page.problems == []
+
+
+def test_cameras_are_copied_and_pasted(page: Any) -> None:
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    picture = page.evaluate(DRAWN)
+    page.get_by_role("button", name="Copy camera").click()
+    page.get_by_text("Copied").first.wait_for()
+    text = page.evaluate("navigator.clipboard.readText()")
+    file = json.loads(text)
+    assert file["fovy_deg"] == 60 and set(file["cameras"][0]) == {"eye", "at", "up"}
+    assert (file["width"], file["height"]) == Image.open(io.BytesIO(canvas_png(page))).size
+    assert changes(page, lambda: drag(page, 100, 0))
+    page.get_by_role("button", name="Paste camera").click()
+    page.get_by_label("Camera file (JSON)").fill(text)
+    assert changes(page, lambda: page.get_by_role("button", name="Use it").click())
+    assert page.evaluate(DRAWN) == picture
+    assert not page.get_by_label("Camera file (JSON)").is_visible()
+
+
+def canvas_png(page: Any) -> bytes:
+    return base64.b64decode(page.evaluate(DRAWN).split(",")[1])
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("", "This is no camera: it must be JSON"),
+        ("{}", '"cameras" with "eye", "at" and "up" is missing'),
+        ('{"cameras": [{"eye": [0, 0], "at": [0, 0, 0]}]}', '"eye" must be three numbers'),
+        ('{"cameras": [{"eye": [1, 2, 3], "at": [1, 2, 3]}]}', "are the same point"),
+        ('{"cameras": [{"eye": [0, 5, 0], "at": [0, 0, 0]}]}', "parallel to the view"),
+        (
+            '{"fovy_deg": 200, "cameras": [{"eye": [0, 0, 5], "at": [0, 0, 0]}]}',
+            "between 0 and 180",
+        ),
+        (
+            '{"fovy_deg": "x", "cameras": [{"eye": [0, 0, 5], "at": [0, 0, 0]}]}',
+            "between 0 and 180",
+        ),
+        ('{"cameras": [{"eye": [1e30, 0, 5], "at": [0, 0, 0]}]}', "too large"),
+        ("[" * 3000, "This is no camera"),
+    ],
+)
+def test_a_bad_camera_gets_a_readable_message(page: Any, text: str, message: str) -> None:
+    page.get_by_role("button", name="Paste camera").click()
+    page.get_by_label("Camera file (JSON)").fill(text)
+    page.get_by_role("button", name="Use it").click()
+    assert message in page.locator(".problem").inner_text()
+    if "same point" in message:
+        keep(page, "bad_camera")
+    page.keyboard.press("Escape")
+    assert not page.get_by_label("Camera file (JSON)").is_visible()
+    assert page.problems == []
+
+
+def test_a_memory_budget_is_shown_and_set(page: Any, server: Server) -> None:
+    field = page.get_by_label("Memory budget")
+    assert field.input_value() == "" and "95 MiB" in page.locator(".device").inner_text()
+    picture = page.evaluate(DRAWN)
+    field.fill("600")
+    page.keyboard.press("Enter")
+    page.wait_for_function("() => document.querySelector('main').dataset.state === 'ready'")
+    assert page.evaluate(DRAWN) == picture  # the old picture stays
+    assert changes(page, lambda: drag(page, 50, 0))
+    assert field.input_value() == "600"
+    field.fill("")
+    page.keyboard.press("Enter")
+    assert changes(page, lambda: drag(page, 50, 0))
+
+
+def test_a_narrow_window_shows_everything(open_page: Callable[..., Any], server: Server) -> None:
+    page = open_page(viewport={"width": 320, "height": 600}, device_scale_factor=2, has_touch=True)
+    page.goto(server.url)
+    rests(page)
+    keep(page, "narrow")
+    frame = "document.querySelector('main').shadowRoot.querySelector('.frame')"
+    page.get_by_role("button", name="Panel").click()
+    page.wait_for_timeout(100)
+    rests(page)
+    assert page.evaluate(f"{frame}.scrollWidth <= 320 && document.body.scrollWidth <= 320")
+    keep(page, "narrow_panel")
+    for name in ("Reset view", "Paste camera"):
+        button = page.get_by_role("button", name=name)
+        button.scroll_into_view_if_needed()
+        box = button.bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 320
+    # On a display of twice the density the picture has twice the pixels.
+    assert page.evaluate(f"{frame}.querySelector('.picture').width") == 640
+
+
+def test_fingers_turn_and_pinch(open_page: Callable[..., Any], server: Server) -> None:
+    page = open_page(has_touch=True)
+    page.goto(server.url)
+    rests(page)
+    home, touch = eye(page), page.context.new_cdp_session(page)
+
+    def fingers(kind: str, *points: tuple[float, float]) -> None:
+        at = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+
+    def turn() -> None:
+        fingers("touchStart", (300, 300))
+        fingers("touchMove", (350, 300))
+        fingers("touchEnd")
+
+    def pinch() -> None:
+        fingers("touchStart", (300, 300), (400, 300))
+        fingers("touchMove", (250, 300), (450, 300))
+        fingers("touchEnd")
+
+    centre = np.full(3, 31.5)
+    assert changes(page, turn)
+    turned = eye(page)
+    assert np.linalg.norm(turned - home) > 1
+    assert changes(page, pinch)
+    away = np.linalg.norm(eye(page) - centre) / np.linalg.norm(turned - centre)
+    assert away == pytest.approx(0.5, rel=0.02)
+
+
+CONTRAST = """() => {
+  const root = document.querySelector("main").shadowRoot;
+  const parse = (c) => c.match(/[\\d.]+/g).map(Number);
+  const light = (c) => { const [r, g, b] = parse(c).map((v) => { v /= 255;
+    return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; });
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+  const back = (e) => { for (; e; e = e.parentElement ?? e.getRootNode().host) {
+    const c = getComputedStyle(e).backgroundColor; const p = parse(c);
+    if (p.length < 4 || p[3] === 1) return c; } return "rgb(255, 255, 255)"; };
+  const ratio = (a, b) => { const [x, y] = [light(a), light(b)].sort((p, q) => q - p);
+    return (x + 0.05) / (y + 0.05); };
+  return [...root.querySelectorAll("*")].filter((e) => e.checkVisibility() &&
+      ([...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim()) || e.matches("input")))
+    .map((e) => [e.className || e.localName, ratio(getComputedStyle(e).color, back(e))]);
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_has_contrast(open_page: Callable[..., Any], server: Server, scheme: str) -> None:
+    page = open_page(color_scheme=scheme, reduced_motion="reduce")
+    page.goto(server.url)
+    rests(page)
+    page.get_by_text("Keys and gestures").click()
+    keep(page, scheme)
+    ratios = page.evaluate(CONTRAST)
+    assert len(ratios) > 25
+    assert [(name, ratio) for name, ratio in ratios if ratio < 4.5] == []
+    moving = "getComputedStyle(document.querySelector('main').shadowRoot.querySelector('.bar'))"
+    assert page.evaluate(f"{moving}.transitionDuration") == "0s"
+
+
+def test_a_wrong_token_and_a_foreign_page_see_nothing(page: Any, server: Server) -> None:
+    answer = page.goto(f"http://127.0.0.1:{server.port}/wrong/")
+    assert answer.status == 403
+    page.goto("about:blank")
+    outcome = page.evaluate(
+        """url => new Promise((done) => { const s = new WebSocket(url);
+        s.onopen = () => done("open"); s.onclose = () => done("closed"); })""",
+        server.url.replace("http", "ws") + "ws",
+    )
+    assert outcome == "closed"
+
+
+def test_the_page_comes_back_after_its_server(open_page: Callable[..., Any]) -> None:
+    first = Server(fake_scene(FakeVolume()))
+    page = open_page()
+    page.goto(first.url)
+    rests(page)
+    first.close()
+    page.get_by_text("The connection is lost").wait_for()
+    keep(page, "lost")
+    with Server(fake_scene(FakeVolume()), port=first.port, token=first.token):
+        page.get_by_text("The connection is lost").wait_for(state="hidden")
+        assert changes(page, lambda: drag(page, 70, 0))
+
+
+def test_nothing_that_is_done_in_the_page_is_malformed(page: Any) -> None:
+    """Extremes: the server would close the connection."""
+    page.get_by_role("application").focus()
+    page.evaluate("""() => {
+        const picture = document.querySelector("main").shadowRoot.querySelector(".picture");
+        const zoom = (deltaY) => picture.dispatchEvent(
+            new WheelEvent("wheel", { deltaY, ctrlKey: true, cancelable: true }));
+        for (let i = 0; i < 2000; i++) zoom(-1000);
+        for (let i = 0; i < 3000; i++) zoom(1000);
+        for (let i = 0; i < 500; i++) picture.dispatchEvent(
+            new KeyboardEvent("keydown", { key: "ArrowUp", bubbles: true }));
+    }""")
+    for name in ("Isovalue", "Largest error", "Time budget", "Memory budget"):
+        for value in ("1e300", "-1e300", "1e-300"):
+            page.get_by_label(name, exact=name == "Isovalue").last.fill(value)
+            page.keyboard.press("Enter")
+    page.get_by_label("Isovalue", exact=True).last.fill("77")
+    page.get_by_role("button", name="Reset view").click()
+    page.wait_for_timeout(100)
+    rests(page)
+    assert page.evaluate("document.querySelector('main').dataset.state") == "ready"
+    assert state(page)["iso"] == "77"
+    assert page.problems == []
+
+
+def test_while_the_device_is_prepared_the_page_says_so(open_page: Callable[..., Any]) -> None:
+    may_begin = threading.Event()
+
+    def slow(options: dict[str, Any]) -> None:
+        may_begin.wait(60)
+
+    with Server(fake_scene(FakeVolume(refuse=slow))) as server:
+        page = open_page()
+        page.goto(server.url)
+        page.get_by_text("Preparing the device").wait_for()
+        keep(page, "preparing")
+        may_begin.set()
+        rests(page)
+        assert not page.get_by_text("Preparing the device").is_visible()
+
+
+def test_a_budget_that_is_too_small_says_what_would_do(open_page: Callable[..., Any]) -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return RuntimeError("needs 20 MiB") if options["memory_budget"] == 1 << 20 else None
+
+    with Server(fake_scene(FakeVolume(refuse=refuse))) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        page.get_by_label("Memory budget").fill("1")
+        page.keyboard.press("Enter")
+        page.get_by_text("needs 20 MiB").wait_for()
+        page.wait_for_function("() => document.querySelector('main').dataset.state === 'ready'")
+        assert page.get_by_text("needs 20 MiB").is_visible()
+        assert changes(page, lambda: drag(page, 60, 0))
+        assert not page.get_by_text("needs 20 MiB").is_visible()
+
+
+def test_an_error_of_the_renderer_is_shown_and_passes(open_page: Callable[..., Any]) -> None:
+    def before_pass(drawn: Any) -> None:
+        if drawn.isovalue == 13:
+            raise RuntimeError("the device was lost")
+
+    with Server(fake_scene(FakeVolume(before_pass=before_pass))) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        page.get_by_label("Isovalue", exact=True).last.fill("13")
+        page.get_by_text("the device was lost").wait_for()
+        keep(page, "error")
+        page.get_by_label("Isovalue", exact=True).last.fill("14")
+        page.wait_for_timeout(100)
+        rests(page)
+        assert not page.get_by_text("the device was lost").is_visible()

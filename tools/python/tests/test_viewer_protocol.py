@@ -1,0 +1,224 @@
+"""What the viewer's messages may be, and that nothing else does harm."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import json
+import os
+import random
+from typing import Any
+
+import pytest
+from viewer_fakes import FakeCamera, FakeVolume
+
+from isowave.viewer.protocol import Ack, Budget, Hello, ProtocolError, View, Wish, check, parse
+from isowave.viewer.scene import Scene, Session
+
+CAMERA = {"eye": [0, 0, 5], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_deg": 60}
+WISH: dict[str, Any] = {
+    "type": "wish",
+    "id": 7,
+    "isovalue": 80,
+    "size": [64, 48],
+    "camera": CAMERA,
+    "color": [1, 0.5, 0],
+    "background": [1, 1, 1],
+    "samples": 2,
+    "max_error": 0.5,
+    "time_budget": None,
+}
+
+
+def test_messages_are_read() -> None:
+    assert check({"type": "hello", "version": 1}) == Hello()
+    assert check({"type": "ack", "frame": 3}) == Ack(3)
+    assert check({"type": "budget", "bytes": None}) == Budget(None)
+    assert check({"type": "budget", "bytes": 5}) == Budget(5)
+    view = View((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
+    wish = Wish(7, 80, (64, 48), view, (1, 0.5, 0), (1, 1, 1), 2, 0.5, None)
+    assert check(parse(json.dumps(WISH))) == wish
+
+
+BAD_WISHES: list[tuple[dict[str, Any], str]] = [
+    ({"id": -1}, "id"),
+    ({"id": 1.5}, "id"),
+    ({"id": True}, "id"),
+    ({"isovalue": "80"}, "isovalue"),
+    ({"isovalue": None}, "isovalue"),
+    ({"isovalue": 1e39}, "isovalue"),
+    ({"isovalue": 10**400}, "isovalue"),
+    ({"isovalue": float("nan")}, "isovalue"),
+    ({"size": [0, 5]}, "size"),
+    ({"size": [5]}, "size"),
+    ({"size": [5, 8193]}, "size"),
+    ({"size": "64x48"}, "size"),
+    ({"samples": 9}, "samples"),
+    ({"samples": 0}, "samples"),
+    ({"color": [0, 0, 1.01]}, "color"),
+    ({"background": [0, 0]}, "background"),
+    ({"max_error": 0}, "max_error"),
+    ({"max_error": -1}, "max_error"),
+    ({"max_error": None, "time_budget": 0.5}, "time_budget"),
+    ({"max_error": 1, "time_budget": 100}, "not both"),
+    ({"camera": []}, "camera"),
+    ({"camera": {**CAMERA, "more": 1}}, "camera"),
+    ({"camera": {**CAMERA, "eye": [0, 0, 0]}}, "the same point"),
+    ({"camera": {**CAMERA, "eye": [1e18, 0, 0], "at": [1e18, 1e-3, 0]}}, "the same point"),
+    ({"camera": {**CAMERA, "up": [0, 0, -2]}}, "parallel"),
+    ({"camera": {**CAMERA, "up": [0, 0, 0]}}, "parallel"),
+    ({"camera": {**CAMERA, "eye": [1e19, 0, 0]}}, "eye"),
+    ({"camera": {**CAMERA, "fovy_deg": 180}}, "fovy_deg"),
+    ({"camera": {**CAMERA, "fovy_deg": 0}}, "fovy_deg"),
+    ({"more": 1}, "other keys"),
+    ({"type": "dance"}, "no known type"),
+    ({"type": ["wish"]}, "no known type"),
+    ({"type": "ack"}, "other keys"),
+]
+
+
+@pytest.mark.parametrize("change, message", BAD_WISHES)
+def test_wishes_that_are_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ProtocolError, match=message):
+        check({**WISH, **change})
+
+
+@pytest.mark.parametrize("key", WISH)
+def test_no_key_may_be_missing(key: str) -> None:
+    with pytest.raises(ProtocolError):
+        check({k: v for k, v in WISH.items() if k != key})
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("", "not JSON"),
+        ("{", "not JSON"),
+        ("[]", "not a JSON object"),
+        ("1", "not a JSON object"),
+        ('{"type": "ack", "frame": NaN}', "NaN"),
+        ('{"type": "ack", "frame": -Infinity}', "Infinity"),
+        ('{"type": "ack", "frame": 1, "frame": 2}', "twice"),
+        ("[" * 5000, "not JSON"),
+        ('{"a":' * 1500, "not JSON"),
+        ("9" * 8000, "not JSON|not a JSON object"),
+        ('"' + "x" * 8192 + '"', "longer than 8192"),
+        ("\udcff", "not JSON"),
+        ('"' + "é" * 5000 + '"', "longer than 8192"),
+    ],
+)
+def test_texts_that_are_refused(text: str, message: str) -> None:
+    with pytest.raises(ProtocolError, match=message):
+        parse(text)
+
+
+def test_another_version_is_told_to_reload() -> None:
+    with pytest.raises(ProtocolError, match="reload"):
+        check({"type": "hello", "version": 2})
+
+
+VALID: list[dict[str, Any]] = [
+    WISH,
+    {"type": "hello", "version": 1},
+    {"type": "ack", "frame": 0},
+    {"type": "budget", "bytes": 1 << 30},
+    {**WISH, "camera": None},
+]
+ODD: list[Any] = [
+    None, True, False, 0, 1, -1, 2**31, 2**53, 2**64, 10**300, 10**400, 0.0, -0.0, 1e-320, 1e308,
+    float("nan"), float("inf"), -float("inf"), "", "wish", "\0", "\ud800", "é" * 99, [], {}, [[]],
+    [1, 2, 3], [1e18, -1e18, 1e18], [0, 0, 0], {"eye": 0}, "__proto__", "constructor",
+]  # fmt: skip
+
+
+def mutated(value: Any, chance: random.Random) -> Any:
+    """The value, with something else in some place."""
+    roll = chance.random()
+    if isinstance(value, dict) and value and roll < 0.85:
+        result = dict(value)
+        key = chance.choice(list(result))
+        if roll < 0.1:
+            del result[key]
+        elif roll < 0.2:
+            result[str(chance.choice(ODD))] = chance.choice(ODD)
+        else:
+            result[key] = mutated(result[key], chance)
+        return result
+    if isinstance(value, list) and value and roll < 0.85:
+        at = chance.randrange(len(value))
+        if roll < 0.1:
+            return value[:at] + value[at + 1 :]
+        return value[:at] + [mutated(value[at], chance)] + value[at + 1 :]
+    if isinstance(value, (int, float)) and abs(value) < 1e300 and roll < 0.5:
+        return value * chance.choice([-1, 0.5, 2, 1e9, 1e-9]) + chance.choice([0, 1, -1, 1e-9])
+    return copy.deepcopy(chance.choice(ODD))
+
+
+def mutated_text(text: str, chance: random.Random) -> str:
+    at, to = sorted(chance.randrange(len(text) + 1) for _ in range(2))
+    middle = "".join(
+        chr(chance.choice([chance.randrange(128), chance.randrange(0x110000)])) for _ in range(3)
+    )
+    return chance.choice([text[:at], text[:at] + middle + text[to:], text[:at] + text[to:] * 2])
+
+
+def test_fuzz() -> None:
+    """Each message is taken or refused, and the scene draws for others as before."""
+    count, seed = int(os.environ.get("ISOWAVE_FUZZ_MESSAGES", "10000")), 20261124
+    chance = random.Random(seed)
+    volume = FakeVolume(passes=1)
+    ticks = itertools.count()
+    scene = Scene(
+        volume,
+        isovalue=80,
+        size=(16, 16),
+        clock=lambda: next(ticks) * 0.1,
+        start=False,
+        make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy),
+    )
+    sent: list[dict[str, Any]] = []
+
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        json.dumps(head, allow_nan=False)
+        sent.append(head)
+
+    refused = taken = 0
+    session: Session | None = None
+    for i in range(count):
+        if session is None:
+            session = Session(scene, post, rate=1e9, burst=1e9)
+            session.receive({"type": "hello", "version": 1})
+        message = copy.deepcopy(chance.choice(VALID))
+        for _ in range(chance.randrange(3)):
+            message = mutated(message, chance) if isinstance(message, dict) else message
+        if isinstance(message, dict) and isinstance(message.get("size"), list):
+            message["size"] = [min(s, 20) if isinstance(s, int) else s for s in message["size"]]
+        if isinstance(message, dict) and message.get("id") == 7:
+            message["id"] = i
+        text = json.dumps(message)
+        if chance.random() < 0.3:
+            text = mutated_text(text, chance)
+        try:
+            session.receive(parse(text))
+            taken += 1
+        except ProtocolError as error:
+            assert str(error) and "\n" not in str(error), text
+            refused += 1
+            session.close()
+            session = None
+        if i % 50 == 0:
+            while scene.step():
+                pass
+    print(f"seed {seed}: {taken} taken, {refused} refused, {len(sent)} answers")
+    assert taken > count / 20 and refused > count / 20
+    if session is not None:
+        session.close()
+    assert scene.num_clients == 0
+    # Somebody else sees a picture.
+    sent.clear()
+    other = Session(scene, post)
+    other.receive({"type": "hello", "version": 1})
+    other.receive({**WISH, "id": 1})
+    while scene.step():
+        other.receive({"type": "ack", "frame": sum(h["type"] == "picture" for h in sent)})
+    assert "whole" in [h["stage"] for h in sent if h["type"] == "picture"]

@@ -1,0 +1,602 @@
+"""The scene's logic, step by step, without threads, with a clock that only tests move."""
+
+from __future__ import annotations
+
+import io
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from viewer_fakes import Drawn, FakeCamera, FakeVolume
+
+from isowave.viewer.pictures import count_rays, dividing_value, fit_size, share_within
+from isowave.viewer.protocol import Ack, Budget, ProtocolError, TokenBucket, View, Wish
+from isowave.viewer.scene import Client, Scene, Session, Stage
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def fake_camera(view: View) -> FakeCamera:
+    return FakeCamera(view.eye, view.at, view.up, view.fovy)
+
+
+class Eye:
+    """A client and all that it was sent."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.heads = scene, list[dict[str, Any]]()
+        self.data: dict[int, bytes] = {}
+        client = scene.join(self._post)
+        assert client is not None
+        self.client: Client = client
+        self.wishes = 0
+
+    def _post(self, head: dict[str, Any], data: bytes | None) -> None:
+        self.heads.append(head)
+        if data is not None:
+            self.data[head["frame"]] = data
+
+    def wish(self, isovalue: float = 80.0, size: tuple[int, int] = (64, 48), **more: Any) -> int:
+        self.wishes += 1
+        fields = dict(view=None, color=(1, 0.5, 0), background=(1, 1, 1), samples=1)
+        fields |= dict(max_error=None, time_budget=None) | more
+        wish = Wish(id=self.wishes, isovalue=isovalue, size=size, **fields)  # type: ignore
+        self.scene.receive(self.client, wish)
+        return self.wishes
+
+    def ack(self) -> None:
+        """Acknowledges all that came."""
+        if self.data:
+            self.scene.receive(self.client, Ack(max(self.data)))
+
+    @property
+    def pictures(self) -> list[tuple[int, str]]:
+        return [(h["wish"], h["stage"]) for h in self.heads if h["type"] == "picture"]
+
+    def of_type(self, kind: str) -> list[dict[str, Any]]:
+        return [h for h in self.heads if h["type"] == kind]
+
+
+def make_scene(volume: FakeVolume, clock: Clock, **options: Any) -> Scene:
+    options = dict(isovalue=80.0, size=(640, 480)) | options
+    scene = Scene(volume, clock=clock, start=False, make_camera=fake_camera, **options)
+    scene.step()  # prepares
+    scene.step()  # makes the renderer
+    return scene
+
+
+def run(scene: Scene) -> None:
+    """Until nothing is to be done but for clients at rest."""
+    for _ in range(1000):
+        if not scene.step():
+            due = [c.due for c in scene._clients if c.stage is Stage.WHOLE]
+            if not due:
+                return
+            clock = scene._clock
+            assert isinstance(clock, Clock)
+            clock.now = max(clock.now, min(due))
+    raise AssertionError("the scene never rests")
+
+
+def test_a_wish_is_drawn_small_then_whole_then_lossless() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish()
+    run(scene)
+    eye.ack()
+    assert eye.pictures == [(1, "first"), (1, "whole")]
+    assert [f.size for f in volume.frames] == [(16, 12), (64, 48)]
+    clock.now += 0.11  # not at rest yet
+    run(scene)
+    assert len(eye.pictures) == 2
+    clock.now += 0.02
+    run(scene)
+    assert eye.pictures[2:] == [(1, "lossless")]
+    assert not eye.of_type("bounds")
+    clock.now += 0.5
+    run(scene)
+    assert len(eye.pictures) == 3
+    assert volume.frames[-1].size == (16, 12)
+    assert volume.frames[-1].outputs == ("depth", "bounds")
+    # A pixel of the whole picture is a quarter of one of the first picture.
+    assert [h["within_pixel"] for h in eye.of_type("bounds")] == [pytest.approx(2 / 3)]
+    frames = len(volume.frames)
+    clock.now += 100
+    run(scene)
+    assert len(volume.frames) == frames
+
+
+def test_whole_pictures_wait_for_wishes_that_are_on_their_way() -> None:
+    clock, volume = Clock(), FakeVolume()
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.01 if drawn.size == (16, 12) else 0.3
+
+    volume.before_pass = before_pass
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    for i in range(5):
+        eye.wish(80.0 + i)
+        while scene.step():
+            pass
+        eye.ack()
+        clock.now += 0.05
+    assert {f.size for f in volume.frames} == {(16, 12)} and len(volume.frames) == 5
+    clock.now += 0.05
+    assert scene.step()
+    assert volume.frames[-1].size == (64, 48)
+
+
+def test_the_last_picture_is_lossless_to_the_bit() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish()
+    run(scene)
+    eye.ack()
+    clock.now += 1
+    run(scene)
+    drawn = volume.frames[-1]
+    renderer = volume.renderer(device=None, size=(64, 48), samples=1)
+    expected = renderer.render(
+        80.0,
+        camera=drawn.camera,
+        size=(64, 48),
+        samples=1,
+        color=(1, 0.5, 0),
+        background=(1, 1, 1),
+        outputs=("rgb",),
+        max_error=None,
+        time_budget=None,
+        on_pass=lambda image: True,
+    )
+    png = Image.open(io.BytesIO(eye.data[max(eye.data)]))
+    assert png.format == "PNG"
+    np.testing.assert_array_equal(np.asarray(png), expected.rgb)
+    jpeg = Image.open(io.BytesIO(eye.data[1]))
+    assert (jpeg.format, jpeg.size) == ("JPEG", (16, 12))
+
+
+@pytest.mark.parametrize("stage_size", [(16, 12), (64, 48)])
+def test_the_newest_wish_cancels_the_frame_at_hand(stage_size: tuple[int, int]) -> None:
+    clock, volume = Clock(), FakeVolume(passes=5)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        if drawn.size == stage_size and drawn.isovalue == 80 and drawn.passes == 2:
+            eye.wish(90.0)
+
+    volume.before_pass = before_pass
+    eye.wish(80.0)
+    run(scene)
+    cancelled = [f for f in volume.frames if f.stopped]
+    assert [(f.isovalue, f.size, f.passes) for f in cancelled] == [(80.0, stage_size, 3)]
+    assert [f.isovalue for f in volume.frames][-2:] == [90.0, 90.0]
+    # Nothing of the old wish after the new one's first picture.
+    wishes = [wish for wish, _ in eye.pictures]
+    assert wishes == sorted(wishes)
+
+
+def test_wishes_that_come_faster_than_first_pictures_still_show_something() -> None:
+    clock, volume = Clock(), FakeVolume(passes=4)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.06
+        if drawn.passes == 2 and eye.wishes < 20:
+            eye.wish(80.0 + eye.wishes)
+            eye.ack()
+
+    volume.before_pass = before_pass
+    eye.wish()
+    run(scene)
+    partial = [wish for wish, stage in eye.pictures if stage == "pass" and wish < 20]
+    assert partial == list(range(1, 20))  # each was drawn for 0.18 s
+    assert all(f.stopped for f in volume.frames if f.isovalue < 99)
+
+
+def test_two_pictures_are_on_the_way_and_the_last_is_sent_on_the_ack() -> None:
+    clock, volume = Clock(), FakeVolume(passes=10)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.1
+
+    volume.before_pass = before_pass
+    for i in range(3):
+        eye.wish(80.0 + i)
+        run(scene)
+    assert len(eye.data) == 2
+    clock.now += 1
+    run(scene)
+    assert len(eye.data) == 2
+    eye.scene.receive(eye.client, Ack(1))
+    assert eye.pictures[-1] == (3, "lossless")
+    assert len(eye.data) == 3
+    eye.ack()
+    run(scene)
+    assert len(eye.data) == 3
+
+
+def test_pictures_of_passes_are_sent_while_there_is_room() -> None:
+    clock, volume = Clock(), FakeVolume(passes=6)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.07
+        eye.ack()
+
+    volume.before_pass = before_pass
+    eye.wish()
+    run(scene)
+    assert eye.pictures == [(1, "first"), *[(1, "pass")] * 6, (1, "whole")]
+    assert not any(h["complete"] for h in eye.of_type("picture") if h["stage"] == "pass")
+
+
+def test_clients_take_turns() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eyes = [Eye(scene) for _ in range(3)]
+    greedy = eyes[0]
+
+    def before_pass(drawn: Drawn) -> None:
+        # One client wishes all the time; the others get their pictures nevertheless.
+        if drawn.isovalue == 1.0 and greedy.wishes < 30:
+            greedy.wish(1.0)
+            greedy.ack()
+
+    volume.before_pass = before_pass
+    for eye, isovalue in zip(eyes, (1.0, 2.0, 3.0)):
+        eye.wish(isovalue)
+    for _ in range(12):
+        scene.step()
+        clock.now += 0.04
+    order = [f.isovalue for f in volume.frames]
+    assert order[:3] == [1.0, 2.0, 3.0] and sorted(order[3:6]) == [1.0, 2.0, 3.0]
+    for eye in eyes[1:]:
+        assert eye.pictures[:2] == [(1, "first"), (1, "whole")]
+
+
+def test_each_client_sees_its_own_state() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eyes = [Eye(scene) for _ in range(3)]
+    for i, eye in enumerate(eyes):
+        eye.wish(50.0 * (i + 1), size=(40 + 8 * i, 40))
+    run(scene)
+    for i, eye in enumerate(eyes):
+        heads = eye.of_type("picture")
+        assert {h["isovalue"] for h in heads} == {50.0 * (i + 1)}
+        assert heads[-1]["size"] == [40 + 8 * i, 40]
+
+
+def test_a_long_whole_picture_gives_way_once_to_a_first_picture() -> None:
+    clock, volume = Clock(), FakeVolume(passes=10)
+    scene = make_scene(volume, clock)
+    slow, quick = Eye(scene), Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.1 if drawn.isovalue == 1.0 and drawn.size == (64, 48) else 0.0
+        if drawn.isovalue == 1.0 and drawn.size == (64, 48) and drawn.passes == 3:
+            if not quick.wishes:
+                quick.wish(2.0)
+
+    volume.before_pass = before_pass
+    slow.wish(1.0)
+    run(scene)
+    frames = [(f.isovalue, f.size[0], f.stopped) for f in volume.frames]
+    assert frames == [
+        (1.0, 16, False),
+        (1.0, 64, True),
+        (2.0, 16, False),
+        (1.0, 64, False),
+        (2.0, 64, False),
+    ]
+
+
+def test_quick_pictures_need_no_first_one() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish(80.0)  # takes no time by this clock
+    run(scene)
+    eye.ack()
+    eye.wish(81.0)
+    run(scene)
+    assert [s for w, s in eye.pictures if w == 2] == ["whole"]
+
+
+def test_a_time_budget_needs_no_first_picture() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish(80.0, time_budget=50.0)
+    run(scene)
+    assert [(f.size, f.time_budget, f.max_error) for f in volume.frames] == [((64, 48), 0.05, None)]
+    eye.ack()
+    eye.wish(80.0, max_error=0.5)
+    run(scene)
+    assert (volume.frames[-1].time_budget, volume.frames[-1].max_error) == (None, 0.5)
+
+
+def test_the_surface_fills_the_picture_where_no_camera_is_given() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish(80.0, size=(64, 48))
+    run(scene)
+    home = volume.renderer(device=None, size=(64, 48), samples=1).camera(80.0, (64, 48))
+    assert volume.frames[0].camera == home == volume.frames[1].camera
+    assert eye.of_type("picture")[0]["camera"]["eye"] == list(home.eye)
+    eye.ack()
+    eye.wish(80.0, size=(32, 64))  # narrow: further away
+    run(scene)
+    assert volume.frames[-1].camera.eye[2] > home.eye[2] + 1
+    eye.ack()
+    view = View((1, 2, 3), (0, 0, 0), (0, 1, 0), 30.0)
+    eye.wish(80.0, view=view)
+    run(scene)
+    assert volume.frames[-1].camera == FakeCamera((1, 2, 3), (0, 0, 0), (0, 1, 0), 30.0)
+
+
+def test_an_error_of_the_renderer_concerns_one_client() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    bad, good = Eye(scene), Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        if drawn.isovalue == 13.0:
+            raise RuntimeError("unlucky\nand long")
+
+    volume.before_pass = before_pass
+    bad.wish(13.0)
+    good.wish(80.0)
+    run(scene)
+    assert [(h["wish"], h["message"]) for h in bad.of_type("error")] == [(1, "unlucky")]
+    assert good.pictures == [(1, "first"), (1, "whole")] and not good.of_type("error")
+    bad.wish(14.0)
+    run(scene)
+    assert bad.pictures == [(2, "first"), (2, "whole")]
+
+
+def test_a_new_budget_makes_a_new_renderer_for_all() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eyes = [Eye(scene), Eye(scene)]
+    scene.receive(eyes[0].client, Budget(1 << 29))
+    run(scene)
+    assert [r["memory_budget"] for r in volume.renderers] == [None, 1 << 29]
+    for eye in eyes:
+        states = [(h["state"], h["memory_budget"]) for h in eye.of_type("status")]
+        assert states == [("ready", None), ("starting", 1 << 29), ("ready", 1 << 29)]
+
+
+def test_a_budget_that_is_too_small_leaves_the_old_one() -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        too_small = options["memory_budget"] is not None and options["memory_budget"] < 1000
+        return RuntimeError("needs 1000 bytes") if too_small else None
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    scene.receive(eye.client, Budget(10))
+    eye.wish()
+    run(scene)
+    assert [h["message"] for h in eye.of_type("error")] == ["needs 1000 bytes"]
+    assert eye.of_type("status")[-1]["state"] == "ready"
+    assert eye.of_type("status")[-1]["memory_budget"] is None
+    assert eye.pictures == [(1, "first"), (1, "whole")]
+
+
+def test_without_any_device_each_wish_says_why_until_a_budget_works() -> None:
+    working = False
+
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return None if working else RuntimeError("no OpenCL device: pip install isowave[cpu]")
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish()
+    run(scene)
+    assert eye.of_type("status")[-1]["state"] == "failed"
+    assert eye.of_type("error")[-1] == {
+        "type": "error",
+        "wish": 1,
+        "message": "no OpenCL device: pip install isowave[cpu]",
+    }
+    working = True
+    scene.receive(eye.client, Budget(None))
+    eye.wish()
+    run(scene)
+    assert eye.pictures[-1] == (2, "whole")
+
+
+def test_a_renderer_grows_with_the_pictures() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), samples=2)
+    run(scene)
+    assert [(r["size"], r["samples"]) for r in volume.renderers] == [((64, 48), 1), ((64, 48), 2)]
+    assert (volume.frames[-1].size, volume.frames[-1].samples) == ((64, 48), 2)
+
+
+def test_a_renderer_that_cannot_grow_draws_smaller_pictures() -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return RuntimeError("too large") if options["samples"] > 1 else None
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), samples=2)
+    run(scene)
+    eye.ack()
+    eye.wish(size=(64, 48), samples=2)
+    run(scene)
+    assert len(volume.renderers) == 3  # the first, the one too large, the first again
+    assert (volume.frames[-1].size, volume.frames[-1].samples) == ((32, 24), 2)
+
+
+def test_the_first_isovalue_divides_the_histogram() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, isovalue=None)
+    eye = Eye(scene)
+    assert 0 < eye.of_type("welcome")[0]["isovalue"] < 255
+    assert len(eye.of_type("histogram")[0]["counts"]) == 256
+
+
+def test_infinite_ranges_are_those_of_the_histogram() -> None:
+    clock, volume = Clock(), FakeVolume(value_range=(float("-inf"), float("inf")))
+    eye = Eye(make_scene(volume, clock))
+    assert eye.of_type("welcome")[0]["range"] == [0.0, 255.0]
+
+
+def test_who_joins_early_is_welcomed_when_the_volume_is_known() -> None:
+    volume = FakeVolume()
+    scene = Scene(volume, clock=Clock(), start=False, make_camera=fake_camera, isovalue=3)
+    eye = Eye(scene)
+    assert [h["type"] for h in eye.heads] == ["status"]
+    run(scene)
+    assert [h["type"] for h in eye.heads] == ["status", "welcome", "status", "status", "histogram"]
+
+
+def test_wish_numbers_grow_and_acks_are_of_sent_pictures() -> None:
+    scene = make_scene(FakeVolume(), Clock())
+    eye = Eye(scene)
+    eye.wish()
+    eye.wishes = 0
+    with pytest.raises(ProtocolError, match="must grow"):
+        eye.wish()
+    with pytest.raises(ProtocolError, match="not sent"):
+        scene.receive(eye.client, Ack(1))
+
+
+def test_a_client_that_leaves_stops_its_frame_and_is_forgotten() -> None:
+    clock, volume = Clock(), FakeVolume(passes=9)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        if drawn.passes == 1:
+            scene.leave(eye.client)
+
+    volume.before_pass = before_pass
+    eye.wish()
+    run(scene)
+    assert [(f.stopped, f.passes) for f in volume.frames] == [(True, 2)]
+    assert scene.num_clients == 0 and not eye.data
+
+
+def test_a_client_whose_transport_fails_is_forgotten() -> None:
+    scene = make_scene(FakeVolume(), Clock())
+    eye = Eye(scene)
+
+    def broken(head: dict[str, Any], data: bytes | None) -> None:
+        raise RuntimeError("the loop is closed")
+
+    eye.client.post = broken
+    other = Eye(scene)
+    eye.wish()
+    other.wish()
+    run(scene)
+    assert scene.num_clients == 1
+    assert other.pictures[-1] == (1, "whole")
+
+
+def test_there_are_at_most_so_many_clients() -> None:
+    scene = make_scene(FakeVolume(), Clock(), max_clients=2)
+    sessions = [Session(scene, lambda head, data: None) for _ in range(3)]
+    hello = {"type": "hello", "version": 1}
+    sessions[0].receive(hello)
+    sessions[1].receive(hello)
+    with pytest.raises(ProtocolError, match="too many clients"):
+        sessions[2].receive(hello)
+    sessions[0].close()
+    Session(scene, lambda head, data: None).receive(hello)
+
+
+def test_sessions_begin_with_hello_and_limit_the_rate() -> None:
+    scene, clock = make_scene(FakeVolume(), Clock()), Clock()
+    session = Session(scene, lambda head, data: None, rate=10, burst=3, clock=clock)
+    with pytest.raises(ProtocolError, match="must be hello"):
+        session.receive({"type": "ack", "frame": 0})
+    session.receive({"type": "hello", "version": 1})
+    session.receive({"type": "ack", "frame": 0})
+    with pytest.raises(ProtocolError, match="too many messages"):
+        session.receive({"type": "ack", "frame": 0})
+    clock.now += 0.15
+    session.receive({"type": "ack", "frame": 0})
+    session.close()
+    assert scene.num_clients == 0
+
+
+def test_a_bucket_never_holds_more_than_its_burst() -> None:
+    clock = Clock()
+    bucket = TokenBucket(1, 2, clock)
+    clock.now += 1000
+    assert [bucket.take() for _ in range(3)] == [True, True, False]
+
+
+def test_100_reconnects_leave_nothing() -> None:
+    threads = threading.active_count()
+    volume = FakeVolume()
+    scene = Scene(volume, isovalue=80, size=(64, 48), make_camera=fake_camera)
+    ready = threading.Event()
+
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        if head["type"] == "picture":
+            ready.set()
+
+    for i in range(100):
+        session = Session(scene, post)
+        session.receive({"type": "hello", "version": 1})
+        wish = {"type": "wish", "id": 1, "isovalue": 80, "size": [32, 32], "camera": None}
+        wish |= {"color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
+        session.receive(wish | {"max_error": None, "time_budget": None})
+        if i % 10 == 0:
+            assert ready.wait(60)
+        ready.clear()
+        session.close()
+    assert scene.num_clients == 0
+    scene.close()
+    assert threading.active_count() == threads
+    assert len(volume.renderers) == 1
+
+
+@pytest.mark.parametrize("rays", [1, 2, 7, 100, 12345])
+@pytest.mark.parametrize("size", [(1, 1), (8192, 1), (1, 8192), (1280, 720), (33, 77)])
+@pytest.mark.parametrize("samples", [1, 3])
+def test_sizes_fit(size: tuple[int, int], samples: int, rays: int) -> None:
+    fitted = fit_size(size, samples, rays)
+    assert min(fitted) >= 1 and fitted[0] <= size[0] and fitted[1] <= size[1]
+    assert count_rays(fitted, samples) <= max(rays, samples**2)
+
+
+def test_the_share_of_rays_within_a_bound() -> None:
+    inf = np.inf
+    depth = np.array([inf, inf, 5, 5, 5], np.float32)
+    bounds = np.array([0, inf, 0.5, 0.25, inf], np.float32)
+    assert share_within(depth, bounds, 0.25) == 0.25
+    assert share_within(depth, bounds, 1) == 0.5
+    assert share_within(depth[:1], bounds[:1], 1) is None
+
+
+def test_the_dividing_value_is_between_two_peaks() -> None:
+    counts = [0, 9, 10, 9, 0, 0, 0, 0, 4, 5, 4, 0]
+    assert 4.0 <= dividing_value(counts, 0.0, 12.0) <= 8.0
+    assert dividing_value([0, 0], 1.0, 3.0) == 2.0
+    assert dividing_value([5], 1.0, 3.0) == 2.0

@@ -1,0 +1,232 @@
+"""The widget: its kernel's side through a fake front end, and all of it in JupyterLab."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import secrets
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from viewer_fakes import FakeCamera, FakeVolume
+
+import isowave
+
+pytest.importorskip("anywidget")
+
+from isowave.viewer import widget as widget_module  # noqa: E402
+from isowave.viewer.widget import MAX_VIEWS, Widget, show  # noqa: E402
+
+TIMEOUT = 60  # seconds; for machines that are busy with other things
+HELLO = {"type": "hello", "version": 1}
+WISH: dict[str, Any] = {
+    "type": "wish",
+    "id": 1,
+    "isovalue": 80,
+    "size": [32, 24],
+    "camera": None,
+    "color": [1, 1, 1],
+    "background": [0, 0, 0],
+    "samples": 1,
+    "max_error": None,
+    "time_budget": None,
+}
+
+
+def fake_camera(view: Any) -> FakeCamera:
+    return FakeCamera(view.eye, view.at, view.up, view.fovy)
+
+
+class FrontEnd:
+    """What the kernel sent, by view; acknowledges pictures as view.js does."""
+
+    def __init__(self, volume: FakeVolume) -> None:
+        self.changed = threading.Condition()
+        self.heads = dict[str, list[dict[str, Any]]]()
+        self.pictures = list[bytes]()
+        self.widget = show(volume, isovalue=80, size=(64, 48), make_camera=fake_camera)
+        self.widget.send = self._take
+
+    def say(self, view: str, message: object) -> None:
+        self.widget._handle_custom_msg({"view": view, "message": message}, [])
+
+    def _take(self, content: dict[str, Any], buffers: list[bytes] | None = None) -> None:
+        json.dumps(content, allow_nan=False)
+        with self.changed:
+            self.heads.setdefault(content["view"], []).append(content["message"])
+            self.pictures += buffers or []
+            self.changed.notify_all()
+        message = content["message"]
+        if message["type"] == "picture":
+            self.say(content["view"], {"type": "ack", "frame": message["frame"]})
+
+    def wait(self, view: str, **wanted: Any) -> None:
+        def came() -> bool:
+            heads = self.heads.get(view, [])
+            return any(all(h.get(k) == v for k, v in wanted.items()) for h in heads)
+
+        with self.changed:
+            assert self.changed.wait_for(came, TIMEOUT), self.heads.get(view)
+
+
+@pytest.fixture
+def front() -> Iterator[FrontEnd]:
+    front = FrontEnd(FakeVolume())
+    yield front
+    front.widget.close()
+    assert not widget_module._scenes
+
+
+def test_a_view_sees_its_wish(front: FrontEnd) -> None:
+    front.say("a", HELLO)
+    front.say("a", WISH)
+    front.wait("a", type="picture", stage="lossless", wish=1)
+    assert front.pictures[-1].startswith(b"\x89PNG")
+
+
+def test_views_have_their_own_state(front: FrontEnd) -> None:
+    for i, view in enumerate("abc"):
+        front.say(view, HELLO)
+        front.say(view, {**WISH, "isovalue": 50 + i})
+    for i, view in enumerate("abc"):
+        front.wait(view, type="picture", stage="lossless")
+        pictures = [h for h in front.heads[view] if h["type"] == "picture"]
+        assert {h["isovalue"] for h in pictures} == {50 + i}
+
+
+def test_a_malformed_message_ends_one_view(front: FrontEnd) -> None:
+    front.say("good", HELLO)
+    front.say("bad", HELLO)
+    front.say("bad", {**WISH, "isovalue": "x"})
+    front.wait("bad", type="closed", retry=False)
+    for odd in (None, 1, [], "x", {"view": "a"}, {"view": 5, "message": HELLO}, {"view": "x" * 99}):
+        front.widget._handle_custom_msg(odd, [])
+    front.say("nobody", WISH)
+    front.say("good", WISH)
+    front.wait("good", type="picture", stage="lossless")
+    assert "nobody" not in front.heads
+
+
+def test_views_that_are_gone_leave_nothing(front: FrontEnd) -> None:
+    scene = front.widget._scene
+    for i in range(100):
+        front.say(f"view {i}", HELLO)
+        if i % 2:
+            front.say(f"view {i}", None)
+    assert scene.num_clients <= MAX_VIEWS
+    front.say("last", HELLO)
+    front.say("last", WISH)
+    front.wait("last", type="picture", stage="lossless")
+
+
+def test_widgets_of_a_volume_share_a_renderer() -> None:
+    volume = FakeVolume()
+    one, two = FrontEnd(volume), FrontEnd(volume)
+    assert one.widget._scene is two.widget._scene
+    for front in (one, two):
+        front.say("a", HELLO)
+        front.say("a", WISH)
+        front.wait("a", stage="whole")
+    one.widget.close()
+    one.widget.close()
+    two.say("b", HELLO)
+    two.say("b", WISH)
+    two.wait("b", stage="whole")
+    assert len(volume.renderers) == 1
+    two.widget.close()
+    assert not widget_module._scenes
+
+
+def test_the_widget_carries_the_module() -> None:
+    script = Path(widget_module.__file__).with_name("view.js").read_text()
+    assert str(Widget._esm) == script and "export default" in script
+    assert not re.search(r"^\s*import\b", script, re.MULTILINE)
+
+
+NOTEBOOK_CELL = """\
+import sys
+sys.path[:0] = {paths!r}
+from viewer_fakes import FakeCamera, FakeVolume
+from isowave.viewer import view
+view(FakeVolume(), isovalue=80, title="ball", height=420,
+     make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy))
+"""
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[str]:
+    """A JupyterLab with a notebook that shows the widget; its URL."""
+    paths = [str(Path(__file__).parent), str(Path(isowave.__file__).parents[1])]
+    cell = NOTEBOOK_CELL.format(paths=paths)
+    kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
+    notebook = {"nbformat": 4, "nbformat_minor": 5, "metadata": kernel, "cells": [
+        {"cell_type": "code", "id": "a", "metadata": {}, "source": cell, "outputs": [],
+         "execution_count": None}]}  # fmt: skip
+    (tmp_path / "ball.ipynb").write_text(json.dumps(notebook))
+    token = secrets.token_hex(16)
+    folders = ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR")
+    environment = {**os.environ, **{name: str(tmp_path / name) for name in folders}}
+    command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ip=127.0.0.1"]
+    command += ["--port=0", f"--IdentityProvider.token={token}", f"--ServerApp.root_dir={tmp_path}"]
+    command += ["--LabApp.news_url=", "--LabApp.check_for_updates_class="]
+    command[-1] += "jupyterlab.NeverCheckForUpdate"
+    log = tmp_path / "lab.log"
+    with log.open("w") as output:
+        process = subprocess.Popen(command, stderr=output, stdout=output, env=environment)
+    try:
+        url = None
+        for _ in range(10 * TIMEOUT):
+            url = url or re.search(r"http://127\.0\.0\.1:(\d+)/lab\?token=", log.read_text())
+            if url or process.poll() is not None:
+                break
+            threading.Event().wait(0.1)
+        assert url, log.read_text()
+        yield f"http://127.0.0.1:{url[1]}/lab/tree/ball.ipynb?token={token}"
+    finally:
+        process.terminate()
+        process.wait(TIMEOUT)
+
+
+@pytest.mark.skipif(
+    not (os.environ.get("ISOWAVE_CHROMIUM") or shutil.which("chromium")), reason="no Chromium"
+)
+def test_in_jupyterlab(lab: str) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    pytest.importorskip("jupyterlab")
+    chromium = os.environ.get("ISOWAVE_CHROMIUM") or shutil.which("chromium")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.set_default_timeout(1000 * TIMEOUT)
+        page.goto(lab)
+        page.get_by_text("| Idle").wait_for()  # the kernel's status; before, keys are lost
+        page.locator(".jp-Notebook .cm-content").first.click()
+        page.keyboard.press("Shift+Enter")
+        view = page.locator("[data-stage=lossless]")
+        view.wait_for()
+        picture = page.get_by_role("application")
+        box = picture.bounding_box()
+        before = view.get_attribute("data-shown")
+        page.mouse.move(box["x"] + 200, box["y"] + 150)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 300, box["y"] + 180, steps=5)
+        page.mouse.up()
+        page.wait_for_function(f"""() => {{ const {{ wish, shown, stage }} =
+            document.querySelector("[data-lm-suppress-shortcuts][data-stage]").dataset;
+            return Number(shown) > {before} && wish === shown && stage === "lossless"; }}""")
+        # Keys are the picture's, not the notebook's: 0 0 would restart the kernel.
+        picture.focus()
+        page.keyboard.press("0")
+        page.keyboard.press("0")
+        page.keyboard.press("ArrowLeft")
+        assert page.get_by_role("dialog").count() == 0
+        if os.environ.get("ISOWAVE_SCREENSHOTS"):
+            page.screenshot(path=f"{os.environ['ISOWAVE_SCREENSHOTS']}/jupyterlab.png")
+        browser.close()
