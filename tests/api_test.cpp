@@ -8,9 +8,11 @@
 #include <cmath>
 #include <cstring>
 #include <isowave/isowave.hpp>
+#include <map>
 #include <thread>
 
 #include "core/ocl/device.hpp"
+#include "core/volume/pyramid.hpp"
 #include "tests/run_program.hpp"
 #include "tests/test_devices.hpp"
 
@@ -52,6 +54,16 @@ FrameRequest small_request(Renderer &renderer) {
   request.size = {64, 48, 1};
   request.want_depth = true;
   return request;
+}
+
+core::VolumeInfo level_info(std::uint32_t level) {
+  const Grid grid = sphere_grid();
+  core::VolumeInfo info;
+  info.dims = {grid.dims[0], grid.dims[1], grid.dims[2]};
+  info.spacing = {grid.spacing[0], grid.spacing[1], grid.spacing[2]};
+  info.origin = {grid.origin[0], grid.origin[1], grid.origin[2]};
+  for (; level != 0; --level) info = core::coarser_level(info);
+  return info;
 }
 
 template <class Call>
@@ -329,6 +341,33 @@ TEST_P(ApiOnDevice, FramesKeepErrorsAndTimes) {
   const Frame timed = renderer.render(request);
   EXPECT_TRUE(timed.statistics.complete);
   EXPECT_EQ(timed.depth, depth);
+}
+
+/// Level, cell and position are a point at distance t; also where several levels draw.
+TEST_P(ApiOnDevice, HitsOfLevelsSayWhereTheyAre) {
+  const auto volume = sphere({.tolerance = 0.001, .levels = 3});
+  Renderer renderer(open_device(selector()), volume, {.largest = {64, 48, 1}, .with_levels = true});
+  FrameRequest request = small_request(renderer);
+  request.want_hits = true;
+  std::map<std::uint32_t, std::size_t> hits_of;  // levels
+  for (const double voxel_pixels : {0.0, 6.0, 1000.0}) {
+    request.voxel_pixels = voxel_pixels;
+    for (const Hit &hit : renderer.render(request).hits) {
+      if (std::isinf(hit.t)) continue;
+      ++hits_of[hit.level];
+      double sum = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const core::VolumeInfo info = level_info(hit.level);
+        const auto i = static_cast<int>(axis);
+        ASSERT_LT(hit.cell[axis] + 1, info.dims[i]);
+        const double at =
+            info.origin[i] + info.spacing[i] * (double{hit.position[axis]} + hit.cell[axis]);
+        sum += (at - request.camera.eye[axis]) * (at - request.camera.eye[axis]);
+      }
+      ASSERT_NEAR(std::sqrt(sum), hit.t, 1e-4 * double{hit.t});
+    }
+  }
+  EXPECT_EQ(hits_of.size(), 3u) << "a level has no hits";
 }
 
 TEST_P(ApiOnDevice, FramesCanBeWatchedAndStopped) {
