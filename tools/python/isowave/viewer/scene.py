@@ -6,8 +6,8 @@
 Of each client the newest wish counts; it cancels the frame of the one before. A wish is drawn in
 stages: a first picture of a quarter of the width and height; the whole picture (sent as JPEG after
 passes); once the client rests, the lossless picture (PNG), and what is certain of it. Clients take
-turns, stage by stage. At most two pictures are on the way to a client; of those that wait for it only the last is
-kept, and it is always sent.
+turns, stage by stage. At most two pictures are on the way to a client; of those that wait for it
+only the last is kept, and it is always sent.
 """
 
 from __future__ import annotations
@@ -380,7 +380,7 @@ class Scene:
                 self._offer(client, {**head, "stage": "lossless", "format": "png"}, data, keep=True)
 
     def _send_bounds(self, renderer: RendererLike, client: Client, wish: Wish) -> None:
-        """How far the surface may be off, of the rays of a first picture: bounds take their time."""
+        """How far the surface may be off, by the rays of a first picture: bounds take time."""
         if client.view is None:
             return
         size, samples = self._fitted(wish, Stage.FIRST)
