@@ -82,7 +82,7 @@ TEST(CliRender, StreamOnTheHost) {
     const json stats = json::parse(test::read_file(folder / (name + ".json")));
     EXPECT_EQ(stats["options"]["stream"], place);
     const json &frame = stats["frames"][0];
-    std::uint64_t decoded = 0;
+    std::uint64_t decoded = frame["normals"]["decoded_blocks"];
     for (const json &pass : frame["per_pass"])
       decoded += pass["decoded_blocks"].get<std::uint64_t>();
     EXPECT_EQ(frame["uploaded_blocks"], std::string_view(place) == "host" ? decoded : 0);
@@ -169,12 +169,33 @@ TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
 
   // The last pass' picture is the picture.
   std::set<std::string> passes;
-  for (std::size_t i = 1; i <= frame["passes"]; ++i) passes.insert(fmt::format("pass{:04}.png", i));
+  EXPECT_GT(frame["normals"]["passes"], 0);
+  EXPECT_TRUE(frame["normals"]["stage_ms"].contains("normals"));
+  const std::size_t num_passes =
+      frame["passes"].get<std::size_t>() + frame["normals"]["passes"].get<std::size_t>();
+  for (std::size_t i = 1; i <= num_passes; ++i) passes.insert(fmt::format("pass{:04}.png", i));
   EXPECT_EQ(names_in(folder / "passes"), passes);
   EXPECT_EQ(test::read_file(folder / "passes" / *passes.rbegin()),
             test::read_file(folder / "a.png"));
   EXPECT_NE(test::read_file(folder / "passes" / *passes.begin()),
             test::read_file(folder / "a.png"));
+}
+
+TEST(CliRender, NormalsOfBothKinds) {
+  const TemporaryFolder folder;
+  const auto picture = [&](const std::string &name, const std::string &options) {
+    render(kHead + " -i 80 --size 48x40 --orbit 1 -o " + quoted(folder / (name + ".png")) +
+           options);
+    return test::read_file(folder / (name + ".png"));
+  };
+  const std::string smooth = picture("smooth", ""), cell = picture("cell", " --normals cell");
+  EXPECT_EQ(picture("named", " --normals smooth"), smooth);
+  EXPECT_NE(cell, smooth);
+  EXPECT_EQ(picture("twin", " --normals cell --reference"), cell);
+  const std::string depth =
+      "render " + kHead + " -i 80 --size 48x40 --depth " + quoted(folder / "d.npy");
+  EXPECT_EQ(run_isowave(depth + " --normals cell").status, 1) << "no picture shows them";
+  EXPECT_EQ(run_isowave("render " + kHead + " -i 80 --normals flat").status, 1);
 }
 
 TEST(CliRender, ReferenceIsTheSamePicture) {

@@ -104,15 +104,17 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
     ocl::Device device(GetParam());
     options.with_shading = shading;
     Renderer renderer(device, volume_, options);
-    renderer.render(
-        {.camera = cameras_[0], .isovalue = 0.1f, .voxel_pixels = options.with_levels ? 2.0 : 0.0});
+    renderer.render({.camera = cameras_[0],
+                     .isovalue = 0.1f,
+                     .voxel_pixels = options.with_levels ? 2.0 : 0.0,
+                     .normals = shading ? Normals::kSmooth : Normals::kCell});
     return stems_of(device);
   };
   EXPECT_THAT(stems({.size = kSize}), ElementsAre("block_cache", "macrocells", "march",
                                                   "request_ahead", "start_rays", "zfp_decode"));
   EXPECT_THAT(stems({.size = kSize}, true),
               ElementsAre("block_cache", "macrocells", "march", "request_ahead", "shade",
-                          "start_rays", "zfp_decode"));
+                          "smooth_normals", "start_rays", "zfp_decode"));
   EXPECT_THAT(stems({.size = kSize, .with_kept_picture = true}),
               ElementsAre("block_cache", "kept_picture", "macrocells", "march", "request_ahead",
                           "start_rays", "zfp_decode"));

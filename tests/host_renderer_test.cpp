@@ -246,17 +246,14 @@ std::vector<WorldRay> any_rays(const glm::uvec3 &dims, std::size_t count) {
     const glm::dvec3 from =
                          extent * glm::dvec3(random.in(-1, 2), random.in(-1, 2), random.in(-1, 2)),
                      to = extent * glm::dvec3(random.in(0, 1), random.in(0, 1), random.in(0, 1));
-    // Numbers that float32 holds, the largest component between 1/2 and 1.
-    const glm::vec3 towards(to - from);
-    const float largest = std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)});
-    glm::vec3 direction = towards / largest * 0.75f;
-    glm::vec3 origin(from);
+    glm::vec3 origin(from), direction(to - from);
     if (i % 4 == 3) {
-      const auto axis = static_cast<int>(i / 4 % 3);
-      direction[axis] = 0;
-      if (glm::length(direction) < 0.5f) direction[(axis + 1) % 3] = 0.75f;
+      direction[static_cast<int>(i / 4 % 3)] = 0;
       origin = glm::round(origin);
     }
+    // Numbers that float32 holds, the largest component between 1/2 and 1.
+    const glm::vec3 sizes = glm::abs(direction);
+    direction *= 0.75f / std::max({sizes.x, sizes.y, sizes.z});
     rays.push_back({origin, direction});
   }
   return rays;

@@ -80,6 +80,21 @@ class ProgressOf : public Progress {
   double completed_percent_ = 0;
 };
 
+/// Has before_kernel called for each kernel that is compiled while this lives.
+class KernelWatch {
+ public:
+  KernelWatch(core::ocl::Device &device, const std::function<void()> &before_kernel)
+      : device_(device) {
+    if (before_kernel) device.on_new_kernel([&](std::string_view) { before_kernel(); });
+  }
+  ~KernelWatch() { device_.on_new_kernel({}); }
+  KernelWatch(const KernelWatch &) = delete;
+  KernelWatch &operator=(const KernelWatch &) = delete;
+
+ private:
+  core::ocl::Device &device_;
+};
+
 void check(const FrameRequest &request, const RendererOptions &options) {
   const bool sets_detail = request.voxel_pixels != 0 || request.voxel_error != 0;
   if (request.max_surface_error && sets_detail)
@@ -157,10 +172,15 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
 }
 
 Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
-                   const RendererOptions &options) {
+                   const RendererOptions &options)
+    : Renderer(std::move(device), std::move(volume), options, {}) {}
+
+Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
+                   const RendererOptions &options, const std::function<void()> &before_kernel) {
   guarded("making a renderer", [&] {
     if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
     const std::lock_guard lock(device->implementation().mutex);
+    const KernelWatch watch(device->implementation().device, before_kernel);
     implementation_ = std::make_unique<Implementation>(device, std::move(volume), options);
   });
 }

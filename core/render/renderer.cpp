@@ -135,7 +135,7 @@ void Renderer::enqueue_normals(bool begins) {
 /// enqueued.
 void Renderer::finish_normals(const OnPass &on_pass, bool has_begun, FrameStats &stats) {
   const auto begin = std::chrono::steady_clock::now();
-  has_open_requests_ = true;
+  open_requests_ = state_.drawing;
   if (!has_begun) {
     enqueue_normals(true);
     if (readback_.in_flight() == PassReadback::kMaxInFlight)
@@ -156,19 +156,21 @@ void Renderer::finish_normals(const OnPass &on_pass, bool has_begun, FrameStats 
     shown.completed_percent = 100;
     stats.cancelled = on_pass && !on_pass(shown) && !finished;
     guard.check(pass.counts);
-    has_open_requests_ = !finished;
+    if (finished) open_requests_.reset();
     if (!finished && !stats.cancelled && readback_.in_flight() == 0) enqueue_normals(false);
   }
   stats.normals.ms = ms_since(begin);
 }
 
 /// Answers what is left of the requests of a frame whose normals were cut short, and forgets its
-/// rays.
+/// rays. rays.frame: of any frame.
 void Renderer::answer_requests() {
-  if (!std::exchange(has_open_requests_, false)) return;
+  const auto of = std::exchange(open_requests_, std::nullopt);
+  if (!of) return;
   state_.rays.forget_rays();
-  enqueue_normals(false);
-  readback_.drain();
+  state_.rays.open_pass();
+  state_.provide_blocks(state_.rays.previous_counts, *of);
+  smooth_normals_(state_.cache, state_.rays, false);  // of no ray; opens the next pass
 }
 
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
@@ -252,7 +254,6 @@ void Renderer::begin_frame(const FrameRequest &request) {
       make_level_frames(infos, request.camera, size, isovalue, request.voxel_pixels);
   const std::vector<DecodedValues> values = decoded_values(request);
   readback_.drain();  // of what the frame before had enqueued beyond its last pass
-  answer_requests();
   decode_as(values, request.bound);
   has_picture_ = false;
   size_ = size;
@@ -286,6 +287,7 @@ void Renderer::begin_frame(const FrameRequest &request) {
     state_.cache.classify(state_.rays);
   }
   cached_isovalue_ = isovalue;
+  answer_requests();
   pipeline_->begin_frame();
   has_picture_ = true;
 }

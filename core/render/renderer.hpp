@@ -139,9 +139,9 @@ class Renderer {
   ImageSize size_;                         ///< of the frame at work, or the last
   bool has_picture_ = false;               ///< the hit buffer has the frame's hits so far
   std::optional<float>
-      cached_isovalue_;             ///< of the cache's bits of voxels inside; none: it is empty
-  bool is_one_pass_ = false;        ///< the last frame was: it found all blocks that it needed
-  bool has_open_requests_ = false;  ///< rays wait for their normals
+      cached_isovalue_;       ///< of the cache's bits of voxels inside; none: it is empty
+  bool is_one_pass_ = false;  ///< the last frame was: it found all blocks that it needed
+  std::optional<LevelRange> open_requests_;  ///< of rays that wait for their normals
   std::unique_ptr<Pipeline> pipeline_;
   SmoothNormals smooth_normals_;
   Shade shade_;

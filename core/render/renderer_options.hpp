@@ -32,8 +32,8 @@ struct RendererOptions {
   bool with_levels = false;        ///< frames may use the volume's levels of detail
   bool with_bounds = false;        ///< frames may draw bounds of the volume
   bool with_kept_picture = false;  ///< Renderer::keep_picture() will be called
-  /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built when
-  /// they are needed.
+  /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built
+  /// when they are needed.
   bool with_shading = true;
 };
 

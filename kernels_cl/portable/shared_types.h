@@ -10,7 +10,9 @@
 #define ISO_NAMESPACE_END
 #define ISO_GLOBAL global      ///< address space of buffers
 #define ISO_CONSTANT constant  ///< address space of tables
+#ifndef ISO_UNROLL /* by -D: empty where it makes programs slower to compile, not to run */
 #define ISO_UNROLL _Pragma("unroll")
+#endif
 #ifdef ISO_CPU /* the host says so, of PoCL and llvmpipe: PoCL calls long functions otherwise, \
                   which takes a fifth longer */
 #define ISO_INLINE static inline __attribute__((always_inline))

@@ -399,7 +399,8 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
   if (options.image.empty() && options.refined.empty() && options.progress_dir.empty())
-    refuse_options(command, {"--color", "--background", "--normals"}, "no picture is written: give --output");
+    refuse_options(command, {"--color", "--background", "--normals"},
+                   "no picture is written: give --output");
   if (options.stats.empty())
     refuse_options(command, {"--no-stage-times"}, "no statistics are written: give --stats");
   check_renderer_options(command, options.renderer_flags);

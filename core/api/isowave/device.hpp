@@ -26,7 +26,8 @@ struct DeviceOptions {
 
 /// An opened device. Any number of renderers may share one, also from several threads: they take
 /// turns, frame by frame. Renderers that are to draw at the same time need devices of their own;
-/// open_device() may be called again for the same one.
+/// open_device() may be called again for the same one. A renderer that is being made keeps the
+/// device from all others, minutes where kernels are compiled: a QuickRenderer draws meanwhile.
 class Device {
  public:
   ~Device();

@@ -2,6 +2,7 @@
 // Draws frames of one volume on one device.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -51,6 +52,10 @@ class Renderer {
   double setup_ms() const;             ///< wall clock of uploads, without compiling
 
  private:
+  friend class QuickRenderer;
+  /// before_kernel: called before each kernel is compiled; what it throws is thrown here.
+  Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
+           const RendererOptions &options, const std::function<void()> &before_kernel);
   void release() noexcept;
 
   struct Implementation;

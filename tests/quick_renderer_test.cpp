@@ -1,0 +1,158 @@
+// Pictures before a device's renderer is ready: who draws, the bits, and what goes wrong.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <future>
+#include <isowave/isowave.hpp>
+#include <mutex>
+
+#include "core/api/device_implementation.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr ImageSize kSize{128, 96};
+
+/// The renderer of a device cannot be made while others have the device.
+class QuickRendererOnDevice : public testing::TestWithParam<core::ocl::DeviceInfo> {
+ protected:
+  std::unique_lock<std::mutex> busy_device() const {
+    return std::unique_lock(device_->implementation().mutex);
+  }
+  /// A renderer of one thread on the host, so that its frames have several bands.
+  QuickRenderer make(const RendererOptions &options = {.largest = kSize, .with_levels = true},
+                     const HostRendererOptions &host = {.num_threads = 1}) const {
+    return {device_, volume_, options, host};
+  }
+  FrameRequest request() const {
+    return {.camera = HostRenderer(volume_).camera(10, kSize),
+            .isovalue = 10,
+            .size = kSize,
+            .want_depth = true};
+  }
+
+  std::shared_ptr<Device> device_ = open_device(std::to_string(GetParam().index));
+  std::shared_ptr<const Volume> volume_ =
+      open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz", {.rate = 8, .levels = 0});
+};
+INSTANTIATE_TEST_SUITE_P(Devices, QuickRendererOnDevice,
+                         testing::ValuesIn(core::devices_under_test()), core::device_test_name);
+
+template <class Call>
+std::string error_of(const Call &call) {
+  try {
+    call();
+  } catch (const Error &error) {
+    EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST_P(QuickRendererOnDevice, TheHostDrawsUntilTheDeviceIsReady) {
+  std::unique_lock busy = busy_device();
+  QuickRenderer renderer = make();
+  const FrameRequest wanted = request();
+  EXPECT_EQ(renderer.camera(10).eye, wanted.camera.eye);
+  const Frame first = renderer.render(wanted);
+  EXPECT_FALSE(renderer.ready());
+  EXPECT_GT(first.statistics.hits, 1000u);
+  busy.unlock();
+  renderer.wait();
+  EXPECT_TRUE(renderer.ready());
+  EXPECT_EQ(renderer.camera(10).eye, wanted.camera.eye);
+  const Frame second = renderer.render(wanted);
+  EXPECT_GT(second.statistics.decoded_blocks, 0u) << "the host draws it";
+  EXPECT_EQ(second.picture, first.picture);
+  EXPECT_EQ(second.depth, first.depth);
+}
+
+TEST_P(QuickRendererOnDevice, AFrameAtWorkIsBegunAnewByTheDevice) {
+  std::unique_lock busy = busy_device();
+  QuickRenderer renderer = make();
+  FrameRequest wanted = request();
+  std::vector<std::uint32_t> passes;
+  wanted.on_pass = [&](const Progress &progress) {
+    passes.push_back(progress.passes());
+    if (passes.size() == 2) {
+      busy.unlock();
+      renderer.wait();
+    }
+    return true;
+  };
+  const Frame frame = renderer.render(wanted);
+  EXPECT_GT(frame.statistics.decoded_blocks, 0u) << "the host draws it";
+  EXPECT_FALSE(frame.statistics.cancelled);
+  ASSERT_GE(passes.size(), 3u);
+  EXPECT_EQ(passes[1], 2u);
+  EXPECT_EQ(passes[2], 1u);
+  wanted.on_pass = {};
+  EXPECT_EQ(frame.depth, renderer.render(wanted).depth);
+}
+
+TEST_P(QuickRendererOnDevice, FramesOfTheHostCanBeStopped) {
+  std::unique_lock busy = busy_device();
+  QuickRenderer renderer = make();
+  FrameRequest wanted = request();
+  wanted.on_pass = [](const Progress &progress) { return progress.passes() < 2; };
+  const Frame frame = renderer.render(wanted);
+  EXPECT_TRUE(frame.statistics.cancelled);
+  EXPECT_EQ(frame.statistics.passes, 2u);
+  busy.unlock();
+}
+
+TEST_P(QuickRendererOnDevice, WhatTheHostCannotDrawWaits) {
+  FrameRequest levels = request();
+  levels.voxel_pixels = 2;
+  const std::vector<float> expected =
+      Renderer(device_, volume_, {.largest = kSize, .with_levels = true}).render(levels).depth;
+  const auto draw = [](QuickRenderer &renderer, const FrameRequest &wanted) {
+    return std::async(std::launch::async, [&] { return renderer.render(wanted); });
+  };
+  {
+    std::unique_lock busy = busy_device();
+    QuickRenderer renderer = make();
+    auto frame = draw(renderer, levels);
+    busy.unlock();
+    EXPECT_EQ(frame.get().depth, expected);
+  }
+  std::unique_lock busy = busy_device();
+  QuickRenderer renderer = make({.largest = kSize}, {.memory_limit = 1});
+  const FrameRequest wanted = request();
+  auto frame = draw(renderer, wanted);
+  busy.unlock();
+  EXPECT_EQ(frame.get().depth, HostRenderer(volume_).render(wanted).depth);
+}
+
+TEST_P(QuickRendererOnDevice, ErrorsOfTheDeviceComeWithTheNextFrame) {
+  std::unique_lock busy = busy_device();
+  QuickRenderer renderer = make({.largest = kSize, .memory_budget = 1000});
+  const FrameRequest wanted = request();
+  EXPECT_NO_THROW(renderer.render(wanted));
+  busy.unlock();
+  EXPECT_THAT(error_of([&] { renderer.wait(); }), HasSubstr("1000"));
+  EXPECT_TRUE(renderer.ready());
+  EXPECT_THAT(error_of([&] { renderer.render(wanted); }), HasSubstr("1000"));
+  EXPECT_THAT(error_of([&] { renderer.camera(10); }), HasSubstr("1000"));
+  EXPECT_THAT(error_of([&] { QuickRenderer(nullptr, volume_); }), HasSubstr("needs a device"));
+}
+
+/// Whether it has begun to compile or not.
+TEST_P(QuickRendererOnDevice, LeavesNothingBehind) {
+  for (int i = 0; i < 3; ++i) {
+    const QuickRenderer renderer = make();
+  }
+  EXPECT_EQ(device_->memory_in_use(), 0u);
+  FrameRequest wanted = request();
+  QuickRenderer first = make(), second = std::move(first);
+  first = make({.largest = kSize, .cache_blocks = 64});
+  EXPECT_EQ(first.render(wanted).depth, second.render(wanted).depth);
+}
+
+}  // namespace
+}  // namespace isowave
