@@ -110,11 +110,11 @@ Frame QuickRenderer::render(const FrameRequest &request) {
   return implementation_->draw(request);
 }
 
-Camera QuickRenderer::camera(float isovalue) {
+Camera QuickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
   const std::lock_guard lock(implementation_->mutex);
   if (const HostRenderer *on_host = implementation_->host_renderer())
-    return on_host->camera(isovalue, implementation_->size);
-  return implementation_->device_renderer().camera(isovalue);
+    return on_host->camera(isovalue, size.value_or(implementation_->size));
+  return implementation_->device_renderer().camera(isovalue, size);
 }
 
 bool QuickRenderer::ready() const {
@@ -123,6 +123,10 @@ bool QuickRenderer::ready() const {
 
 void QuickRenderer::wait() const {
   implementation_->device_renderer();
+}
+
+std::uint64_t QuickRenderer::memory_bytes() const {
+  return implementation_->done && implementation_->made ? implementation_->made->memory_bytes() : 0;
 }
 
 }  // namespace isowave

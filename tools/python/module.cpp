@@ -346,7 +346,7 @@ isowave::FrameRequest request_of(const nb::dict &options) {
   return request;
 }
 
-/// Draws by a Renderer or a HostRenderer.
+/// Draws by any of the library's renderers.
 ///
 /// on_pass     called after each pass with a PassView; False from it ends the frame
 /// interrupts  signals are looked for after each pass, which waits for that
@@ -399,36 +399,48 @@ class PyRenderer {
     get("with_time_budget", wanted.with_time_budget);
     isowave::DeviceOptions device_options;
     get("profiling", device_options.profiling);
+    bool quick = false;
+    get("quick", quick);
     const nb::gil_scoped_release no_gil;
     device_ = isowave::open_device(selector, device_options);
-    renderer_.reset(new isowave::Renderer(device_, volume.volume, wanted));
+    if (quick) {
+      quick_.reset(new isowave::QuickRenderer(device_, volume.volume, wanted));
+    } else {
+      renderer_.reset(new isowave::Renderer(device_, volume.volume, wanted));
+    }
   }
 
   nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
                   bool interrupts) {
-    return draw(*renderer_, options, on_pass, interrupts);
+    return quick_ ? draw(*quick_, options, on_pass, interrupts)
+                  : draw(*renderer_, options, on_pass, interrupts);
   }
 
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
+    const isowave::ImageSize size{width, height, 1};
     isowave::Camera camera;
     {
       const nb::gil_scoped_release no_gil;
-      camera = renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
+      camera = quick_ ? quick_->camera(isovalue, size) : renderer_->camera(isovalue, size);
     }
     return camera_tuple(camera);
   }
 
-  nb::dict device() const { return device_dict(device_->info()); }
-  double compile_ms() const {
+  bool ready() const { return !quick_ || quick_->ready(); }
+  void wait() const {
     const nb::gil_scoped_release no_gil;
-    return device_->compile_ms();
+    if (quick_) quick_->wait();
   }
-  double setup_ms() const { return renderer_->setup_ms(); }
-  std::uint64_t memory_bytes() const { return renderer_->memory_bytes(); }
+  nb::dict device() const { return device_dict(device_->info()); }
+  std::uint64_t memory_bytes() const {
+    return quick_ ? quick_->memory_bytes() : renderer_->memory_bytes();
+  }
 
  private:
   std::shared_ptr<isowave::Device> device_;
+  // One of the two.
   std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>> renderer_;
+  std::unique_ptr<isowave::QuickRenderer, DestroyWithoutGil<isowave::QuickRenderer>> quick_;
 };
 
 /// Draws on the host.
@@ -564,7 +576,7 @@ NB_MODULE(_core, m) {
       .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
       .def("camera", &PyRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
       .def_prop_ro("device", &PyRenderer::device)
-      .def_prop_ro("compile_ms", &PyRenderer::compile_ms)
-      .def_prop_ro("setup_ms", &PyRenderer::setup_ms)
+      .def_prop_ro("ready", &PyRenderer::ready)
+      .def("wait", &PyRenderer::wait)
       .def_prop_ro("memory_bytes", &PyRenderer::memory_bytes);
 }

@@ -1,7 +1,9 @@
 #pragma once
 // Draws at once what a device's renderer will draw when its kernels are compiled.
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "isowave/device.hpp"
 #include "isowave/frame.hpp"
@@ -40,7 +42,7 @@ class QuickRenderer {
   /// The view that Renderer::camera() takes, from whichever renderer there is.
   ///
   /// Throws  Error: NaN; as render() does
-  Camera camera(float isovalue);
+  Camera camera(float isovalue, std::optional<ImageSize> size = {});
 
   /// Whether the device's renderer is made, or could not be.
   bool ready() const;
@@ -48,6 +50,8 @@ class QuickRenderer {
   ///
   /// Throws  Error: what went wrong when the device's renderer was made
   void wait() const;
+  /// Of device memory that it holds; 0 before ready().
+  std::uint64_t memory_bytes() const;
 
  private:
   struct Implementation;

@@ -268,6 +268,11 @@ class Renderer:
         `time_budget`.
     profiling
         Measures stages, for statistics["stage_ms"]; each pass is waited for.
+    quick
+        Returns at once: the device's renderer is made in a thread of its own, which may take half a
+        minute where a driver compiles kernels. Until it is ready, the host draws, with the same
+        bits; volumes that are too large for that, and what the host cannot draw (levels, bounds,
+        time_budget), wait for the device.
     """
 
     #: Of the constructor's arguments, what frames may ask for only if it was given.
@@ -286,6 +291,7 @@ class Renderer:
         bounds: bool = False,
         time_budget: bool = False,
         profiling: bool = False,
+        quick: bool = False,
     ) -> None:
         self.volume = volume
         self.size = size
@@ -304,6 +310,7 @@ class Renderer:
                 "with_bounds": bounds,
                 "with_time_budget": time_budget,
                 "profiling": profiling,
+                "quick": quick,
             },
         )
 
@@ -314,8 +321,17 @@ class Renderer:
 
     @property
     def memory_bytes(self) -> int:
-        """Of device memory that it holds."""
+        """Of device memory that it holds; 0 before it is ready."""
         return self._core.memory_bytes
+
+    @property
+    def ready(self) -> bool:
+        """Whether the device draws; False while the host does (quick)."""
+        return self._core.ready
+
+    def wait(self) -> None:
+        """Waits until the device draws. Raises Error where its renderer cannot be made."""
+        self._core.wait()
 
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
         """A view from the front right and above in which the isosurface fills the picture."""

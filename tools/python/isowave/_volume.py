@@ -362,7 +362,8 @@ class Volume:
     ) -> Image:
         """Draws the isosurface; Renderer.render has the other arguments.
 
-        The renderer is kept for the next call.
+        The renderer is kept for the next call. While a driver compiles its kernels, which may take
+        half a minute the first time on a machine, the host draws; the bits are the same.
 
         Parameters
         ----------
@@ -396,7 +397,7 @@ class Volume:
         if self._renderer is None or not fits:
             self._renderer = None  # its memory goes before that of the next is taken
             largest = max(size, (1280, 720), key=lambda s: s[0] * s[1])
-            self._renderer = Renderer(self, size=largest, **wanted)
+            self._renderer = Renderer(self, size=largest, quick=True, **wanted)
             self._made_with = wanted
         return self._renderer
 
@@ -459,8 +460,10 @@ class Volume:
             equal: whether all are the same; differing_pixels, differing_depths, differing_normals:
             how many are not; hits: rays that hit something.
         """
-        image = self.render(isovalue, size=size, camera=camera, device=device)
         with self._lock:
+            renderer = self._renderer_for({"device": device, "size": size})
+            renderer.wait()
+            image = renderer.render(isovalue, size=size, camera=camera)
             if self._host is None:
                 self._host = _core.HostRenderer(self._core, 0)
             host = self._host

@@ -137,6 +137,66 @@ def test_direction_turns_the_world():
     assert np.allclose(np.linalg.norm(index, axis=0), 6, atol=0.2)
 
 
+def test_rays_of_any_origin(volume):
+    """Those of a camera's pixels hit what its picture has; the result has the rays' axes."""
+    camera = volume.camera(6, size=SIZE)
+    image = volume.render(6, size=SIZE, camera=camera)
+    hit = np.isfinite(image.depth)
+    towards = np.where(hit[..., None], image.position - camera.eye, (0, 0, 1)).astype(float)
+    rays = np.concatenate([np.broadcast_to(camera.eye, towards.shape), towards], axis=-1)
+    found = volume.cast_rays(rays, 6)
+    assert found["t_hit"].shape == hit.shape and found["cell"].shape == (*hit.shape, 3)
+    # The direction is as long as the way to the hit. Float32 positions move grazing rays.
+    assert np.abs(found["t_hit"][hit] - 1).max() < 0.05
+    assert np.median(np.abs(found["t_hit"][hit] - 1)) < 1e-5
+    index = (found["position"][hit][:, ::-1] - volume.origin) / volume.spacing
+    assert (np.abs(index - found["cell"][hit] - 0.5) <= 0.5001).all()
+    one = volume.cast_rays(rays[24, 32], 6)
+    assert one["t_hit"].shape == () and one["normals"].shape == (3,)
+    away = volume.cast_rays([[*camera.eye, *(np.array(camera.eye) - camera.at)]], 6)
+    assert np.isinf(away["t_hit"]).all() and np.isnan(away["position"]).all()
+    for bad in ([1, 2, 3], np.zeros((2, 6)), [[0, 0, 0, np.nan, 0, 1]]):
+        with pytest.raises((ValueError, isowave.Error)) as raised:
+            volume.cast_rays(bad, 6)
+        assert "\n" not in str(raised.value)
+
+
+def test_device_and_host_draw_the_same_bits(volume):
+    said = volume.verify(6, size=SIZE)
+    assert said["equal"] and said["hits"] > 100
+
+
+def test_normals_are_smooth_unless_asked(renderer):
+    smooth, cell = renderer.render(6), renderer.render(6, normals="cell")
+    assert np.array_equal(smooth.depth, cell.depth)
+    assert not np.array_equal(smooth.normals, cell.normals)
+    with pytest.raises(ValueError, match="smooth"):
+        renderer.render(6, normals="flat")
+
+
+COLD = """
+import sys, time
+import numpy as np
+import isowave
+volume = isowave.compress(np.indices((32, 32, 32)).sum(axis=0).astype(np.float32), rate=16)
+renderer = volume.renderer(size=(64, 48), device="cpu", quick=True)
+first = renderer.render(40)
+print(renderer.ready, flush=True)
+renderer.wait()
+assert renderer.ready and renderer.memory_bytes > 0
+assert np.array_equal(renderer.render(40).rgb, first.rgb)
+"""
+
+
+def test_host_draws_while_kernels_are_compiled(tmp_path):
+    environment = {**os.environ, "POCL_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", COLD], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "False\n"
+
+
 def test_passes_end_with_the_finished_picture(volume):
     renderer = volume.renderer(size=SIZE, cache_blocks=16)
     whole = renderer.render(6)
