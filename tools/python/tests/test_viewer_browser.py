@@ -162,10 +162,10 @@ def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:
     volume = FakeVolume()
     renderer = volume.renderer(device=None, size=shot.size, samples=1)
     names = ("eye", "at", "up")
-    at = {k: tuple(float(x) for x in state(page)[k].split(",")) for k in names}
+    vectors: list[Any] = [tuple(float(x) for x in state(page)[k].split(",")) for k in names]
     expected = renderer.render(
         80.0,
-        camera=FakeCamera(at["eye"], at["at"], at["up"], float(state(page)["fovy"])),  # type: ignore
+        camera=FakeCamera(*vectors, float(state(page)["fovy"])),
         size=shot.size,
         samples=1,
         color=(0xDB / 255, 0xBD / 255, 0x87 / 255),

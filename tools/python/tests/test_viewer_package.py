@@ -13,6 +13,7 @@ from conftest import sphere_voxels
 from PIL import Image
 
 import isowave
+from isowave.viewer.host import make_host
 from isowave.viewer.scene import Scene, Session
 
 if not isowave.devices():
@@ -95,6 +96,28 @@ def test_the_lossless_picture_has_the_renderers_bits(
     assert np.unique(shown.reshape(-1, 3), axis=0).shape[0] > 50  # there is a surface
     camera = renderer.camera(8.5)
     assert head["camera"]["eye"] == list(camera.eye)
+
+
+def test_the_host_draws_the_devices_bits(volume: isowave.Volume) -> None:
+    renderers = [volume.renderer(size=(90, 70)), make_host(volume)]
+    pictures = []
+    for renderer in renderers:
+        assert renderer is not None
+        image = renderer.render(
+            8.5,
+            camera=renderer.camera(8.5, (90, 70)),
+            size=(90, 70),
+            samples=1,
+            color=(0.5, 0.25, 1),
+            background=(1, 1, 0),
+            outputs=("rgb",),
+            max_error=None,
+            time_budget=None,
+            on_pass=lambda so_far: so_far.completed_percent <= 100,
+        )
+        assert image.complete and image.statistics["passes"] > 0
+        pictures.append(image.rgb)
+    np.testing.assert_array_equal(*pictures)
 
 
 def test_all_of_a_first_picture_and_its_bounds_come(front: Front) -> None:

@@ -401,6 +401,52 @@ def test_a_budget_that_is_too_small_leaves_the_old_one() -> None:
     assert eye.pictures == [(1, "first"), (1, "whole")]
 
 
+@pytest.mark.parametrize("works", [True, False])
+def test_the_host_draws_while_the_device_is_prepared(works: bool) -> None:
+    may_begin, changed, heads = threading.Event(), threading.Condition(), list[dict[str, Any]]()
+
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        assert may_begin.wait(60)
+        return None if works else RuntimeError("no device")
+
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        with changed:
+            heads.append(head)
+            changed.notify_all()
+        if data is not None and client is not None:
+            scene.receive(client, Ack(head["frame"]))
+
+    def came(**wanted: Any) -> bool:
+        def there() -> bool:
+            return any(all(h.get(k) == v for k, v in wanted.items()) for h in heads)
+
+        with changed:
+            return changed.wait_for(there, 60)
+
+    volume = FakeVolume(refuse=refuse)
+    host = FakeVolume().renderer(device="host", size=(64, 48), samples=1)
+    scene = Scene(
+        volume, isovalue=80, size=(64, 48), make_camera=fake_camera, make_host=lambda v: host
+    )
+    client = scene.join(post)
+    assert client is not None
+    wish = dict(isovalue=80.0, size=(32, 32), view=None, color=(1, 1, 1), background=(0, 0, 0))
+    more: dict[str, Any] = dict(wish, samples=1, max_error=None, time_budget=None)
+    scene.receive(client, Wish(id=1, **more))
+    assert came(stage="lossless", wish=1)
+    assert not [h for h in heads if h.get("state") in ("ready", "failed")] and not volume.frames
+    may_begin.set()
+    if works:
+        # The pictures have the same bits: only what the host does not know is drawn again.
+        assert came(type="bounds", wish=1)
+        assert [f.outputs for f in volume.frames] == [("depth", "bounds")]
+    else:
+        assert came(type="error", message="no device")
+        scene.receive(client, Wish(id=2, **more))
+        assert came(type="error", message="no device", wish=2)
+    scene.close()
+
+
 def test_without_any_device_each_wish_says_why_until_a_budget_works() -> None:
     working = False
 

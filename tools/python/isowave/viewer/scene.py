@@ -6,8 +6,8 @@
 Of each client the newest wish counts; it cancels the frame of the one before. A wish is drawn in
 stages: a first picture of a quarter of the width and height; the whole picture (sent as JPEG after
 passes); once the client rests, the lossless picture (PNG), and what is certain of it. Clients take
-turns, stage by stage. At most two pictures are on the way to a client; of those that wait for it only the last is
-kept, and it is always sent.
+turns, stage by stage. At most two pictures are on the way to a client; of those that wait for it
+only the last is kept, and it is always sent.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from .host import make_host
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
 from .pictures import count_rays, dividing_value, encode_jpeg, encode_png, fit_size, share_within
 from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, View, Wish
@@ -37,6 +38,7 @@ CERTAIN_SECONDS: Final = 0.4  # after the lossless picture, until its bounds are
 GIVE_WAY_SECONDS: Final = 0.15  # of a whole picture, before others' first pictures come between
 QUICK_SECONDS: Final = 0.02  # a whole picture that needs no first one
 SHOW_SECONDS: Final = 0.15  # without a picture, until what a cancelled one has is shown
+HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws meanwhile
 CLOSE_SECONDS: Final = 10.0  # for a pass, or a renderer that is being made, to end
 MAX_RAYS: Final = 1 << 26  # of a picture
 
@@ -113,6 +115,7 @@ class Scene:
     size, samples  the largest picture that the renderer is made for at first; it is made anew when
                    a client wants more
     max_clients    further ones are refused
+    make_host      a renderer that draws while the first one of the device is prepared, or None
     clock          seconds; tests replace it
     start          False: no thread; call step() instead, as tests do
     """
@@ -129,13 +132,14 @@ class Scene:
         samples: int = 1,
         max_clients: int = 16,
         make_camera: Callable[[View], Any] | None = None,
+        make_host: Callable[[VolumeLike], RendererLike | None] = make_host,
         clock: Callable[[], float] = time.monotonic,
         start: bool = True,
     ) -> None:
         self._volume, self._isovalue, self._title = volume, isovalue, title
         self._device, self._max_clients = device, max_clients
         self._make_camera = make_camera or _isowave_camera
-        self._clock = clock
+        self._make_host, self._clock = make_host, clock
         self._changed = threading.Condition()
         self._clients: list[Client] = []  # who comes next is in front
         self._closing = self._prepared = self._failed = False
@@ -147,6 +151,8 @@ class Scene:
         self._made: RendererOptions | None = None  # what the renderer was made for
         self._wanted = RendererOptions(size, samples, memory_budget)
         self._fallback: RendererOptions | None = None  # worked before
+        self._host: RendererLike | None = None  # draws until there is a renderer
+        self._making: threading.Thread | None = None  # the first renderer
         self._ray_limit = MAX_RAYS
         self._thread: threading.Thread | None = None
         if start:
@@ -211,7 +217,9 @@ class Scene:
             self._changed.notify_all()
         if self._thread and self._thread is not threading.current_thread():
             self._thread.join(CLOSE_SECONDS)
-        self._renderer = None  # the thread's last frame may still hold it
+        if self._making:
+            self._making.join(CLOSE_SECONDS)
+        self._renderer = self._host = None  # the thread's last frame may still hold it
 
     # What follows runs in the scene's thread.
 
@@ -220,7 +228,7 @@ class Scene:
         if not self._prepared:
             self._prepare()
             return True
-        if self._made != self._wanted and not self._failed:
+        if self._must_make():
             self._make_renderer()
             return True
         turn = self._next_turn()
@@ -233,6 +241,7 @@ class Scene:
         return False
 
     def _work(self) -> None:
+        self._begin()
         while True:
             with self._changed:
                 if self._closing:
@@ -243,16 +252,42 @@ class Scene:
                         self._changed.wait(self._seconds_to_rest())
 
     def _is_due(self) -> bool:
-        return any(self._has_turn(client) for client in self._clients) or (
-            self._made != self._wanted and not self._failed
-        )
+        return any(self._has_turn(client) for client in self._clients) or self._must_make()
+
+    def _must_make(self) -> bool:
+        """Whether the renderer is another one than is wanted, and nobody is at it."""
+        is_made = self._made == self._wanted or self._failed
+        return not is_made and (self._making is None or not self._making.is_alive())
+
+    def _begin(self) -> None:
+        """Kernels may take long to compile: in another thread, and the host draws meanwhile."""
+        self._making = threading.Thread(target=self._make_renderer, daemon=True)
+        self._making.start()
+        self._prepare()
+        self._making.join(HOST_SECONDS)
+        if self._making.is_alive():
+            try:
+                host = self._make_host(self._volume)
+            except Exception:  # there is not enough memory: then nothing is drawn meanwhile
+                return
+            with self._changed:
+                if self._renderer is None and not self._failed:
+                    self._host = host
 
     def _seconds_to_rest(self) -> float | None:
-        due = [c.due for c in self._clients if c.stage is not Stage.DONE]
+        due = [c.due for c in self._clients if self._may_begin(c)]
         return max(0.0, min(due) - self._clock()) if due else None
 
     def _has_turn(self, client: Client) -> bool:
-        return client.stage is not Stage.DONE and self._clock() >= client.due
+        return self._may_begin(client) and self._clock() >= client.due
+
+    def _may_begin(self, client: Client) -> bool:
+        """Whether there is what the client's stage needs, but for time."""
+        if client.stage in (Stage.DONE, Stage.LOSSLESS):
+            return client.stage is Stage.LOSSLESS
+        if self._renderer is not None or self._failed:
+            return True
+        return self._host is not None and client.stage is not Stage.CERTAIN
 
     def _next_turn(self) -> tuple[Client, Wish, Stage] | None:
         """The first client in the row that something is to be done for; it goes to the end."""
@@ -266,15 +301,16 @@ class Scene:
 
     def _serve(self, client: Client, wish: Wish, stage: Stage) -> None:
         """One stage of a wish. Whatever goes wrong concerns this client alone."""
+        renderer = self._renderer or self._host
         try:
             if stage is Stage.LOSSLESS:
                 self._send_lossless(client, wish)
-            elif self._renderer is None:
+            elif renderer is None:
                 raise RuntimeError(self._failure)
             elif stage is Stage.CERTAIN:
-                self._send_bounds(self._renderer, client, wish)
-            elif not self._grow(wish, stage):
-                self._draw(self._renderer, client, wish, stage)
+                self._send_bounds(renderer, client, wish)
+            elif renderer is self._host or not self._grow(wish, stage):
+                self._draw(renderer, client, wish, stage)
         except Exception as error:  # of the library, or of its drivers
             with self._changed:
                 if client.joined and client.wish is wish:
@@ -290,6 +326,8 @@ class Scene:
             client.view = view
         size, samples = self._fitted(wish, stage)
         frame = _Frame(client, wish, stage, view, began, size, samples)
+        # A device's frames with a time budget show no passes; the host knows no budget.
+        timed = wish.time_budget is not None and renderer is not self._host
         image = renderer.render(
             wish.isovalue,
             camera=self._make_camera(view),
@@ -300,8 +338,7 @@ class Scene:
             max_error=wish.max_error,
             outputs=("rgb",),
             time_budget=None if wish.time_budget is None else wish.time_budget / 1000,
-            # Frames with a time budget show no passes.
-            on_pass=None if wish.time_budget else lambda so_far: self._on_pass(frame, so_far),
+            on_pass=None if timed else lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.stopped:
             self._show_what_there_is(frame, image)
@@ -380,7 +417,7 @@ class Scene:
                 self._offer(client, {**head, "stage": "lossless", "format": "png"}, data, keep=True)
 
     def _send_bounds(self, renderer: RendererLike, client: Client, wish: Wish) -> None:
-        """How far the surface may be off, of the rays of a first picture: bounds take their time."""
+        """How far the surface may be off, by the rays of a first picture: bounds take time."""
         if client.view is None:
             return
         size, samples = self._fitted(wish, Stage.FIRST)
@@ -441,7 +478,9 @@ class Scene:
             return
         with self._changed:
             self._renderer, self._made, self._fallback = renderer, wanted, wanted
+            self._host = None
             self._broadcast(self._status())
+            self._changed.notify_all()
 
     def _renderer_failed(self, wanted: RendererOptions, error: Exception) -> None:
         """Goes back to what worked. Nothing did: waits for another budget."""
@@ -449,6 +488,7 @@ class Scene:
             fallback = self._fallback if self._fallback != wanted else None
             if self._wanted == wanted:
                 self._failed, self._failure = fallback is None, first_line(error)
+                self._host = None
                 if fallback is not None:
                     self._wanted = fallback
                     if wanted.rays > fallback.rays:
@@ -456,6 +496,7 @@ class Scene:
             for client in list(self._clients):
                 self._post_error(client, error, None)
             self._broadcast(self._status())
+            self._changed.notify_all()
 
     def _fitted(self, wish: Wish, stage: Stage) -> tuple[tuple[int, int], int]:
         """Size and samples of a stage's picture, within what the renderer was made for."""
