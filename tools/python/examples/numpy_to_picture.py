@@ -1,6 +1,6 @@
 """From an array to a picture, in four lines.
 
-    python numpy_to_picture.py [picture.png]
+python numpy_to_picture.py [picture.png]
 """
 
 import sys

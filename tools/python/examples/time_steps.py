@@ -1,6 +1,6 @@
 """A batch of time steps: one picture each, all from the same camera.
 
-    python time_steps.py FOLDER [STEPS]
+python time_steps.py FOLDER [STEPS]
 """
 
 import pathlib

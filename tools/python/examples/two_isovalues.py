@@ -1,6 +1,6 @@
 """Compares two isovalues, and says how far compression may have moved each surface.
 
-    python two_isovalues.py VOLUME ISOVALUE ISOVALUE [picture.png]
+python two_isovalues.py VOLUME ISOVALUE ISOVALUE [picture.png]
 """
 
 import sys

@@ -470,7 +470,9 @@ def test_a_bad_camera_gets_a_readable_message(page: Any, text: str, message: str
 
 def test_a_memory_budget_is_shown_and_set(page: Any, server: Server) -> None:
     field = page.get_by_label("Memory budget")
-    assert field.input_value() == "" and "95 MiB" in page.locator(".device").inner_text()
+    assert (
+        field.input_value() == "" and "95 MiB of 1,024 MiB" in page.locator(".device").inner_text()
+    )
     picture = page.evaluate(DRAWN)
     field.fill("600")
     page.keyboard.press("Enter")

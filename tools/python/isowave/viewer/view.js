@@ -427,9 +427,8 @@ class View {
     else this.clearNote("passing");
     this.list(".device", ready ? {
       Device: head.device,
-      "Memory held": toMiB(head.memory_bytes),
-      "Of the device's": toMiB(head.device_memory),
-      "Compressed volume": toMiB(head.nbytes),
+      Memory: `${toMiB(head.memory_bytes)} of ${toMiB(head.device_memory)}`,
+      Volume: `${toMiB(head.nbytes)}, compressed`,
     } : { Device: head.state === "failed" ? "none" : "starting …" });
     const budget = this.field("budget");
     if (this.root.activeElement !== budget) {
