@@ -90,13 +90,13 @@ const Column kColumns[] = {
      [](const FrameReport &, const FrameStats &frame) {
        return sum_of(frame, &PassCounts::decoded_count);
      }},
-    {"normals", "normals_decoded_blocks", 0,
+    {"nrm blocks", "normals_decoded_blocks", 0,
      [](const FrameReport &, const FrameStats &frame) {
        return double(frame.normals.decoded_blocks);
      }},
-    {"passes", "normals_passes", 0,
+    {"nrm passes", "normals_passes", 0,
      [](const FrameReport &, const FrameStats &frame) { return double(frame.normals.passes); }},
-    {"ms", "normals_ms", 2,
+    {"nrm ms", "normals_ms", 2,
      [](const FrameReport &, const FrameStats &frame) { return frame.normals.ms; }},
     {"N_spec", "median_n_spec", 1,
      [](const FrameReport &, const FrameStats &frame) { return median_n_spec(frame); }},
@@ -264,8 +264,8 @@ void print_report(const FrameReport &report) {
       "columns are a cold frame's. visible: blocks with rays, summed over the passes, of all "
       "blocks; "
       "decoded:\n"
-      "blocks; normals: blocks decoded for smooth normals alone, and passes and ms for these, of "
-      "the frame's;\n"
+      "blocks; nrm blocks, nrm passes: those for smooth normals, on top; nrm ms: theirs, of the "
+      "frame;\n"
       "N_spec: median over the passes; util: intersected ray-block pairs per pass, of all pixels. "
       "resident\nfloor: the whole volume decoded, one kernel, no cache.\n");
   print_stages(report);

@@ -7,6 +7,25 @@
 #include "portable/touched_blocks.h"
 #include "portable/window.h"
 
+/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the
+/// others. In steps for all corners, so that a GPU waits for memory twice, not sixteen times.
+ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
+                                global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
+                                Requests requests) {
+  BlockEntry entries[8];
+  uint missing = unasked_corners(frame, b, touched, requests);
+  if (missing == 0) return;
+  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
+      slot_stamps[entries[corner].slot] = stamp;
+      missing &= ~(1u << corner);
+    }
+  }
+  request_corners(frame, b, missing, requests);
+}
+
 /// Of the rays that wait, the first counts->window_count ask for the blocks that they touch in
 /// their next active blocks: N_Spec of them (Sec. 4), or, with
 /// frame->schedule.per_ray_speculation, a number of their own.

@@ -122,7 +122,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
                              staged,         &num_staged};
   const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
                         frame->screen.end_y};
-  const uint item = get_local_id(0), num_left = prev->next_active_count;
+  const uint item = get_local_id(0), num_left = prev->next_active_count, pass = counts->pass;
   const int too_early = begins && num_left != 0;
   const uint num_rays = too_early ? 0 : (begins ? num_tiled_pixels(box) : num_left);
   const uint window = begins ? first_window(frame)
@@ -140,19 +140,20 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
   for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
        begin += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint i = begin + item;
-    uint pixel = ISO_INVALID_ID, block_id = ISO_INVALID_ID;
+    uint pixel = ISO_INVALID_ID, block_id = ISO_INVALID_ID, touched = 0, missing = 0;
+    BlockCoords base = {0, 0, 0};
     if (i < num_rays)
       pixel = begins ? tiled_pixel(frame, box, i) : unpack_entry(active_ray_ids[i]).pixel;
     if (pixel != ISO_INVALID_ID) block_id = hits[pixel].block_id;
-    int waits = 0;
     if (block_id != ISO_INVALID_ID) {
       ISO_FRAME_OF(level, block_id);
       const BlockCoords b = block_coords(level, block_id);
       const Stencil stencil = stencil_of(b, hits[pixel].cell, last_planes(level));
-      const CachedStencil cached = {cache_values, slots + item, stencil_base(&stencil)};
-      const uint touched = stencil_blocks(&stencil);
-      waits = (touched & ~find_slots(level, table, cached.base, touched, slots + item)) != 0;
-      if (!waits) {
+      base = stencil_base(&stencil);
+      touched = stencil_blocks(&stencil);
+      missing = touched & ~find_slots(level, table, base, touched, slots + item);
+      if (missing == 0) {
+        const CachedStencil cached = {cache_values, slots + item, base};
         const CellPoint at = {hits[pixel].x, hits[pixel].y, hits[pixel].z};
         const Gradient gradient = cached_gradient(&cached, &stencil, at);
         if (!is_no_gradient(gradient)) {
@@ -160,7 +161,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
           hits[pixel].grad_y = gradient.y;
           hits[pixel].grad_z = gradient.z;
         }
-        stamp_stencil(slot_stamps, read_stamp(counts->pass), b, &cached);
+        stamp_stencil(slot_stamps, read_stamp(pass), b, &cached);
       } else {
         atomic_inc(&num_waiting);
       }
@@ -169,16 +170,15 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
     uint any_waits = num_waiting != 0;
     barrier(CLK_LOCAL_MEM_FENCE);
     for (; any_waits != 0; any_waits = 0) { /* none, mostly: a CPU pays for each barrier */
-      const uint place = append_entry(waits, pack_entry(pixel, 0, 0), counters,
+      const uint place = append_entry(missing != 0, pack_entry(pixel, 0, 0), counters,
                                       &counts->next_active_count, next_active_ray_ids);
-      if (waits && place < window) {
+      if (missing != 0 && place < window) {
         ISO_FRAME_OF(level, block_id);
-        const Stencil stencil =
-            stencil_of(block_coords(level, block_id), hits[pixel].cell, last_planes(level));
-        const BlockCoords base = stencil_base(&stencil);
-        const uint touched = stencil_blocks(&stencil);
-        request_touched(level, table, slot_stamps, needed_stamp(counts->pass), base, touched,
-                        requests);
+        for (uint corner = 0; corner < 8; ++corner) {
+          if ((touched & ~missing & 1u << corner) != 0)
+            stamp_needed(slot_stamps, slots[corner * ISO_GROUP_SIZE + item], needed_stamp(pass));
+        }
+        request_corners(level, base, unasked_corners(level, base, missing, requests), requests);
         if (place == 0) {
           cache->first_block_id = block_id_at(level, base.x, base.y, base.z);
           cache->first_touched = touched;

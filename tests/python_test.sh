@@ -29,9 +29,7 @@ quietly "$python" -m pip install --quiet -r "$tests/requirements.txt" -r "$tests
 quietly "$python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
 
 "$python" -m mypy --config-file "$source/pyproject.toml" "$source/tools/python/isowave"
-# Outside of the sources, whose folder has no compiled part.
-cd "$work"
-"$python" -m mypy.stubtest isowave._core > "$work/log" 2>&1 || { cat "$work/log"; fail 'the stubs are wrong'; }
+cd "$work"  # not among the sources, whose folder has no compiled part
 ISOWAVE_PROGRAM=$program "$python" -m pytest -q -p no:cacheprovider "$tests"
 
 # On a machine without any OpenCL: PoCL comes from PyPI, the loader with the wheel.

@@ -16,34 +16,28 @@ typedef struct Requests {
   volatile local uint *num_staged;  ///< 0 at first
 } Requests;
 
-/// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the
-/// others. In steps for all corners, so that a GPU waits for memory twice, not sixteen times. Most
-/// have been asked for by another ray: their bits tell, and cost neither a search in the table nor
-/// an atomic, for whose result one would wait.
-ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
-                                global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
+/// Of the given corners x + 2y + 4z (bits 0..7) of the 2^3 blocks from b on, those that nobody is
+/// known to have asked for. Most have been asked for by another ray: their bits tell, and cost
+/// neither a search in the table nor an atomic, for whose result one would wait.
+ISO_INLINE uint unasked_corners(const FrameParams *frame, BlockCoords b, uint corners,
                                 Requests requests) {
-  BlockEntry entries[8];
-  uint missing = touched; /* of the corners: nobody is known to have asked for them */
+  uint unasked = corners;
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
     const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-    const uint word = (touched >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
+    const uint word = (corners >> corner & 1u) != 0 ? request_word(frame, x, y, z) : 0;
     const uint bits = ISO_CHECK_RACES ? atomic_or(&requests.bits[word], 0u) : requests.bits[word];
-    missing &= ~((uint)((bits & request_bit(frame, x, y, z)) != 0) << corner);
+    unasked &= ~((uint)((bits & request_bit(frame, x, y, z)) != 0) << corner);
   }
-  if (missing == 0) return;
-  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
-  ISO_UNROLL
-  for (uint corner = 0; corner < 8; ++corner) {
-    if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
-      stamp_needed(slot_stamps, entries[corner].slot, stamp);
-      missing &= ~(1u << corner);
-    }
-  }
+  return unasked;
+}
+
+/// Asks for those corners, which are not cached.
+ISO_INLINE void request_corners(const FrameParams *frame, BlockCoords b, uint corners,
+                                Requests requests) {
   for (uint corner = 0; corner < 8; ++corner) {
     const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-    if ((missing >> corner & 1u) != 0 && mark_request(frame, requests.bits, x, y, z)) {
+    if ((corners >> corner & 1u) != 0 && mark_request(frame, requests.bits, x, y, z)) {
       const uint block_id = block_id_at(frame, x, y, z), place = atomic_inc(requests.num_staged);
       if (place < ISO_REQUEST_STAGING) {
         requests.staged[place] = block_id;

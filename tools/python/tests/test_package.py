@@ -1,5 +1,6 @@
 """The package on a device: volumes, renderers, pictures; the program's bits."""
 
+import ast
 import gc
 import gzip
 import os
@@ -11,7 +12,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import FUEL, sphere_voxels
+from conftest import FUEL, TOP, sphere_voxels
 
 import isowave
 
@@ -400,6 +401,22 @@ def test_report_names_devices_and_loader():
         assert {"index", "name", "vendor", "platform", "driver", "type", "memory_bytes"} == set(
             device
         )
+
+
+def test_stubs_name_what_the_compiled_part_has():
+    """nanobind's functions show no signatures, so names are all that can be compared."""
+    from isowave import _core
+
+    def names(body):
+        found = {node.name for node in body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+        return {name for name in found if not name.startswith("_")}
+
+    stub = ast.parse((TOP / "tools/python/isowave/_core.pyi").read_text())
+    assert names(stub.body) == {name for name in dir(_core) if not name.startswith("_")}
+    for node in stub.body:
+        if isinstance(node, ast.ClassDef) and node.name != "Error":
+            members = {name for name in dir(getattr(_core, node.name)) if not name.startswith("_")}
+            assert names(node.body) == members, node.name
 
 
 def test_command_is_the_program():
