@@ -341,6 +341,15 @@ TEST_P(ApiOnDevice, FramesKeepErrorsAndTimes) {
   const Frame timed = renderer.render(request);
   EXPECT_TRUE(timed.statistics.complete);
   EXPECT_EQ(timed.depth, depth);
+  request.on_pass = [&](const Progress &progress) {
+    EXPECT_EQ(progress.picture().size(), 3u * progress.size().width * progress.size().height);
+    EXPECT_LT(progress.size().width, 64u);
+    return false;
+  };
+  const Frame stopped = renderer.render(request);
+  EXPECT_TRUE(stopped.statistics.cancelled);
+  EXPECT_FALSE(stopped.statistics.complete);
+  EXPECT_EQ(stopped.picture.size(), 3u * 64 * 48);
 }
 
 /// Level, cell and position are a point at distance t; also where several levels draw.

@@ -126,6 +126,37 @@ TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheSmallestPicture) {
   expect_same_hits(shown, enlarged(small, {4, 3}, kSize), kSize.width);
 }
 
+/// Whoever asks may stop it at any pass, be it of the smallest picture, and see what there is.
+TEST_P(TimeBudgetOnDevice, CanBeStoppedAtAnyPass) {
+  FrameRequest request{camera_, kIsovalue};
+  std::vector<ImageSize> sizes;
+  request.on_pass = [&](const PassStats &) {
+    sizes.push_back(renderer_.size());
+    return true;
+  };
+  EXPECT_FALSE(frames_.render(request, 1e9).stopped);
+  const std::size_t num_passes = sizes.size();
+  ASSERT_GT(num_passes, 2u);
+  EXPECT_EQ(sizes.front().width, 4u);
+  EXPECT_EQ(sizes.back().width, kSize.width);
+  for (std::size_t last = 1; last <= num_passes; ++last) {
+    SCOPED_TRACE(last);
+    std::size_t passes = 0;
+    request.on_pass = [&](const PassStats &) { return ++passes < last; };
+    const TimedFrame frame = frames_.render(request, 1e9);
+    // Blocks that are cached by then save passes: the frame may be whole before.
+    EXPECT_TRUE(passes == last || frame.complete);
+    EXPECT_EQ(frame.stopped, passes == last);
+    EXPECT_EQ(renderer_.size().width, kSize.width);
+    EXPECT_EQ(renderer_.hits().size(), kSize.num_rays());
+    EXPECT_TRUE(last > 1 || !frame.complete);
+  }
+  request.on_pass = {};
+  EXPECT_TRUE(frames_.render(request, 1e9).complete);
+  expect_same_hits(renderer_.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
+                   kSize.width);
+}
+
 TEST_P(TimeBudgetOnDevice, AmpleTimeGivesTheWholePicture) {
   const TimedFrame frame = frames_.render({camera_, kIsovalue}, 1e9);
   EXPECT_EQ(frame.steps.size(), 2u) << "nothing between the first and the full picture";

@@ -29,8 +29,10 @@ void check(const FrameRequest &request) {
 /// The frame at work, for on_pass.
 class HostProgress : public Progress {
  public:
-  HostProgress(const core::HostRenderer &renderer, const core::Appearance &appearance)
-      : renderer_(renderer), appearance_(appearance) {}
+  HostProgress(const core::HostRenderer &renderer, const FrameRequest &request)
+      : renderer_(renderer),
+        size_(request.size),
+        appearance_(core_appearance(request.appearance)) {}
 
   void end_pass(const core::PassStats &pass) {
     ++passes_;
@@ -38,10 +40,12 @@ class HostProgress : public Progress {
   }
   std::uint32_t passes() const override { return passes_; }
   double completed_percent() const override { return completed_percent_; }
+  ImageSize size() const override { return size_; }
   std::vector<std::uint8_t> picture() const override { return renderer_.shade(appearance_).pixels; }
 
  private:
   const core::HostRenderer &renderer_;
+  ImageSize size_;
   core::Appearance appearance_;
   std::uint32_t passes_ = 0;
   double completed_percent_ = 0;
@@ -64,7 +68,7 @@ struct HostRenderer::Implementation {
 Frame HostRenderer::Implementation::draw(const FrameRequest &request) {
   check(request);
   core::FrameRequest wanted = core_request(request);
-  HostProgress progress(renderer, core_appearance(request.appearance));
+  HostProgress progress(renderer, request);
   if (request.on_pass) {
     wanted.on_pass = [&](const core::PassStats &pass) {
       progress.end_pass(pass);

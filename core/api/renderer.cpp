@@ -47,7 +47,7 @@ struct Renderer::Implementation {
   }
 
   Frame draw(const FrameRequest &request);
-  core::FrameStats draw_hits(const FrameRequest &request, core::FrameRequest &wanted, Frame &frame);
+  void draw_hits(const FrameRequest &request, core::FrameRequest &wanted, Frame &frame);
   void fetch(const FrameRequest &request, const core::FrameRequest &drawn, Frame &frame);
 
   std::shared_ptr<Device> device;
@@ -71,6 +71,10 @@ class ProgressOf : public Progress {
   }
   std::uint32_t passes() const override { return passes_; }
   double completed_percent() const override { return completed_percent_; }
+  ImageSize size() const override {
+    const core::ImageSize size = renderer_.size();
+    return {size.width, size.height, size.samples};
+  }
   std::vector<std::uint8_t> picture() const override { return renderer_.shade(appearance_).pixels; }
 
  private:
@@ -110,21 +114,28 @@ void check(const FrameRequest &request, const RendererOptions &options) {
     throw core::Error("a time budget needs a renderer that was made with_time_budget");
   if (request.time_budget_ms && request.want_bounds)
     throw core::Error("a picture within a time has no bounds of its error: leave out want_bounds");
-  if (request.time_budget_ms && request.on_pass)
-    throw core::Error("a frame with a time budget does not show its passes: leave out on_pass");
 }
 
 }  // namespace
 
 /// Chooses the detail, or keeps to the time, where the request says so, and draws. wanted: becomes
 /// the request as it was drawn.
-core::FrameStats Renderer::Implementation::draw_hits(const FrameRequest &request,
-                                                     core::FrameRequest &wanted, Frame &frame) {
+void Renderer::Implementation::draw_hits(const FrameRequest &request, core::FrameRequest &wanted,
+                                         Frame &frame) {
+  ProgressOf progress(renderer, core_appearance(request.appearance));
+  const core::OnPass on_pass = [&](const core::PassStats &pass) {
+    progress.end_pass(pass);
+    return request.on_pass(progress);
+  };
   if (request.time_budget_ms) {
+    if (request.on_pass) wanted.on_pass = on_pass;
     const core::TimedFrame drawn = timed.value().render(wanted, *request.time_budget_ms);
+    wanted.on_pass = {};
     core::FrameStats stats = drawn.stats;
-    stats.cancelled = !drawn.complete;
-    return stats;
+    stats.cancelled = drawn.stopped;
+    describe_frame(request, stats, frame);
+    frame.statistics.complete = drawn.complete;
+    return;
   }
   if (request.max_surface_error) {
     const core::DetailChoice choice = core::choose_detail(renderer, volume->implementation().volume,
@@ -134,16 +145,9 @@ core::FrameStats Renderer::Implementation::draw_hits(const FrameRequest &request
     frame.detail =
         DetailChoice{wanted.voxel_pixels, wanted.voxel_error, choice.reachable, choice.advice};
   }
-  ProgressOf progress(renderer, core_appearance(request.appearance));
-  if (request.on_pass) {
-    wanted.on_pass = [&](const core::PassStats &pass) {
-      progress.end_pass(pass);
-      return request.on_pass(progress);
-    };
-  }
-  core::FrameStats stats = renderer.render(wanted);
+  if (request.on_pass) wanted.on_pass = on_pass;
+  describe_frame(request, renderer.render(wanted), frame);
   wanted.on_pass = {};
-  return stats;
 }
 
 /// What the request wants of the frame that was drawn.
@@ -165,8 +169,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   check(request, options);
   core::FrameRequest wanted = core_request(request);
   Frame frame;
-  const core::FrameStats stats = draw_hits(request, wanted, frame);
-  describe_frame(request, stats, frame);
+  draw_hits(request, wanted, frame);
   fetch(request, wanted, frame);
   return frame;
 }

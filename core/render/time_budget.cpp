@@ -57,11 +57,12 @@ TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
     const bool may_be_cancelled = !frame.steps.empty();
     FrameRequest in_time = of_step;
     // Further passes have fewer rays, so the next one takes no longer than the last, mostly.
-    in_time.on_pass = [&](const PassStats &) {
+    in_time.on_pass = [&](const PassStats &pass) {
       const double now = now_(), pass_ms = now - pass_begin;
       if (first_pass_ms == 0) first_pass_ms = pass_ms;
+      frame.stopped = request.on_pass && !request.on_pass(pass);
       pass_begin = now;
-      return !may_be_cancelled || now + pass_ms - begin <= budget_ms;
+      return !frame.stopped && (!may_be_cancelled || now + pass_ms - begin <= budget_ms);
     };
     const FrameStats stats = renderer_.render(in_time);
     const bool whole = !stats.cancelled,
@@ -71,10 +72,11 @@ TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
                            stats.passes.back().completed_percent, stats.cancelled});
     add(frame.stats, stats);
     frame.complete = whole && step == 0;
-    last_ms_[step] = whole ? step_ms : 2 * step_ms;
-    if (!has_all_hits) renderer_.fill_from_kept();
+    if (!frame.stopped) last_ms_[step] = whole ? step_ms : 2 * step_ms;
+    if (!has_all_hits && may_be_cancelled) renderer_.fill_from_kept();
     if (step == 0) break;
     renderer_.keep_picture();
+    if (frame.stopped) break;
     const std::size_t next =
         whole ? next_step(step, step_ms, first_pass_ms, budget_ms - (now - begin)) : step;
     if (next == step) break;

@@ -24,6 +24,7 @@ struct TimedStep {
 struct TimedFrame {
   std::vector<TimedStep> steps;  ///< as they were drawn, each with more pixels
   FrameStats stats;              ///< of all steps; rays_hit and cancelled of the last
+  bool stopped = false;          ///< by on_pass, not by the time
   bool complete = false;         ///< the hit buffer holds what Renderer::render() draws
 };
 
@@ -43,7 +44,8 @@ class TimedFrames {
   /// Draws the smallest picture, however long it takes, then the largest that is expected to be
   /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
   /// in time is filled from the one before. The hit buffer holds a picture of the full size. The
-  /// request's on_pass is not called.
+  /// request's on_pass is called after each pass, while the renderer has a picture of the step's
+  /// size; where it returns false, the frame ends there, be it in the smallest picture.
   ///
   /// Throws  Error unless budget_ms is finite and above 0, where half of the picture is larger than
   ///         what the renderer keeps, and as Renderer::render() does

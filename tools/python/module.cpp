@@ -238,7 +238,6 @@ nb::tuple camera_tuple(const isowave::Camera &camera) {
 /// The picture so far; only while the callback that got it is at work.
 struct PassView {
   const isowave::Progress *progress;
-  std::uint32_t width, height;
 
   const isowave::Progress &get() const {
     if (progress == nullptr) throw Error("this pass is over: look at it within on_pass");
@@ -250,7 +249,8 @@ struct PassView {
       const nb::gil_scoped_release no_gil;
       pixels = get().picture();
     }
-    return to_numpy<std::uint8_t>(std::move(pixels), {height, width, 3});
+    const isowave::ImageSize size = get().size();
+    return to_numpy<std::uint8_t>(std::move(pixels), {size.height, size.width, 3});
   }
 };
 
@@ -360,8 +360,7 @@ nb::dict draw(AnyRenderer &renderer, const nb::dict &options,
       bool wanted = true;
       const bool goes_on = callbacks.run([&] {
         if (!on_pass) return;
-        const nb::object view =
-            nb::cast(PassView{&progress, request.size.width, request.size.height});
+        const nb::object view = nb::cast(PassView{&progress});
         const auto end = [&] { nb::cast<PassView &>(view).progress = nullptr; };
         try {
           const nb::object answer = (*on_pass)(view);

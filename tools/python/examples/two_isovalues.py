@@ -20,8 +20,8 @@ for isovalue in isovalues:
     hit = np.isfinite(image.depth)
     bounds = image.bounds[hit]
     print(
-        f"isovalue {isovalue:g}: {hit.mean():.1%} of the pixels; of these, {np.mean(bounds <= 1):.1%} "
-        f"are certainly within a pixel of the surface before compression"
+        f"isovalue {isovalue:g}: {hit.mean():.1%} of the pixels; of these, "
+        f"{np.mean(bounds <= 1):.1%} are certainly within a pixel of the surface before compression"
     )
     images.append(image)
 

@@ -2,7 +2,7 @@
 
     import isowave
 
-    volume = isowave.compress(array, tolerance=0.5, spacing=(2, 1, 1))  # or isowave.open("head.nrrd")
+    volume = isowave.compress(array, tolerance=0.5, spacing=(2, 1, 1))  # or open("head.nrrd")
     image = volume.render(isovalue=80, size=(1280, 720))
     image.save("head.png")  # image.rgba, .depth, .normals, .position are numpy arrays
     isowave.view(volume)  # in a browser or notebook

@@ -168,7 +168,7 @@ class Progress:
 
     @property
     def rgb(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 3), drawn when it is asked for."""
+        """(height, width, 3), drawn when it is asked for; within a time budget, first smaller."""
         return self._view.picture()
 
 
@@ -408,7 +408,7 @@ class Renderer:
         )
         # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
         # pass would cost time.
-        interrupts = time_budget is None and self.device["type"] != "gpu"
+        interrupts = self.device["type"] != "gpu"
         frame = draw(self._core, request, on_pass, interrupts)
         return Image(frame, camera_of(request), isovalue, samples)
 

@@ -143,8 +143,8 @@ def compress(
     fill_value
         What replaces masked values of masked arrays.
     progress
-        True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to 1.
-        None: a bar on a terminal or in a notebook, where tqdm is installed.
+        True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to
+        1. None: a bar on a terminal or in a notebook, where tqdm is installed.
     num_threads
         0: one per processor. The result is the same for any number.
 
@@ -308,7 +308,10 @@ class Volume:
         return self._core.num_levels
 
     def decode(self, level: int = 0) -> npt.NDArray[np.float32]:
-        """All voxels, float32, (z, y, x). level: of detail; each has half the voxels of the last."""
+        """All voxels, float32, (z, y, x).
+
+        level: of detail; each has half the voxels of the last along each axis.
+        """
         return self._core.decode(level)
 
     def __array__(

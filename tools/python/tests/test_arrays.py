@@ -226,7 +226,11 @@ def test_layers_that_do_not_exist():
 def test_64_bits_exact_values(dtype):
     limits = np.iinfo(dtype)
     values = [0, 1, 2**53, 2**53 + 2, 2**60, 2**62 + 2**10, 255]
-    values += [2**63, 2**64 - 2**11] if limits.min == 0 else [-(2**53), -(2**63), -(2**53) - 2]
+    values += (
+        [2**63, 2**64 - 2**11]
+        if limits.min == 0
+        else [-(2**53), -(2**63), -(2**53) - 2]
+    )
     voxels = make_voxels("uint8").astype(dtype)
     voxels.ravel()[: len(values)] = values
     got = read_all(as_source(voxels), 4)

@@ -242,6 +242,15 @@ def test_errors_are_kept_and_bounds_given():
     assert image.normals is None
     timed = volume.render(10, size=SIZE, time_budget=1000.0)
     assert timed.complete
+    shapes = []
+
+    def stop(progress):
+        shapes.append(progress.rgb.shape)
+        return False
+
+    stopped = volume.render(10, size=SIZE, time_budget=1000.0, on_pass=stop)
+    assert shapes == [(6, 8, 3)] and not stopped.complete
+    assert stopped.rgb.shape == (48, 64, 3)
 
 
 def test_bad_requests_are_one_line(volume, renderer):
@@ -332,7 +341,8 @@ if sys.argv[1] == "compress":
     voxels = np.random.default_rng(0).random((512, 256, 256), np.float32)
     work = lambda: isowave.compress(voxels, tolerance=1e-4, num_threads=1)
 else:
-    renderer = isowave.compress(voxels, rate=16).renderer(size=(640, 480), cache_blocks=8, device="cpu")
+    volume = isowave.compress(voxels, rate=16)
+    renderer = volume.renderer(size=(640, 480), cache_blocks=8, device="cpu")
     work = lambda: renderer.render(0.5)
 print("ready", flush=True)
 try:

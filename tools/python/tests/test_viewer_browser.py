@@ -593,7 +593,8 @@ def test_the_page_comes_back_after_its_server(open_page: Callable[..., Any]) -> 
 def test_nothing_that_is_done_in_the_page_is_malformed(page: Any) -> None:
     """Extremes: the server would close the connection."""
     page.get_by_role("application").focus()
-    page.evaluate("""() => {
+    page.evaluate(
+        """() => {
         const picture = document.querySelector("main").shadowRoot.querySelector(".picture");
         const zoom = (deltaY) => picture.dispatchEvent(
             new WheelEvent("wheel", { deltaY, ctrlKey: true, cancelable: true }));
@@ -601,7 +602,8 @@ def test_nothing_that_is_done_in_the_page_is_malformed(page: Any) -> None:
         for (let i = 0; i < 3000; i++) zoom(1000);
         for (let i = 0; i < 500; i++) picture.dispatchEvent(
             new KeyboardEvent("keydown", { key: "ArrowUp", bubbles: true }));
-    }""")
+    }"""
+    )
     for name in ("Isovalue", "Largest error", "Time budget", "Memory budget"):
         for value in ("1e300", "-1e300", "1e-300"):
             page.get_by_label(name, exact=name == "Isovalue").last.fill(value)

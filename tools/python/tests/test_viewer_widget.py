@@ -218,9 +218,11 @@ def test_in_jupyterlab(lab: str) -> None:
         page.mouse.down()
         page.mouse.move(box["x"] + 300, box["y"] + 180, steps=5)
         page.mouse.up()
-        page.wait_for_function(f"""() => {{ const {{ wish, shown, stage }} =
+        page.wait_for_function(
+            f"""() => {{ const {{ wish, shown, stage }} =
             document.querySelector("[data-lm-suppress-shortcuts][data-stage]").dataset;
-            return Number(shown) > {before} && wish === shown && stage === "lossless"; }}""")
+            return Number(shown) > {before} && wish === shown && stage === "lossless"; }}"""
+        )
         # Keys are the picture's, not the notebook's: 0 0 would restart the kernel.
         picture.focus()
         page.keyboard.press("0")

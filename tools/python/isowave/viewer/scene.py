@@ -326,8 +326,6 @@ class Scene:
             client.view = view
         size, samples = self._fitted(wish, stage)
         frame = _Frame(client, wish, stage, view, began, size, samples)
-        # A device's frames with a time budget show no passes; the host knows no budget.
-        timed = wish.time_budget is not None and renderer is not self._host
         image = renderer.render(
             wish.isovalue,
             camera=self._make_camera(view),
@@ -338,7 +336,7 @@ class Scene:
             max_error=wish.max_error,
             outputs=("rgb",),
             time_budget=None if wish.time_budget is None else wish.time_budget / 1000,
-            on_pass=None if timed else lambda so_far: self._on_pass(frame, so_far),
+            on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.stopped:
             self._show_what_there_is(frame, image)
