@@ -24,8 +24,8 @@ measured() { # OPTION...: into the results
 }
 measured --only frames,normals,error,time,stability,sweep
 measured --only storage,sizes,detail,solvers,pareto --volumes "$top/tests/data"
-tables=(front frames normals error time stability leaks storage sizes detail solvers solver_frames pareto
-  pareto_times)
+tables=(front frames normals error time stability leaks storage sizes detail solvers solver_frames
+  pareto pareto_times)
 if [ -x "$programs/bench/peer_bench" ]; then
   measured --only peer
   tables+=(peer)

@@ -25,10 +25,12 @@ unzip -l "$wheel" | grep -iE 'embree|gmp|itk' && fail 'the wheel has what a rend
 [ -x "$work/venv/bin/python" ] || /usr/bin/python3 -m venv "$work/venv"
 python=$work/venv/bin/python
 quietly "$python" -m pip install --quiet --upgrade pip
-quietly "$python" -m pip install --quiet -r "$tests/requirements.txt" -r "$tests/requirements-viewer.txt"
+quietly "$python" -m pip install --quiet -r "$tests/requirements.txt" \
+  -r "$tests/requirements-viewer.txt"
 quietly "$python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
 
-"$python" -m mypy --config-file "$source/pyproject.toml" "$source/tools/python/isowave"
+"$python" -m mypy --config-file "$source/pyproject.toml" --cache-dir "$work/mypy" \
+  "$source/tools/python/isowave"
 cd "$work"  # not among the sources, whose folder has no compiled part
 ISOWAVE_PROGRAM=$program "$python" -m pytest -q -p no:cacheprovider "$tests"
 
@@ -62,6 +64,8 @@ fuel=$source/tests/data/fuel_64x33x32_uint8.raw.gz
 unshare --mount bash "$work/hidden.sh" "$loader" env HOME="$work" XDG_CACHE_HOME="$work/cache" \
   "$work/fresh/bin/python" "$work/picture.py" "$fuel" "$work/hidden.png" > "$work/report" 2>&1 ||
   { cat "$work/report"; fail 'no picture where OpenCL is hidden'; }
-grep -q 'opencl/libOpenCL.so.1' "$work/report" || fail "not the wheel's loader: $(cat "$work/report")"
-"$program" render "$fuel" -i 10 --exact --size 320x240 --device cpu -o "$work/program.png" > /dev/null
+grep -q 'opencl/libOpenCL.so.1' "$work/report" ||
+  fail "not the wheel's loader: $(cat "$work/report")"
+"$program" render "$fuel" -i 10 --exact --size 320x240 --device cpu -o "$work/program.png" \
+  > /dev/null
 cmp "$work/hidden.png" "$work/program.png" || fail "the wheel's picture is not the program's"

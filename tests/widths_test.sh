@@ -22,7 +22,7 @@ mapfile -t files < <(
   find . -maxdepth 1 -type f ! -name LICENSE
   find .ci bench core kernels_cl reference tests tools -type f \
     ! -name '*.json' ! -name '*.png' ! -name '*.svg' ! -name '*.pyc' ! -name '*.gz' \
-    ! -path 'tests/fuzz/seeds/*' ! -path 'tests/fuzz/found/*' \
+    ! -path 'tests/fuzz/seeds/*' ! -path 'tests/fuzz/found/*' ! -path '*/.mypy_cache/*' \
     ! -path kernels_cl/portable/shared_types_fields.h
 )
 [ "${#files[@]}" -gt 100 ] || { echo 'widths_test: no files'; exit 1; }
