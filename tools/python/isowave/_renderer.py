@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import operator
 import os
 import queue
 import re
@@ -69,6 +70,11 @@ class Camera:
 def vector(values: Any) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in values)
     return x, y, z
+
+
+def size_of(size: Sequence[int]) -> tuple[int, int]:
+    width, height = (operator.index(side) for side in size)
+    return width, height
 
 
 def color_of(color: Color) -> tuple[float, float, float]:
@@ -212,7 +218,7 @@ def request_for(
         "at": camera.at,
         "up": camera.up,
         "fovy_degrees": camera.fovy,
-        "isovalue": isovalue,
+        "isovalue": float(isovalue),
         "width": size[0],
         "height": size[1],
         "samples": samples,
@@ -294,15 +300,15 @@ class Renderer:
         quick: bool = False,
     ) -> None:
         self.volume = volume
-        self.size = size
-        self.max_rays = size[0] * size[1] * samples**2
+        self.size = size_of(size)
+        self.max_rays = self.size[0] * self.size[1] * samples**2
         self._can = {"levels": levels, "bounds": bounds, "time_budget": time_budget}
         self._core = _core.Renderer(
             "" if device is None else str(device),
             volume._core,
             {
-                "width": size[0],
-                "height": size[1],
+                "width": self.size[0],
+                "height": self.size[1],
                 "samples": samples,
                 "memory_budget": memory_budget,
                 "cache_blocks": cache_blocks,
@@ -335,7 +341,8 @@ class Renderer:
 
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
         """A view from the front right and above in which the isosurface fills the picture."""
-        return Camera(*self._core.camera(isovalue, *(size or self.size)))
+        picture_size = self.size if size is None else size_of(size)
+        return Camera(*self._core.camera(float(isovalue), *picture_size))
 
     def render(
         self,
@@ -391,7 +398,7 @@ class Renderer:
             A request that the renderer was not made for, in one line. The next is not affected.
         """
         self._check(max_error, voxel_pixels, time_budget, outputs)
-        picture_size = size or self.size
+        picture_size = self.size if size is None else size_of(size)
         request = request_for(
             isovalue,
             camera or self.camera(isovalue, picture_size),

@@ -22,6 +22,7 @@ from isowave._renderer import (
     is_smooth,
     needed_options,
     request_for,
+    size_of,
 )
 
 #: Called with what is done ("compressing") and how much of it, 0 to 1.
@@ -381,21 +382,24 @@ class Volume:
         memory_budget
             Of device memory [bytes]; None: three quarters of it.
         """
-        wanted = {"device": device, "memory_budget": memory_budget, "size": size}
+        wanted = {"device": device, "memory_budget": memory_budget, "size": size_of(size)}
         with self._lock:
             renderer = self._renderer_for({**wanted, **needed_options(request)})
             return renderer.render(isovalue, size=size, camera=camera, **request)
 
     def _renderer_for(self, wanted: dict[str, Any]) -> Renderer:
         """The kept renderer, or a new one where it lacks what is wanted."""
+        made = self._made_with
         size = wanted.pop("size", (0, 0))
         samples = wanted.get("samples", 1)
-        made = self._made_with
+        wanted.setdefault("memory_budget", made.get("memory_budget"))
+        for name in Renderer.CAPABILITIES:  # or two kinds of requests in turn would make it anew
+            wanted[name] = bool(wanted.get(name) or made.get(name))
         fits = (
             self._renderer is not None
             and size[0] * size[1] * samples**2 <= self._renderer.max_rays
             and all(made.get(name) == wanted.get(name) for name in ("device", "memory_budget"))
-            and all(made.get(name) or not wanted.get(name) for name in Renderer.CAPABILITIES)
+            and all(made.get(name) or not wanted[name] for name in Renderer.CAPABILITIES)
         )
         if self._renderer is None or not fits:
             self._renderer = None  # its memory goes before that of the next is taken
@@ -403,6 +407,11 @@ class Volume:
             self._renderer = Renderer(self, size=largest, quick=True, **wanted)
             self._made_with = wanted
         return self._renderer
+
+    def _host_renderer(self) -> _core.HostRenderer:
+        if self._host is None:
+            self._host = _core.HostRenderer(self._core, 0)
+        return self._host
 
     def cast_rays(
         self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
@@ -433,9 +442,7 @@ class Volume:
             raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
         smooth = is_smooth(normals)
         with self._lock:
-            if self._host is None:
-                self._host = _core.HostRenderer(self._core, 0)
-            host = self._host
+            host = self._host_renderer()
         found = host.cast_rays(array.reshape(-1, 6), isovalue, smooth)
         lead = array.shape[:-1]
         return {
@@ -464,12 +471,10 @@ class Volume:
             how many are not; hits: rays that hit something.
         """
         with self._lock:
-            renderer = self._renderer_for({"device": device, "size": size})
+            renderer = self._renderer_for({"device": device, "size": size_of(size)})
             renderer.wait()
             image = renderer.render(isovalue, size=size, camera=camera)
-            if self._host is None:
-                self._host = _core.HostRenderer(self._core, 0)
-            host = self._host
+            host = self._host_renderer()
         twin = draw(host, request_for(isovalue, image.camera, size))
         assert image.rgb is not None and image.depth is not None and image.normals is not None
         differing = {
