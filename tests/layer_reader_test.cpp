@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <isowave/isowave.hpp>
 #include <numeric>
@@ -62,6 +63,28 @@ TYPED_TEST(LayerReaderOfType, CompressesAsAnArrayDoes) {
     EXPECT_EQ(of_layers->grid().spacing, kGrid.spacing);
     EXPECT_EQ(of_layers->source_type(), voxel_type_of<TypeParam>());
   }
+}
+
+TEST(LayerReader, CompressesToTheFileThatIsSaved) {
+  const core::test::TemporaryFolder folder;
+  const std::vector<float> voxels = ramp<float>();
+  for (const Compression &compression : {Compression{.rate = 8}, Compression{.tolerance = 0.5},
+                                         Compression{.rate = 8, .levels = 2}}) {
+    std::vector<int> counts;
+    const auto of_layers = compress_to_file(counting_reader(voxels, counts), VoxelType::kFloat32,
+                                            kGrid, folder / "layers.zfp", compression);
+    EXPECT_THAT(counts, testing::Each(1));
+    const auto of_array = compress(voxels, kGrid, compression);
+    of_array->save(folder / "array.zfp");
+    EXPECT_EQ(core::test::read_file(folder / "layers.zfp"),
+              core::test::read_file(folder / "array.zfp"));
+    EXPECT_EQ(of_layers->decode(), of_array->decode());
+  }
+  std::vector<int> counts;
+  EXPECT_THROW(compress_to_file(counting_reader(voxels, counts), VoxelType::kFloat32, kGrid,
+                                folder / "layers.nrrd"),
+               Error);
+  EXPECT_FALSE(std::filesystem::exists(folder / "layers.nrrd"));
 }
 
 TEST(LayerReader, AsksAgainWhereNothingIsKept) {

@@ -82,6 +82,13 @@ const core::CompressedVolume &level_of(const core::CompressedVolume &volume, std
   return *levels[level];
 }
 
+core::OpenReader open_layers(const ReadLayers &read, VoxelType type, const Grid &grid, bool keep,
+                             const core::Storage &storage) {
+  const auto source =
+      std::make_shared<core::LayerSource>(core_info(grid, type), read, keep && storage.bounded());
+  return [source] { return std::make_unique<core::LayerReader>(source); };
+}
+
 std::shared_ptr<const Volume> make_volume(core::CompressedVolume volume) {
   return std::make_shared<const Volume>(
       std::make_unique<const Volume::Implementation>(std::move(volume)));
@@ -173,10 +180,18 @@ std::shared_ptr<const Volume> compress(const ReadLayers &read, VoxelType type, c
                                        const Compression &compression, bool keep) {
   return guarded("compressing", [&] {
     const core::Storage storage = to_storage(compression);
-    const auto source =
-        std::make_shared<core::LayerSource>(core_info(grid, type), read, keep && storage.bounded());
-    return make_volume(core::compress_volume(
-        [&] { return std::make_unique<core::LayerReader>(source); }, "the array", storage));
+    return make_volume(
+        core::compress_volume(open_layers(read, type, grid, keep, storage), "the array", storage));
+  });
+}
+
+std::shared_ptr<const Volume> compress_to_file(const ReadLayers &read, VoxelType type,
+                                               const Grid &grid, const std::filesystem::path &path,
+                                               const Compression &compression, bool keep) {
+  return guarded("compressing", [&] {
+    const core::Storage storage = to_storage(compression);
+    return make_volume(core::compress_volume_to_file(open_layers(read, type, grid, keep, storage),
+                                                     "the array", storage, path));
   });
 }
 

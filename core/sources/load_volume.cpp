@@ -100,10 +100,12 @@ std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string
   return choose_precision(*open(), goal, input);
 }
 
-CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
-                                 const Storage &storage) {
-  const std::unique_ptr<VolumeReader> reader = open();
-  check_drawable(reader->info(), what);
+namespace {
+
+/// Finds the precision, which may read the whole volume.
+CompressOptions compress_options(const OpenReader &open, const VolumeInfo &info,
+                                 std::string_view what, const Storage &storage) {
+  check_drawable(info, what);
   CompressOptions options;
   options.rate = storage.rate;
   options.precision = find_precision(open, what, storage);
@@ -111,9 +113,28 @@ CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
   options.measure_error = storage.measure_error;
   options.input = {storage.map_nan, step(storage, "compressing"), storage.num_threads};
   options.device = options.precision ? nullptr : storage.device;
-  CompressedVolume volume = compress(*reader, options);
+  return options;
+}
+
+}  // namespace
+
+CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
+                                 const Storage &storage) {
+  const std::unique_ptr<VolumeReader> reader = open();
+  CompressedVolume volume =
+      compress(*reader, compress_options(open, reader->info(), what, storage));
   if (storage.device) storage.device->timer().collect();  // they belong to no frame
   return volume;
+}
+
+CompressedVolume compress_volume_to_file(const OpenReader &open, std::string_view what,
+                                         const Storage &storage,
+                                         const std::filesystem::path &path) {
+  if (!is_zfp_name(path.string()))
+    throw Error("{}: compressed volumes are opened by the ending .zfp: give it", path.string());
+  const std::unique_ptr<VolumeReader> reader = open();
+  compress_to_file(*reader, compress_options(open, reader->info(), what, storage), path);
+  return open_compressed_volume(path.string(), {});
 }
 
 bool is_zfp_name(std::string_view path) {

@@ -1,6 +1,7 @@
 #pragma once
 // A compressed volume from whatever a user names: a file of any format, or a synthetic volume.
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -43,6 +44,13 @@ std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string
 /// Throws  Error also on what cannot be drawn
 CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
                                  const Storage &storage);
+
+/// As compress_volume(), but straight into a `.zfp` file, which is then opened: in memory, a few
+/// layers of voxels, and what compress_to_file() says of levels.
+///
+/// Throws  Error also where the file cannot be written, or its name does not end in .zfp
+CompressedVolume compress_volume_to_file(const OpenReader &open, std::string_view what,
+                                         const Storage &storage, const std::filesystem::path &path);
 
 /// Whether the name ends in .zfp.
 bool is_zfp_name(std::string_view path);

@@ -145,6 +145,7 @@ struct PyVolume {
 PyVolume compress(const nb::callable &read, const std::string &type, const Index3 &dims,
                   const Vector3 &spacing, const Vector3 &origin,
                   const std::array<Vector3, 3> &direction, const nb::dict &options, bool keep,
+                  const std::optional<std::filesystem::path> &path,
                   const std::optional<nb::callable> &progress) {
   Callbacks callbacks;
   isowave::Compression compression = compression_of(options);
@@ -163,8 +164,12 @@ PyVolume compress(const nb::callable &read, const std::string &type, const Index
     if (!goes_on) throw Stopped();
   };
   return callbacks.without_gil([&] {
-    return PyVolume{isowave::compress(isowave::ReadLayers(read_layers), voxel_type(type),
-                                      {dims, spacing, origin, direction}, compression, keep)};
+    const isowave::Grid grid{dims, spacing, origin, direction};
+    const isowave::ReadLayers read_all = read_layers;
+    const isowave::VoxelType voxels = voxel_type(type);
+    return PyVolume{
+        path ? isowave::compress_to_file(read_all, voxels, grid, *path, compression, keep)
+             : isowave::compress(read_all, voxels, grid, compression, keep)};
   });
 }
 
@@ -552,7 +557,7 @@ NB_MODULE(_core, m) {
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
           "path"_a, nb::call_guard<nb::gil_scoped_release>());
   m.def("compress", &compress, "read"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a, "direction"_a,
-        "options"_a, "keep"_a, "progress"_a.none());
+        "options"_a, "keep"_a, "path"_a.none(), "progress"_a.none());
   m.def("compress_array", &compress_array, "array"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a,
         "direction"_a, "options"_a, "progress"_a.none());
   m.def("open", &open_volume, "path"_a, "options"_a, "dims"_a.none(), "type"_a.none(),

@@ -128,6 +128,16 @@ using ReadLayers =
 std::shared_ptr<const Volume> compress(const ReadLayers &read, VoxelType type, const Grid &grid,
                                        const Compression &compression = {}, bool keep = true);
 
+/// The same, straight into a `.zfp` file, which is then opened: only a few layers of voxels are in
+/// memory, and with levels of detail up to 9 bytes for each block of 4^3 voxels.
+///
+/// path    ends in .zfp; written under a temporary name that is renamed
+/// Throws  Error: as above; the file cannot be written
+std::shared_ptr<const Volume> compress_to_file(const ReadLayers &read, VoxelType type,
+                                               const Grid &grid, const std::filesystem::path &path,
+                                               const Compression &compression = {},
+                                               bool keep = true);
+
 /// Throws  Error unless a number of voxels is that of the grid
 void check_num_voxels(std::uint64_t num_voxels, const Grid &grid);
 

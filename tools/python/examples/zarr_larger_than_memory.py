@@ -3,8 +3,7 @@
     python zarr_larger_than_memory.py FOLDER [EDGE]
 
 Makes a zarr array of EDGE^3 voxels (default 256) in the folder, as a simulation would, and
-compresses it into a .zfp file beside it. Neither is ever in memory whole: with EDGE 4096, 64 GB are
-read, and the process takes about the size of the result.
+compresses it into a .zfp file beside it. Neither is ever in memory whole, whatever EDGE is.
 """
 
 import pathlib
@@ -27,9 +26,8 @@ for begin in range(0, edge, 32):
     waves = np.sin(0.11 * x) + np.sin(0.07 * y + 0.05 * z) + np.cos(0.09 * z)
     store[begin : begin + 32] = np.rint(42 * (waves + 3)).astype("uint8")
 
-volume = isowave.compress(store, tolerance=1)
-volume.save(folder / "waves.zfp")
+volume = isowave.compress(store, tolerance=1, path=folder / "waves.zfp")
 print(volume)
 
-image = isowave.open(folder / "waves.zfp").render(isovalue=150, size=(640, 480))
+image = volume.render(isovalue=150, size=(640, 480))
 image.save(folder / "waves.png")

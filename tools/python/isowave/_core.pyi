@@ -54,6 +54,7 @@ def compress(
     direction: list[Vector],
     options: dict[str, Any],
     keep: bool,
+    path: str | PathLike[str] | None,
     progress: Callable[[str, float], object] | None,
 ) -> Volume: ...
 def compress_array(

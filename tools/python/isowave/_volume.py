@@ -110,10 +110,11 @@ def compress(
     levels: int = 1,
     map_nan: float | None = None,
     fill_value: float | None = None,
+    path: str | os.PathLike[str] | None = None,
     progress: bool | Progress | None = None,
     num_threads: int = 0,
 ) -> Volume:
-    """Compresses a three-dimensional array into memory.
+    """Compresses a three-dimensional array into memory, or into a file.
 
     Arrays in chunked stores (dask, zarr, h5py, tensorstore, and xarray of these) are read a few
     layers at a time, each chunk once; by a tolerance or exact, a temporary file of the array's size
@@ -143,6 +144,9 @@ def compress(
         What replaces NaN and infinities, which are refused without.
     fill_value
         What replaces masked values of masked arrays.
+    path
+        A .zfp file that the volume is written to, layer by layer, and opened from: then the result
+        need not fit into memory. None: into memory.
     progress
         True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to
         1. None: a bar on a terminal or in a notebook, where tqdm is installed.
@@ -170,10 +174,11 @@ def compress(
     grid = (str(source.dtype), (nx, ny, nz), spacing_xyz, origin_xyz, columns)
     shown = make_progress(progress)
     try:
-        if is_plain(array):
+        if path is None and is_plain(array):
             return Volume(_core.compress_array(array, *grid, options, shown))
         keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
-        return Volume(_core.compress(source.read, *grid, options, keep, shown))
+        file = None if path is None else os.fspath(path)
+        return Volume(_core.compress(source.read, *grid, options, keep, file, shown))
     finally:
         if isinstance(shown, TqdmProgress):
             shown.close()

@@ -73,6 +73,16 @@ def test_files_are_those_of_the_program(program, tmp_path):
     assert opened.decode(1).shape == (17, 17, 33)
 
 
+def test_arrays_are_compressed_into_files(tmp_path):
+    voxels = sphere_voxels()
+    of_file = isowave.compress(voxels, tolerance=0.01, path=tmp_path / "a.zfp")
+    isowave.compress(voxels, tolerance=0.01).save(tmp_path / "b.zfp")
+    assert (tmp_path / "a.zfp").read_bytes() == (tmp_path / "b.zfp").read_bytes()
+    assert np.array_equal(of_file.decode(), isowave.open(tmp_path / "b.zfp").decode())
+    with pytest.raises(isowave.Error, match=".zfp"):
+        isowave.compress(voxels, path=tmp_path / "a.nrrd")
+
+
 def test_array_and_file_are_one_volume():
     voxels = np.frombuffer(gzip.open(FUEL).read(), np.uint8).reshape(32, 33, 64)
     of_array, of_file = isowave.compress(voxels, exact=True), isowave.open(FUEL, exact=True)
