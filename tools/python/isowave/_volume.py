@@ -313,6 +313,19 @@ class Volume:
         """Levels of detail, the volume itself among them."""
         return self._core.num_levels
 
+    def level_shape(self, level: int) -> tuple[int, int, int]:
+        """Voxels of a level along (z, y, x). Voxel k of it lies at voxel 2^level k of the volume.
+
+        Sides are halved, and one is added: a level may end up to a voxel of its own behind the
+        volume.
+        """
+        if not 0 <= level < self.num_levels:
+            raise ValueError(f"level {level} of a volume that has {self.num_levels}: from 0 on")
+        z, y, x = self.shape
+        for _ in range(level):
+            z, y, x = z // 2 + 1, y // 2 + 1, x // 2 + 1
+        return z, y, x
+
     def decode(self, level: int = 0) -> npt.NDArray[np.float32]:
         """All voxels, float32, (z, y, x).
 

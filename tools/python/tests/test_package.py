@@ -44,6 +44,16 @@ def test_volume_says_what_it_is(volume):
     assert "20 x 25 x 30" in repr(volume) and "20 x 25 x 30" in volume._repr_html_()
 
 
+def test_level_shapes_are_those_that_decode_gives():
+    volume = isowave.compress(sphere_voxels((20, 25, 33)), tolerance=0.01, levels=0)
+    assert volume.num_levels == 3
+    for level in range(volume.num_levels):
+        assert volume.level_shape(level) == volume.decode(level).shape
+    for level in (-1, volume.num_levels):
+        with pytest.raises(ValueError, match=f"level {level} "):
+            volume.level_shape(level)
+
+
 @pytest.mark.parametrize(
     "dtype", ["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"]
 )

@@ -1,0 +1,293 @@
+"""Volumes in napari: a reader (napari.yaml), layers of levels of detail, isosurfaces.
+
+napari chooses a level by the zoom in 2D, and in 3D always shows the coarsest of a layer. So a layer
+has the levels from the volume itself to the finest that a texture holds, and none coarser:
+3D shows that one. Levels are decoded when they are looked at; `decode` gives whole levels, so a
+level is decoded whole, and kept as float32 for as long as the layer lives.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave._core import Error
+from isowave._renderer import Camera, Image, vector
+from isowave._volume import Volume, open
+
+#: What is sure to fit into a texture: 512 MiB of float32.
+LARGEST_TEXTURE = 1 << 27
+#: OpenGL's limit of a 3D texture's side on common devices.
+LONGEST_SIDE = 2048
+#: napari's orthographic view is drawn from afar, with this angle [degrees].
+NARROW_VIEW = 5.0
+#: A step in depth between neighbouring pixels that is more pixels long than this is a silhouette.
+SILHOUETTE = 10.0
+
+LayerData = tuple[Any, dict[str, Any], str]
+
+
+class Level:
+    """A level of a volume as napari wants arrays: decoded when it is first indexed.
+
+    Voxel k of level n lies at voxel 2^n k of the volume, and napari takes the ratio of their sides
+    for the ratio of their voxels. So of the level's voxels those are shown that make it so: sides
+    divided by 2^n, rounded up. What lies behind the volume's last voxel goes. Where 2^n does not
+    divide a side, napari shows the level up to one of its voxels away from its place.
+    """
+
+    ndim = 3
+    dtype = np.dtype(np.float32)
+
+    def __init__(self, volume: Volume, level: int) -> None:
+        self._volume, self._level = volume, level
+        z, y, x = (-(-n // (1 << level)) for n in volume.shape)
+        self.shape = (z, y, x)
+        self._lock = threading.Lock()
+        self._voxels: npt.NDArray[np.float32] | None = None
+
+    @property
+    def size(self) -> int:
+        z, y, x = self.shape
+        return z * y * x
+
+    @property
+    def nbytes(self) -> int:
+        """When it is decoded."""
+        return self.size * self.dtype.itemsize
+
+    @property
+    def is_decoded(self) -> bool:
+        return self._voxels is not None
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._decoded()[key]
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]:
+        return np.array(self._decoded(), dtype=dtype, copy=copy)
+
+    def __repr__(self) -> str:
+        return f"<level {self._level} of {self._volume!r}>"
+
+    def _decoded(self) -> npt.NDArray[np.float32]:
+        with self._lock:  # napari slices in threads, too
+            if self._voxels is None:
+                z, y, x = self.shape
+                self._voxels = self._volume.decode(self._level)[:z, :y, :x]
+            return self._voxels
+
+
+def host_memory() -> int:
+    """Of the machine [bytes]."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return 1 << 63  # not told
+
+
+def levels_of(
+    volume: Volume, *, texture: int = LARGEST_TEXTURE, memory: int | None = None
+) -> tuple[int, list[Level]]:
+    """The levels of a layer, finest first, and which one of the volume the first is.
+
+    Parameters
+    ----------
+    texture
+        Voxels that a 3D texture may have: the last level is the first that does not exceed it, or
+        the volume's coarsest.
+    memory
+        Decoded levels may take as much [bytes]; finer ones are left out, with a warning. None: half
+        of the machine's.
+    """
+    levels = [Level(volume, level) for level in range(volume.num_levels)]
+    budget = host_memory() // 2 if memory is None else memory
+    first, last = 0, 0
+    while first + 1 < len(levels) and levels[first].nbytes > budget:
+        first += 1
+    if first > 0:
+        warnings.warn(
+            f"the volume takes {levels[0].nbytes / 2**30:.1f} GiB decoded: "
+            f"the layer begins with level {first}",
+            stacklevel=2,
+        )
+    last = first
+    while last + 1 < len(levels) and not fits_texture(levels[last], texture):
+        last += 1
+    return first, levels[first : last + 1]
+
+
+def fits_texture(level: Level, texture: int) -> bool:
+    return level.size <= texture and max(level.shape) <= LONGEST_SIDE
+
+
+def layer_data(volume: Volume, **options: Any) -> LayerData:
+    """What napari makes a multiscale image layer of.
+
+    Scale and translate are the volume's spacing and origin, (z, y, x); affine is there where the
+    volume's axes are not those of the world. options: of levels_of().
+    """
+    first, levels = levels_of(volume, **options)
+    scale = [2**first * s for s in volume.spacing]
+    attributes: dict[str, Any] = {
+        "multiscale": True,
+        "scale": scale,
+        "translate": list(volume.origin),
+        "metadata": {"isowave": volume},
+    }
+    least, largest = volume.value_range
+    if np.isfinite([least, largest]).all() and least < largest:
+        attributes["contrast_limits"] = [least, largest]
+    turn = volume.direction[::-1, ::-1]  # (x, y, z) to (z, y, x)
+    if not np.array_equal(turn, np.eye(3)):
+        # napari applies it after scale and translate: about the origin.
+        affine = np.eye(4)
+        affine[:3, :3] = turn
+        affine[:3, 3] = np.array(volume.origin) - turn @ volume.origin
+        attributes["affine"] = affine
+    return levels, attributes, "image"
+
+
+def add_volume(viewer: Any, volume: Volume, **options: Any) -> Any:
+    """Adds a volume to a napari viewer as a multiscale image layer, which is returned.
+
+    options: of levels_of(), and of viewer.add_image().
+    """
+    own = {name: options.pop(name) for name in ("texture", "memory") if name in options}
+    levels, attributes, _ = layer_data(volume, **own)
+    return viewer.add_image(levels, **{**attributes, **options})
+
+
+def get_reader(
+    path: str | Sequence[str],
+) -> Callable[[str | Sequence[str]], list[LayerData]] | None:
+    """napari's door: a function that reads the path, or None for several."""
+    return read if isinstance(path, str) else None
+
+
+def read(path: str | Sequence[str]) -> list[LayerData]:
+    """A layer of a file.
+
+    What is not .zfp is compressed into memory: integers below 2^24 exactly, others with errors of
+    at most 2^-16 of their range.
+    """
+    assert isinstance(path, str)
+    levels, attributes, kind = layer_data(open_with_levels(path))
+    name = os.path.basename(path)
+    return [(levels, {"name": name.removesuffix(".gz").rpartition(".")[0], **attributes}, kind)]
+
+
+def open_with_levels(path: str) -> Volume:
+    if path.endswith(".zfp"):
+        return open(path)
+    try:
+        return open(path, exact=True, levels=0, progress=False)
+    except Error:  # not integers, or no volume: then what follows says so
+        pass
+    return open(path, relative_tolerance=2**-16, levels=0, progress=False)
+
+
+def add_isosurface(
+    viewer: Any,
+    volume: Volume,
+    isovalue: float,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    name: str = "isosurface",
+    **request: Any,
+) -> Any:
+    """Adds what isowave draws from the viewer's 3D camera, as a surface layer, which is returned.
+
+    Its vertices are where the pixels' rays hit the isosurface of the volume itself, of any size; so
+    it is in its place among other layers, and exact from this camera, while the viewer may turn.
+    What this camera cannot see is not there: call it again to replace the layer by what the next
+    camera sees. Neighbouring pixels are joined but where the depth steps by more than ten pixels.
+
+    Parameters
+    ----------
+    viewer
+        napari.Viewer, showing (z, y, x) in 3D.
+    isovalue
+        The surface is where the trilinear field crosses this value.
+    size
+        Width and height of the picture [pixels]: at best those of the viewer's canvas.
+    name
+        Of the layer. A surface layer of this name is replaced.
+    request
+        Of Volume.render(): color, normals, device, max_error and so on.
+
+    Raises
+    ------
+    ValueError
+        The viewer does not show (z, y, x) in 3D, or no ray hits the surface.
+    """
+    order = tuple(viewer.dims.order)  # two axes where the viewer is empty
+    if viewer.dims.ndisplay != 3 or len(order) > 3 or order != tuple(sorted(order)):
+        raise ValueError("the viewer does not show (z, y, x) in 3D: viewer.dims.ndisplay = 3")
+    scene = getattr(viewer, "scene", viewer)  # it has the camera since napari 0.9
+    view = scene.camera
+    image = volume.render(
+        isovalue,
+        size=size,
+        camera=camera_of(view, size[1]),
+        samples=1,  # a vertex for each pixel
+        outputs=("rgb", "depth", "position"),
+        **request,
+    )
+    vertices, faces, colors = mesh_of(image)
+    if not len(faces):
+        raise ValueError(f"no surface of value {isovalue:g} is in the viewer's picture")
+    if name in viewer.layers and hasattr(viewer.layers[name], "vertex_colors"):
+        layer = viewer.layers[name]
+        layer.vertex_colors = None  # never of as many vertices as before
+        layer.data = (vertices, faces)
+        layer.vertex_colors = colors
+        return layer
+    seen = (view.center, view.zoom, view.angles)
+    layer = viewer.add_surface((vertices, faces), vertex_colors=colors, shading="none", name=name)
+    view.center, view.zoom, view.angles = seen  # napari turns to the first layer of a viewer
+    return layer
+
+
+def camera_of(camera: Any, height: int) -> Camera:
+    """The view of a napari camera on a canvas of `height` pixels; orthographic ones from afar."""
+    angle = camera.perspective or NARROW_VIEW
+    distance = height / camera.zoom / 2 / math.tan(math.radians(angle) / 2)
+    at = np.array(camera.center[::-1], float)
+    eye = at - distance * np.array(camera.view_direction[::-1])
+    up = camera.up_direction[::-1]
+    return Camera(vector(eye), vector(at), vector(up), float(angle))
+
+
+def mesh_of(
+    image: Image,
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.float32]]:
+    """Vertices [n][3], (z, y, x) in world space, triangles [m][3] and colours [n][4] of a picture
+    with a ray for each pixel."""
+    assert image.rgb is not None and image.depth is not None and image.position is not None
+    depth = image.depth
+    pixel = 2 * math.tan(math.radians(image.camera.fovy) / 2) / depth.shape[0]  # at distance 1
+    ids = np.arange(depth.size).reshape(depth.shape)
+    a, b, c, d = ids[:-1, :-1], ids[:-1, 1:], ids[1:, :-1], ids[1:, 1:]
+    faces = np.stack([np.stack([a, c, b], axis=-1), np.stack([b, c, d], axis=-1)]).reshape(-1, 3)
+    depths = depth.reshape(-1)[faces]
+    nearest = depths.min(axis=1)
+    with np.errstate(invalid="ignore"):  # inf - inf: no surface
+        joined = depths.max(axis=1) - nearest <= SILHOUETTE * pixel * nearest
+    faces = faces[joined]
+    used, faces = np.unique(faces, return_inverse=True)
+    vertices = image.position.reshape(-1, 3)[used][:, ::-1]
+    colors = np.ones((len(used), 4), np.float32)
+    colors[:, :3] = image.rgb.reshape(-1, 3)[used] / 255
+    return np.ascontiguousarray(vertices), faces.reshape(-1, 3).astype(np.int32), colors
