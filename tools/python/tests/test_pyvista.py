@@ -340,3 +340,31 @@ def test_what_cannot_be_drawn(plotter, volume):
 def test_max_error(plotter, volume):
     surface = adapter.add_isosurface(plotter, volume, RADIUS, color=GREY, max_error=1)
     assert is_grey(adapter.screenshot(plotter)).any() and surface.image.complete
+
+
+def test_scaled_scene_is_refused(plotter, volume):
+    adapter.add_isosurface(plotter, volume, RADIUS, color=GREY)
+    plotter.set_scale(zscale=2, reset_camera=False, render=False)
+    with pytest.raises(ValueError, match="scaled"):
+        adapter.screenshot(plotter)
+
+
+def test_volume_with_directions(plotter):
+    """A blob where only spacing, origin and directions together put it."""
+    voxels = np.zeros((12, 16, 20), np.float32)
+    voxels[4:7, 9:12, 13:16] = 1  # around (5, 10, 14)
+    turned = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], float)
+    grid = {"spacing": (0.1, 0.2, 0.05), "origin": (0.5, 0.4, -0.3), "direction": turned}
+    volume = isowave.compress(voxels, tolerance=TOLERANCE, **grid)
+    blob = np.array([-0.3, 0.4, 0.5]) + turned @ (np.array([0.05, 0.2, 0.1]) * (14, 10, 5))
+    surface = adapter.add_isosurface(plotter, volume, 0.5, color=GREY)
+    plotter.camera.focal_point, plotter.camera.position = (0, 0, 0), (3, 2, 5)
+    rgb = adapter.screenshot(plotter)
+    row, column = pixel_of(plotter, blob)
+    assert is_grey(rgb[row, column])
+    # The blob is a box that has rounded corners and sides of at most 0.6.
+    distance = np.linalg.norm(blob - np.array(plotter.camera.position))
+    assert abs(surface.image.depth[row, column] - distance) < 0.3 * np.sqrt(3)
+    low, high = np.array(surface.actor.GetBounds()).reshape(3, 2).T
+    corner = np.array([-0.3, 0.4, 0.5]) + turned @ (np.array([0.05, 0.2, 0.1]) * (19, 15, 11))
+    assert np.allclose(np.sort([low, high], 0), np.sort([[-0.3, 0.4, 0.5], corner], 0), atol=1e-6)
