@@ -550,6 +550,10 @@ NB_MODULE(_core, m) {
                    [](const PyVolume &v) { return v.volume->compressed_bytes(); })
       .def_prop_ro("max_voxel_error", [](const PyVolume &v) { return v.volume->max_voxel_error(); })
       .def_prop_ro("num_levels", [](const PyVolume &v) { return v.volume->num_levels(); })
+      .def(
+          "level_dims",
+          [](const PyVolume &v, std::uint32_t level) { return v.volume->level_grid(level).dims; },
+          "level"_a)
       .def("decode", &decode, "level"_a)
       .def("sample", &sample, "max_voxels"_a)
       .def(

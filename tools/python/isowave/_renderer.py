@@ -58,7 +58,9 @@ class Camera:
 
     @staticmethod
     def from_pyvista(camera: Any) -> Camera:
-        """The view of a pyvista.Camera, or of a plotter's `camera`."""
+        """The view of a pyvista.Camera, or of a plotter's `camera`; of perspective projection."""
+        if getattr(camera, "parallel_projection", False):
+            raise ValueError("isowave has perspective cameras only, not of parallel projection")
         return Camera(
             vector(camera.position),
             vector(camera.focal_point),

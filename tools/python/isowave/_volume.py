@@ -319,19 +319,20 @@ class Volume:
         Sides are halved, and one is added: a level may end up to a voxel of its own behind the
         volume.
         """
+        x, y, z = self._core.level_dims(self._checked(level))
+        return z, y, x
+
+    def _checked(self, level: int) -> int:
         if not 0 <= level < self.num_levels:
             raise ValueError(f"level {level} of a volume that has {self.num_levels}: from 0 on")
-        z, y, x = self.shape
-        for _ in range(level):
-            z, y, x = z // 2 + 1, y // 2 + 1, x // 2 + 1
-        return z, y, x
+        return level
 
     def decode(self, level: int = 0) -> npt.NDArray[np.float32]:
         """All voxels, float32, (z, y, x).
 
         level: of detail; each has half the voxels of the last along each axis.
         """
-        return self._core.decode(level)
+        return self._core.decode(self._checked(level))
 
     def __array__(
         self, dtype: npt.DTypeLike | None = None, copy: bool | None = None

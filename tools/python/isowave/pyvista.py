@@ -1,0 +1,357 @@
+"""Isosurfaces in the scenes of PyVista: our picture, with its depth, among other meshes.
+
+    import pyvista
+    import isowave.pyvista
+
+    plotter = pyvista.Plotter()
+    plotter.add_mesh(pyvista.Sphere())
+    surface = isowave.pyvista.add_isosurface(plotter, volume, 80)
+    plotter.show()
+    surface.isovalue = 90
+
+Whenever VTK is about to draw the scene, isowave draws the surface with the scene's camera and size,
+unless neither these nor the surface have changed. A rectangle as large as the view then writes
+colour and depth of each pixel among VTK's opaque meshes. So meshes hide the surface, and it them,
+pixel by pixel; translucent meshes are blended over it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+import weakref
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyvista
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
+from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkTexture
+
+from isowave._renderer import Camera, Color, Image, color_of, is_smooth, vector
+from isowave._volume import Volume
+
+__all__ = ["Isosurface", "add_isosurface", "screenshot"]
+
+PARALLEL = "isosurfaces need a perspective camera: plotter.disable_parallel_projection()"
+TEXTURE = "isowaveFrame"
+PLANES = "isowavePlanes"  # the two numbers by which OpenGL's projection maps distances to depths
+
+# The actor's bounds must be the volume's: PyVista sets cameras and clipping planes by them. So its
+# points are the corners of the volume's box. The shader moves the first four to the corners of the
+# view, and the others to one point, where they cover no pixel.
+VERTEX = {
+    "PositionVC::Dec": "out vec2 isowavePlace;\n",
+    "PositionVC::Impl": """
+  vec2 isowaveCorner = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1);
+  isowavePlace = isowaveCorner;
+  gl_Position = vec4(0.0, 0.0, 0.0, 1.0);
+  if (gl_VertexID < 4) { gl_Position.xy = 2.0 * isowaveCorner - 1.0; }
+""",
+}
+# The texture holds distances, not the depth buffer's values: these depend on the clipping planes,
+# which may move while the picture stays. What is beyond the planes is not seen, as with meshes.
+FRAGMENT = {
+    "PositionVC::Dec": "in vec2 isowavePlace;\n",
+    "Depth::Impl": f"""
+  ivec2 isowaveSize = textureSize({TEXTURE}, 0);
+  ivec2 isowaveTexel = min(ivec2(isowavePlace * vec2(isowaveSize)), isowaveSize - 1);
+  vec4 isowavePixel = texelFetch({TEXTURE}, isowaveTexel, 0);
+  if (isowavePixel.a <= 0.0) {{ discard; }}
+  float isowaveDepth = {PLANES}.y / isowavePixel.a - {PLANES}.x;
+  if (abs(isowaveDepth) > 1.0) {{ discard; }}
+  gl_FragDepth = 0.5 * isowaveDepth + 0.5;
+""",
+    "Light::Impl": "  gl_FragData[0] = vec4(isowavePixel.rgb, 1.0);\n",
+}
+
+Request = dict[str, Any]
+surfaces_of: weakref.WeakKeyDictionary[Any, list[Isosurface]] = weakref.WeakKeyDictionary()
+
+
+class Isosurface:
+    """An isosurface in a plotter's scene, made by add_isosurface().
+
+    What is set is seen when the scene is drawn next.
+    """
+
+    def __init__(
+        self, plotter: Any, volume: Volume, isovalue: float, color: Color | None, request: Request
+    ) -> None:
+        self.volume = volume
+        self.isovalue = isovalue  #: the surface is where the trilinear field crosses this value
+        self.color = color
+        self.image: Image | None = None  #: the last picture, with "rgb" and "depth"
+        self.error: Exception | None = None  #: why the last frame was drawn without the surface
+        self._failure: Exception | None = None  # the same, of any frame since screenshot() began
+        self._request = request
+        self._drawn: tuple[Any, ...] | None = None
+        self._plotter = weakref.ref(plotter)
+        self._renderer = weakref.ref(plotter.renderer)
+        self._texture = vtkTexture()
+        self._texture.SetColorModeToDirectScalars()
+        self._texture.InterpolateOff()
+        self.actor = make_actor(corners_of(volume), self._texture)  #: the vtkActor in the scene
+        self._show(np.zeros((1, 1, 4), np.float32))
+        self._observer: int | None = plotter.renderer.AddObserver("StartEvent", self._update)
+
+    @property
+    def visible(self) -> bool:
+        return bool(self.actor.GetVisibility())
+
+    @visible.setter
+    def visible(self, value: bool) -> None:
+        self.actor.SetVisibility(value)
+
+    def remove(self) -> None:
+        """Takes the surface out of the scene. May be called again."""
+        renderer, plotter = self._renderer(), self._plotter()
+        if self._observer is None:
+            return
+        if renderer is not None:
+            renderer.RemoveObserver(self._observer)
+            renderer.remove_actor(self.actor, render=False)
+        if plotter is not None:
+            surfaces_of[plotter].remove(self)
+        self._observer = None
+
+    def _update(self, renderer: Any, _event: str) -> None:
+        """Draws what the renderer, which is about to draw, shows of the surface."""
+        if not self.visible or not renderer.HasViewProp(self.actor):
+            return
+        try:
+            view = view_of(renderer)
+            if not self.actor.GetIsIdentity():
+                raise ValueError("isosurfaces cannot be scaled or moved with the scene")
+            wanted = (self.isovalue, self.color, view)
+            if wanted != self._drawn:
+                self.image = self.volume.render(
+                    self.isovalue,
+                    size=view.size,
+                    camera=view.camera,
+                    color=self.color,
+                    outputs=("rgb", "depth"),
+                    **self._request,
+                )
+                (left, bottom), (width, height) = view.corner, view.part
+                frame = frame_of(self.image)
+                self._show(frame[bottom : bottom + height, left : left + width])
+                self._drawn = wanted
+            projection = projection_of(renderer)
+            uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
+            uniforms.SetUniform2f(PLANES, [projection[2, 2], projection[2, 3]])
+            self.error = None
+        except Exception as error:  # noqa: BLE001: VTK would print it, and go on
+            self._show(np.zeros((1, 1, 4), np.float32))
+            self._drawn = None
+            self.error = self._failure = error
+            warnings.warn(f"no isosurface is shown: {error}", RuntimeWarning, stacklevel=2)
+
+    def _show(self, frame: npt.NDArray[np.float32]) -> None:
+        image = vtkImageData()
+        image.SetDimensions(frame.shape[1], frame.shape[0], 1)
+        image.GetPointData().SetScalars(vtk_array(frame.reshape(-1, 4)))
+        self._texture.SetInputData(image)
+
+    def __repr__(self) -> str:
+        return f"<isowave.pyvista.Isosurface isovalue {self.isovalue:g}>"
+
+
+def add_isosurface(
+    plotter: pyvista.Plotter,
+    volume: Volume,
+    isovalue: float,
+    *,
+    color: Color | None = None,
+    device: str | int | None = None,
+    max_error: float | None = None,
+    voxel_pixels: float = 0.0,
+    normals: str = "smooth",
+    memory_budget: int | None = None,
+    reset_camera: bool | None = None,
+) -> Isosurface:
+    """Adds an isosurface to the plotter's active scene.
+
+    It is opaque, has one ray for each pixel, and its own light: a headlight, and one from above.
+
+    Parameters
+    ----------
+    plotter
+        Its scene has a perspective camera; its active one where there are several.
+    volume
+        In the scene's world space; isowave.compress(pyvista.ImageData) is where the image is.
+    isovalue
+        The surface is where the trilinear field crosses this value.
+    color
+        "#rrggbb", or red, green, blue from 0 to 1.
+    device, memory_budget
+        As for Volume.render.
+    max_error, voxel_pixels, normals
+        As for Renderer.render.
+    reset_camera
+        Whether the camera is set such that all of the scene is seen; None: if nobody has set it.
+
+    Returns
+    -------
+    Isosurface
+        With it, isovalue and colour are changed, and the surface is removed.
+
+    Raises
+    ------
+    ValueError
+        A scene whose camera has parallel projection, in one line. Where that is found when a scene
+        is drawn, there is a warning, and screenshot() raises.
+    """
+    if plotter.renderer.GetActiveCamera().GetParallelProjection():
+        raise ValueError(PARALLEL)
+    is_smooth(normals)
+    if color is not None:
+        color_of(color)
+    request = {"device": device, "memory_budget": memory_budget, "max_error": max_error}
+    request |= {"voxel_pixels": voxel_pixels, "normals": normals}
+    surface = Isosurface(plotter, volume, float(isovalue), color, request)
+    plotter.add_actor(surface.actor, reset_camera=reset_camera, pickable=False, render=False)
+    surfaces_of.setdefault(plotter, []).append(surface)
+    return surface
+
+
+def screenshot(plotter: pyvista.Plotter, **options: Any) -> npt.NDArray[np.uint8]:
+    """What the plotter shows now, isosurfaces among it: uint8 (height, width, 3).
+
+    options are those of pyvista.Plotter.screenshot. Raises what kept a surface from being drawn.
+    """
+    surfaces = list(surfaces_of.get(plotter, []))
+    for surface in surfaces:
+        surface._failure = None
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "no isosurface is shown", RuntimeWarning)
+        plotter.render()  # what changed since the last time; nothing before the first
+        rgb = plotter.screenshot(return_img=True, **options)
+    for surface in surfaces:
+        if surface._failure is not None:
+            raise surface._failure
+    return np.asarray(rgb)
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """What a vtkRenderer shows: a part of a picture whose middle the camera looks at.
+
+    The part is less than the whole where VTK draws pictures larger than the window in tiles.
+    """
+
+    camera: Camera
+    size: tuple[int, int]  #: width and height of the whole picture
+    corner: tuple[int, int]  #: columns left of the part, and rows below it
+    part: tuple[int, int]  #: width and height of the part
+
+
+def view_of(renderer: Any) -> View:
+    """The view by the matrices that VTK is about to draw with."""
+    camera, aspect = renderer.GetActiveCamera(), renderer.GetTiledAspectRatio()
+    if camera.GetParallelProjection():
+        raise ValueError(PARALLEL)
+    part = part_of(renderer)
+    if min(part) < 1:
+        raise ValueError("isosurfaces need a view of at least one pixel")
+    view, projection = matrix_of(camera.GetModelViewTransformMatrix()), projection_of(renderer)
+    rotation = view[:3, :3]
+    if not np.allclose(rotation @ rotation.T, np.eye(3)):
+        raise ValueError("isosurfaces need a camera that does not scale the scene")
+    if not np.isclose(projection[0, 0] * aspect, projection[1, 1]):
+        raise ValueError("isosurfaces need a camera with square pixels")
+    shift = projection[:2, 2]  # of the middle, in halves of the part
+    exact = part * (1 + np.abs(shift))
+    whole = np.rint(exact).astype(int)
+    if np.abs(exact - whole).max() > 0.01:
+        raise ValueError("isosurfaces need a camera that looks through the middle of its view")
+    corner = np.where(shift > 0, whole - part, 0)
+    eye = -rotation.T @ view[:3, 3]
+    towards = eye - camera.GetDistance() * rotation[2]
+    fovy = math.degrees(2 * math.atan(whole[1] / part[1] / projection[1, 1]))
+    return View(
+        Camera(vector(eye), vector(towards), vector(rotation[1]), fovy),
+        (int(whole[0]), int(whole[1])),
+        (int(corner[0]), int(corner[1])),
+        part,
+    )
+
+
+def part_of(renderer: Any) -> tuple[int, int]:
+    """Width and height [pixels] of what is drawn at once."""
+    width, height = renderer.GetSize()
+    columns, rows = renderer.GetVTKWindow().GetTileScale()
+    if (columns, rows) != (1, 1) and tuple(renderer.GetViewport()) != (0, 0, 1, 1):
+        raise ValueError(
+            "isosurfaces cannot be enlarged (scale=) where a plotter has several scenes"
+        )
+    return width // columns, height // rows
+
+
+def projection_of(renderer: Any) -> npt.NDArray[np.float64]:
+    aspect = renderer.GetTiledAspectRatio()
+    return matrix_of(renderer.GetActiveCamera().GetProjectionTransformMatrix(aspect, -1, 1))
+
+
+def matrix_of(matrix: Any) -> npt.NDArray[np.float64]:
+    return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+
+
+def eye_depth(image: Image) -> npt.NDArray[np.float64]:
+    """Distance from the eye's plane [world units], (height, width); inf: no surface."""
+    assert image.depth is not None
+    height, width = image.depth.shape
+    pixel = 2 * math.tan(math.radians(image.camera.fovy) / 2) / height
+    x = pixel * (np.arange(width) + 0.5 - width / 2)
+    y = pixel * (np.arange(height) + 0.5 - height / 2)
+    return np.asarray(image.depth / np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2), np.float64)
+
+
+def frame_of(image: Image) -> npt.NDArray[np.float32]:
+    """Red, green, blue from 0 to 1, and eye_depth(), 0 for none; rows from bottom to top."""
+    assert image.rgb is not None
+    depth = eye_depth(image)
+    frame = np.empty((*depth.shape, 4), np.float32)
+    frame[..., :3] = image.rgb[::-1] / np.float32(255)
+    frame[..., 3] = np.where(np.isfinite(depth), depth, 0)[::-1]
+    return frame
+
+
+def vtk_array(rows: npt.NDArray[Any]) -> Any:
+    contiguous = np.ascontiguousarray(rows)
+    return numpy_to_vtk(contiguous, deep=True)  # type: ignore[no-untyped-call,unused-ignore]
+
+
+def corners_of(volume: Volume) -> npt.NDArray[np.float64]:
+    """The corners of the volume's box in world space, (8, 3)."""
+    extent = (np.array(volume.shape[::-1]) - 1) * volume.spacing[::-1]
+    index = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
+    corners = np.array(volume.origin[::-1]) + (index * extent) @ np.asarray(volume.direction).T
+    return np.asarray(corners, np.float64)
+
+
+def make_actor(corners: npt.NDArray[np.float64], texture: Any) -> Any:
+    """What writes the texture's colours and depths to all pixels of the view."""
+    points = vtkPoints()
+    points.SetData(vtk_array(corners))
+    cells = vtkCellArray()
+    for first in (0, 4):
+        cells.InsertNextCell(4, [first, first + 1, first + 3, first + 2])
+    box = vtkPolyData()
+    box.SetPoints(points)
+    box.SetPolys(cells)
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(box)
+    actor = pyvista.Actor(mapper=mapper)
+    actor.ForceOpaqueOn()  # the texture's fourth component is no opacity
+    actor.GetProperty().LightingOff()
+    actor.GetProperty().SetTexture(TEXTURE, texture)
+    shader = actor.GetShaderProperty()
+    for place, code in VERTEX.items():
+        shader.AddVertexShaderReplacement(f"//VTK::{place}", True, code, False)
+    for place, code in FRAGMENT.items():
+        shader.AddFragmentShaderReplacement(f"//VTK::{place}", True, code, False)
+    return actor
