@@ -176,6 +176,7 @@ def add_isosurface(
     """Adds an isosurface to the plotter's active scene.
 
     It is opaque, has one ray for each pixel, and its own light: a headlight, and one from above.
+    Not for scenes with shadows (plotter.enable_shadows()), which VTK draws from the lights' places.
 
     Parameters
     ----------
