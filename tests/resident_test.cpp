@@ -106,7 +106,7 @@ TEST_P(ResidentOnDevice, EqualsBothPipelines) {
   resident.render(camera, 0.3f);
   for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
     Renderer renderer(device_, volume.compressed, {.size = kMedium, .pipeline = pipeline});
-    renderer.render({camera, 0.3f});
+    renderer.render({.camera = camera, .isovalue = 0.3f, .normals = Normals::kCell});
     expect_same_hits(resident.hits(), renderer.hits(), kMedium.width);
   }
 }
