@@ -307,6 +307,22 @@ def test_a_long_whole_picture_gives_way_once_to_a_first_picture() -> None:
     ]
 
 
+def test_a_new_wish_cancels_a_frame_with_a_time_budget() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+
+    def before_pass(frame: Drawn) -> None:
+        if frame.isovalue == 80.0 and frame.passes == 1:
+            eye.wish(81.0, time_budget=50.0)
+
+    volume.before_pass = before_pass
+    eye.wish(80.0, time_budget=50.0)
+    run(scene)
+    stopped = [(f.isovalue, f.stopped) for f in volume.frames if f.time_budget is not None]
+    assert stopped == [(80.0, True), (81.0, False)]
+
+
 def test_quick_pictures_need_no_first_one() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)
