@@ -44,6 +44,14 @@ nb::object to_numpy(std::vector<T> &&values, std::initializer_list<std::size_t> 
   return nb::cast(nb::ndarray<nb::numpy, Number>(data, shape, owner));
 }
 
+/// get(name, field): reads an option that is there and not None into the field.
+auto reader_of(const nb::dict &options) {
+  return [&options](const char *name, auto &field) {
+    if (options.contains(name) && !options[name].is_none())
+      field = nb::cast<std::decay_t<decltype(field)>>(options[name]);
+  };
+}
+
 /// Keeps the first exception of Python's that a callback raises, since the library makes an Error
 /// of what leaves a callback, and raises it again when the library has returned.
 class Callbacks {
@@ -112,10 +120,7 @@ std::string type_name(isowave::VoxelType type) {
 
 isowave::Compression compression_of(const nb::dict &options) {
   isowave::Compression result;
-  const auto get = [&](const char *name, auto &field) {
-    if (options.contains(name) && !options[name].is_none())
-      field = nb::cast<std::decay_t<decltype(field)>>(options[name]);
-  };
+  const auto get = reader_of(options);
   get("rate", result.rate);
   get("tolerance", result.tolerance);
   get("relative_tolerance", result.relative_tolerance);
@@ -321,10 +326,7 @@ nb::dict frame_dict(isowave::Frame &&frame) {
 
 isowave::FrameRequest request_of(const nb::dict &options) {
   isowave::FrameRequest request;
-  const auto get = [&](const char *name, auto &field) {
-    if (options.contains(name) && !options[name].is_none())
-      field = nb::cast<std::decay_t<decltype(field)>>(options[name]);
-  };
+  const auto get = reader_of(options);
   get("eye", request.camera.eye);
   get("at", request.camera.at);
   get("up", request.camera.up);
@@ -389,10 +391,7 @@ class PyRenderer {
  public:
   PyRenderer(const std::string &selector, const PyVolume &volume, const nb::dict &options) {
     isowave::RendererOptions wanted;
-    const auto get = [&](const char *name, auto &field) {
-      if (options.contains(name) && !options[name].is_none())
-        field = nb::cast<std::decay_t<decltype(field)>>(options[name]);
-    };
+    const auto get = reader_of(options);
     get("width", wanted.largest.width);
     get("height", wanted.largest.height);
     get("samples", wanted.largest.samples);
