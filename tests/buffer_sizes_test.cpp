@@ -15,6 +15,7 @@
 
 #include "core/render/pass_readback.hpp"
 #include "core/render/pipeline.hpp"
+#include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/resident.hpp"
 #include "core/stages/shade.hpp"
@@ -89,8 +90,10 @@ struct Maker {
 };
 
 void check_wavefront(ocl::Device &device) {
-  for (const Wavefront::Limits &limits :
-       {Wavefront::Limits{1}, {.num_rays = 1000, .with_pairs = false}, {333, true, 4}})
+  for (const Wavefront::Limits &limits : {Wavefront::Limits{1},
+                                          {.num_rays = 1000, .with_pairs = false},
+                                          {333, true, 4},
+                                          {.num_rays = 50, .with_given = true}})
     expect_books(device, Wavefront::sizes(limits), [&] { return Wavefront(device, limits); });
 }
 
@@ -186,6 +189,10 @@ void check_shade(ocl::Device &device) {
     expect_books(device, Shade::sizes(pixels), [&] { return Shade(device, pixels); });
 }
 
+void check_ambient(ocl::Device &device) {
+  expect_books(device, Ambient::sizes(), [&] { return Ambient(device, 1000); });
+}
+
 void check_kept_picture(ocl::Device &device) {
   for (const uint rays : {1u, 1000u})
     expect_books(device, KeptPicture::sizes(rays), [&] { return KeptPicture(device, rays); });
@@ -213,6 +220,7 @@ void check_pipelines(ocl::Device &device) {
       expect_books(device, pipeline_sizes(kind, limits), [&] {
         return make_pipeline(kind, state, limits, kDefaultSolver, kDefaultClosestHit);
       });
+    expect_books(device, {}, [&] { return make_given_pipeline(state, 8, kDefaultSolver); });
     levels = std::move(state.levels);
   }
 }
@@ -246,6 +254,7 @@ constexpr std::array kMakers = {Maker{"Wavefront", check_wavefront},
                                 Maker{"RadixSort", check_radix_sort},
                                 Maker{"Group", check_group},
                                 Maker{"Shade", check_shade},
+                                Maker{"Ambient", check_ambient},
                                 Maker{"KeptPicture", check_kept_picture},
                                 Maker{"PassReadback", check_pass_readback},
                                 Maker{"Pipelines", check_pipelines},
