@@ -273,6 +273,8 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["normals_passes"] = statistics.normals_passes;
   result["normals_decoded_blocks"] = statistics.normals_decoded_blocks;
   result["normals_ms"] = statistics.normals_ms;
+  result["ambient_passes"] = statistics.ambient_passes;
+  result["ambient_ms"] = statistics.ambient_ms;
   result["uploaded_bytes"] = statistics.uploaded_bytes;
   result["first_level"] = statistics.first_level;
   result["last_level"] = statistics.last_level;
@@ -324,6 +326,9 @@ nb::dict frame_dict(isowave::Frame &&frame) {
   return result;
 }
 
+/// [count][6]
+using RayArray = nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig>;
+
 isowave::FrameRequest request_of(const nb::dict &options) {
   isowave::FrameRequest request;
   const auto get = reader_of(options);
@@ -341,6 +346,7 @@ isowave::FrameRequest request_of(const nb::dict &options) {
   get("voxel_error", request.voxel_error);
   get("max_surface_error", request.max_surface_error);
   get("time_budget_ms", request.time_budget_ms);
+  get("ambient_rays", request.ambient_rays);
   get("want_picture", request.want_picture);
   get("want_depth", request.want_depth);
   get("want_normals", request.want_normals);
@@ -386,6 +392,20 @@ nb::dict draw(AnyRenderer &renderer, const nb::dict &options,
   return frame_dict(std::move(frame));
 }
 
+/// By any of the library's renderers. rays [count][6]: origin and direction.
+template <class AnyRenderer>
+nb::dict cast(AnyRenderer &renderer, const RayArray &rays, float isovalue, bool smooth) {
+  static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
+  const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
+  isowave::Frame frame;
+  {
+    const nb::gil_scoped_release no_gil;
+    frame = renderer.cast_rays({first, rays.shape(0)}, isovalue,
+                               smooth ? isowave::Normals::kSmooth : isowave::Normals::kCell);
+  }
+  return frame_dict(std::move(frame));
+}
+
 /// A renderer, with the device that it draws on.
 class PyRenderer {
  public:
@@ -400,6 +420,7 @@ class PyRenderer {
     get("with_levels", wanted.with_levels);
     get("with_bounds", wanted.with_bounds);
     get("with_time_budget", wanted.with_time_budget);
+    get("with_rays", wanted.with_rays);
     isowave::DeviceOptions device_options;
     get("profiling", device_options.profiling);
     bool quick = false;
@@ -417,6 +438,11 @@ class PyRenderer {
                   bool interrupts) {
     return quick_ ? draw(*quick_, options, on_pass, interrupts)
                   : draw(*renderer_, options, on_pass, interrupts);
+  }
+
+  nb::dict cast_rays(const RayArray &rays, float isovalue, bool smooth) {
+    return quick_ ? cast(*quick_, rays, isovalue, smooth)
+                  : cast(*renderer_, rays, isovalue, smooth);
   }
 
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
@@ -460,18 +486,8 @@ class PyHostRenderer {
     return draw(*renderer_, options, on_pass, interrupts);
   }
 
-  /// rays [count][6]: origin and direction
-  nb::dict cast_rays(const nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig> &rays,
-                     float isovalue, bool smooth) {
-    static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
-    const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
-    isowave::Frame frame;
-    {
-      const nb::gil_scoped_release no_gil;
-      frame = renderer_->cast_rays({first, rays.shape(0)}, isovalue,
-                                   smooth ? isowave::Normals::kSmooth : isowave::Normals::kCell);
-    }
-    return frame_dict(std::move(frame));
+  nb::dict cast_rays(const RayArray &rays, float isovalue, bool smooth) {
+    return cast(*renderer_, rays, isovalue, smooth);
   }
 
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
@@ -581,6 +597,7 @@ NB_MODULE(_core, m) {
       .def(nb::init<const std::string &, const PyVolume &, const nb::dict &>(), "device"_a,
            "volume"_a, "options"_a)
       .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
+      .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "smooth"_a)
       .def("camera", &PyRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
       .def_prop_ro("device", &PyRenderer::device)
       .def_prop_ro("ready", &PyRenderer::ready)

@@ -18,6 +18,7 @@ from isowave._renderer import (
     Camera,
     Image,
     Renderer,
+    cast_rays,
     draw,
     is_smooth,
     needed_options,
@@ -433,12 +434,14 @@ class Volume:
         return self._host
 
     def cast_rays(
-        self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
+        self,
+        rays: npt.ArrayLike,
+        isovalue: float,
+        *,
+        normals: str = "smooth",
+        device: str | int | None = None,
     ) -> dict[str, npt.NDArray[Any]]:
         """Where rays of any origin and direction first cross the isosurface.
-
-        On the host, without a device. The first call decodes the whole volume, which takes 4.4
-        bytes a voxel until the volume goes: at most a quarter of the host's memory.
 
         Parameters
         ----------
@@ -448,6 +451,11 @@ class Volume:
             The surface is where the trilinear field crosses this value.
         normals
             "smooth", or "cell": of the trilinear field itself.
+        device
+            "gpu", "cpu", an index, or a part of a name: casts them there, from compressed blocks.
+            None: on the host, where the first call decodes the whole volume, which takes 4.4 bytes
+            a voxel until the volume goes; volumes that would take more than a quarter of the host's
+            memory are left to the default device. The result is the same.
 
         Returns
         -------
@@ -456,20 +464,20 @@ class Volume:
             space, of length 1, away from larger values. position: (..., 3), world space, nan where
             nothing is hit. cell: (..., 3), (z, y, x) of the voxel at the cell's lowest corner.
         """
-        array = np.ascontiguousarray(rays, np.float64)
-        if array.ndim == 0 or array.shape[-1] != 6:
-            raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
-        smooth = is_smooth(normals)
         with self._lock:
-            host = self._host_renderer()
-        found = host.cast_rays(array.reshape(-1, 6), isovalue, smooth)
-        lead = array.shape[:-1]
-        return {
-            "t_hit": found["depth"].reshape(lead),
-            "normals": found["normals"].reshape(*lead, 3),
-            "position": found["positions"].reshape(*lead, 3),
-            "cell": found["cells"][..., ::-1].reshape(*lead, 3),
-        }
+            if device is None and self._fits_host():
+                host = self._host_renderer()
+            else:
+                renderer = self._renderer_for({"device": device, "rays": True})
+                return renderer.cast_rays(rays, isovalue, normals=normals)
+        return cast_rays(host, rays, isovalue, normals)
+
+    def _fits_host(self) -> bool:
+        try:
+            self._host_renderer()
+        except _core.Error:
+            return False
+        return True
 
     def verify(
         self,

@@ -95,6 +95,7 @@ class RendererLike(Protocol):
         outputs: Sequence[str],
         max_error: float | None,
         time_budget: float | None,
+        ambient: int,
         on_pass: Callable[[Any], bool] | None,
     ) -> ImageLike:
         ...
