@@ -37,7 +37,7 @@ def test_messages_are_read() -> None:
     assert check({"type": "budget", "bytes": None}) == Budget(None)
     assert check({"type": "budget", "bytes": 5}) == Budget(5)
     view = View((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
-    wish = Wish(7, 80, (64, 48), view, (1, 0.5, 0), (1, 1, 1), 2, 0.5, None)
+    wish = Wish(7, 80, (64, 48), view, (1, 0.5, 0), (1, 1, 1), 2, 0.5, None, 16)
     assert check(parse(json.dumps(WISH))) == wish
 
 
@@ -118,7 +118,7 @@ def test_texts_that_are_refused(text: str, message: str) -> None:
 
 def test_another_version_is_told_to_reload() -> None:
     with pytest.raises(ProtocolError, match="reload"):
-        check({"type": "hello", "version": 2})
+        check({"type": "hello", "version": 3})
 
 
 VALID: list[dict[str, Any]] = [
