@@ -80,6 +80,12 @@ struct FrameOfPicture {
   ~FrameOfPicture() { rays.frame = frame; }
 };
 
+std::vector<VolumeInfo> infos_of(const std::vector<Level> &levels) {
+  std::vector<VolumeInfo> infos;
+  for (const Level &level : levels) infos.push_back(level.info);
+  return infos;
+}
+
 LaterPasses later_pass(const PassStats &pass) {
   return {1, pass.counts.decoded_count, pass.counts.recycled_count, 0, pass.stage_ms};
 }
@@ -202,16 +208,15 @@ bool Renderer::trace_given(const OnPass &on_pass, LaterPasses &stats) {
   open_requests_ = state_.drawing;
   given_pipeline_->begin_frame();
   StallGuard guard(state_.levels[0].info.dims);
-  for (bool finished = false, cancelled = false; !finished;) {
+  for (bool finished = false; !finished;) {
     given_pipeline_->enqueue_pass();
     readback_.push(state_.rays.counts);
     if (!in_step(on_pass) && readback_.in_flight() < PassReadback::kMaxInFlight) continue;
     const PassStats pass = stats_of(readback_.pop());
     stats += later_pass(pass);
     finished = pass.counts.next_active_count == 0;
-    cancelled = on_pass && !on_pass(with_all_hits(pass));
     guard.check(pass.counts);
-    if (cancelled) return false;
+    if (on_pass && !on_pass(with_all_hits(pass))) return false;
   }
   given_pipeline_->end_frame();
   open_requests_.reset();
@@ -316,10 +321,8 @@ void Renderer::check(const FrameRequest &request) const {
 void Renderer::begin_frame(const FrameRequest &request) {
   check(request);
   const ImageSize size = size_of(request);
-  std::vector<VolumeInfo> infos;
-  for (const Level &level : state_.levels) infos.push_back(level.info);
-  std::vector<FrameParams> frames =
-      make_level_frames(infos, request.camera, size, request.isovalue, request.voxel_pixels);
+  std::vector<FrameParams> frames = make_level_frames(infos_of(state_.levels), request.camera, size,
+                                                      request.isovalue, request.voxel_pixels);
   const std::vector<DecodedValues> values = decoded_values(request);
   has_picture_ = false;
   size_ = size;
@@ -480,9 +483,7 @@ std::vector<HitRecord> Renderer::cast_rays(std::span<const WorldRay> world_rays,
 /// Of all levels: the finest draws given rays, seen as a picture of so many.
 std::vector<FrameParams> Renderer::frames_of_rays(std::uint32_t columns, std::uint32_t rows,
                                                   float isovalue) const {
-  std::vector<VolumeInfo> infos;
-  for (const Level &level : state_.levels) infos.push_back(level.info);
-  std::vector<FrameParams> frames = make_level_grids(infos);
+  std::vector<FrameParams> frames = make_level_grids(infos_of(state_.levels));
   for (FrameParams &frame : frames) {
     frame.view.width = columns;
     frame.view.height = rows;

@@ -542,12 +542,7 @@ void add_render(CLI::App &app) {
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
   add_normals_option(*command, options->normals);
-  command
-      ->add_option("--ambient", options->ambient_rays,
-                   "rays of each hit that find out how much of the sky it sees: shows depth, in "
-                   "about as many times as long; 16 and more look smooth, up to 255")
-      ->type_name("N")
-      ->capture_default_str();
+  add_ambient_option(*command, options->ambient_rays);
   command->add_option("--output,-o", options->image,
                       "PNG; NAME_isoV_viewK.png when there are several frames [VOLUME_isoV.png in "
                       "the current folder, where no other output is asked for]");
