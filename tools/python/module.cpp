@@ -205,14 +205,17 @@ PyVolume open_volume(const std::filesystem::path &path, const nb::dict &options,
       [&] { return PyVolume{isowave::open_volume(path, compression, raw)}; });
 }
 
-nb::object decode(const PyVolume &self, std::uint32_t level) {
+nb::object decode(const PyVolume &self, std::uint32_t level, const Index3 &begin, const Index3 &end,
+                  const Index3 &step) {
   std::vector<float> voxels;
   {
     const nb::gil_scoped_release no_gil;
-    voxels = self.volume->decode(level);
+    voxels = self.volume->decode(level, {begin, end, step});
   }
-  const Index3 dims = self.volume->level_grid(level).dims;
-  return to_numpy<float>(std::move(voxels), {dims[2], dims[1], dims[0]});
+  const auto count = [&](std::size_t axis) -> std::size_t {
+    return (end.at(axis) - begin.at(axis) - 1) / step.at(axis) + 1;
+  };
+  return to_numpy<float>(std::move(voxels), {count(2), count(1), count(0)});
 }
 
 nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
@@ -569,7 +572,7 @@ NB_MODULE(_core, m) {
           "level_dims",
           [](const PyVolume &v, std::uint32_t level) { return v.volume->level_grid(level).dims; },
           "level"_a)
-      .def("decode", &decode, "level"_a)
+      .def("decode", &decode, "level"_a, "begin"_a, "end"_a, "step"_a)
       .def("sample", &sample, "max_voxels"_a)
       .def(
           "save",

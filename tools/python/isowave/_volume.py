@@ -6,7 +6,7 @@ import html
 import os
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._arrays import as_source
+from isowave._levels import Level
 from isowave._renderer import (
     Camera,
     Image,
@@ -250,8 +251,12 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
 class Volume:
     """A compressed volume. It cannot be changed, and threads may share it.
 
-    Made by compress() and open().
+    Made by compress() and open(). It is an array of float32, (z, y, x), that is decoded where it is
+    indexed: volume[10], volume[10:20, ::4, -1]. Level has more of that.
     """
+
+    ndim = 3
+    dtype = Level.dtype  # of what indexing gives
 
     def __init__(self, core: _core.Volume) -> None:
         self._core = core
@@ -265,6 +270,11 @@ class Volume:
         """Voxels along (z, y, x)."""
         x, y, z = self._core.dims
         return z, y, x
+
+    @property
+    def size(self) -> int:
+        """Voxels."""
+        return self.levels[0].size
 
     @property
     def spacing(self) -> tuple[float, float, float]:
@@ -285,7 +295,7 @@ class Volume:
         return np.ascontiguousarray(columns.T)
 
     @property
-    def dtype(self) -> np.dtype[Any]:
+    def source_dtype(self) -> np.dtype[Any]:
         """Of the voxels before compression."""
         return np.dtype(self._core.source_type)
 
@@ -328,20 +338,45 @@ class Volume:
             raise ValueError(f"level {level} of a volume that has {self.num_levels}: from 0 on")
         return level
 
-    def decode(self, level: int = 0) -> npt.NDArray[np.float32]:
-        """All voxels, float32, (z, y, x).
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """The levels of detail as arrays, the volume itself first: volume.levels[2][5]."""
+        return tuple(Level(self._core, number) for number in range(self.num_levels))
 
-        level: of detail; each has half the voxels of the last along each axis.
+    def decode(self, level: int = 0, region: Any = ...) -> npt.NDArray[np.float32]:
+        """Voxels of a level of detail, float32, (z, y, x).
+
+        Parameters
+        ----------
+        level
+            Each has half the voxels of the last along each axis.
+        region
+            What one would index an array of the level with: numpy.s_[10:20, :, 5]. Only the blocks
+            of 4 x 4 x 4 voxels that hold these voxels are decoded.
+
+        Raises
+        ------
+        ValueError
+            There is no such level.
+        IndexError
+            The region is none of the level, in one line.
         """
-        return self._core.decode(self._checked(level))
+        voxels: npt.NDArray[np.float32] = np.asarray(self.levels[self._checked(level)][region])
+        return voxels
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __iter__(self) -> Iterator[npt.NDArray[np.float32]]:
+        return iter(self.levels[0])
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.levels[0][key]
 
     def __array__(
         self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
     ) -> npt.NDArray[Any]:
-        if copy is False:
-            raise ValueError("a volume is decoded into a new array: copy=False is not possible")
-        voxels: npt.NDArray[Any] = self.decode()
-        return voxels if dtype is None else voxels.astype(dtype)
+        return self.levels[0].__array__(dtype, copy)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .zfp file, which open() and the program read; whole, or not at all."""
@@ -524,7 +559,7 @@ class Volume:
     def __repr__(self) -> str:
         shape = " x ".join(str(n) for n in self.shape)
         return (
-            f"<isowave.Volume {shape} (z, y, x) {self.dtype}, "
+            f"<isowave.Volume {shape} (z, y, x) {self.source_dtype}, "
             f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel>"
         )
 
@@ -533,7 +568,7 @@ class Volume:
         rows = {
             "shape (z, y, x)": " x ".join(str(n) for n in self.shape),
             "spacing": ", ".join(f"{s:g}" for s in self.spacing),
-            "values": f"{self.dtype}, {least:g} to {largest:g}",
+            "values": f"{self.source_dtype}, {least:g} to {largest:g}",
             "compressed": f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel",
             "largest error": "not known" if self.max_error is None else f"{self.max_error:.3g}",
             "levels of detail": str(self.num_levels),

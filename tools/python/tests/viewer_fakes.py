@@ -71,7 +71,7 @@ class FakeVolume:
     renderers: list[dict[str, Any]] = field(default_factory=list)
     shape: tuple[int, int, int] = (SIDE, SIDE, SIDE)
     spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
+    source_dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
     value_range: tuple[float, float] = (0.0, VALUES)
     nbytes: int = 65536
     bits_per_voxel: float = 2.0

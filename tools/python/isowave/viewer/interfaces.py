@@ -113,7 +113,7 @@ class VolumeLike(Protocol):
         ...
 
     @property
-    def dtype(self) -> np.dtype[Any]:
+    def source_dtype(self) -> np.dtype[Any]:
         ...
 
     @property

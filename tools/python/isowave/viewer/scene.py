@@ -626,7 +626,7 @@ class Scene:
                 "title": self._title,
                 "shape": [int(n) for n in volume.shape],
                 "spacing": [float(s) for s in volume.spacing],
-                "dtype": str(volume.dtype),
+                "dtype": str(volume.source_dtype),
                 "range": list(self._range),
                 "bits_per_voxel": float(volume.bits_per_voxel),
                 "max_error": _finite(volume.max_error),
