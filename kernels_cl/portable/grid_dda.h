@@ -9,6 +9,16 @@
 /// "The cell after an event" is the number of planes of each axis that are not later than the
 /// event. So walking cell by cell, skipping by macrocells, and resuming at a block pass through the
 /// same cells with the same bits, and a ray's state between passes is just a block.
+///
+/// Float filter: processors compare moments in float32 first. float_t() rounds three times: plane -
+/// o, 1 / d and their product. Each is off by at most u = 2^-24 of itself, 1 / d by 5 u where a
+/// device divides within 2.5 ulp, as OpenCL allows. So a moment in float32 is off by at most 7.1 u
+/// of itself, and the two-float one by far less than the 0.1. Two moments that are further apart
+/// than 16 u = 2^-20 of the one with the larger magnitude are in the order that two-float finds:
+/// 14.2 u cover what both are off by, the rest covers the rounding of their difference. Where the
+/// smaller moment has the larger magnitude, it is negative. The other one is then either not, and
+/// signs are exact, or so near that the same rest covers the difference of their magnitudes.
+/// Closer moments are in doubt, and two-float decides.
 #ifndef ISOWAVE_GRID_DDA_H
 #define ISOWAVE_GRID_DDA_H
 
@@ -19,6 +29,14 @@ ISO_NAMESPACE_BEGIN
 #define ISO_AXIS_START 3  ///< axis of the event "the ray starts here"
 #define ISO_SMALLEST_DIRECTION \
   0x1p-40f  ///< smaller direction components count as 0: no denormals behind them
+
+#if defined(ISO_CPU) || !defined(__OPENCL_C_VERSION__)
+#define ISO_FLOAT_FILTER 1  ///< a GPU compares two-floats faster than it branches
+#endif
+#define ISO_FLOAT_DOUBT 0x1p-20f  ///< share of a moment within which float32 leaves an order open
+/// The float32 moment of a crossing that never comes. Others are below 2^65: eyes are at most 1e7
+/// voxels away.
+#define ISO_NEVER 0x1p100f
 
 /// One axis of a ray. Position = o + t d.
 typedef struct RayAxis {
@@ -139,6 +157,16 @@ ISO_INLINE TwoFloat far_t(RayAxis a, float plane) {
   return t;
 }
 
+/// When the ray crosses the plane, in float32.
+ISO_INLINE float float_t(RayAxis a, float plane) {
+  return a.d == 0.0f ? ISO_NEVER : (plane - a.o) * a.inv_d.hi;
+}
+
+/// Does two-float have to say which of two moments, by float_t(), is the earlier?
+ISO_INLINE int in_doubt(float earlier, float later) {
+  return later - earlier <= ISO_FLOAT_DOUBT * fabs(later);
+}
+
 /// The later of `e` and the crossing by which the ray enters region c of this axis.
 ISO_INLINE RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int size, int last_plane) {
   int plane = a.d > 0.0f ? size * c : size * (c + 1);
@@ -193,12 +221,12 @@ ISO_INLINE float local_position(RayAxis a, TwoFloat t, int c) {
 
 /// A walk through regions of one size: where it is, and by which plane of each axis it would leave.
 /// A GPU computes the three times when it needs them, without a branch, faster than it chooses one
-/// of them to renew; a CPU keeps them (ISO_CPU). The same bits either way.
+/// of them to renew; a CPU keeps them in float32. The same bits either way.
 typedef struct GridWalk {
   int x, y, z;                ///< the region
   float far_x, far_y, far_z;  ///< planes
-#ifdef ISO_CPU
-  TwoFloat t_x, t_y, t_z;  ///< far_t() of each
+#ifdef ISO_FLOAT_FILTER
+  float t_x, t_y, t_z;  ///< float_t() of each
 #endif
 } GridWalk;
 
@@ -224,10 +252,10 @@ ISO_INLINE GridWalk walk_from(const Ray *r, int x, int y, int z, int size, LastP
   w.far_x = far_plane(r->x, x, size, last.x);
   w.far_y = far_plane(r->y, y, size, last.y);
   w.far_z = far_plane(r->z, z, size, last.z);
-#ifdef ISO_CPU
-  w.t_x = far_t(r->x, w.far_x);
-  w.t_y = far_t(r->y, w.far_y);
-  w.t_z = far_t(r->z, w.far_z);
+#ifdef ISO_FLOAT_FILTER
+  w.t_x = float_t(r->x, w.far_x);
+  w.t_y = float_t(r->y, w.far_y);
+  w.t_z = float_t(r->z, w.far_z);
 #endif
   return w;
 }
@@ -241,15 +269,11 @@ ISO_INLINE RayEvent region_entry(const Ray *r, int x, int y, int z, int size, La
   return later_entry(e, r->z, 2, z, size, last.z);
 }
 
-/// The event by which the ray leaves the walk's region: the first of the three; ties in the order
-/// x, y, z. Numbers are chosen, not structs, which compilers would choose by address and so keep in
-/// memory.
-ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
-#ifdef ISO_CPU
-  const TwoFloat x = w->t_x, y = w->t_y, z = w->t_z;
-#else
-  const TwoFloat x = far_t(r->x, w->far_x), y = far_t(r->y, w->far_y), z = far_t(r->z, w->far_z);
-#endif
+/// The event by which the ray leaves a region with these far planes: the first of the three; ties
+/// in the order x, y, z. Numbers are chosen, not structs, which compilers would choose by address
+/// and so keep in memory.
+ISO_INLINE RayEvent first_exit(const Ray *r, float far_x, float far_y, float far_z) {
+  const TwoFloat x = far_t(r->x, far_x), y = far_t(r->y, far_y), z = far_t(r->z, far_z);
   const int y_first = t_less(y, x);
   TwoFloat xy;
   RayEvent e;
@@ -263,6 +287,31 @@ ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
   return e;
 }
 
+#ifdef ISO_FLOAT_FILTER
+/// The same; two-float finds the moment of the one exit, and the order only where float32 leaves it
+/// in doubt.
+ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
+  const int y_first = w->t_y < w->t_x;
+  const float xy = y_first ? w->t_y : w->t_x, not_xy = y_first ? w->t_x : w->t_y;
+  const int z_first = w->t_z < xy;
+  const float first = z_first ? w->t_z : xy, not_z = z_first ? xy : w->t_z,
+              second = not_z < not_xy ? not_z : not_xy;
+  RayAxis a;
+  if (in_doubt(first, second)) return first_exit(r, w->far_x, w->far_y, w->far_z);
+  a.o = z_first ? r->z.o : (y_first ? r->y.o : r->x.o);
+  a.d = z_first ? r->z.d : (y_first ? r->y.d : r->x.d);
+  a.inv_d.hi = z_first ? r->z.inv_d.hi : (y_first ? r->y.inv_d.hi : r->x.inv_d.hi);
+  a.inv_d.lo = z_first ? r->z.inv_d.lo : (y_first ? r->y.inv_d.lo : r->x.inv_d.lo);
+  return make_event(plane_t(a, z_first ? w->far_z : (y_first ? w->far_y : w->far_x)),
+                    z_first ? 2 : y_first);
+}
+#else
+/// The same for the walk's region.
+ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
+  return first_exit(r, w->far_x, w->far_y, w->far_z);
+}
+#endif
+
 /// One axis of walk_step().
 ISO_INLINE float next_far_plane(RayAxis a, float plane, int size, int last_plane) {
   const float next = plane + (float)(a.d > 0.0f ? size : -size), end = (float)last_plane;
@@ -271,19 +320,19 @@ ISO_INLINE float next_far_plane(RayAxis a, float plane, int size, int last_plane
 
 /// Goes through the region's exit into the next region, which may lie outside the grid.
 ISO_INLINE void walk_step(GridWalk *w, const Ray *r, RayEvent exit, int size, LastPlanes last) {
-#ifdef ISO_CPU
+#ifdef ISO_FLOAT_FILTER
   if (exit.axis == 0) {
     w->x += r->x.d > 0.0f ? 1 : -1;
     w->far_x = next_far_plane(r->x, w->far_x, size, last.x);
-    w->t_x = far_t(r->x, w->far_x);
+    w->t_x = float_t(r->x, w->far_x);
   } else if (exit.axis == 1) {
     w->y += r->y.d > 0.0f ? 1 : -1;
     w->far_y = next_far_plane(r->y, w->far_y, size, last.y);
-    w->t_y = far_t(r->y, w->far_y);
+    w->t_y = float_t(r->y, w->far_y);
   } else {
     w->z += r->z.d > 0.0f ? 1 : -1;
     w->far_z = next_far_plane(r->z, w->far_z, size, last.z);
-    w->t_z = far_t(r->z, w->far_z);
+    w->t_z = float_t(r->z, w->far_z);
   }
 #else /* no branches: the work-items of a GPU take turns at them */
   const int on_x = exit.axis == 0, on_y = exit.axis == 1, on_z = exit.axis == 2;
