@@ -7,7 +7,7 @@ namespace {
 
 void request_surface(benchmark::State &state, Gradients gradients) {
   auto &in = input<SurfaceRig>(state.range(0), gradients);
-  const double asked = double{blocks_of_block(gradients)} * in.num_listed;
+  const double asked = double(blocks_of_block(gradients)) * in.num_listed;
   measure(
       state, {double(in.num_listed), 20 * asked}, [] {}, [&] { in.ask(); });
   check(in.rays.counts.read()[0].requested_count == 0, "nothing is missing");

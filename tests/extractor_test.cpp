@@ -71,13 +71,14 @@ TEST_P(ExtractorOnDevice, SmallVolumeEqualsTheTwin) {
 }
 
 TEST_P(ExtractorOnDevice, SmallCacheGivesTheSameMesh) {
-  const CompressedVolume volume = noise_volume({13, 10, 12}, 2);
+  const CompressedVolume volume = noise_volume({9, 5, 6}, 2);
   ExtractStats all, few;
-  const Mesh expected = extract(volume, 0.1f, {}, &all);
-  const Mesh mesh = extract(volume, 0.1f, {.cache_slots = 17, .part_vertices = 300}, &few);
+  const Mesh expected = extract(volume, 0.1f, {.with_normals = false}, &all);
+  const Mesh mesh =
+      extract(volume, 0.1f, {.with_normals = false, .cache_slots = 8, .part_vertices = 300}, &few);
   expect_same_mesh(mesh, expected);
   EXPECT_EQ(all.decoded_blocks, all.needed_blocks) << "each once";
-  EXPECT_GT(few.decoded_blocks, 2 * all.decoded_blocks);
+  EXPECT_GT(few.decoded_blocks, all.decoded_blocks);
   EXPECT_GT(few.write_batches, all.write_batches);
 }
 
@@ -135,7 +136,7 @@ TEST_P(ExtractorOnDevice, ASphereIsClosedAndLooksOutwards) {
 }
 
 /// Spacing, origin, and axes that are turned and mirrored.
-TEST_P(ExtractorOnDevice, SmallMeshLiesInTheWorld) {
+TEST_P(ExtractorOnDevice, AMeshLiesInTheWorld) {
   CompressedVolume volume = noise_volume({7, 6, 8}, 4);
   const Mesh plain = extract(volume, 0.1f);
   volume.info.spacing = {2, 0.5, 3};
