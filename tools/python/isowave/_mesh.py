@@ -34,7 +34,9 @@ class Mesh:
         """A pyvista.PolyData with the normals as point data. Needs pyvista."""
         import pyvista
 
-        mesh = pyvista.PolyData.from_regular_faces(self.vertices, self.faces.astype(np.int64))
+        vertices: Any = self.vertices
+        faces: Any = self.faces.astype(np.int64)
+        mesh = pyvista.PolyData.from_regular_faces(vertices, faces)
         if self.normals is not None:
             mesh.point_data.active_normals = self.normals
         return mesh
