@@ -97,6 +97,7 @@ void save_mesh(const Mesh &mesh, const std::filesystem::path &path) {
     }
     const auto to_vec3 = [](const std::vector<std::array<float, 3>> &values) {
       std::vector<glm::vec3> result;
+      result.reserve(values.size());
       for (const auto &[x, y, z] : values) result.emplace_back(x, y, z);
       return result;
     };

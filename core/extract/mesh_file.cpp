@@ -199,7 +199,7 @@ class MeshFile::Writer {
     std::uint64_t offset = 0;  // behind the '_'
     const auto array = [&](std::string_view type, std::string_view attributes,
                            std::uint64_t bytes) {
-      const std::string text =
+      std::string text =
           fmt::format("<DataArray type=\"{}\" {} format=\"appended\" offset=\"{}\"/>\n", type,
                       attributes, offset);
       offset += sizeof(std::uint64_t) + bytes;

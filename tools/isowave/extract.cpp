@@ -125,9 +125,9 @@ void add_extract(CLI::App &app) {
           "level of detail, each of half the voxels along each axis; 0 is the volume itself")
       ->capture_default_str();
   command
-      ->add_option("--normals", options->normals,
-                   "of vertices: smooth (central differences of voxels), or none, which takes half "
-                   "the blocks")
+      ->add_option(
+          "--normals", options->normals,
+          "of vertices: smooth (central differences of voxels), or none, which needs fewer blocks")
       ->check(CLI::IsMember({"smooth", "none"}))
       ->capture_default_str();
   command->add_option("--device", options->device,

@@ -16,7 +16,7 @@ namespace isowave {
 
 struct ExtractOptions {
   std::uint32_t level = 0;          ///< of detail; 0: the volume itself
-  bool with_normals = true;         ///< needs up to twice as many blocks
+  bool with_normals = true;         ///< needs more blocks around the surface
   std::uint64_t memory_budget = 0;  ///< of device memory [bytes]; 0: three quarters of it
   /// Decoded blocks of 4^3 voxels that are kept at most, 17 and more (without normals 8); 0: as
   /// many as the surface needs and the budget allows. The mesh does not depend on it.

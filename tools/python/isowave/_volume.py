@@ -493,7 +493,7 @@ class Volume:
         level
             Of detail; each has half the voxels of the last along each axis.
         normals
-            Of vertices: central differences of voxels. Without, about half the blocks are decoded.
+            Of vertices: central differences of voxels. Without, fewer blocks are decoded.
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
         memory_budget
