@@ -112,7 +112,9 @@ void add_extract(CLI::App &app) {
       app.add_subcommand("extract", "Write an isosurface as triangles: PLY, STL, OBJ, VTP, glTF");
   command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))
       ->required();
-  command->add_option("-i,--isovalue", options->isovalue, "the surface is where the field has it")
+  command
+      ->add_option("-i,--isovalue", options->isovalue,
+                   "the value of the field whose surface is extracted")
       ->check(fits_float32())
       ->required();
   command->add_option(
