@@ -228,6 +228,52 @@ nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
   return to_numpy<float>(std::move(voxels), {count});
 }
 
+// ---- Meshes ----
+
+nb::dict extract(const PyVolume &self, const std::string &device, float isovalue,
+                 std::uint32_t level, bool normals, std::uint64_t memory_budget,
+                 const std::optional<nb::callable> &progress) {
+  Callbacks callbacks;
+  isowave::ExtractOptions options{
+      .level = level, .with_normals = normals, .memory_budget = memory_budget};
+  options.progress = [&](std::string_view what, double done) {
+    const bool goes_on = callbacks.run([&] {
+      if (progress) (*progress)(std::string(what), done);
+    });
+    if (!goes_on) throw Stopped();
+  };
+  isowave::Mesh mesh = callbacks.without_gil([&] {
+    return isowave::extract(isowave::open_device(device), self.volume, isovalue, options);
+  });
+  nb::dict result;
+  const std::size_t num_vertices = mesh.vertices.size(), num_faces = mesh.triangles.size();
+  result["vertices"] = to_numpy<float>(std::move(mesh.vertices), {num_vertices, 3});
+  result["faces"] = to_numpy<std::uint32_t>(std::move(mesh.triangles), {num_faces, 3});
+  if (normals) result["normals"] = to_numpy<float>(std::move(mesh.normals), {num_vertices, 3});
+  return result;
+}
+
+/// values [count][3]
+template <class T>
+using Rows = nb::ndarray<T, nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+template <class T>
+std::vector<std::array<T, 3>> to_vector(const Rows<T> &rows) {
+  std::vector<std::array<T, 3>> result(rows.shape(0));
+  if (!result.empty()) std::memcpy(result.data(), rows.data(), rows.nbytes());
+  return result;
+}
+
+void save_mesh(const Rows<float> &vertices, const Rows<std::uint32_t> &faces,
+               const std::optional<Rows<float>> &normals, const std::filesystem::path &path) {
+  const isowave::Mesh mesh{
+      .vertices = to_vector(vertices),
+      .normals = normals ? to_vector(*normals) : std::vector<std::array<float, 3>>{},
+      .triangles = to_vector(faces)};
+  const nb::gil_scoped_release no_gil;
+  isowave::save_mesh(mesh, path);
+}
+
 // ---- Devices and renderers ----
 
 nb::dict device_dict(const isowave::DeviceInfo &info) {
@@ -577,7 +623,10 @@ NB_MODULE(_core, m) {
       .def(
           "save",
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
-          "path"_a, nb::call_guard<nb::gil_scoped_release>());
+          "path"_a, nb::call_guard<nb::gil_scoped_release>())
+      .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a, "memory_budget"_a,
+           "progress"_a.none());
+  m.def("save_mesh", &save_mesh, "vertices"_a, "faces"_a, "normals"_a.none(), "path"_a);
   m.def("compress", &compress, "read"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a, "direction"_a,
         "options"_a, "keep"_a, "path"_a.none(), "progress"_a.none());
   m.def("compress_array", &compress_array, "array"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a,

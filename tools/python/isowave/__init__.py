@@ -17,6 +17,7 @@ _loader.prepare()
 
 from isowave._core import Error, __version__  # noqa: E402
 from isowave._levels import Level  # noqa: E402
+from isowave._mesh import Mesh  # noqa: E402
 from isowave._renderer import Camera, Image, Renderer  # noqa: E402
 from isowave._report import Report, devices  # noqa: E402
 from isowave._volume import Volume, compress, open, view  # noqa: E402
@@ -26,6 +27,7 @@ __all__ = [
     "Error",
     "Image",
     "Level",
+    "Mesh",
     "Renderer",
     "Report",
     "Volume",

@@ -48,6 +48,15 @@ class Volume:
     ) -> NDArray[np.float32]: ...
     def sample(self, max_voxels: int) -> NDArray[np.float32]: ...
     def save(self, path: str | PathLike[str]) -> None: ...
+    def extract(
+        self,
+        device: str,
+        isovalue: float,
+        level: int,
+        normals: bool,
+        memory_budget: int,
+        progress: Callable[[str, float], object] | None,
+    ) -> dict[str, NDArray[Any]]: ...
 
 def compress(
     read: Callable[[int, int], NDArray[Any]],
@@ -121,3 +130,9 @@ class Renderer:
     def wait(self) -> None: ...
     @property
     def memory_bytes(self) -> int: ...
+def save_mesh(
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    normals: NDArray[np.float32] | None,
+    path: str | PathLike[str],
+) -> None: ...

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from isowave import _core
 from isowave._arrays import as_source
 from isowave._levels import Level
+from isowave._mesh import Mesh
 from isowave._renderer import (
     Camera,
     Image,
@@ -513,6 +514,45 @@ class Volume:
         except _core.Error:
             return False
         return True
+
+    def extract(
+        self,
+        isovalue: float,
+        *,
+        level: int = 0,
+        normals: bool = True,
+        device: str | int | None = None,
+        memory_budget: int | None = None,
+        progress: Progress | None = None,
+    ) -> Mesh:
+        """The isosurface as triangles, by marching cubes on the device.
+
+        The result is in memory; `isowave extract` writes surfaces that are larger to a file.
+
+        Parameters
+        ----------
+        isovalue
+            The surface is where the field crosses this value along edges between voxels.
+        level
+            Of detail; each has half the voxels of the last along each axis.
+        normals
+            Of vertices: central differences of voxels. Without, fewer blocks are decoded.
+        device
+            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
+        memory_budget
+            Of device memory [bytes]; None: three quarters of it.
+        progress
+            Called with what is done and how much of it, 0 to 1.
+        """
+        found = self._core.extract(
+            "" if device is None else str(device),
+            isovalue,
+            self._checked(level),
+            normals,
+            memory_budget or 0,
+            progress,
+        )
+        return Mesh(found["vertices"], found["faces"], found["normals"] if normals else None)
 
     def verify(
         self,
