@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
@@ -169,8 +170,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
       }
     }
   });
-  certificate.total_ms =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  certificate.total_ms = ms_since(begin);
   return certificate;
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/view/detail.hpp"
 
 namespace isowave::core {
@@ -171,8 +172,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
           return Detail{choice.detail.voxel_pixels, voxel_error};
         });
   }
-  choice.total_ms =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  choice.total_ms = ms_since(begin);
   return choice;
 }
 

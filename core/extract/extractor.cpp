@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/stages/prefix_sum.hpp"
 #include "core/view/frame.hpp"
@@ -25,10 +26,6 @@ constexpr std::uint64_t kTrianglesPerVertex = 2;
 constexpr std::uint32_t kWindowBlocks = 1u << 12;
 
 using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-}
 
 OnHost window_for(const CompressedVolume &volume) {
   return {static_cast<std::uint32_t>(

@@ -7,6 +7,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/host_memory.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/stages/ambient.hpp"
@@ -38,11 +39,6 @@ const CompressedVolume &checked(const CompressedVolume &volume,
       "drawing on the host takes {} MiB of memory for the decoded volume, and {} MiB are allowed: "
       "raise the limit, or draw on a device",
       mebibytes(needed), limit >> 20);
-}
-
-double ms_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
-      .count();
 }
 
 template <class Count>

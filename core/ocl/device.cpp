@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/ocl/build_log.hpp"
 #include "core/ocl/device_list.hpp"
 #include "core/ocl/kernel_sources.hpp"
@@ -148,8 +149,7 @@ Device::Compiling::Compiling(Device &device)
 
 Device::Compiling::~Compiling() {
   if (--device_.compiling_depth_ > 0) return;
-  device_.compile_ms_ +=
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
+  device_.compile_ms_ += ms_since(begin_);
 }
 
 std::uint32_t Device::max_resident_groups() const {

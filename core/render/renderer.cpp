@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/render/stall_guard.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
@@ -20,11 +21,6 @@ namespace {
 
 /// Slots; below, slots may run out within one pass.
 constexpr std::uint32_t kSmallCache = 1u << 16;
-
-double ms_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
-      .count();
-}
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
                       const RendererOptions &options, const MemoryPlan &plan) {

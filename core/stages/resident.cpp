@@ -1,4 +1,5 @@
 #include "core/stages/resident.hpp"
+#include "core/base/ms_since.hpp"
 
 #include <fmt/format.h>
 
@@ -100,8 +101,7 @@ double Resident::render(const Camera &camera, float isovalue) {
   kernel_(ocl::Range::covering(tiles * kTilePixels, ocl::kGroupSize), frame, macrocells_.masks(),
           values_, changing_, hits_);
   device_.finish();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
-      .count();
+  return ms_since(begin);
 }
 
 }  // namespace isowave::core

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/io/png.hpp"
 #include "core/render/renderer.hpp"
@@ -53,10 +54,6 @@ std::vector<Solver> compared_solvers() {
   }
   result.push_back({ISO_SOLVER_ANALYTIC, 0});  // closed form: no steps
   return result;
-}
-
-double ms_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
 /// One volume's frame: what is drawn, and what is true.

@@ -22,7 +22,6 @@ from isowave._renderer import (
     Renderer,
     cast_rays,
     draw,
-    is_smooth,
     needed_options,
     request_for,
     size_of,
