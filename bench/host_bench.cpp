@@ -99,8 +99,9 @@ void measure(const Options &options) {
     const bool best = &loops == &all_host_loops().back();
     const std::string processor = best ? "" : ", any processor";
     ways.push_back({"rays" + processor, loops.trace_rays, false});
-    ways.push_back({"packets" + processor, loops.trace, false});
-    if (best) ways.push_back({"packets, smooth normals", loops.trace, true});
+    if (loops.trace != loops.trace_rays)
+      ways.push_back({"packets" + processor, loops.trace, false});
+    if (best) ways.push_back({"as drawn, smooth normals", loops.trace, true});
   }
   std::map<std::string, std::vector<double>> times;
   std::uint64_t num_rays = 0, num_hits = 0, num_differing = 0;
