@@ -35,6 +35,7 @@ struct Options {
   std::uint32_t samples = 1;
   bool resident = true;
   std::string normals = "cell";
+  std::uint32_t ambient_rays = 0;
   tools::RendererFlags renderer;
 };
 
@@ -67,7 +68,9 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, R
     for (const PassStats &pass : frame.passes) {
       for (const auto &[stage, ms] : pass.stage_ms) views[view][stage] += ms;
     }
-    for (const auto &[stage, ms] : frame.normals.stage_ms) views[view][stage] += ms;
+    for (const LaterPasses *later : {&frame.normals, &frame.ambient}) {
+      for (const auto &[stage, ms] : later->stage_ms) views[view][stage] += ms;
+    }
   }
   return views;
 }
@@ -85,6 +88,8 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   report.normals = normals_from_string(options.normals);
   report.options = tools::to_renderer_options(
       options.renderer, {options.size.at(0), options.size.at(1), options.samples});
+  report.ambient_rays = options.ambient_rays;
+  report.options.with_given_rays = options.ambient_rays != 0;
   report.num_views = options.orbit;
   report.rounds = options.rounds;
   return report;
@@ -105,6 +110,7 @@ FrameReport measure(const Options &options, std::string command) {
     renderer.render(seen_from(cameras.front(), report.request()));
     FrameRequest of_cells = report.request();
     of_cells.normals = Normals::kCell;  // as the floor draws
+    of_cells.ambient_rays = 0;
     renderer.render(seen_from(cameras.front(), of_cells));
     first_hits = renderer.hits();
     report.views = measure_views(renderer, cameras, report.request(), options.rounds);
@@ -217,6 +223,7 @@ void add_options(CLI::App &app, Options &options) {
                  "the smallest to an ample one, in equal ratios of what lies above that; the "
                  "pictures must be the same");
   tools::add_normals_option(app, options.normals);
+  tools::add_ambient_option(app, options.ambient_rays);
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")
       ->check(CLI::PositiveNumber)

@@ -246,6 +246,7 @@ ordered_json options_json(const FrameReport &report) {
   json.update(tools::renderer_options_json(report.options));
   json["voxel_pixels"] = report.voxel_pixels;
   json["normals"] = to_string(report.normals);
+  json["ambient"] = report.ambient_rays;
   return json;
 }
 

@@ -21,6 +21,7 @@ struct FrameReport {
   float isovalue = 0;
   double voxel_pixels = 0;
   Normals normals = Normals::kCell;
+  std::uint32_t ambient_rays = 0;
   RendererOptions options;
   std::uint32_t num_views = 0, rounds = 0;
   std::vector<ViewTimes> views;
@@ -34,7 +35,10 @@ struct FrameReport {
 
   /// Of its frames, but for the camera.
   FrameRequest request() const {
-    return {.isovalue = isovalue, .voxel_pixels = voxel_pixels, .normals = normals};
+    return {.isovalue = isovalue,
+            .voxel_pixels = voxel_pixels,
+            .normals = normals,
+            .ambient_rays = ambient_rays};
   }
 };
 

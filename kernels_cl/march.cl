@@ -9,12 +9,13 @@
 #include "device/march_block.h"
 #include "device/pass_counts.h"
 #include "device/ray_lanes.h"
+#include "device/ray_source.h"
 #include "device/work_group.h"
 
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
 /// behind the border.
 ///
-/// frame_params, frames, num_frames, ranges  as start_rays
+/// frame_params, frames, num_frames, given, ranges  as start_rays
 /// macrocell_masks                           as traverse
 /// In      active_ray_ids [prev->next_active_count]; ray_block_ids [pixel]: the active block that a
 ///         ray goes on from
@@ -28,11 +29,11 @@
 /// first block in which anything happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
-    global const uint *macrocell_masks, global const ushort *ranges, global BlockEntry *table,
-    global const ulong *inside, global const float *cache_values, global const PassCounts *prev,
-    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
-    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
-    global uint *slot_stamps, global CacheState *cache) {
+    global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
+    global BlockEntry *table, global const ulong *inside, global const float *cache_values,
+    global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
+    global const uint *active_ray_ids, global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global HitRecord *hits, global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
   local uint counters[2], group_hits, group_blocks, num_going;
@@ -64,7 +65,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const uint from = stand.block_id;
     ISO_FRAME_OF(level, from);
     const LastPlanes last = last_planes(level);
-    const Ray ray = make_ray(level, pixel);
+    const Ray ray = ray_of(level, given, pixel);
     uint next = from, at = lane, more = 1, waits_at = 0, decides_at = 0;
     int result = ISO_RAY_LEFT, going = is_ray, gone = 0, first = 1;
     BlockChange change;

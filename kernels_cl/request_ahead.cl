@@ -3,6 +3,7 @@
 #define ISO_FOUND local
 #include "device/level_borders.h"
 #include "device/ray_lanes.h"
+#include "device/ray_source.h"
 #include "device/touched_requests.h"
 #include "portable/touched_blocks.h"
 #include "portable/window.h"
@@ -37,10 +38,10 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
 ///         work-items, which share its blocks out among them
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
-    global const uint *macrocell_masks, global const BlockEntry *table, global PassCounts *counts,
-    global const uint *active_ray_ids, global const uint *ray_block_ids, global uint *slot_stamps,
-    global uint *requested_bits, global uint *request_block_ids, uint capacity,
-    global CacheState *cache) {
+    global const GivenRay *given, global const uint *macrocell_masks,
+    global const BlockEntry *table, global PassCounts *counts, global const uint *active_ray_ids,
+    global const uint *ray_block_ids, global uint *slot_stamps, global uint *requested_bits,
+    global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin, group_pairs, group_ahead;
@@ -70,7 +71,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       uint next = stand.block_id, side = stand.side;
       ISO_FRAME_OF(level, next);
       const LastPlanes last = last_planes(level);
-      const Ray ray = make_ray(level, entry.pixel);
+      const Ray ray = ray_of(level, given, entry.pixel);
       const uint own = min(own_ahead(entry), frame->schedule.max_spec_count);
       const uint ahead =
           min(frame->schedule.per_ray_speculation ? max(own, least) : spec_count, most);

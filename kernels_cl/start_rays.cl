@@ -1,8 +1,9 @@
-/// start_rays.cl -- pipeline `rays`: begins a frame with the rays that meet an active block
-/// (Sec. 3.2, 3.3). A kernel of its own, since it is so much leaner than march that far more of its
-/// work-items fit a device at a time.
+/// start_rays.cl -- pipeline `rays`: begins a frame, or a list of rays, with those that meet an
+/// active block (Sec. 3.2, 3.3). A kernel of its own, since it is so much leaner than march that
+/// far more of its work-items fit a device at a time.
 #define ISO_FOUND local
 #include "device/level_borders.h"
+#include "device/ray_source.h"
 #include "device/work_group.h"
 #include "portable/block_cells.h"
 #include "portable/window.h"
@@ -33,6 +34,7 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 ///
 /// frames  [num_frames] with levels of detail, those that draw, the finest first; frame_params is
 ///         the first of them
+/// given   [pixel] the rays, where ISO_GIVEN_RAYS is 1
 /// ranges  of the blocks of all levels
 /// counts  of the last pass of the frame before
 /// next    counts of this frame's first pass
@@ -43,9 +45,9 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 /// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
-    global const uint *macrocell_masks, global const ushort *ranges, global PassCounts *counts,
-    global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
-    global uint *hit_words) {
+    global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
+    global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
+    global uint *ray_block_ids, global uint *hit_words) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
   const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
@@ -69,11 +71,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
     const uint pixel =
         begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
     uint stand = ISO_INVALID_ID, log_ahead = ISO_FIRST_LOG_AHEAD;
-    if (pixel != ISO_INVALID_ID) {
-      const Ray ray = make_ray(frame, pixel);
-      uint block_id = first_block(frame, &ray);
+    if (pixel != ISO_INVALID_ID && has_ray(given, pixel)) {
+      ISO_FIRST_FRAME_OF(level, pixel);
+      const Ray ray = ray_of(level, given, pixel);
+      uint block_id = first_block(level, &ray);
       if (block_id != ISO_INVALID_ID &&
-          find_blocks(frame, macrocell_masks, &ray, &block_id, 1, found + item, 1) != 0) {
+          find_blocks(level, macrocell_masks, &ray, &block_id, 1, found + item, 1) != 0) {
         stand = found[item];
       } else {
         stand = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0,

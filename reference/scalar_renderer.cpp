@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/parallel_for.hpp"
+#include "core/stages/ambient.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/smooth_gradient.h"
@@ -270,6 +271,39 @@ void smooth_gradients(std::span<const FrameParams> frames,
       }
     }
   });
+}
+
+std::vector<uchar> count_open(std::span<const FrameParams> frames,
+                              std::span<const VolumeInfo> levels,
+                              std::span<const std::vector<float>> voxels,
+                              std::span<const HitRecord> hits, std::uint32_t num_rays,
+                              Solver solver, unsigned threads) {
+  const std::size_t first =
+      static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
+  const FrameParams &seen = frames[first];
+  const AmbientParams params = make_ambient_params(levels[first]);
+  const std::vector<AmbientDirection> directions = make_ambient_directions(num_rays);
+  std::vector<uchar> counts(hits.size());
+  parallel_for(seen.view.height, threads, [&](std::uint64_t row, std::uint32_t) {
+    for (uint column = 0; column < seen.view.width; ++column) {
+      const uint pixel = static_cast<uint>(row) * seen.view.width + column;
+      HitRecord hit = hits[pixel];
+      if (!std::isfinite(hit.t)) continue;
+      std::size_t level = first;
+      while (frames.size() > 1 && level_block_of(&frames[level], hit.block_id) == ISO_INVALID_ID)
+        ++level;
+      if (frames.size() > 1) hit.block_id = level_block_of(&frames[level], hit.block_id);
+      for (std::uint32_t k = 0; k < num_rays; ++k) {
+        const GivenRay given = ambient_ray(
+            &seen, &frames[level], static_cast<uint>(level - first), &params, hit, pixel,
+            directions[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
+        const HitRecord met =
+            trace(frames[level], voxels[level].data(), solver, make_given_ray(given));
+        counts[pixel] = static_cast<uchar>(counts[pixel] + !std::isfinite(met.t));
+      }
+    }
+  });
+  return counts;
 }
 
 void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,

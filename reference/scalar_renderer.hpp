@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/stages/solvers.hpp"
+#include "core/volume/volume.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 
 namespace isowave::core {
@@ -35,6 +36,14 @@ void smooth_gradients(std::span<const FrameParams> frames,
 /// And of a frame of one level.
 void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
                       std::span<HitRecord> hits);
+
+/// How many of num_rays ambient rays of each hit meet nothing (kernels_cl/portable/ambient.h); 0
+/// where there is no hit. The arguments are those of render_scalar_levels(), and the levels' infos.
+std::vector<uchar> count_open(std::span<const FrameParams> frames,
+                              std::span<const VolumeInfo> levels,
+                              std::span<const std::vector<float>> voxels,
+                              std::span<const HitRecord> hits, std::uint32_t num_rays,
+                              Solver solver = kDefaultSolver, unsigned threads = 0);
 
 /// One ray of the same: rays [level], which is the same ray in each level's index space.
 HitRecord trace_scalar_levels(std::span<const FrameParams> frames,

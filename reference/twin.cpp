@@ -1,5 +1,6 @@
 #include "reference/twin.hpp"
 
+#include "core/stages/ambient.hpp"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave::core {
@@ -47,6 +48,15 @@ std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float 
   std::vector<HitRecord> hits = render_scalar_levels(frames, voxels_, solver);
   if (normals == Normals::kSmooth) smooth_gradients(frames, voxels_, hits);
   return hits;
+}
+
+OpenCounts Twin::open(const Camera &camera, ImageSize size, float isovalue,
+                      const std::vector<HitRecord> &hits, std::uint32_t num_rays,
+                      Solver solver) const {
+  check_ambient_rays(num_rays);
+  const std::vector<FrameParams> frames =
+      make_level_frames(levels_, camera, size, isovalue, voxel_pixels_);
+  return {count_open(frames, levels_, voxels_, hits, num_rays, solver), num_rays};
 }
 
 }  // namespace isowave::core

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/stages/shade.hpp"
 #include "core/stages/smooth_normals.hpp"
 #include "core/stages/solvers.hpp"
 #include "core/view/detail.hpp"
@@ -25,6 +26,11 @@ class Twin {
   std::vector<HitRecord> render(const Camera &camera, ImageSize size, float isovalue,
                                 Solver solver = kDefaultSolver,
                                 Normals normals = Normals::kSmooth) const;
+
+  /// How open such hits are, of a renderer's frame with ambient rays.
+  OpenCounts open(const Camera &camera, ImageSize size, float isovalue,
+                  const std::vector<HitRecord> &hits, std::uint32_t num_rays,
+                  Solver solver = kDefaultSolver) const;
 
  private:
   double voxel_pixels_;

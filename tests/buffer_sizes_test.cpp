@@ -15,7 +15,10 @@
 
 #include "core/render/pass_readback.hpp"
 #include "core/render/pipeline.hpp"
+#include "core/stages/active_blocks.hpp"
+#include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
+#include "core/stages/marching_cubes.hpp"
 #include "core/stages/resident.hpp"
 #include "core/stages/shade.hpp"
 #include "core/zfp/zfp_encode.hpp"
@@ -89,8 +92,10 @@ struct Maker {
 };
 
 void check_wavefront(ocl::Device &device) {
-  for (const Wavefront::Limits &limits :
-       {Wavefront::Limits{1}, {.num_rays = 1000, .with_pairs = false}, {333, true, 4}})
+  for (const Wavefront::Limits &limits : {Wavefront::Limits{1},
+                                          {.num_rays = 1000, .with_pairs = false},
+                                          {333, true, 4},
+                                          {.num_rays = 50, .with_given = true}})
     expect_books(device, Wavefront::sizes(limits), [&] { return Wavefront(device, limits); });
 }
 
@@ -167,6 +172,27 @@ void check_compaction(ocl::Device &device) {
                  [&] { return Compaction(device, count, group_size); });
 }
 
+void check_prefix_sum(ocl::Device &device) {
+  for (const auto &[count, group_size] : {std::pair(1u, 8u), {65u, 8u}, {5000u, 64u}})
+    expect_books(device, PrefixSum::sizes(count, group_size),
+                 [&] { return PrefixSum(device, count, group_size); });
+}
+
+void check_active_blocks(ocl::Device &device) {
+  for (const uint macrocells : {1u, 1000u})
+    expect_books(device, ActiveBlocks::sizes(macrocells),
+                 [&] { return ActiveBlocks(device, macrocells); });
+}
+
+void check_marching_cubes(ocl::Device &device) {
+  for (const Gradients gradients : {Gradients::kNone, Gradients::kSmooth}) {
+    expect_books(device, MarchingCubes::sizes(), [&] { return MarchingCubes(device, gradients); });
+    expect_books(device, MeshBuffers::sizes(100, 333, gradients),
+                 [&] { return MeshBuffers(device, 100, 333, gradients); });
+  }
+  expect_books(device, SurfaceCounts::sizes(77), [&] { return SurfaceCounts(device, 77); });
+}
+
 void check_radix_sort(ocl::Device &device) {
   for (const auto &[count, group_size] : {std::pair(1u, 8u), {128u, 8u}, {129u, 8u}, {5000u, 64u}})
     expect_books(device, RadixSort::sizes(count, group_size),
@@ -184,6 +210,10 @@ void check_group(ocl::Device &device) {
 void check_shade(ocl::Device &device) {
   for (const uint pixels : {1u, 1000u})
     expect_books(device, Shade::sizes(pixels), [&] { return Shade(device, pixels); });
+}
+
+void check_ambient(ocl::Device &device) {
+  expect_books(device, Ambient::sizes(), [&] { return Ambient(device, 1000); });
 }
 
 void check_kept_picture(ocl::Device &device) {
@@ -213,6 +243,7 @@ void check_pipelines(ocl::Device &device) {
       expect_books(device, pipeline_sizes(kind, limits), [&] {
         return make_pipeline(kind, state, limits, kDefaultSolver, kDefaultClosestHit);
       });
+    expect_books(device, {}, [&] { return make_given_pipeline(state, 8, kDefaultSolver); });
     levels = std::move(state.levels);
   }
 }
@@ -243,9 +274,13 @@ constexpr std::array kMakers = {Maker{"Wavefront", check_wavefront},
                                 Maker{"StreamWindow", check_stream_window},
                                 Maker{"ZfpDecode", check_zfp_decode},
                                 Maker{"Compaction", check_compaction},
+                                Maker{"PrefixSum", check_prefix_sum},
+                                Maker{"ActiveBlocks", check_active_blocks},
+                                Maker{"MarchingCubes", check_marching_cubes},
                                 Maker{"RadixSort", check_radix_sort},
                                 Maker{"Group", check_group},
                                 Maker{"Shade", check_shade},
+                                Maker{"Ambient", check_ambient},
                                 Maker{"KeptPicture", check_kept_picture},
                                 Maker{"PassReadback", check_pass_readback},
                                 Maker{"Pipelines", check_pipelines},

@@ -60,7 +60,10 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     for (const double pixels : {options.with_levels ? 2.0 : 0.0, 0.0}) {
       for (const float isovalue :
            {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
-        renderer.render({.camera = cameras_[0], .isovalue = isovalue, .voxel_pixels = pixels});
+        renderer.render({.camera = cameras_[0],
+                         .isovalue = isovalue,
+                         .voxel_pixels = pixels,
+                         .ambient_rays = options.with_given_rays ? 2u : 0u});
         EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.size.num_pixels());
       }
     }
@@ -69,6 +72,10 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       renderer.keep_picture();
       renderer.enlarge_kept({cameras_[0], 0.1f});
       renderer.fill_from_kept();
+    }
+    if (options.with_given_rays) {
+      renderer.cast_rays(std::vector<WorldRay>(1, {glm::dvec3(-1), glm::dvec3(1)}), 0.1f,
+                         Normals::kSmooth);
     }
     device_.on_new_kernel({});
     EXPECT_THAT(late, IsEmpty());
@@ -87,6 +94,8 @@ TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
   expect_all_compiled({.size = kSize, .with_levels = true});
   expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .with_levels = true});
   expect_all_compiled({.size = kSize, .with_kept_picture = true});
+  expect_all_compiled({.size = kSize, .with_levels = true, .with_given_rays = true});
+  expect_all_compiled({.size = kSize, .pipeline = PipelineKind::kBlocks, .with_given_rays = true});
 }
 
 TEST_P(CompileOnDevice, EverySolverAndGroupingIsCompiled) {

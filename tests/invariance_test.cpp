@@ -31,6 +31,8 @@ constexpr float kIsovalue = 0.8f;  // both fields: many candidate blocks that ra
 class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
   bool is_slow() const { return is_llvmpipe(device_.info()); }
+  /// Of cases that are called Small.
+  ImageSize small_size() const { return is_simulator(device_.info()) ? kTiny : kSmall; }
 
   static bool is_blocks() { return GetParam().pipeline == PipelineKind::kBlocks; }
 
@@ -129,7 +131,7 @@ TEST_P(InvarianceOnDevice, SmallSpeculationLimits) {
   const TestVolume volume = small_volume();
   for (const std::uint32_t limit : {1u, 64u}) {
     SCOPED_TRACE(limit);
-    check(volume, {.size = kSmall, .max_speculation = limit});
+    check(volume, {.size = small_size(), .max_speculation = limit});
   }
 }
 
@@ -219,7 +221,7 @@ TEST_P(InvarianceOnDevice, SmallWorkGroups) {
     if (is_slow() && (group != 8 || !is_blocks())) continue;
     if (group > device_.capabilities().max_work_group_size) continue;
     SCOPED_TRACE(group);
-    check(volume, {.size = kSmall, .group_size = group});
+    check(volume, {.size = small_size(), .group_size = group});
   }
 }
 

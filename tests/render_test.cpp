@@ -18,6 +18,8 @@ using test::expect_same_hits;
 using test::TestVolume;
 using test::twin_hits;
 
+constexpr ImageSize kTiny{6, 5}, kSmall{12, 8}, kMedium{96, 64};
+
 class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Draws all isovalues from all cameras with one renderer, with normals of both kinds. Returns
@@ -49,13 +51,13 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     return check(volume, orbit_cameras(volume.info(), 2), isovalues, size);
   }
 
+  /// What the simulator can afford where a case draws many frames.
+  ImageSize small_size() const { return is_simulator(device_.info()) ? kTiny : kSmall; }
+
   ocl::Device device_{GetParam()};
 };
 INSTANTIATE_TEST_SUITE_P(Devices, RenderOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
-
-constexpr ImageSize kSmall{12, 8};
-constexpr ImageSize kMedium{96, 64};
 
 TestVolume read_volume(const char *name, std::uint32_t rate) {
   const auto reader = open_volume(std::string(ISOWAVE_TEST_DATA "/") + name);
@@ -77,7 +79,7 @@ TEST_P(RenderOnDevice, SmallOneCellOneBlockAndThinVolumes) {
   for (const glm::uvec3 dims : {glm::uvec3(2, 2, 2), {4, 4, 4}, {5, 2, 9}, {2, 13, 6}}) {
     SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
     const TestVolume volume(dims, test::noise_field(4), 16);
-    EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, kSmall), 5u);
+    EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, small_size()), 5u);
   }
 }
 
@@ -130,9 +132,10 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
   const VolumeInfo info = test::grid_info({9, 10, 11});
   const std::vector<float> source = test::sample(info.dims, test::gyroid_field(7));
   const Camera camera = orbit_cameras(info, 1)[0];
+  const ImageSize size = small_size();
   for (const TestVolume &volume :
        {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
-    Renderer renderer(device_, volume.compressed, {.size = kSmall});
+    Renderer renderer(device_, volume.compressed, {.size = size});
     for (const double voxel_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
       SCOPED_TRACE(fmt::format("{} bits per block, value error {}",
                                volume.compressed.bits_per_block, voxel_error));
@@ -141,8 +144,7 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
         ASSERT_LE(std::abs(voxels[i] - volume.voxels[i]), voxel_error);
       renderer.render({.camera = camera, .isovalue = 0.1f, .voxel_error = voxel_error});
       expect_same_hits(renderer.hits(),
-                       twin_hits(make_frame_params(info, camera, kSmall, 0.1f), voxels),
-                       kSmall.width);
+                       twin_hits(make_frame_params(info, camera, size, 0.1f), voxels), size.width);
     }
     for (const double bad : {-1.0, double{NAN}, double{INFINITY}})
       EXPECT_THROW(renderer.render({.camera = camera, .isovalue = 0.1f, .voxel_error = bad}),

@@ -9,7 +9,7 @@ build=$1
 shift
 export CLANG_TIDY_DATABASE=$build/clang_tidy
 mkdir -p "$CLANG_TIDY_DATABASE"
-sed -E 's/ -include [^ "]*cmake_pch\.hxx//g; s/ -W[A-Za-z][^ "]*//g' \
+sed -E 's/ -include [^ "]*cmake_pch\.hxx//g; s/ (-W[A-Za-z]|--param=)[^ "]*//g' \
   "$build/compile_commands.json" > "$CLANG_TIDY_DATABASE/compile_commands.json"
 
 check() {

@@ -49,6 +49,11 @@ std::vector<uint> host_offsets() {
     EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "HitRecord";
   }
   {
+    using Object = GivenRay;
+    ISO_GIVEN_RAY_FIELDS(ISO_ADD_OFFSET)
+    EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "GivenRay";
+  }
+  {
     using Object = StreamLayout;
     ISO_STREAM_LAYOUT_FIELDS(ISO_ADD_OFFSET)
     EXPECT_EQ(std::exchange(listed_bytes, 0), sizeof(Object)) << "StreamLayout";
@@ -62,9 +67,9 @@ std::vector<uint> host_offsets() {
 }
 
 TEST_P(SharedTypesOnDevice, SmallSizesAreTheHosts) {
-  const std::vector<uint> expected = {sizeof(FrameParams),  sizeof(PairHit),
-                                      sizeof(BlockRays),    sizeof(HitRecord),
-                                      sizeof(StreamLayout), sizeof(PassCounts)};
+  const std::vector<uint> expected = {sizeof(FrameParams), sizeof(PairHit),  sizeof(BlockRays),
+                                      sizeof(HitRecord),   sizeof(GivenRay), sizeof(StreamLayout),
+                                      sizeof(PassCounts)};
   ocl::Buffer<uint> sizes(device_, "sizes", expected.size());
   ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_sizes"}({1, 1}, sizes);
   EXPECT_EQ(sizes.read(), expected);

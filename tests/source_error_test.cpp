@@ -366,6 +366,7 @@ TEST_P(SourceErrorOnDevice, SmallErrorsAreTheHosts) {
     EXPECT_EQ(got.bounds.codes, host.bounds.codes);
     for (std::size_t level = 0; level < host.coarser_levels.size(); ++level)
       EXPECT_EQ(got.coarser_levels[level].bounds.codes, host.coarser_levels[level].bounds.codes);
+    if (is_simulator(device.info())) break;  // the kernels are those of every source
   }
 }
 

@@ -40,6 +40,13 @@ inline bool is_llvmpipe(const ocl::DeviceInfo &device) {
   return device.platform == "rusticl";
 }
 
+/// Oclgrind, which takes about a second for what others do in a millisecond. What it looks for,
+/// races and uninitialised memory, shows in small pictures of one view. The long tests
+/// (ISOWAVE_LONG_TESTS) draw there what other devices draw.
+inline bool is_simulator(const ocl::DeviceInfo &device) {
+  return device.platform == "Oclgrind" && std::getenv("ISOWAVE_LONG_TESTS") == nullptr;
+}
+
 /// "0_rusticl": a device as the suffix of a test's name.
 inline std::string device_test_name(const testing::TestParamInfo<ocl::DeviceInfo> &info) {
   std::string name = std::to_string(info.param.index) + "_";

@@ -113,7 +113,7 @@ class TimeBudgetOnDevice : public testing::TestWithParam<PipelineOnDevice> {
 INSTANTIATE_TEST_SUITE_P(Devices, TimeBudgetOnDevice, testing::ValuesIn(pipelines_under_test()),
                          pipeline_test_name);
 
-TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheSmallestPicture) {
+TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheFewestRays) {
   const TimedFrame frame = frames_.render({camera_, kIsovalue}, 1e-6);
   const Hits shown = renderer_.hits();
   ASSERT_EQ(frame.steps.size(), 1u);

@@ -14,7 +14,8 @@ namespace {
 
 FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t num_rays) {
   FrameStatistics result;
-  result.passes = static_cast<std::uint32_t>(stats.passes.size()) + stats.normals.passes;
+  result.passes =
+      static_cast<std::uint32_t>(stats.passes.size()) + stats.normals.passes + stats.ambient.passes;
   result.rays = num_rays;
   result.hits = stats.rays_hit;
   for (const core::PassStats &pass : stats.passes) {
@@ -24,8 +25,12 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   result.normals_passes = stats.normals.passes;
   result.normals_decoded_blocks = stats.normals.decoded_blocks;
   result.normals_ms = stats.normals.ms;
-  result.decoded_blocks += stats.normals.decoded_blocks;
-  for (const auto &[stage, ms] : stats.normals.stage_ms) result.stage_ms[stage] += ms;
+  result.ambient_passes = stats.ambient.passes;
+  result.ambient_ms = stats.ambient.ms;
+  result.decoded_blocks += stats.normals.decoded_blocks + stats.ambient.decoded_blocks;
+  for (const core::LaterPasses *later : {&stats.normals, &stats.ambient}) {
+    for (const auto &[stage, ms] : later->stage_ms) result.stage_ms[stage] += ms;
+  }
   result.uploaded_bytes = stats.uploaded_bytes;
   result.first_level = static_cast<std::uint32_t>(stats.first_level);
   result.last_level = static_cast<std::uint32_t>(stats.last_level);
@@ -133,6 +138,7 @@ core::FrameRequest core_request(const FrameRequest &request) {
       request.want_picture || request.want_normals || request.want_hits || request.on_pass;
   result.normals =
       shows_normals ? static_cast<core::Normals>(request.normals) : core::Normals::kCell;
+  if (request.want_picture || request.on_pass) result.ambient_rays = request.ambient_rays;
   return result;
 }
 
@@ -142,6 +148,14 @@ void describe_frame(const FrameRequest &request, const core::FrameStats &stats, 
   frame.rows = size.ray_rows();
   frame.columns = size.ray_columns();
   frame.statistics = public_statistics(stats, size.num_rays());
+}
+
+std::vector<core::WorldRay> world_rays(std::span<const Ray> rays) {
+  std::vector<core::WorldRay> result(rays.size());
+  std::ranges::transform(rays, result.begin(), [](const Ray &ray) {
+    return core::WorldRay{to_glm(ray.origin), to_glm(ray.direction)};
+  });
+  return result;
 }
 
 void fill_frame(const FrameRequest &request, const std::vector<core::HitRecord> &records,
@@ -155,6 +169,17 @@ void fill_frame(const FrameRequest &request, const std::vector<core::HitRecord> 
   if (request.want_normals) to_each(frame.normals, WorldNormals(volume.info));
   if (request.want_positions) to_each(frame.positions, WorldPositions(volume, with_levels));
   if (request.want_hits) to_each(frame.hits, HitCells(volume, with_levels));
+}
+
+Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::CompressedVolume &volume,
+                    bool with_levels) {
+  Frame frame;
+  frame.rows = 1;
+  frame.columns = static_cast<std::uint32_t>(hits.size());
+  const FrameRequest wanted{
+      .want_depth = true, .want_normals = true, .want_positions = true, .want_hits = true};
+  fill_frame(wanted, hits, volume, with_levels, frame);
+  return frame;
 }
 
 }  // namespace isowave

@@ -1,10 +1,12 @@
 #pragma once
 // Private to core/api: requests and frames of its users and of core, whichever renderer draws.
 
+#include <span>
 #include <vector>
 
 #include "core/render/frame_request.hpp"
 #include "core/stages/shade.hpp"
+#include "core/view/given_rays.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/frame.hpp"
 
@@ -18,6 +20,12 @@ core::FrameRequest core_request(const FrameRequest &request);
 
 /// Fills in the frame's size and statistics.
 void describe_frame(const FrameRequest &request, const core::FrameStats &stats, Frame &frame);
+
+std::vector<core::WorldRay> world_rays(std::span<const Ray> rays);
+
+/// One row: what rays of any origin hit.
+Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::CompressedVolume &volume,
+                    bool with_levels);
 
 /// Fills in the frame's depth, normals, positions and hits, as the request wants them.
 ///

@@ -104,20 +104,10 @@ Frame HostRenderer::render(const FrameRequest &request) {
 
 Frame HostRenderer::cast_rays(std::span<const Ray> rays, float isovalue, Normals normals) {
   return guarded("casting rays", [&] {
-    std::vector<core::WorldRay> world_rays(rays.size());
-    std::ranges::transform(rays, world_rays.begin(), [](const Ray &ray) {
-      return core::WorldRay{to_glm(ray.origin), to_glm(ray.direction)};
-    });
     const std::lock_guard lock(implementation_->mutex);
-    const std::vector<core::HitRecord> hits = implementation_->renderer.cast_rays(
-        world_rays, isovalue, static_cast<core::Normals>(normals));
-    Frame frame;
-    frame.rows = 1;
-    frame.columns = static_cast<std::uint32_t>(hits.size());
-    const FrameRequest wanted{
-        .want_depth = true, .want_normals = true, .want_positions = true, .want_hits = true};
-    fill_frame(wanted, hits, volume()->implementation().volume, false, frame);
-    return frame;
+    return frame_of_rays(implementation_->renderer.cast_rays(world_rays(rays), isovalue,
+                                                             static_cast<core::Normals>(normals)),
+                         volume()->implementation().volume, false);
   });
 }
 

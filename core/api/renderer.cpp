@@ -30,6 +30,7 @@ core::RendererOptions core_options(const RendererOptions &options, const Volume 
   result.with_levels = options.with_levels && volume.num_levels() > 1;
   result.with_bounds = options.with_bounds;
   result.with_kept_picture = options.with_time_budget;
+  result.with_given_rays = options.with_rays;
   return result;
 }
 
@@ -114,6 +115,8 @@ void check(const FrameRequest &request, const RendererOptions &options) {
     throw core::Error("a time budget needs a renderer that was made with_time_budget");
   if (request.time_budget_ms && request.want_bounds)
     throw core::Error("a picture within a time has no bounds of its error: leave out want_bounds");
+  if (request.ambient_rays != 0 && !options.with_rays)
+    throw core::Error("ambient rays need a renderer that was made with_rays");
 }
 
 }  // namespace
@@ -210,6 +213,18 @@ Frame Renderer::render(const FrameRequest &request) {
   return guarded("rendering", [&] {
     const std::lock_guard lock(implementation_->device->implementation().mutex);
     return implementation_->draw(request);
+  });
+}
+
+Frame Renderer::cast_rays(std::span<const Ray> rays, float isovalue, Normals normals) {
+  return guarded("casting rays", [&] {
+    if (!implementation_->options.with_rays)
+      throw core::Error("rays of any origin need a renderer that was made with_rays");
+    const std::lock_guard lock(implementation_->device->implementation().mutex);
+    core::Renderer &renderer = implementation_->renderer;
+    return frame_of_rays(
+        renderer.cast_rays(world_rays(rays), isovalue, static_cast<core::Normals>(normals)),
+        volume()->implementation().volume, renderer.options().with_levels);
   });
 }
 

@@ -8,6 +8,7 @@
 #include "core/sources/memory_reader.hpp"
 #include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
+#include "core/zfp/voxel_region.hpp"
 #include "core/zfp/voxel_sample.hpp"
 
 namespace isowave {
@@ -33,6 +34,10 @@ core::VolumeInfo core_info(const Grid &grid, VoxelType type) {
   for (int axis = 0; axis < 3; ++axis) info.direction[axis] = to_glm(grid.direction.at(axis));
   info.type = core_type(type);
   return info;
+}
+
+glm::uvec3 to_uvec3(const std::array<std::uint32_t, 3> &values) {
+  return {values[0], values[1], values[2]};
 }
 
 Grid public_grid(const core::VolumeInfo &info) {
@@ -131,8 +136,19 @@ Grid Volume::level_grid(std::uint32_t level) const {
 }
 
 std::vector<float> Volume::decode(std::uint32_t level) const {
+  return decode(level, {.begin = {}, .end = level_grid(level).dims});
+}
+
+std::vector<float> Volume::decode(std::uint32_t level, const Region &region) const {
   return guarded("decoding", [&] {
-    return core::decode_with_libzfp(level_of(implementation_->volume, level));
+    const core::CompressedVolume &volume = level_of(implementation_->volume, level);
+    const core::VoxelRegion wanted{to_uvec3(region.begin), to_uvec3(region.end),
+                                   to_uvec3(region.step)};
+    core::check_region(wanted, volume.info.dims);
+    const glm::u64vec3 dims(wanted.dims());
+    std::vector<float> voxels(dims.x * dims.y * dims.z);
+    core::decode_region(volume, wanted, voxels);
+    return voxels;
   });
 }
 

@@ -228,21 +228,40 @@ inline void cast(const FrameParams &frame, const HostField &field, const IndexRa
   const LastPlanes last = last_planes(&frame);
   const ActiveBox box = active_box(frame.surface, last);
   for (uint i = 0; i < num_rays; ++i) {
-    const IndexRay &r = rays[i];
-    const Ray ray = {make_ray_axis(r.origin[0], r.direction[0]),
-                     make_ray_axis(r.origin[1], r.direction[1]),
-                     make_ray_axis(r.origin[2], r.direction[2])};
-    if (!trace_ray(frame, field, box, last, ray, hits + i)) continue;
-    hits[i].t *= r.t_scale;
+    if (!trace_ray(frame, field, box, last, make_given_ray(rays[i].ray), hits + i)) continue;
+    hits[i].t *= rays[i].t_scale;
     if (is_smooth) smooth_gradient(frame, field, last, hits + i);
   }
 }
 
+inline void ambient(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                    const AmbientRays &rays, const HitRecord *hits, uchar *open_counts) {
+  const LastPlanes last = last_planes(&frame);
+  const ActiveBox box = active_box(frame.surface, last);
+  HitRecord met;
+  for (uint y = tile.begin_y; y < tile.end_y; ++y) {
+    for (uint x = tile.begin_x; x < tile.end_x; ++x) {
+      const uint ray_id = x + frame.view.width * y;
+      if (hits[ray_id].t == INFINITY) continue;
+      const uint pattern = ambient_pattern(&frame, ray_id);
+      uint num_open = 0;
+      for (uint k = 0; k < rays.num_rays; ++k) {
+        const GivenRay given = ambient_ray(&frame, &frame, 0, &rays.params, hits[ray_id], ray_id,
+                                           rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
+        num_open += !trace_ray(frame, field, box, last, make_given_ray(given), &met);
+      }
+      open_counts[ray_id] = static_cast<uchar>(num_open);
+    }
+  }
+}
+
 inline void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
-                  const HitRecord *hits, std::uint8_t *rgb) {
+                  const HitRecord *hits, const uchar *open_counts, uint num_ambient,
+                  std::uint8_t *rgb) {
   const uint columns = frame.view.width / samples;
   for (uint column = 0; column < columns; ++column) {
-    const uint rgba = shade_pixel(&frame, &params, samples, column, row, hits);
+    const uint rgba =
+        shade_pixel(&frame, &params, samples, column, row, hits, open_counts, num_ambient);
     for (uint channel = 0; channel < 3; ++channel)
       rgb[3 * column + channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
   }
@@ -263,10 +282,15 @@ ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &fie
                                   HitRecord *hits) {
   cast(frame, field, rays, num_rays, is_smooth, hits);
 }
+ISO_WHOLE_LOOP void ambient_anywhere(const FrameParams &frame, const HostField &field,
+                                     const RayTile &tile, const AmbientRays &rays,
+                                     const HitRecord *hits, uchar *open_counts) {
+  ambient(frame, field, tile, rays, hits, open_counts);
+}
 ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
                                    uint samples, uint row, const HitRecord *hits,
-                                   std::uint8_t *rgb) {
-  shade(frame, params, samples, row, hits, rgb);
+                                   const uchar *open_counts, uint num_ambient, std::uint8_t *rgb) {
+  shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
 }
 
 #ifdef ISO_HAS_WIDE_LOOPS
@@ -290,9 +314,15 @@ ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, c
                              uint num_rays, bool is_smooth, HitRecord *hits) {
   cast(frame, field, rays, num_rays, is_smooth, hits);
 }
+ISO_WIDE_LOOP void ambient_wide(const FrameParams &frame, const HostField &field,
+                                const RayTile &tile, const AmbientRays &rays, const HitRecord *hits,
+                                uchar *open_counts) {
+  ambient(frame, field, tile, rays, hits, open_counts);
+}
 ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
-                              uint row, const HitRecord *hits, std::uint8_t *rgb) {
-  shade(frame, params, samples, row, hits, rgb);
+                              uint row, const HitRecord *hits, const uchar *open_counts,
+                              uint num_ambient, std::uint8_t *rgb) {
+  shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
 }
 
 bool is_wide() {
@@ -304,9 +334,9 @@ bool is_wide() {
 
 constexpr HostLoops kLoops[] = {
     {decode_anywhere, inside_anywhere, trace_rays_anywhere, trace_rays_anywhere, cast_anywhere,
-     shade_anywhere},
+     ambient_anywhere, shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
-    {decode_wide, inside_wide, trace_wide, trace_rays_wide, cast_wide, shade_wide},
+    {decode_wide, inside_wide, trace_wide, trace_rays_wide, cast_wide, ambient_wide, shade_wide},
 #endif
 };
 

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <span>
 
+#include "core/view/given_rays.hpp"
+#include "kernels_cl/portable/ambient.h"
 #include "kernels_cl/portable/shade.h"
 
 namespace isowave::core {
@@ -37,11 +39,11 @@ struct RayTile {
   uint begin_x, begin_y, end_x, end_y;  ///< of the frame's rays
 };
 
-/// A ray of any origin, in index space.
-struct IndexRay {
-  float origin[3];     ///< [voxels]
-  float direction[3];  ///< [voxels per t]; the largest component is from 1/2 to below 1
-  float t_scale;       ///< power of two: t of the kernels -> t of whoever asks
+/// The ambient rays of a frame's hits.
+struct AmbientRays {
+  AmbientParams params;
+  const AmbientDirection *directions;  ///< [num_rays][ISO_AMBIENT_PATTERNS]
+  uint num_rays;                       ///< of each hit
 };
 
 struct HostLoops {
@@ -67,12 +69,18 @@ struct HostLoops {
   /// frame      as for trace(); its view is not used
   void (*cast)(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                uint num_rays, bool is_smooth, HitRecord *hits);
+  /// Counts the ambient rays of a tile's hits that meet nothing, into open_counts
+  /// [height * width].
+  void (*ambient)(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                  const AmbientRays &rays, const HitRecord *hits, uchar *open_counts);
   /// Shades a row of the picture of the frame's hits [height * width].
   ///
-  /// samples  rays of a pixel along each axis
-  /// rgb      [width / samples][3]
+  /// samples      rays of a pixel along each axis
+  /// open_counts  [height * width] of num_ambient rays; 0: there are none
+  /// rgb          [width / samples][3]
   void (*shade)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
-                const HitRecord *hits, std::uint8_t *rgb);
+                const HitRecord *hits, const uchar *open_counts, uint num_ambient,
+                std::uint8_t *rgb);
 };
 
 /// The loops that this processor can run, the fastest last.

@@ -9,6 +9,7 @@
 #include "core/base/host_memory.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/render/surface_camera.hpp"
+#include "core/stages/ambient.hpp"
 #include "core/stages/shade.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
@@ -39,27 +40,14 @@ const CompressedVolume &checked(const CompressedVolume &volume,
       mebibytes(needed), limit >> 20);
 }
 
+double ms_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+      .count();
+}
+
 template <class Count>
 Count rounded_up(Count count, std::uint32_t unit) {
   return (count + unit - 1) / unit;
-}
-
-/// number: of the ray, for messages.
-IndexRay index_ray(const glm::dvec3 &origin, const glm::dvec3 &direction, std::size_t number) {
-  const auto largest = [](const glm::dvec3 &v) {
-    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  };
-  const double length = largest(direction), away = largest(origin);
-  if (!std::isfinite(length + direction.x + direction.y + direction.z) || length == 0)
-    throw Error("ray {} has no direction: give three finite numbers that are not all 0", number);
-  if (!std::isfinite(away + origin.x + origin.y + origin.z) || away > 1e7) {
-    throw Error("ray {} begins {:.3g} voxels from the volume's origin: up to 1e7 can be traced",
-                number, away);
-  }
-  int exponent = 0;
-  std::frexp(length, &exponent);
-  const glm::vec3 o(origin), d(direction * std::exp2(-exponent));
-  return {{o.x, o.y, o.z}, {d.x, d.y, d.z}, static_cast<float>(std::exp2(-exponent))};
 }
 
 }  // namespace
@@ -76,6 +64,7 @@ void HostRenderer::check(const FrameRequest &request) {
     throw Error("voxels of fewer bit planes are drawn on devices alone: leave out voxel_error");
   if (request.bound != FieldBound::kNone)
     throw Error("bounds of the field are drawn on devices alone: leave out bound");
+  check_ambient_rays(request.ambient_rays);
 }
 
 FrameStats HostRenderer::render(const FrameRequest &request) {
@@ -90,61 +79,92 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   samples_ = size.samples;
   normals_ = request.normals;
   hits_.assign(size.num_rays(), no_hit());
-
-  // Bands have whole rows of pixels; without a callback, one has all.
-  const std::uint32_t rows = size.ray_rows(), tiles = rounded_up(size.ray_columns(), kTileRays),
-                      tile_rows = std::max(kTileRays / size.samples, 1u) * size.samples;
-  const std::uint32_t band =
-      request.on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), tiles)
-                      : rows;
+  open_ = {};
   FrameStats stats;
-  for (std::uint32_t row = 0; row < rows && !stats.cancelled; row += band) {
-    const std::uint32_t end = std::min(rows - row, band) + row;
-    PassStats pass;
-    pass.counts.hit_count = static_cast<uint>(draw_band(row, end, tile_rows));
-    pass.completed_percent = 100.0 * end / rows;
-    stats.rays_hit += pass.counts.hit_count;
-    stats.passes.push_back(pass);
-    stats.cancelled = request.on_pass && !request.on_pass(pass) && end < rows;
-  }
-  stats.total_ms =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  draw_bands(request, stats);
+  if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
+  stats.total_ms = ms_since(begin);
   return stats;
 }
 
-/// Returns how many of the band's rays hit something.
-std::uint64_t HostRenderer::draw_band(std::uint32_t begin_row, std::uint32_t end_row,
-                                      std::uint32_t tile_rows) {
-  const ScreenBox &screen = frame_.screen;
-  const std::uint32_t begin_y = std::max(begin_row, screen.begin_y),
-                      end_y = std::min(end_row, screen.end_y);
-  if (begin_y >= end_y || screen.begin_x >= screen.end_x) return 0;
-  const std::uint32_t tiles = rounded_up(screen.end_x - screen.begin_x, kTileRays);
-  const HostField field = blocks_.field();
-  const HostLoops &loops = host_loops();
+/// Band by band, so that the picture so far can be shown; without on_pass, one has all.
+void HostRenderer::draw_bands(const FrameRequest &request, FrameStats &stats) {
   std::atomic<std::uint64_t> num_hits = 0;
-  parallel_for(
-      std::uint64_t{tiles} * rounded_up(end_y - begin_y, tile_rows), num_threads_,
-      [&](std::uint64_t tile, std::uint32_t) {
-        const auto x = static_cast<std::uint32_t>(screen.begin_x + tile % tiles * kTileRays),
-                   y = static_cast<std::uint32_t>(begin_y + tile / tiles * tile_rows);
-        num_hits += loops.trace(
-            frame_, field,
-            {x, y, std::min(x + kTileRays, screen.end_x), std::min(y + tile_rows, end_y)},
-            normals_ == Normals::kSmooth, hits_.data());
+  stats.cancelled = !for_bands(
+      request.on_pass, request.ambient_rays != 0,
+      [&](const RayTile &tile) {
+        num_hits += host_loops().trace(frame_, blocks_.field(), tile, normals_ == Normals::kSmooth,
+                                       hits_.data());
+      },
+      [&](double percent) {
+        PassStats pass;
+        pass.counts.hit_count = static_cast<uint>(num_hits.exchange(0));
+        pass.completed_percent = percent;
+        stats.rays_hit += pass.counts.hit_count;
+        stats.passes.push_back(pass);
+        return pass;
       });
-  return num_hits;
+}
+
+/// All rays of each hit at once: bands that are not there yet show all of the sky.
+void HostRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::vector<AmbientDirection> directions = make_ambient_directions(request.ambient_rays);
+  const AmbientRays rays{make_ambient_params(info_), directions.data(), request.ambient_rays};
+  open_.counts.assign(hits_.size(), static_cast<uchar>(request.ambient_rays));
+  open_.num_ambient = request.ambient_rays;
+  stats.cancelled = !for_bands(
+      request.on_pass, false,
+      [&](const RayTile &tile) {
+        host_loops().ambient(frame_, blocks_.field(), tile, rays, hits_.data(),
+                             open_.counts.data());
+      },
+      [&](double) {
+        PassStats pass;
+        pass.completed_percent = 100;
+        ++stats.ambient.passes;
+        return pass;
+      });
+  stats.ambient.ms = ms_since(begin);
+}
+
+/// Calls draw(tile) for the tiles of the frame's rays that may hit something, on all threads, in
+/// bands of whole rows of pixels from the top; after each band, on_pass(after(percent of the rows
+/// that are done)). Returns false where that says to stop, and there is more to draw: bands, or
+/// what follows.
+template <class Draw, class After>
+bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after) {
+  const ScreenBox &screen = frame_.screen;
+  const std::uint32_t rows = frame_.view.height,
+                      tile_rows = std::max(kTileRays / samples_, 1u) * samples_;
+  const std::uint32_t tiles = rounded_up(frame_.view.width, kTileRays);
+  const std::uint32_t band =
+      on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), tiles) : rows;
+  for (std::uint32_t row = 0; row < rows; row += band) {
+    const std::uint32_t end_row = std::min(rows - row, band) + row;
+    const std::uint32_t begin_y = std::max(row, screen.begin_y),
+                        end_y = std::min(end_row, screen.end_y);
+    if (begin_y < end_y && screen.begin_x < screen.end_x) {
+      const std::uint32_t columns = rounded_up(screen.end_x - screen.begin_x, kTileRays);
+      parallel_for(
+          std::uint64_t{columns} * rounded_up(end_y - begin_y, tile_rows), num_threads_,
+          [&](std::uint64_t tile, std::uint32_t) {
+            const auto x = static_cast<std::uint32_t>(screen.begin_x + tile % columns * kTileRays),
+                       y = static_cast<std::uint32_t>(begin_y + tile / columns * tile_rows);
+            draw(RayTile{x, y, std::min(x + kTileRays, screen.end_x),
+                         std::min(y + tile_rows, end_y)});
+          });
+    }
+    const PassStats pass = after(100.0 * end_row / rows);
+    if (on_pass && !on_pass(pass) && (end_row < rows || more_follows)) return false;
+  }
+  return true;
 }
 
 std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, float isovalue,
                                                Normals normals) {
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-  const glm::dmat3 world_to_index = glm::inverse(info_.index_to_world());
-  std::vector<IndexRay> index_rays(rays.size());
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const glm::dvec3 origin = world_to_index * (rays[i].origin - info_.origin);
-    index_rays[i] = index_ray(origin, world_to_index * rays[i].direction, i);
-  }
+  const std::vector<IndexRay> index_rays = make_index_rays(info_, rays);
   FrameParams frame = make_grid_params(info_);
   frame.view.t_scale = 1;
   frame.surface.isovalue = isovalue;
@@ -175,6 +195,7 @@ Image8 HostRenderer::shade(const Appearance &appearance) const {
   image.pixels.resize(std::size_t{3} * image.width * image.height);
   parallel_for(image.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
     host_loops().shade(frame_, params, samples_, static_cast<uint>(row), hits_.data(),
+                       open_.counts.data(), open_.num_ambient,
                        image.pixels.data() + 3 * image.width * row);
   });
   return image;

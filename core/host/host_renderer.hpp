@@ -12,6 +12,7 @@
 #include "core/host/host_blocks.hpp"
 #include "core/render/frame_request.hpp"
 #include "core/stages/shade.hpp"
+#include "core/view/given_rays.hpp"
 
 namespace isowave::core {
 
@@ -19,11 +20,6 @@ struct HostRendererOptions {
   /// Bytes that it may take; 0: a quarter of the host's memory.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor
-};
-
-/// A ray in world space: origin + t direction, t from 0 on.
-struct WorldRay {
-  glm::dvec3 origin, direction;
 };
 
 /// Not thread-safe.
@@ -60,13 +56,18 @@ class HostRenderer {
   /// The hits of the last frame [size.ray_rows()][size.ray_columns()], row 0 at the top; of rows
   /// that were not drawn, none.
   const std::vector<HitRecord> &hits() const { return hits_; }
+  /// How open they are.
+  const OpenCounts &open() const { return open_; }
   /// The picture of hits(), RGB.
   Image8 shade(const Appearance &appearance = {}) const;
 
   std::uint64_t memory_bytes() const;  ///< of the decoded volume; pictures come on top
 
  private:
-  std::uint64_t draw_band(std::uint32_t begin_row, std::uint32_t end_row, std::uint32_t tile_rows);
+  void draw_bands(const FrameRequest &request, FrameStats &stats);
+  void add_ambient(const FrameRequest &request, FrameStats &stats);
+  template <class Draw, class After>
+  bool for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after);
 
   VolumeInfo info_;
   std::uint32_t num_threads_;
@@ -75,6 +76,7 @@ class HostRenderer {
   std::uint32_t samples_ = 1;
   Normals normals_ = Normals::kSmooth;
   std::vector<HitRecord> hits_;
+  OpenCounts open_;
 };
 
 }  // namespace isowave::core

@@ -30,31 +30,41 @@ struct PassStats {
       stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
-/// What smooth normals took after the passes that found the hits.
-struct NormalsStats {
+/// What a part of a frame took that comes after the passes that found the hits.
+struct LaterPasses {
   std::uint32_t passes = 0;
-  std::uint64_t decoded_blocks = 0;        ///< for them alone
+  std::uint64_t decoded_blocks = 0;        ///< for it alone
   std::uint64_t recycled_blocks = 0;       ///< see PassCounts::recycled_count
   double ms = 0;                           ///< wall clock, of total_ms
   std::map<std::string, double> stage_ms;  ///< as PassStats::stage_ms
+
+  LaterPasses &operator+=(const LaterPasses &other) {
+    passes += other.passes;
+    decoded_blocks += other.decoded_blocks;
+    recycled_blocks += other.recycled_blocks;
+    ms += other.ms;
+    for (const auto &[stage, time] : other.stage_ms) stage_ms[stage] += time;
+    return *this;
+  }
 };
 
 struct FrameStats {
   std::vector<PassStats> passes;                ///< that looked for hits
-  NormalsStats normals;                         ///< Normals::kSmooth
+  LaterPasses normals;                          ///< Normals::kSmooth
+  LaterPasses ambient;                          ///< of ambient rays
   std::size_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
   std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
   std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
   /// on_pass said so before the picture was finished; the hit buffer holds the picture so far.
-  /// Where the last pass has left no rays, that has all hits, some with the gradients of their
-  /// cells.
+  /// Where the last of `passes` has left no rays, that has all hits, some with the gradients of
+  /// their cells, or of fewer ambient rays.
   bool cancelled = false;
 };
 
-/// Called after each pass, the last included, and those for smooth normals, of which 100 % of the
-/// rays are completed; Renderer::hits() and shade() show the picture so far.
+/// Called after each pass, the last included, and those for smooth normals and ambient rays, of
+/// which 100 % of the rays are completed; Renderer::hits() and shade() show the picture so far.
 /// Return false to stop. With a callback, or with profiling, the host waits after each pass;
 /// without, it stays a pass ahead.
 using OnPass = std::function<bool(const PassStats &)>;
@@ -77,6 +87,9 @@ struct FrameRequest {
   /// raised by the bound of their error.
   FieldBound bound = FieldBound::kNone;
   Normals normals = Normals::kSmooth;  ///< gradients of the hits; nothing else depends on them
+  /// Rays of each hit that find out how much of the sky it sees, which shading shows
+  /// (kernels_cl/portable/ambient.h); 0: all see all of it.
+  std::uint32_t ambient_rays = 0;
   OnPass on_pass{};
 };
 

@@ -7,6 +7,7 @@
 
 #include "core/base/error.hpp"
 #include "core/render/pass_readback.hpp"
+#include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
 #include "core/view/detail.hpp"
@@ -69,7 +70,8 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
                          .num_selections = request.with_bounds ? kNumFieldBounds : 1},
           .rays = {.num_rays = rays,
                    .with_pairs = request.pipeline == PipelineKind::kBlocks,
-                   .num_levels = grids.size()},
+                   .num_levels = grids.size(),
+                   .with_given = request.with_given_rays},
           .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays),
           .pairs = {.num_rays = rays,
                     .num_slots = cache_slots,
@@ -121,6 +123,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
       .add(pipeline_sizes(request.pipeline, limits.pairs))
       .add(Shade::sizes(request.num_rays))
       .add(PassReadback::sizes());
+  if (request.with_given_rays) plan.buffers.add(Ambient::sizes());
   if (limits.kept_rays != 0) plan.buffers.add(KeptPicture::sizes(limits.kept_rays));
   return plan;
 }

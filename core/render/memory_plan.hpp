@@ -37,6 +37,7 @@ struct MemoryRequest {
   bool with_levels = false;         ///< the volume's coarser levels are on the device, too
   bool with_bounds = false;         ///< and the bounds of their blocks' errors
   std::uint64_t kept_rays = 0;      ///< of KeptPicture
+  bool with_given_rays = false;     ///< rays of any origin, and ambient rays
 };
 
 /// What the lengths of a renderer's buffers depend on, beside its compressed volume: the plan adds

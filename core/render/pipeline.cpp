@@ -75,11 +75,11 @@ class BlocksPipeline : public Pipeline {
 
 class RaysPipeline : public Pipeline {
  public:
-  RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver)
+  RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver, RaySource source)
       : state_(state),
-        start_rays_(state.device, state.rays.num_rays, group_size, has_levels(state)),
-        march_(state.device, state.rays.num_rays, group_size, solver, has_levels(state)),
-        request_ahead_(state.device, state.rays.num_rays, group_size, has_levels(state)) {}
+        start_rays_(state.device, state.rays.num_rays, group_size, has_levels(state), source),
+        march_(state.device, state.rays.num_rays, group_size, solver, has_levels(state), source),
+        request_ahead_(state.device, state.rays.num_rays, group_size, has_levels(state), source) {}
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("start_rays");
@@ -152,7 +152,12 @@ std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
                                         ClosestHit closest) {
   if (kind == PipelineKind::kBlocks)
     return std::make_unique<BlocksPipeline>(state, limits, solver, closest);
-  return std::make_unique<RaysPipeline>(state, limits.group_size, solver);
+  return std::make_unique<RaysPipeline>(state, limits.group_size, solver, RaySource::kCamera);
+}
+
+std::unique_ptr<Pipeline> make_given_pipeline(FrameState &state, std::uint32_t group_size,
+                                              Solver solver) {
+  return std::make_unique<RaysPipeline>(state, group_size, solver, RaySource::kGiven);
 }
 
 }  // namespace isowave::core

@@ -86,4 +86,9 @@ std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
                                         const Group::Limits &limits, Solver solver,
                                         ClosestHit closest);
 
+/// Pipeline `rays` for the rays state.rays.given: what they hit is in given_hits. state.rays.frame
+/// has as many as a picture has pixels.
+std::unique_ptr<Pipeline> make_given_pipeline(FrameState &state, std::uint32_t group_size,
+                                              Solver solver);
+
 }  // namespace isowave::core

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "core/base/error.hpp"
@@ -64,9 +65,34 @@ std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, Strea
 }
 
 bool turned_over(const FrameStats &stats, std::uint32_t most) {
-  std::uint64_t num_recycled = stats.normals.recycled_blocks;
+  std::uint64_t num_recycled = stats.normals.recycled_blocks + stats.ambient.recycled_blocks;
   for (const PassStats &pass : stats.passes) num_recycled += pass.counts.recycled_count;
   return num_recycled > most;
+}
+
+/// Columns of the picture that a list of rays is seen as.
+constexpr std::uint32_t kGivenColumns = 1024;
+
+/// Puts the frame that shading reads back when this goes.
+struct FrameOfPicture {
+  Wavefront &rays;
+  FrameParams frame;
+  ~FrameOfPicture() { rays.frame = frame; }
+};
+
+std::vector<VolumeInfo> infos_of(const std::vector<Level> &levels) {
+  std::vector<VolumeInfo> infos;
+  for (const Level &level : levels) infos.push_back(level.info);
+  return infos;
+}
+
+LaterPasses later_pass(const PassStats &pass) {
+  return {1, pass.counts.decoded_count, pass.counts.recycled_count, 0, pass.stage_ms};
+}
+
+PassStats with_all_hits(PassStats pass) {
+  pass.completed_percent = 100;
+  return pass;
 }
 
 }  // namespace
@@ -76,6 +102,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
   const Uploads uploaded_before = uploads();
   const OnPass &on_pass = request.on_pass;
   const bool is_smooth = request.normals == Normals::kSmooth;
+  const bool more_follows = is_smooth || request.ambient_rays != 0;
   FrameStats stats;
   begin_frame(request);
   stats.first_level = state_.drawing.first;
@@ -98,7 +125,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
     stats.rays_hit += pass.counts.hit_count;
     stats.passes.push_back(pass);
     finished = pass.counts.next_active_count == 0;
-    stats.cancelled = on_pass && !on_pass(pass) && (is_smooth || !finished);
+    stats.cancelled = on_pass && !on_pass(pass) && (more_follows || !finished);
     guard.check(pass.counts);
     if (has_begun_normals && !finished) {
       readback_.drain();
@@ -110,7 +137,9 @@ FrameStats Renderer::render(const FrameRequest &request) {
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
   // for it.
   if (stats.passes.back().counts.next_active_count == 0) pipeline_->end_frame();
-  if (is_smooth && !stats.cancelled) finish_normals(on_pass, has_begun_normals, stats);
+  if (is_smooth && !stats.cancelled)
+    finish_normals(on_pass, has_begun_normals, request.ambient_rays != 0, stats);
+  if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
   if (!stats.cancelled && turned_over(stats, most_recycled(state_.cache.num_slots,
                                                            device_.info().type, options_.stream)))
     state_.cache.clear();
@@ -123,47 +152,79 @@ FrameStats Renderer::render(const FrameRequest &request) {
 }
 
 /// Begins with all hits, or goes on with those that wait.
-void Renderer::enqueue_normals(bool begins) {
+void Renderer::enqueue_normals(bool begins, RaySource of) {
   state_.rays.open_pass();
   if (!begins) state_.provide_blocks(state_.rays.previous_counts, state_.drawing);
   const auto stage = device_.timer().stage("normals");
-  smooth_normals_(state_.cache, state_.rays, begins);
+  smooth_normals_(state_.cache, state_.rays, begins, of);
   readback_.push(state_.rays.counts);
 }
 
 /// Enqueues and awaits what is left of the passes for smooth normals. has_begun: the first is
 /// enqueued.
-void Renderer::finish_normals(const OnPass &on_pass, bool has_begun, FrameStats &stats) {
+void Renderer::finish_normals(const OnPass &on_pass, bool has_begun, bool more_follows,
+                              FrameStats &stats, RaySource of) {
   const auto begin = std::chrono::steady_clock::now();
   open_requests_ = state_.drawing;
   if (!has_begun) {
-    enqueue_normals(true);
+    enqueue_normals(true, of);
     if (readback_.in_flight() == PassReadback::kMaxInFlight)
       readback_.pop();  // of the pass beyond the last
   }
   StallGuard guard(state_.levels[0].info.dims);
   for (bool finished = false; !finished && !stats.cancelled;) {
     if (!in_step(on_pass) && readback_.in_flight() < PassReadback::kMaxInFlight)
-      enqueue_normals(false);
+      enqueue_normals(false, of);
     const PassStats pass = stats_of(readback_.pop());
-    NormalsStats &normals = stats.normals;
-    ++normals.passes;
-    normals.decoded_blocks += pass.counts.decoded_count;
-    normals.recycled_blocks += pass.counts.recycled_count;
-    for (const auto &[stage, ms] : pass.stage_ms) normals.stage_ms[stage] += ms;
+    stats.normals += later_pass(pass);
     finished = pass.counts.next_active_count == 0;
-    PassStats shown = pass;
-    shown.completed_percent = 100;
-    stats.cancelled = on_pass && !on_pass(shown) && !finished;
+    stats.cancelled = on_pass && !on_pass(with_all_hits(pass)) && (more_follows || !finished);
     guard.check(pass.counts);
     if (finished) open_requests_.reset();
-    if (!finished && !stats.cancelled && readback_.in_flight() == 0) enqueue_normals(false);
+    if (!finished && !stats.cancelled && readback_.in_flight() == 0) enqueue_normals(false, of);
   }
   stats.normals.ms = ms_since(begin);
 }
 
-/// Answers what is left of the requests of a frame whose normals were cut short, and forgets its
-/// rays. rays.frame: of any frame.
+/// Round by round: a ray of each hit, through the same passes. Between rounds, the picture shows
+/// those that are through.
+void Renderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
+  const auto begin = std::chrono::steady_clock::now();
+  ambient_->begin(state_.levels[state_.drawing.first].info, request.ambient_rays);
+  for (std::uint32_t round = 0; round < request.ambient_rays && !stats.cancelled; ++round) {
+    {
+      const auto stage = device_.timer().stage("ambient");
+      (*ambient_)(state_.rays, round);
+    }
+    stats.cancelled = !trace_given(request.on_pass, stats.ambient);
+  }
+  if (!stats.cancelled) (*ambient_)(state_.rays, request.ambient_rays);
+  stats.ambient.ms = ms_since(begin);
+}
+
+/// Traces the rays state_.rays.given. Returns false where on_pass says to stop.
+bool Renderer::trace_given(const OnPass &on_pass, LaterPasses &stats) {
+  readback_.drain();
+  open_requests_ = state_.drawing;
+  given_pipeline_->begin_frame();
+  StallGuard guard(state_.levels[0].info.dims);
+  for (bool finished = false; !finished;) {
+    given_pipeline_->enqueue_pass();
+    readback_.push(state_.rays.counts);
+    if (!in_step(on_pass) && readback_.in_flight() < PassReadback::kMaxInFlight) continue;
+    const PassStats pass = stats_of(readback_.pop());
+    stats += later_pass(pass);
+    finished = pass.counts.next_active_count == 0;
+    guard.check(pass.counts);
+    if (on_pass && !on_pass(with_all_hits(pass))) return false;
+  }
+  given_pipeline_->end_frame();
+  open_requests_.reset();
+  return true;
+}
+
+/// Answers what is left of the requests of a frame whose normals or ambient rays were cut short,
+/// and forgets its rays. rays.frame: of any frame.
 void Renderer::answer_requests() {
   const auto of = std::exchange(open_requests_, std::nullopt);
   if (!of) return;
@@ -171,6 +232,7 @@ void Renderer::answer_requests() {
   state_.rays.open_pass();
   state_.provide_blocks(state_.rays.previous_counts, *of);
   smooth_normals_(state_.cache, state_.rays, false);  // of no ray; opens the next pass
+  if (given_pipeline_) given_pipeline_->end_frame();
 }
 
 Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
@@ -189,6 +251,10 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       shade_(device, options_.size.num_rays()),
       readback_(device) {
   if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
+  if (options_.with_given_rays) {
+    given_pipeline_ = make_given_pipeline(state_, options_.group_size, options_.solver);
+    ambient_.emplace(device, state_.rays.num_rays, state_.levels.size() > 1);
+  }
   options_.cache_slots = plan_.cache_slots;
   options_.stream = plan_.stream;
   options_.window_blocks = plan_.window_blocks;
@@ -218,6 +284,12 @@ void Renderer::compile_kernels() {
       pipeline_->enqueue_pass();  // the first has nothing to decode
     pipeline_->end_frame();
     if (options_.with_shading) enqueue_normals(true);
+    if (given_pipeline_) {
+      (*ambient_)(rays, 0);
+      given_pipeline_->begin_frame();
+      for (int pass = 0; pass < 2; ++pass) given_pipeline_->enqueue_pass();
+      given_pipeline_->end_frame();
+    }
     readback_.drain();
   }
   state_.cache.classify(rays);
@@ -242,21 +314,30 @@ void Renderer::check(const FrameRequest &request) const {
   }
   if (request.bound != FieldBound::kNone && !options_.with_bounds)
     throw Error("a renderer that was made without bounds cannot draw one");
+  check_ambient_rays(request.ambient_rays);
+  if (request.ambient_rays != 0) check_has_given();
 }
 
 void Renderer::begin_frame(const FrameRequest &request) {
   check(request);
-  const float isovalue = request.isovalue;
   const ImageSize size = size_of(request);
-  std::vector<VolumeInfo> infos;
-  for (const Level &level : state_.levels) infos.push_back(level.info);
-  std::vector<FrameParams> frames =
-      make_level_frames(infos, request.camera, size, isovalue, request.voxel_pixels);
+  std::vector<FrameParams> frames = make_level_frames(infos_of(state_.levels), request.camera, size,
+                                                      request.isovalue, request.voxel_pixels);
   const std::vector<DecodedValues> values = decoded_values(request);
-  readback_.drain();  // of what the frame before had enqueued beyond its last pass
-  decode_as(values, request.bound);
   has_picture_ = false;
   size_ = size;
+  state_.rays.num_ambient = 0;
+  open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
+  pipeline_->begin_frame();
+  has_picture_ = true;
+}
+
+/// Makes the levels, the cache and the rays' constants those of the frame, that its rays can begin.
+void Renderer::open_frame(std::vector<FrameParams> frames, const std::vector<DecodedValues> &values,
+                          FieldBound bound, RaySource source) {
+  const float isovalue = frames.front().surface.isovalue;
+  readback_.drain();  // of what the frame before had enqueued beyond its last pass
+  decode_as(values, bound);
   const auto first = std::ranges::find_if(frames, draws);
   const auto end = std::find_if_not(first, frames.end(), draws);
   state_.drawing = {static_cast<std::size_t>(first - frames.begin()),
@@ -274,7 +355,8 @@ void Renderer::begin_frame(const FrameRequest &request) {
       level.macrocells.select(frame, level.range_error, &level.stream);
       frame.surface = level.macrocells.surface(frame);
       // Where there are several bands, a ray stands at a border wherever it crosses that.
-      if (!has_bands) frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+      if (!has_bands && source == RaySource::kCamera)
+        frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
     }
     level.frame = frame;
   }
@@ -288,8 +370,6 @@ void Renderer::begin_frame(const FrameRequest &request) {
   }
   cached_isovalue_ = isovalue;
   answer_requests();
-  pipeline_->begin_frame();
-  has_picture_ = true;
 }
 
 Renderer::Uploads Renderer::uploads() const {
@@ -367,6 +447,60 @@ Camera Renderer::camera(std::span<const float> isovalues, std::optional<ImageSiz
                         size.value_or(options_.size));
 }
 
+std::vector<HitRecord> Renderer::cast_rays(std::span<const WorldRay> world_rays, float isovalue,
+                                           Normals normals) {
+  check_has_given();
+  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
+  const std::vector<IndexRay> rays = make_index_rays(state_.levels[0].info, world_rays);
+  Wavefront &wavefront = state_.rays;
+  const FrameOfPicture kept{wavefront, wavefront.frame};
+  // As many as the buffers hold at a time, seen as a picture.
+  const auto columns = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>({kGivenColumns, wavefront.num_rays, rays.size()}));
+  std::vector<HitRecord> hits, part;
+  while (hits.size() < rays.size()) {
+    const std::size_t num_left = rays.size() - hits.size(),
+                      num_rows = std::min((num_left + columns - 1) / columns,
+                                          wavefront.num_rays / columns);
+    const std::span of_part =
+        std::span(rays).subspan(hits.size(), std::min(num_left, num_rows * columns));
+    std::vector<GivenRay> given(num_rows * columns);
+    std::ranges::transform(of_part, given.begin(), &IndexRay::ray);
+    wavefront.given.write(given);
+    open_frame(frames_of_rays(columns, static_cast<std::uint32_t>(num_rows), isovalue),
+               decoded_values({}), FieldBound::kNone, RaySource::kGiven);
+    FrameStats stats;
+    trace_given({}, stats.ambient);
+    if (normals == Normals::kSmooth) finish_normals({}, false, false, stats, RaySource::kGiven);
+    part.resize(given.size());
+    wavefront.given_hits.read(part);
+    for (std::size_t i = 0; i < of_part.size(); ++i) part[i].t *= of_part[i].t_scale;
+    hits.insert(hits.end(), part.begin(), part.begin() + std::ptrdiff_t(of_part.size()));
+  }
+  return hits;
+}
+
+/// Of all levels: the finest draws given rays, seen as a picture of so many.
+std::vector<FrameParams> Renderer::frames_of_rays(std::uint32_t columns, std::uint32_t rows,
+                                                  float isovalue) const {
+  std::vector<FrameParams> frames = make_level_grids(infos_of(state_.levels));
+  for (FrameParams &frame : frames) {
+    frame.view.width = columns;
+    frame.view.height = rows;
+    frame.view.t_scale = 1;
+    frame.band = {};
+    frame.surface.isovalue = isovalue;
+    frame.screen = {0, 0, columns, rows};
+  }
+  frames.front().band.end_t = std::numeric_limits<float>::infinity();
+  return frames;
+}
+
+void Renderer::check_has_given() const {
+  if (!given_pipeline_)
+    throw Error("a renderer that was made without given rays has no ambient ones, and casts none");
+}
+
 void Renderer::check_has_picture() const {
   if (!has_picture_) throw Error("there is no picture: no frame has been drawn");
 }
@@ -381,6 +515,15 @@ std::vector<HitRecord> Renderer::hits() const {
 Image8 Renderer::shade(const Appearance &appearance) {
   check_has_picture();
   return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, size_.samples);
+}
+
+OpenCounts Renderer::open() const {
+  check_has_picture();
+  OpenCounts open{{}, state_.rays.num_ambient};
+  if (open.num_ambient == 0) return open;
+  open.counts.resize(size_.num_rays());
+  state_.rays.open_counts.read(open.counts);
+  return open;
 }
 
 KeptPicture &Renderer::kept() {
@@ -405,6 +548,7 @@ void Renderer::enlarge_kept(const FrameRequest &request) {
   state_.rays.frame =
       make_frame_params(state_.levels[0].info, request.camera, size, request.isovalue);
   size_ = size;
+  state_.rays.num_ambient = 0;
   kept().show(state_.rays, true);
   device_.finish();
 }

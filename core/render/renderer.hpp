@@ -1,7 +1,8 @@
 #pragma once
 // Draws isosurfaces of one compressed volume on one device: the main loop of the program.
 //
-// camera -> rays -> [ pass of a pipeline ]* -> hits -> [ pass for smooth normals ]* -> picture
+// camera -> rays -> [ pass of a pipeline ]* -> hits -> [ pass for smooth normals ]*
+//        -> [ ambient rays -> [ pass of a pipeline ]* ]* -> picture
 //
 // core/render/pipeline.hpp has the pipelines.
 
@@ -17,8 +18,10 @@
 #include "core/render/pass_readback.hpp"
 #include "core/render/pipeline.hpp"
 #include "core/render/renderer_options.hpp"
+#include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
+#include "core/view/given_rays.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
@@ -56,6 +59,15 @@ class Renderer {
   /// Waits   yes
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {});
 
+  /// The first hit of each ray, in the finest level of detail. t counts in lengths of its
+  /// direction. Leaves the picture of the last frame as it is.
+  ///
+  /// isovalue, normals  as in FrameRequest
+  /// Throws  Error: the renderer was made without given rays; what make_index_rays() throws; the
+  ///         isovalue is NaN
+  /// Waits   yes
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue, Normals normals);
+
   /// Returns  the hit buffer of the last frame [size.ray_rows()][size.ray_columns()], row 0 at the
   ///          top
   /// Throws   Error: no frame was drawn
@@ -65,6 +77,11 @@ class Renderer {
   /// Throws   Error: no frame was drawn
   /// Waits    yes
   Image8 shade(const Appearance &appearance = {});
+  /// How open the hits of the last frame are, as far as its ambient rays are through.
+  ///
+  /// Throws  Error: no frame was drawn
+  /// Waits   yes
+  OpenCounts open() const;
 
   // For pictures of one frame with more and more pixels (core/render/time_budget.hpp). Without
   // options().with_kept_picture these three throw Error.
@@ -112,8 +129,13 @@ class Renderer {
 
   void compile_kernels();
   void check_has_picture() const;
+  void check_has_given() const;
   KeptPicture &kept();
   void begin_frame(const FrameRequest &request);
+  void open_frame(std::vector<FrameParams> frames, const std::vector<DecodedValues> &values,
+                  FieldBound bound, RaySource source);
+  std::vector<FrameParams> frames_of_rays(std::uint32_t columns, std::uint32_t rows,
+                                          float isovalue) const;
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
   void decode_as(const std::vector<DecodedValues> &values, FieldBound bound);
   struct Uploads {
@@ -121,8 +143,11 @@ class Renderer {
   };
   Uploads uploads() const;
   PassStats stats_of(const PassCounts &counts);
-  void enqueue_normals(bool begins);
-  void finish_normals(const OnPass &on_pass, bool has_begun, FrameStats &stats);
+  void enqueue_normals(bool begins, RaySource of = RaySource::kCamera);
+  void finish_normals(const OnPass &on_pass, bool has_begun, bool more_follows, FrameStats &stats,
+                      RaySource of = RaySource::kCamera);
+  void add_ambient(const FrameRequest &request, FrameStats &stats);
+  bool trace_given(const OnPass &on_pass, LaterPasses &stats);
   void answer_requests();
   bool in_step(const OnPass &on_pass) const {
     return on_pass || device_.timer().source() != ocl::TimerSource::kOff;
@@ -141,11 +166,14 @@ class Renderer {
   std::optional<float>
       cached_isovalue_;       ///< of the cache's bits of voxels inside; none: it is empty
   bool is_one_pass_ = false;  ///< the last frame was: it found all blocks that it needed
-  std::optional<LevelRange> open_requests_;  ///< of rays that wait for their normals
+  /// Of rays that wait for their normals, or are not those of the camera.
+  std::optional<LevelRange> open_requests_;
   std::unique_ptr<Pipeline> pipeline_;
   SmoothNormals smooth_normals_;
   Shade shade_;
   std::optional<KeptPicture> kept_;
+  std::unique_ptr<Pipeline> given_pipeline_;  ///< with given rays; as is
+  std::optional<Ambient> ambient_;
   PassReadback readback_;
   double setup_ms_ = 0;
 };

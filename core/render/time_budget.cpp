@@ -15,11 +15,8 @@ constexpr double kGrowth = 4;
 
 void add(FrameStats &sum, FrameStats step) {
   step.passes.insert(step.passes.begin(), sum.passes.begin(), sum.passes.end());
-  step.normals.passes += sum.normals.passes;
-  step.normals.decoded_blocks += sum.normals.decoded_blocks;
-  step.normals.recycled_blocks += sum.normals.recycled_blocks;
-  step.normals.ms += sum.normals.ms;
-  for (const auto &[stage, ms] : sum.normals.stage_ms) step.normals.stage_ms[stage] += ms;
+  step.normals += sum.normals;
+  step.ambient += sum.ambient;
   step.uploaded_blocks += sum.uploaded_blocks;
   step.uploaded_bytes += sum.uploaded_bytes;
   sum = std::move(step);
@@ -107,6 +104,7 @@ FrameRequest TimedFrames::request_of(const FrameRequest &request, std::size_t st
   smaller.size = halved(full, static_cast<unsigned>(step));
   if (step != 0 && renderer_.options().with_levels)
     smaller.voxel_pixels = std::max(1.0, request.voxel_pixels / scale);
+  if (step != 0) smaller.ambient_rays = 0;
   return smaller;
 }
 

@@ -13,22 +13,24 @@ class March {
  public:
   /// levels: frames may have several levels of detail.
   March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
-        bool levels = false);
+        bool levels = false, RaySource source = RaySource::kCamera);
 
   /// Takes rays further, as far as what was requested in the pass before has been provided.
   ///
   /// macrocells  of any level of detail, since levels share what is used of them
-  /// Out         rays.hits; next_active_ray_ids and ray_block_ids of the rays that wait;
+  /// Out         rays.hits_of(source); next_active_ray_ids and ray_block_ids of the rays that wait;
   ///             counts.hit_count, granted_count (blocks intersected), next_active_count
   /// Waits       no
   void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:
+  RaySource source_;
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
-                 ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>, ocl::In<PassCounts>,
-                 ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
-                 ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<CacheState>>
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<GivenRay>, ocl::In<uint>,
+                 ocl::In<cl_ushort>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
+                 ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
+                 ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>,
+                 ocl::Out<CacheState>>
       kernel_;
 };
 

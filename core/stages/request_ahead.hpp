@@ -12,7 +12,7 @@ class RequestAhead {
  public:
   /// levels: frames may have several levels of detail.
   RequestAhead(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
-               bool levels = false);
+               bool levels = false, RaySource source = RaySource::kCamera);
 
   /// The rays that wait ask for blocks, as far as they are in the pass's window.
   ///
@@ -26,9 +26,9 @@ class RequestAhead {
 
  private:
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<BlockEntry>,
-                 ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>,
-                 ocl::Out<uint>, uint, ocl::Out<CacheState>>
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<GivenRay>, ocl::In<uint>,
+                 ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>,
+                 ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
       kernel_;
 };
 

@@ -5,9 +5,6 @@
 
 namespace isowave::core {
 
-namespace {
-
-/// GLM's columns -> rows, scaled so that the largest entry is 1: only directions count.
 void store_rows(const glm::dmat3 &m, float *rows) {
   double largest = 0.0;
   for (int column = 0; column < 3; ++column) {
@@ -18,6 +15,8 @@ void store_rows(const glm::dmat3 &m, float *rows) {
       rows[3 * row + column] = static_cast<float>(m[column][row] / largest);
   }
 }
+
+namespace {
 
 Image8 rgb_image(std::uint32_t columns, std::uint32_t rows, const std::vector<uint> &packed) {
   Image8 image{columns, rows, 3, {}};
@@ -50,12 +49,13 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
 }
 
 Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
-                    const std::vector<HitRecord> &hits, std::uint32_t samples) {
+                    const std::vector<HitRecord> &hits, std::uint32_t samples,
+                    const OpenCounts &open) {
   const std::uint32_t columns = frame.view.width / samples, rows = frame.view.height / samples;
   std::vector<uint> packed(std::size_t{columns} * rows);
   for (uint pixel = 0; pixel < packed.size(); ++pixel)
-    packed[pixel] =
-        shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns, hits.data());
+    packed[pixel] = shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns,
+                                hits.data(), open.counts.data(), open.num_ambient);
   return rgb_image(columns, rows, packed);
 }
 
@@ -74,7 +74,7 @@ void Shade::compile(Wavefront &rays) {
   for (const std::size_t num_pixels :
        {std::size_t{1}, image_.size()}) {  // PoCL compiles large ones anew
     kernel_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device_), FrameParams{}, params_, 1,
-            rays.hits, image_);
+            rays.hits, rays.open_counts, 0u, image_);
   }
 }
 
@@ -84,7 +84,7 @@ Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32
   std::vector<uint> packed(std::size_t{columns} * rows);
   params_.write({&params, 1});
   kernel_(ocl::Range::strided(packed.size(), ocl::kGroupSize, device_), rays.frame, params_,
-          samples, rays.hits, image_);
+          samples, rays.hits, rays.open_counts, rays.num_ambient, image_);
   image_.read(packed);
   return rgb_image(columns, rows, packed);
 }

@@ -16,9 +16,19 @@ namespace isowave::core {
 struct Appearance {
   glm::vec3 surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   glm::vec3 background{1.0f, 1.0f, 1.0f};
-  float ambient = 0.15f, diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
-  float above = 0.45f;                                     ///< diffuse, of a light above it
+  float ambient = 0.15f;                  ///< light from all around
+  float diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
+  float above = 0.45f;                    ///< diffuse, of a light above it
 };
+
+/// How many of a frame's ambient rays met nothing.
+struct OpenCounts {
+  std::vector<uchar> counts;      ///< [height * width] by ray
+  std::uint32_t num_ambient = 0;  ///< of so many; 0: there are none
+};
+
+/// GLM's columns -> rows [9], scaled so that the largest entry is 1: only directions count.
+void store_rows(const glm::dmat3 &m, float *rows);
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
 
@@ -26,9 +36,11 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
 ///
 /// hits     [height * width] of the frame's rays
 /// samples  rays a pixel along each axis
+/// open     how much of the sky hits see
 /// Returns  RGB
 Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
-                    const std::vector<HitRecord> &hits, std::uint32_t samples = 1);
+                    const std::vector<HitRecord> &hits, std::uint32_t samples = 1,
+                    const OpenCounts &open = {});
 
 class Shade {
  public:
@@ -39,7 +51,7 @@ class Shade {
   /// Launches the kernel without a pixel to shade, see Device::Compiling.
   void compile(Wavefront &rays);
 
-  /// Shades rays.hits.
+  /// Shades rays.hits, as open as rays.open_counts says.
   ///
   /// samples  rays a pixel along each axis
   /// Returns  RGB
@@ -50,7 +62,9 @@ class Shade {
   ocl::Device &device_;
   ocl::Buffer<ShadeParams> params_;
   ocl::Buffer<uint> image_;
-  ocl::Kernel<FrameParams, ocl::In<ShadeParams>, uint, ocl::In<HitRecord>, ocl::Out<uint>> kernel_;
+  ocl::Kernel<FrameParams, ocl::In<ShadeParams>, uint, ocl::In<HitRecord>, ocl::In<uchar>, uint,
+              ocl::Out<uint>>
+      kernel_;
 };
 
 }  // namespace isowave::core

@@ -20,11 +20,12 @@ SmoothNormals::SmoothNormals(ocl::Device &device, std::uint64_t num_pixels,
     : range_(ocl::Range::strided(num_pixels, group_size, device, 4)),
       kernel_(device, "smooth_normals", group_defines(group_size), levels) {}
 
-void SmoothNormals::operator()(BlockCache &cache, Wavefront &rays, bool begins) {
+void SmoothNormals::operator()(BlockCache &cache, Wavefront &rays, bool begins, RaySource of) {
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, begins ? 1u : 0u,
                    cache.table, cache.values, rays.previous_counts, rays.counts, rays.next_counts,
-                   rays.active_ray_ids, rays.next_active_ray_ids, rays.hits, cache.slot_stamps,
-                   cache.requested_bits, cache.request_block_ids, cache.capacity, cache.state);
+                   rays.active_ray_ids, rays.next_active_ray_ids, rays.hits_of(of),
+                   cache.slot_stamps, cache.requested_bits, cache.request_block_ids, cache.capacity,
+                   cache.state);
 }
 
 }  // namespace isowave::core

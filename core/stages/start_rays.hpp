@@ -11,22 +11,24 @@ class StartRays {
  public:
   /// levels: frames may have several levels of detail.
   StartRays(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
-            bool levels = false);
+            bool levels = false, RaySource source = RaySource::kCamera);
 
-  /// Begins a frame.
+  /// Begins a frame, or a list of rays.
   ///
   /// macrocells  of any level of detail, since levels share what is used of them
   /// In          rays.counts: next_active_count is 0
-  /// Out         rays.hits: none; next_active_ray_ids and ray_block_ids of the rays that meet an
+  /// Out         rays.hits_of(source): none; next_active_ray_ids and ray_block_ids of the rays that
+  /// meet an
   ///             active block; counts.next_active_count: how many they are
   /// Waits       no
   void operator()(const Macrocells &macrocells, Wavefront &rays);
 
  private:
+  RaySource source_;
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<uint>, ocl::In<cl_ushort>,
-                 ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>,
-                 ocl::Out<HitRecord>>
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<GivenRay>, ocl::In<uint>,
+                 ocl::In<cl_ushort>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
+                 ocl::Out<uint>, ocl::Out<HitRecord>>
       kernel_;
 };
 

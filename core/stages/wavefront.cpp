@@ -3,12 +3,16 @@
 namespace isowave::core {
 
 ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
-  const std::uint64_t rays = limits.num_rays, pairs = limits.with_pairs ? rays : 0;
+  const std::uint64_t rays = limits.num_rays, pairs = limits.with_pairs ? rays : 0,
+                      given = limits.with_given ? rays : 0;
   return {ocl::buffer_size<PassCounts>("pass counts", 1),
           ocl::buffer_size<PassCounts>("pass counts, previous", 1),
           ocl::buffer_size<PassCounts>("pass counts, next", 1),
           ocl::buffer_size<FrameParams>("level frames", limits.num_levels),
           ocl::buffer_size<HitRecord>("hits", rays),
+          ocl::buffer_size<GivenRay>("given rays", given),
+          ocl::buffer_size<HitRecord>("hits of given rays", given),
+          ocl::buffer_size<uchar>("open ambient rays", given),
           ocl::buffer_size<uint>("ray states", rays),
           ocl::buffer_size<uint>("active ray ids", rays),
           ocl::buffer_size<uint>("active ray ids, next", rays),
@@ -28,6 +32,9 @@ Wavefront::Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferS
       previous_counts(device, sizes["pass counts, previous"]),
       next_counts(device, sizes["pass counts, next"]),
       hits(device, sizes["hits"]),
+      given(device, sizes["given rays"]),
+      given_hits(device, sizes["hits of given rays"]),
+      open_counts(device, sizes["open ambient rays"]),
       ray_block_ids(device, sizes["ray states"]),
       active_ray_ids(device, sizes["active ray ids"]),
       next_active_ray_ids(device, sizes["active ray ids, next"]),

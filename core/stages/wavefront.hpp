@@ -28,12 +28,25 @@ inline ocl::Defines closest_defines(ClosestHit closest) {
   return {{"ISO_CLOSEST_BY_ATOMICS", closest == ClosestHit::kAtomicMin ? "1" : "0"}};
 }
 
+/// Where the rays of pipeline `rays` come from.
+enum class RaySource {
+  kCamera,
+  kGiven  ///< Wavefront::given
+};
+
+/// The macro for the kernels that make rays.
+inline ocl::Defines with_source(ocl::Defines defines, RaySource source) {
+  if (source == RaySource::kGiven) defines.insert({"ISO_GIVEN_RAYS", "1"});
+  return defines;
+}
+
 struct Wavefront {
   /// What the lengths of its buffers depend on.
   struct Limits {
     std::uint64_t num_rays = 0;
     bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
     std::size_t num_levels = 1;  ///< of detail
+    bool with_given = false;     ///< there may be rays of RaySource::kGiven
   };
   static ocl::BufferSizes sizes(const Limits &limits);
 
@@ -74,16 +87,25 @@ struct Wavefront {
     std::swap(previous_counts, counts);
   }
 
+  /// What the rays of a source hit.
+  ocl::Buffer<HitRecord> &hits_of(RaySource source) {
+    return source == RaySource::kGiven ? given_hits : hits;
+  }
+
   std::uint64_t num_rays;  ///< R
   FrameParams
       frame{};  ///< of the frame at work; of several levels of detail, the finest that draws
   ocl::Buffer<FrameParams>
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;
-  CountsBuffer counts;              ///< [1] of the pass at work
-  CountsBuffer previous_counts;     ///< [1] of the pass before, where open_pass() is called
-  CountsBuffer next_counts;         ///< [1] of the next such pass, opened by this one
-  ocl::Buffer<HitRecord> hits;      ///< [R] by pixel: the picture so far
+  CountsBuffer counts;                ///< [1] of the pass at work
+  CountsBuffer previous_counts;       ///< [1] of the pass before, where open_pass() is called
+  CountsBuffer next_counts;           ///< [1] of the next such pass, opened by this one
+  ocl::Buffer<HitRecord> hits;        ///< [R] by pixel: the picture so far
+  ocl::Buffer<GivenRay> given;        ///< [R] of any origin; empty unless there may be some
+  ocl::Buffer<HitRecord> given_hits;  ///< [R] what these hit
+  ocl::Buffer<uchar> open_counts;   ///< [R] by pixel: ambient rays of its hit that met nothing ...
+  std::uint32_t num_ambient = 0;    ///< ... of so many; 0: the frame has none
   ocl::Buffer<uint> ray_block_ids;  ///< [R] by pixel: where a ray goes on from: RayStand (R_BID)
   ocl::Buffer<uint>
       active_ray_ids;  ///< [active_count] rays at work: RayEntry of ray_state.h (R_ID)

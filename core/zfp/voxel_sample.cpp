@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "core/base/parallel_for.hpp"
+#include "core/zfp/block_decoder.hpp"
 #include "kernels_cl/portable/block_grid.h"
-#include "kernels_cl/portable/zfp_codec.h"
 
 namespace isowave::core {
 
@@ -16,20 +15,17 @@ namespace {
 constexpr std::uint64_t kBatch = 256;
 
 void append_block(const CompressedVolume &volume, std::uint32_t id, std::vector<float> &voxels) {
-  const std::uint64_t first_bit = volume.block_begin(id);
-  const std::uint32_t num_bits = volume.block_bits(id);
-  std::array<std::uint32_t, ISO_MAX_BLOCK_BITS / 32 + 2 + kDecoderAhead> words{};
-  volume.read_words(first_bit, std::span(words).first(num_bits / 32 + 1 + kDecoderAhead));
+  BlockDecoder decoder(volume);
+  decoder.load(id, 1);
   std::array<float, ISO_BLOCK_VOXELS> values{};
-  zfp_decode_block(words.data(), 0, num_bits, volume.precision.min_exponent, values.data());
+  decoder.decode(id, values);
   const glm::uvec3 blocks = volume.num_blocks();
   const glm::uvec3 at =
       4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
   const glm::uvec3 size = glm::min(volume.info.dims - at, glm::uvec3(4));
   for (std::uint32_t i = 0; i < ISO_BLOCK_VOXELS; ++i) {
     if (i % 4 >= size.x || i / 4 % 4 >= size.y || i / 16 >= size.z) continue;
-    const float value = values.at(i);
-    voxels.push_back(volume.precision.whole_numbers ? std::rint(value) + 0.0f : value);
+    voxels.push_back(values.at(i));
   }
 }
 

@@ -291,12 +291,14 @@ std::uint64_t CompressedVolume::payload_bits() const {
   return is_indexed() ? indexed_bits : block_count() * bits_per_block;
 }
 
-std::uint64_t CompressedVolume::block_begin(std::uint32_t block_id) const {
-  return is_indexed() ? isowave::core::block_begin(index.data(), block_id)
-                      : std::uint64_t{block_id} * bits_per_block;
+std::uint64_t CompressedVolume::block_begin(std::uint64_t block_id) const {
+  // Blocks of lengths of their own are fewer than 2^32.
+  return is_indexed()
+             ? isowave::core::block_begin(index.data(), static_cast<std::uint32_t>(block_id))
+             : block_id * bits_per_block;
 }
 
-std::uint32_t CompressedVolume::block_bits(std::uint32_t block_id) const {
+std::uint32_t CompressedVolume::block_bits(std::uint64_t block_id) const {
   if (!is_indexed()) return bits_per_block;
   return static_cast<std::uint32_t>(block_begin(block_id + 1) - block_begin(block_id));
 }

@@ -93,8 +93,8 @@ struct CompressedVolume {
   bool is_indexed() const { return bits_per_block == 0; }
   std::uint64_t payload_bits() const;
   std::uint64_t block_begin(
-      std::uint32_t block_id) const;  ///< bit of the payload; of block_count(): its end
-  std::uint32_t block_bits(std::uint32_t block_id) const;  ///< length of a block
+      std::uint64_t block_id) const;  ///< bit of the payload; of block_count(): its end
+  std::uint32_t block_bits(std::uint64_t block_id) const;  ///< length of a block
   std::uint32_t max_block_bits() const {
     return is_indexed() ? ISO_MAX_BLOCK_BITS : bits_per_block;
   }

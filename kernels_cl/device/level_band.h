@@ -1,5 +1,5 @@
 /// level_band.h -- the part of a ray that one level of detail draws (core/view/detail.hpp). OpenCL
-/// C 1.2. Where ISO_LEVELS is 0, that is all of it, and nothing here costs anything.
+/// C 1.2. Where ISO_BANDS is 0, that is all of it, and nothing here costs anything.
 #ifndef ISOWAVE_LEVEL_BAND_H
 #define ISOWAVE_LEVEL_BAND_H
 
@@ -12,20 +12,20 @@ ISO_INLINE uint masks_begin(const FrameParams *frame) {
 }
 
 ISO_INLINE RayEvent band_begin(const FrameParams *frame) {
-  return border_event(ISO_LEVELS ? frame->band.begin_t : 0.0f);
+  return border_event(ISO_BANDS ? frame->band.begin_t : 0.0f);
 }
 ISO_INLINE RayEvent band_end(const FrameParams *frame) {
-  return border_event(ISO_LEVELS ? frame->band.end_t : INFINITY);
+  return border_event(ISO_BANDS ? frame->band.end_t : INFINITY);
 }
 
 /// Is `exit` beyond the band?
 ISO_INLINE int ends_band(const FrameParams *frame, RayEvent exit) {
-  return ISO_LEVELS && !event_before(exit, band_end(frame));
+  return ISO_BANDS && !event_before(exit, band_end(frame));
 }
 
 /// Where the ray's band begins, if it has not entered the region before.
 ISO_INLINE RayEvent band_entry(const FrameParams *frame, RayEvent entry) {
-  return ISO_LEVELS && event_before(entry, band_begin(frame)) ? band_begin(frame) : entry;
+  return ISO_BANDS && event_before(entry, band_begin(frame)) ? band_begin(frame) : entry;
 }
 
 /// Where it ends, if it does before the ray leaves the region.
@@ -35,7 +35,7 @@ ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
 
 /// Does the ray stand at a border, with a side that it was on before?
 ISO_INLINE int has_side(uint side) {
-  return ISO_LEVELS && side != ISO_SIDE_UNKNOWN;
+  return ISO_BANDS && side != ISO_SIDE_UNKNOWN;
 }
 
 /// Where a ray stands: without levels a block, and no side.

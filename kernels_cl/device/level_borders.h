@@ -52,7 +52,7 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
                               global const uint *macrocell_masks, global const ushort *ranges,
                               uint pixel, uint level, uint side, local uint *found) {
   uint stand = ISO_INVALID_ID;
-  for (; ISO_LEVELS && level + 1 < num_frames && stand == ISO_INVALID_ID; ++level) {
+  for (; ISO_BANDS && level + 1 < num_frames && stand == ISO_INVALID_ID; ++level) {
     const FrameParams behind = frames[level + 1];
     const Ray ray = make_ray(&behind, pixel);
     BlockCoords b;

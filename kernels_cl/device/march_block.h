@@ -36,7 +36,7 @@ typedef struct BlockChange {
 } BlockChange;
 
 ISO_INLINE int changes_at_border(const BlockChange *found) {
-  return ISO_LEVELS && found->at_border;
+  return ISO_BANDS && found->at_border;
 }
 
 /// The cells of a block that have voxels of any of those corners.
@@ -147,7 +147,7 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
 
 /// Does a ray with this result leave its band? gone: there is no active block left for it there.
 ISO_INLINE int leaves_band(int result, int gone) {
-  return ISO_LEVELS && (gone || result == ISO_RAY_ENDS_OUTSIDE || result == ISO_RAY_ENDS_INSIDE);
+  return ISO_BANDS && (gone || result == ISO_RAY_ENDS_OUTSIDE || result == ISO_RAY_ENDS_INSIDE);
 }
 
 /// On which side it leaves.

@@ -58,15 +58,14 @@ ISO_INLINE uint cell_in_block(const GridWalk *cell) {
   return (uint)((cell->x & 3) + 4 * (cell->y & 3) + 16 * (cell->z & 3));
 }
 
-/// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8]: which
-/// voxels of the blocks of its dual grid are inside; where one is not known, the cells that need it
-/// have any bit.
-ISO_INLINE ulong changing_cells(const ulong *inside) {
+/// Which corners of a block's cells are inside: bit x + 4y + 16z of v[corner x + 2y + 4z]. inside
+/// [8]: which voxels of the blocks of its dual grid are; where one is not known, the cells that
+/// need it have any bit.
+ISO_INLINE void corners_inside(const ulong *inside, ulong *v) {
   /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The
    * same for +y, +z. */
   const ulong not_x3 = 0x7777777777777777ul, not_y3 = 0x0FFF0FFF0FFF0FFFul,
               not_z3 = 0x0000FFFFFFFFFFFFul;
-  ulong v[8], any = 0, all = ~0ul;
   int i;
   for (i = 0; i < 8; ++i) v[i] = inside[i];
   for (i = 0; i < 8; i += 2) v[i + 1] = (v[i] >> 1 & not_x3) | (v[i + 1] << 3 & ~not_x3);
@@ -75,6 +74,14 @@ ISO_INLINE ulong changing_cells(const ulong *inside) {
     v[i + 3] = (v[i + 1] >> 4 & not_y3) | (v[i + 3] << 12 & ~not_y3);
   }
   for (i = 0; i < 4; ++i) v[i + 4] = (v[i] >> 16 & not_z3) | (v[i + 4] << 48 & ~not_z3);
+}
+
+/// The cells of a block (bit x + 4y + 16z) whose corners are not all on one side. inside [8] as in
+/// corners_inside().
+ISO_INLINE ulong changing_cells(const ulong *inside) {
+  ulong v[8], any = 0, all = ~0ul;
+  int i;
+  corners_inside(inside, v);
   for (i = 0; i < 8; ++i) {
     any |= v[i];
     all &= v[i];

@@ -106,6 +106,28 @@ ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   return r;
 }
 
+/// A ray of a list.
+ISO_INLINE Ray make_given_ray(GivenRay given) {
+  Ray r;
+  r.x = make_ray_axis(given.o_x, given.d_x);
+  r.y = make_ray_axis(given.o_y, given.d_y);
+  r.z = make_ray_axis(given.o_z, given.d_z);
+  return r;
+}
+
+/// "There is no ray."
+ISO_INLINE GivenRay no_ray(void) {
+  GivenRay given;
+  given.o_x = given.o_y = given.o_z = 0.0f;
+  given.d_x = given.d_y = given.d_z = 0.0f;
+  given.level = 0;
+  return given;
+}
+
+ISO_INLINE int is_given(GivenRay given) {
+  return given.d_x != 0.0f || given.d_y != 0.0f || given.d_z != 0.0f;
+}
+
 /// t at which the ray crosses the plane, a whole number (a pure function; the order of crossings
 /// rests on it). Needs d != 0. plane - o is exact as a pair (Knuth's two-sum); it is multiplied by
 /// the two-float 1 / d.

@@ -19,8 +19,9 @@ typedef struct ShadeParams {
   float view[9];  ///< row-major: ray direction in index space -> world space (up to a factor)
   float surface_r, surface_g, surface_b;
   float background_r, background_g, background_b;
-  float ambient, diffuse, specular;  ///< weights of the headlight; its highlight is white
-  float above;                       ///< weight of the light above
+  float ambient;            ///< weight of light from all around
+  float diffuse, specular;  ///< of the headlight; its highlight is white
+  float above;              ///< weight of the light above
 } ShadeParams;
 ISO_CHECK_SIZE(ShadeParams, 112);
 
@@ -48,9 +49,10 @@ ISO_INLINE uint to_byte(float c) {
   return (uint)fma(c, 255.0f, 0.5f);
 }
 
-/// Of the ray of that number.
+/// Of the ray of that number. open: how much of the sky its hit sees, [0,1]; as much of all lights
+/// but the headlight's gets there.
 ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint ray_id,
-                           float t, float gx, float gy, float gz) {
+                           float t, float gx, float gy, float gz, float open) {
   const Ray ray = make_ray(frame, ray_id);
   float nx, ny, nz, vx, vy, vz, ux, uy, uz, n, lengths, cosine, facing, slope, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
@@ -87,8 +89,8 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
   slope = fma(slope, facing, cosine) * 0.70710678f;
   highlight = cosine;
   for (i = 0; i < 5; ++i) highlight *= highlight; /* cosine^32 */
-  light = fma(p->diffuse, cosine, p->ambient);
-  if (slope > 0.0f) light = fma(p->above, slope, light);
+  light = fma(p->diffuse, cosine, open * p->ambient);
+  if (slope > 0.0f) light = fma(open * p->above, slope, light);
   highlight *= p->specular;
   return make_color(fma(p->surface_r, light, highlight), fma(p->surface_g, light, highlight),
                     fma(p->surface_b, light, highlight));
@@ -96,16 +98,23 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
 
 /// RGBA, 8 bits each, red in bits 0..7: of the pixel at a column and row of the picture, which has
 /// samples times samples rays of the frame.
+///
+/// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h), of num_ambient; 0:
+/// there
+///              are none, and all is open
 ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p,
-                            uint samples, uint column, uint row, ISO_GLOBAL const HitRecord *hits) {
+                            uint samples, uint column, uint row, ISO_GLOBAL const HitRecord *hits,
+                            ISO_GLOBAL const uchar *open_counts, uint num_ambient) {
   const float share = 1.0f / (float)(samples * samples);
   float r = 0.0f, g = 0.0f, b = 0.0f;
   uint i;
   for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
     const uint ray_id =
         (row * samples + i / samples) * frame->view.width + column * samples + i % samples;
-    const Color color = shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x,
-                                  hits[ray_id].grad_y, hits[ray_id].grad_z);
+    const Color color =
+        shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x, hits[ray_id].grad_y,
+                  hits[ray_id].grad_z,
+                  num_ambient == 0 ? 1.0f : (float)open_counts[ray_id] / (float)num_ambient);
     r += color.r;
     g += color.g;
     b += color.b;

@@ -69,6 +69,13 @@ inline uint popcount(uint x) {
   0 /* 1: frames are drawn in bands of several levels of detail (core/view/detail.hpp) */
 #endif
 
+#ifndef ISO_GIVEN_RAYS /* by -D */
+#define ISO_GIVEN_RAYS                                                                            \
+  0 /* 1: rays are read from a list (GivenRay) instead of made from the camera; each stays in one \
+       level of detail */
+#endif
+#define ISO_BANDS (ISO_LEVELS && !ISO_GIVEN_RAYS) /* rays go from level to level */
+
 /// The voxels of a volume, or of one of its levels of detail, and the blocks that hold them.
 typedef struct BlockGrid {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
@@ -173,6 +180,14 @@ typedef struct HitRecord {
       grad_z;  ///< gradient there, see smooth_gradient.h [value per voxel], index space
 } HitRecord;
 ISO_CHECK_SIZE(HitRecord, 36);
+
+/// A ray of any origin. Position = o + t d; d = 0: there is no ray.
+typedef struct GivenRay {
+  float o_x, o_y, o_z;  ///< index space of its level of detail
+  float d_x, d_y, d_z;  ///< [voxels of the level per t]
+  uint level;           ///< which of those that draw the frame, 0: the finest of them
+} GivenRay;
+ISO_CHECK_SIZE(GivenRay, 28);
 
 /// Where a compressed volume's blocks begin in its zfp stream, and how they are decoded.
 typedef struct StreamLayout {

@@ -3,15 +3,16 @@
 #include "portable/shared_types.h"
 #include "portable/shared_types_fields.h"
 
-/// sizes[0..5]: sizeof FrameParams, PairHit, BlockRays, HitRecord, StreamLayout, PassCounts. One
-/// work-item.
+/// sizes[0..6]: sizeof FrameParams, PairHit, BlockRays, HitRecord, GivenRay, StreamLayout,
+/// PassCounts. One work-item.
 kernel void shared_type_sizes(global uint *sizes) {
   sizes[0] = sizeof(FrameParams);
   sizes[1] = sizeof(PairHit);
   sizes[2] = sizeof(BlockRays);
   sizes[3] = sizeof(HitRecord);
-  sizes[4] = sizeof(StreamLayout);
-  sizes[5] = sizeof(PassCounts);
+  sizes[4] = sizeof(GivenRay);
+  sizes[5] = sizeof(StreamLayout);
+  sizes[6] = sizeof(PassCounts);
 }
 
 // OpenCL C has no offsetof.
@@ -35,6 +36,10 @@ kernel void shared_type_offsets(global uint *offsets) {
   {
     HitRecord object;
     ISO_HIT_RECORD_FIELDS(ISO_WRITE_OFFSET)
+  }
+  {
+    GivenRay object;
+    ISO_GIVEN_RAY_FIELDS(ISO_WRITE_OFFSET)
   }
   {
     StreamLayout object;

@@ -12,6 +12,7 @@ void add_info(CLI::App &app);
 void add_generate(CLI::App &app);
 void add_convert(CLI::App &app);
 void add_render(CLI::App &app);
+void add_extract(CLI::App &app);
 void add_compare(CLI::App &app);
 void add_verify(CLI::App &app);
 void add_bench(CLI::App &app);

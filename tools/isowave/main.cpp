@@ -20,6 +20,7 @@ int main(int argc, char **argv) {
   add_generate(app);
   add_convert(app);
   add_render(app);
+  add_extract(app);
   add_compare(app);
 #ifdef ISOWAVE_HAS_ORACLES
   add_verify(app);

@@ -51,6 +51,7 @@ struct RenderArgs {
   std::optional<double> time_budget;        ///< ms
   double voxel_pixels = 0;                  ///< of whole frames
   std::string normals = "smooth";
+  std::uint32_t ambient_rays = 0;
 };
 
 /// "#RRGGBB" -> [0,1]^3.
@@ -104,6 +105,7 @@ class DeviceFrames : public FrameSource {
     base_.voxel_pixels = args.voxel_pixels;
     base_.voxel_error = args.frame.voxel_error;
     base_.normals = normals_from_string(args.normals);
+    base_.ambient_rays = args.ambient_rays;
     if (time_budget_) timed_frames_.emplace(renderer_);
   }
   FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
@@ -219,11 +221,14 @@ class TwinFrames : public FrameSource {
         appearance_(appearance),
         solver_(args.renderer.solver),
         normals_(normals_from_string(args.normals)),
+        num_ambient_(args.ambient_rays),
         twin_(scene.volume, args.voxel_pixels, args.frame.voxel_error) {}
   FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
     hits_ = twin_.render(camera, scene_.size, isovalue, solver_, normals_);
+    if (num_ambient_ != 0)
+      open_ = twin_.open(camera, scene_.size, isovalue, hits_, num_ambient_, solver_);
     FrameStats stats;
     stats.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
     for (const HitRecord &hit : hits_) stats.rays_hit += std::isfinite(hit.t);
@@ -232,7 +237,7 @@ class TwinFrames : public FrameSource {
   std::vector<HitRecord> hits() override { return hits_; }
   Image8 shade() override {
     return shade_scalar(frame_, make_shade_params(scene_.volume.info, appearance_), hits_,
-                        scene_.size.samples);
+                        scene_.size.samples, open_);
   }
 
  private:
@@ -240,9 +245,11 @@ class TwinFrames : public FrameSource {
   Appearance appearance_;
   Solver solver_;
   Normals normals_;
+  std::uint32_t num_ambient_;
   Twin twin_;
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
+  OpenCounts open_;
 };
 
 void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &frames,
@@ -304,6 +311,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, const Scene &scen
   json.update(renderer_options_json(options.renderer));
   json["voxel_pixels"] = options.voxel_pixels;
   json["normals"] = options.normals;
+  json["ambient"] = options.ambient_rays;
   return json;
 }
 
@@ -399,11 +407,12 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
   if (options.image.empty() && options.refined.empty() && options.progress_dir.empty())
-    refuse_options(command, {"--color", "--background", "--normals"},
+    refuse_options(command, {"--color", "--background", "--normals", "--ambient"},
                    "no picture is written: give --output");
   if (options.stats.empty())
     refuse_options(command, {"--no-stage-times"}, "no statistics are written: give --stats");
   check_renderer_options(command, options.renderer_flags);
+  check_ambient_rays(options.ambient_rays);
   with_fewer_planes({}, options.frame.voxel_error);  // or throws
   check_voxel_pixels(options.voxel_pixels);
   check_choice(options);
@@ -449,6 +458,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   options.frame.compression.measure_error |= options.max_surface_error.has_value();
   wanted.with_bounds = options.max_surface_error.has_value();
   wanted.with_kept_picture = options.time_budget.has_value();
+  wanted.with_given_rays = options.ambient_rays != 0;
   wanted.with_shading =
       !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
@@ -498,7 +508,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
 void group_render_options(CLI::App &command) {
   group_options(command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
-                 "--color", "--background", "--normals", "--device"});
+                 "--color", "--background", "--normals", "--ambient", "--device"});
   group_volume_options(command);
   group_compression_options(command);
   group_options(command, "Precision and time",
@@ -532,6 +542,7 @@ void add_render(CLI::App &app) {
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
   add_normals_option(*command, options->normals);
+  add_ambient_option(*command, options->ambient_rays);
   command->add_option("--output,-o", options->image,
                       "PNG; NAME_isoV_viewK.png when there are several frames [VOLUME_isoV.png in "
                       "the current folder, where no other output is asked for]");

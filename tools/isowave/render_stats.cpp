@@ -30,12 +30,12 @@ ordered_json pass_json(const PassStats &pass) {
   return result;
 }
 
-ordered_json normals_json(const NormalsStats &normals) {
-  ordered_json result = {{"passes", normals.passes},
-                         {"decoded_blocks", normals.decoded_blocks},
-                         {"recycled_blocks", normals.recycled_blocks},
-                         {"ms", normals.ms}};
-  if (!normals.stage_ms.empty()) result["stage_ms"] = normals.stage_ms;
+ordered_json later_json(const LaterPasses &later) {
+  ordered_json result = {{"passes", later.passes},
+                         {"decoded_blocks", later.decoded_blocks},
+                         {"recycled_blocks", later.recycled_blocks},
+                         {"ms", later.ms}};
+  if (!later.stage_ms.empty()) result["stage_ms"] = later.stage_ms;
   return result;
 }
 
@@ -75,7 +75,8 @@ ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera,
                          {"passes", stats.passes.size()},
                          {"total_ms", stats.total_ms},
                          {"rays_hit", stats.rays_hit},
-                         {"normals", normals_json(stats.normals)},
+                         {"normals", later_json(stats.normals)},
+                         {"ambient", later_json(stats.ambient)},
                          {"uploaded_blocks", stats.uploaded_blocks},
                          {"uploaded_bytes", stats.uploaded_bytes},
                          {"cancelled", stats.cancelled}};

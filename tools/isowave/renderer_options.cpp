@@ -66,6 +66,14 @@ void add_normals_option(CLI::App &app, std::string &normals) {
       ->capture_default_str();
 }
 
+void add_ambient_option(CLI::App &app, std::uint32_t &num_rays) {
+  app.add_option("--ambient", num_rays,
+                 "N rays of each hit, up to 255, that find out how much of the sky it sees: shows "
+                 "depth; each takes about as long as the frame without; 16 and more look smooth")
+      ->type_name("N")
+      ->capture_default_str();
+}
+
 void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
   if (flags.speculation == "off")
     refuse_options(app, {"--max-speculation"}, "--speculation off is 1");

@@ -23,6 +23,9 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags);
 /// --normals smooth or cell, for normals_from_string().
 void add_normals_option(CLI::App &app, std::string &normals);
 
+/// --ambient N, FrameRequest::ambient_rays.
+void add_ambient_option(CLI::App &app, std::uint32_t &num_rays);
+
 /// Asks for levels of detail of a volume that is compressed now, if nobody said how many.
 inline void want_levels(CompressionOptions &compression) {
   if (!says_levels(compression)) compression.levels = 0;

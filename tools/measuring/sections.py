@@ -7,6 +7,7 @@ SECTIONS = {
     for section in (
         speed.frames,
         speed.normals,
+        speed.ambient,
         speed.speculation,
         speed.slots,
         speed.budgets,

@@ -71,6 +71,14 @@ def normals(run):
     ]
 
 
+def ambient(run):
+    return [
+        frame_row(run, field, normals="smooth", ambient=n, rounds=1, cache_slots=slots_for(field))
+        for field in run.fields()
+        for n in (0, 1, 16)
+    ]
+
+
 def speculation(run):
     return [
         frame_row(run, run.fields()[0], speculation=kind, pipeline=pipeline)

@@ -86,6 +86,17 @@ def normals(rows):
         )
 
 
+def ambient(rows):
+    """Each volume has a row for each number of rays, 0 first. What a ray takes: of warm frames."""
+    yield "volume", "ambient rays", "cold ms", "next", "warm", "of a warm frame, each ray"
+    for row in rows:
+        n = int(option(row, "--ambient"))
+        if n == 0:
+            without = row
+        each = (row["warm"]["median"] - without["warm"]["median"]) / max(n, 1)
+        yield name_of(row["volume"]), n, *thrice(row), ms(each) if n else ""
+
+
 def speculation(rows):
     yield "pipeline", "speculation", "cold ms", "next", "warm", "passes", "blocks decoded"
     for row in rows:
@@ -422,6 +433,7 @@ TABLES = {
     for section, *tables in (
         ("frames", frames, front),
         ("normals", normals),
+        ("ambient", ambient),
         ("speculation", speculation),
         ("slots", slots),
         ("budgets", budgets),

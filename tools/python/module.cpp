@@ -205,14 +205,17 @@ PyVolume open_volume(const std::filesystem::path &path, const nb::dict &options,
       [&] { return PyVolume{isowave::open_volume(path, compression, raw)}; });
 }
 
-nb::object decode(const PyVolume &self, std::uint32_t level) {
+nb::object decode(const PyVolume &self, std::uint32_t level, const Index3 &begin, const Index3 &end,
+                  const Index3 &step) {
   std::vector<float> voxels;
   {
     const nb::gil_scoped_release no_gil;
-    voxels = self.volume->decode(level);
+    voxels = self.volume->decode(level, {begin, end, step});
   }
-  const Index3 dims = self.volume->level_grid(level).dims;
-  return to_numpy<float>(std::move(voxels), {dims[2], dims[1], dims[0]});
+  const auto count = [&](std::size_t axis) -> std::size_t {
+    return (end.at(axis) - begin.at(axis) - 1) / step.at(axis) + 1;
+  };
+  return to_numpy<float>(std::move(voxels), {count(2), count(1), count(0)});
 }
 
 nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
@@ -223,6 +226,52 @@ nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
   }
   const std::size_t count = voxels.size();
   return to_numpy<float>(std::move(voxels), {count});
+}
+
+// ---- Meshes ----
+
+nb::dict extract(const PyVolume &self, const std::string &device, float isovalue,
+                 std::uint32_t level, bool normals, std::uint64_t memory_budget,
+                 const std::optional<nb::callable> &progress) {
+  Callbacks callbacks;
+  isowave::ExtractOptions options{
+      .level = level, .with_normals = normals, .memory_budget = memory_budget};
+  options.progress = [&](std::string_view what, double done) {
+    const bool goes_on = callbacks.run([&] {
+      if (progress) (*progress)(std::string(what), done);
+    });
+    if (!goes_on) throw Stopped();
+  };
+  isowave::Mesh mesh = callbacks.without_gil([&] {
+    return isowave::extract(isowave::open_device(device), self.volume, isovalue, options);
+  });
+  nb::dict result;
+  const std::size_t num_vertices = mesh.vertices.size(), num_faces = mesh.triangles.size();
+  result["vertices"] = to_numpy<float>(std::move(mesh.vertices), {num_vertices, 3});
+  result["faces"] = to_numpy<std::uint32_t>(std::move(mesh.triangles), {num_faces, 3});
+  if (normals) result["normals"] = to_numpy<float>(std::move(mesh.normals), {num_vertices, 3});
+  return result;
+}
+
+/// values [count][3]
+template <class T>
+using Rows = nb::ndarray<T, nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+template <class T>
+std::vector<std::array<T, 3>> to_vector(const Rows<T> &rows) {
+  std::vector<std::array<T, 3>> result(rows.shape(0));
+  if (!result.empty()) std::memcpy(result.data(), rows.data(), rows.nbytes());
+  return result;
+}
+
+void save_mesh(const Rows<float> &vertices, const Rows<std::uint32_t> &faces,
+               const std::optional<Rows<float>> &normals, const std::filesystem::path &path) {
+  const isowave::Mesh mesh{
+      .vertices = to_vector(vertices),
+      .normals = normals ? to_vector(*normals) : std::vector<std::array<float, 3>>{},
+      .triangles = to_vector(faces)};
+  const nb::gil_scoped_release no_gil;
+  isowave::save_mesh(mesh, path);
 }
 
 // ---- Devices and renderers ----
@@ -273,6 +322,8 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["normals_passes"] = statistics.normals_passes;
   result["normals_decoded_blocks"] = statistics.normals_decoded_blocks;
   result["normals_ms"] = statistics.normals_ms;
+  result["ambient_passes"] = statistics.ambient_passes;
+  result["ambient_ms"] = statistics.ambient_ms;
   result["uploaded_bytes"] = statistics.uploaded_bytes;
   result["first_level"] = statistics.first_level;
   result["last_level"] = statistics.last_level;
@@ -324,6 +375,9 @@ nb::dict frame_dict(isowave::Frame &&frame) {
   return result;
 }
 
+/// [count][6]
+using RayArray = nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig>;
+
 isowave::FrameRequest request_of(const nb::dict &options) {
   isowave::FrameRequest request;
   const auto get = reader_of(options);
@@ -341,6 +395,7 @@ isowave::FrameRequest request_of(const nb::dict &options) {
   get("voxel_error", request.voxel_error);
   get("max_surface_error", request.max_surface_error);
   get("time_budget_ms", request.time_budget_ms);
+  get("ambient_rays", request.ambient_rays);
   get("want_picture", request.want_picture);
   get("want_depth", request.want_depth);
   get("want_normals", request.want_normals);
@@ -386,6 +441,20 @@ nb::dict draw(AnyRenderer &renderer, const nb::dict &options,
   return frame_dict(std::move(frame));
 }
 
+/// By any of the library's renderers. rays [count][6]: origin and direction.
+template <class AnyRenderer>
+nb::dict cast(AnyRenderer &renderer, const RayArray &rays, float isovalue, bool smooth) {
+  static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
+  const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
+  isowave::Frame frame;
+  {
+    const nb::gil_scoped_release no_gil;
+    frame = renderer.cast_rays({first, rays.shape(0)}, isovalue,
+                               smooth ? isowave::Normals::kSmooth : isowave::Normals::kCell);
+  }
+  return frame_dict(std::move(frame));
+}
+
 /// A renderer, with the device that it draws on.
 class PyRenderer {
  public:
@@ -400,6 +469,7 @@ class PyRenderer {
     get("with_levels", wanted.with_levels);
     get("with_bounds", wanted.with_bounds);
     get("with_time_budget", wanted.with_time_budget);
+    get("with_rays", wanted.with_rays);
     isowave::DeviceOptions device_options;
     get("profiling", device_options.profiling);
     bool quick = false;
@@ -417,6 +487,11 @@ class PyRenderer {
                   bool interrupts) {
     return quick_ ? draw(*quick_, options, on_pass, interrupts)
                   : draw(*renderer_, options, on_pass, interrupts);
+  }
+
+  nb::dict cast_rays(const RayArray &rays, float isovalue, bool smooth) {
+    return quick_ ? cast(*quick_, rays, isovalue, smooth)
+                  : cast(*renderer_, rays, isovalue, smooth);
   }
 
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
@@ -460,18 +535,8 @@ class PyHostRenderer {
     return draw(*renderer_, options, on_pass, interrupts);
   }
 
-  /// rays [count][6]: origin and direction
-  nb::dict cast_rays(const nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig> &rays,
-                     float isovalue, bool smooth) {
-    static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
-    const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
-    isowave::Frame frame;
-    {
-      const nb::gil_scoped_release no_gil;
-      frame = renderer_->cast_rays({first, rays.shape(0)}, isovalue,
-                                   smooth ? isowave::Normals::kSmooth : isowave::Normals::kCell);
-    }
-    return frame_dict(std::move(frame));
+  nb::dict cast_rays(const RayArray &rays, float isovalue, bool smooth) {
+    return cast(*renderer_, rays, isovalue, smooth);
   }
 
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
@@ -553,12 +618,15 @@ NB_MODULE(_core, m) {
           "level_dims",
           [](const PyVolume &v, std::uint32_t level) { return v.volume->level_grid(level).dims; },
           "level"_a)
-      .def("decode", &decode, "level"_a)
+      .def("decode", &decode, "level"_a, "begin"_a, "end"_a, "step"_a)
       .def("sample", &sample, "max_voxels"_a)
       .def(
           "save",
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
-          "path"_a, nb::call_guard<nb::gil_scoped_release>());
+          "path"_a, nb::call_guard<nb::gil_scoped_release>())
+      .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a, "memory_budget"_a,
+           "progress"_a.none());
+  m.def("save_mesh", &save_mesh, "vertices"_a, "faces"_a, "normals"_a.none(), "path"_a);
   m.def("compress", &compress, "read"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a, "direction"_a,
         "options"_a, "keep"_a, "path"_a.none(), "progress"_a.none());
   m.def("compress_array", &compress_array, "array"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a,
@@ -581,6 +649,7 @@ NB_MODULE(_core, m) {
       .def(nb::init<const std::string &, const PyVolume &, const nb::dict &>(), "device"_a,
            "volume"_a, "options"_a)
       .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
+      .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "smooth"_a)
       .def("camera", &PyRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
       .def_prop_ro("device", &PyRenderer::device)
       .def_prop_ro("ready", &PyRenderer::ready)

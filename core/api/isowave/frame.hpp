@@ -25,11 +25,17 @@ enum class Normals {
   kCell     ///< of the trilinear field itself, which jumps from cell to cell
 };
 
+/// In world space: origin + t direction, t from 0 on.
+struct Ray {
+  Vector3 origin, direction;
+};
+
 /// Colours are sRGB, 0 to 1.
 struct Appearance {
   std::array<float, 3> surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   std::array<float, 3> background{1, 1, 1};
-  float ambient = 0.15f, diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
+  float ambient = 0.15f;                  ///< light from all around
+  float diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
   float above = 0.45f;  ///< of a light halfway between the eye and the picture's upper edge
 };
 
@@ -60,6 +66,9 @@ struct FrameRequest {
   double voxel_error = 0;
   FieldBound bound = FieldBound::kNone;  ///< needs RendererOptions::with_bounds
   Normals normals = Normals::kSmooth;    ///< nothing but the hits' gradients depends on them
+  /// Rays of each hit, up to 255, that find out how much of the sky it sees: pictures show depth.
+  /// Each takes about as long as the frame without. Needs with_rays.
+  std::uint32_t ambient_rays = 0;
   /// Instead: chooses voxel_pixels and voxel_error such that most pixels are within so many pixels
   /// of the true surface, that of the volume before compression. Needs with_bounds.
   std::optional<double> max_surface_error{};
@@ -71,8 +80,8 @@ struct FrameRequest {
   bool want_depth = false, want_normals = false, want_positions = false, want_hits = false;
   bool want_bounds = false;  ///< of the error of each pixel; needs RendererOptions::with_bounds
 
-  /// Called after each pass, those for smooth normals included. Return false to stop; the frame is
-  /// the picture so far.
+  /// Called after each pass, those for smooth normals and ambient rays included. Return false to
+  /// stop; the frame is the picture so far.
   std::function<bool(const Progress &)> on_pass{};
 };
 
@@ -92,6 +101,8 @@ struct FrameStatistics {
   std::uint32_t normals_passes = 0;               ///< of these, for smooth normals
   std::uint64_t normals_decoded_blocks = 0;       ///< of these, for smooth normals
   double normals_ms = 0;                          ///< of total_ms
+  std::uint32_t ambient_passes = 0;               ///< of these, for ambient rays
+  double ambient_ms = 0;                          ///< of total_ms
   std::uint64_t uploaded_bytes = 0;               ///< of a compressed volume that stays on the host
   std::uint32_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
   double total_ms = 0;     ///< wall clock, from camera to finished hits on the device

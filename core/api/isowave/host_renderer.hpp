@@ -18,11 +18,6 @@ struct HostRendererOptions {
   std::uint32_t num_threads = 0;  ///< 0: one per processor. The result is the same for any number
 };
 
-/// In world space: origin + t direction, t from 0 on.
-struct Ray {
-  Vector3 origin, direction;
-};
-
 /// Keeps the whole volume decoded in host memory. May be used from several threads: frames are
 /// drawn one after the other.
 class HostRenderer {

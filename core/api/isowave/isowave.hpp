@@ -15,6 +15,7 @@
 #include "isowave/error.hpp"
 #include "isowave/frame.hpp"
 #include "isowave/host_renderer.hpp"
+#include "isowave/mesh.hpp"
 #include "isowave/quick_renderer.hpp"
 #include "isowave/renderer.hpp"
 #include "isowave/version.hpp"

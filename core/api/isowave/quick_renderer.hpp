@@ -39,6 +39,9 @@ class QuickRenderer {
   ///         renderer was made
   Frame render(const FrameRequest &request);
 
+  /// As Renderer::cast_rays() does, by whichever renderer there is.
+  Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
+
   /// The view that Renderer::camera() takes, from whichever renderer there is.
   ///
   /// Throws  Error: NaN; as render() does

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "isowave/device.hpp"
 #include "isowave/frame.hpp"
@@ -21,6 +22,7 @@ struct RendererOptions {
   bool with_levels = false;       ///< frames may use levels of detail
   bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error
   bool with_time_budget = false;  ///< frames may have a time budget
+  bool with_rays = false;         ///< frames may have ambient rays, and cast_rays() may be called
 };
 
 /// May be used from several threads: frames are drawn one after the other.
@@ -41,6 +43,13 @@ class Renderer {
   /// Throws  Error: a request that the renderer was not made for, a degenerate camera, a NaN;
   ///         further frames are drawn as if it had not been
   Frame render(const FrameRequest &request);
+
+  /// The first hit of each ray, in the finest level of detail: from a frame of one row, with depth
+  /// (in lengths of the ray's direction), normals, positions and hits. Needs with_rays.
+  ///
+  /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
+  ///         1e7 voxels away from the volume's origin
+  Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
 
   /// A view from the front right and above in which the isosurface fills a picture of that size
   /// (none: of the largest); the volume, where there is no surface.

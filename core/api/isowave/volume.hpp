@@ -29,6 +29,13 @@ struct Grid {
   std::array<Vector3, 3> direction{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 };
 
+/// Voxels of a grid: begin, begin + step, ... below end, along x, y, z.
+struct Region {
+  std::array<std::uint32_t, 3> begin{};
+  std::array<std::uint32_t, 3> end{};
+  std::array<std::uint32_t, 3> step{1, 1, 1};
+};
+
 /// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact; at 8 bits a
 /// voxel where none is given. Compression takes memory for the result and a few layers of voxels.
 struct Compression {
@@ -78,6 +85,11 @@ class Volume {
   ///
   /// Throws  Error: there is no such level
   std::vector<float> decode(std::uint32_t level = 0) const;
+  /// Decodes voxels of a level: [nz][ny][nx] of those in the region. Only blocks of 4^3 voxels that
+  /// have some of these are decoded, and only they are read where the volume stays in a file.
+  ///
+  /// Throws  Error: there is no such level; a side of the region is empty, or ends outside
+  std::vector<float> decode(std::uint32_t level, const Region &region) const;
   /// Decodes blocks that are spread over the volume, for histograms: about max_voxels voxels, the
   /// same ones each time; all, where there are no more.
   std::vector<float> sample(std::uint64_t max_voxels) const;

@@ -16,6 +16,8 @@ from isowave import _loader
 _loader.prepare()
 
 from isowave._core import Error, __version__  # noqa: E402
+from isowave._levels import Level  # noqa: E402
+from isowave._mesh import Mesh  # noqa: E402
 from isowave._renderer import Camera, Image, Renderer  # noqa: E402
 from isowave._report import Report, devices  # noqa: E402
 from isowave._volume import Volume, compress, open, view  # noqa: E402
@@ -24,6 +26,8 @@ __all__ = [
     "Camera",
     "Error",
     "Image",
+    "Level",
+    "Mesh",
     "Renderer",
     "Report",
     "Volume",

@@ -12,6 +12,7 @@ __version__: str
 class Error(RuntimeError): ...
 
 Vector = tuple[float, float, float] | list[float]
+Index3 = tuple[int, int, int]
 CameraTuple = tuple[
     tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float
 ]
@@ -42,9 +43,20 @@ class Volume:
     @property
     def num_levels(self) -> int: ...
     def level_dims(self, level: int) -> list[int]: ...
-    def decode(self, level: int) -> NDArray[np.float32]: ...
+    def decode(
+        self, level: int, begin: Index3, end: Index3, step: Index3
+    ) -> NDArray[np.float32]: ...
     def sample(self, max_voxels: int) -> NDArray[np.float32]: ...
     def save(self, path: str | PathLike[str]) -> None: ...
+    def extract(
+        self,
+        device: str,
+        isovalue: float,
+        level: int,
+        normals: bool,
+        memory_budget: int,
+        progress: Callable[[str, float], object] | None,
+    ) -> dict[str, NDArray[Any]]: ...
 
 def compress(
     read: Callable[[int, int], NDArray[Any]],
@@ -107,6 +119,9 @@ class Renderer:
         on_pass: Callable[[PassView], bool | None] | None,
         interrupts: bool,
     ) -> dict[str, Any]: ...
+    def cast_rays(
+        self, rays: NDArray[np.float64], isovalue: float, smooth: bool
+    ) -> dict[str, Any]: ...
     def camera(self, isovalue: float, width: int, height: int) -> CameraTuple: ...
     @property
     def device(self) -> dict[str, Any]: ...
@@ -115,3 +130,9 @@ class Renderer:
     def wait(self) -> None: ...
     @property
     def memory_bytes(self) -> int: ...
+def save_mesh(
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    normals: NDArray[np.float32] | None,
+    path: str | PathLike[str],
+) -> None: ...

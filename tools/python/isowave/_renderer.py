@@ -186,6 +186,7 @@ def needed_options(request: dict[str, Any]) -> dict[str, Any]:
     needed: dict[str, Any] = {
         "bounds": bounds,
         "time_budget": request.get("time_budget") is not None,
+        "rays": request.get("ambient", 0) != 0,
     }
     needed["levels"] = bool(bounds or request.get("voxel_pixels") or needed["time_budget"])
     if request.get("samples", 1) != 1:
@@ -213,6 +214,7 @@ def request_for(
     voxel_pixels: float = 0.0,
     voxel_error: float = 0.0,
     time_budget: float | None = None,
+    ambient: int = 0,
 ) -> dict[str, Any]:
     """What the compiled part is asked for; arguments as Renderer.render()."""
     return {
@@ -231,6 +233,7 @@ def request_for(
         "voxel_error": voxel_error,
         "max_surface_error": max_error,
         "time_budget_ms": None if time_budget is None else 1000 * time_budget,
+        "ambient_rays": ambient,
         "want_picture": "rgb" in outputs,
         "want_depth": "depth" in outputs,
         "want_normals": "normals" in outputs,
@@ -255,6 +258,26 @@ def draw(
     return renderer.render(request, callback, interrupts and is_main)
 
 
+def cast_rays(
+    renderer: _core.Renderer | _core.HostRenderer,
+    rays: npt.ArrayLike,
+    isovalue: float,
+    normals: str,
+) -> dict[str, npt.NDArray[Any]]:
+    """See Volume.cast_rays()."""
+    array = np.ascontiguousarray(rays, np.float64)
+    if array.ndim == 0 or array.shape[-1] != 6:
+        raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
+    found = renderer.cast_rays(array.reshape(-1, 6), isovalue, is_smooth(normals))
+    lead = array.shape[:-1]
+    return {
+        "t_hit": found["depth"].reshape(lead),
+        "normals": found["normals"].reshape(*lead, 3),
+        "position": found["positions"].reshape(*lead, 3),
+        "cell": found["cells"][..., ::-1].reshape(*lead, 3),
+    }
+
+
 class Renderer:
     """Draws frames of one volume on one device. Threads may share it: frames take turns.
 
@@ -271,9 +294,9 @@ class Renderer:
         Of device memory [bytes]; None: three quarters of it. Bounds all that is taken there.
     cache_blocks
         Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows.
-    levels, bounds, time_budget
+    levels, bounds, time_budget, rays
         Whether frames may use levels of detail, ask for `max_error` and bounds, have a
-        `time_budget`.
+        `time_budget`; whether they may have `ambient` rays, and cast_rays() may be called.
     profiling
         Measures stages, for statistics["stage_ms"]; each pass is waited for.
     quick
@@ -284,7 +307,7 @@ class Renderer:
     """
 
     #: Of the constructor's arguments, what frames may ask for only if it was given.
-    CAPABILITIES = ("levels", "bounds", "time_budget")
+    CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
 
     def __init__(
         self,
@@ -298,13 +321,19 @@ class Renderer:
         levels: bool = False,
         bounds: bool = False,
         time_budget: bool = False,
+        rays: bool = False,
         profiling: bool = False,
         quick: bool = False,
     ) -> None:
         self.volume = volume
         self.size = size_of(size)
         self.max_rays = self.size[0] * self.size[1] * samples**2
-        self._can = {"levels": levels, "bounds": bounds, "time_budget": time_budget}
+        self._can = {
+            "levels": levels,
+            "bounds": bounds,
+            "time_budget": time_budget,
+            "rays": rays,
+        }
         self._core = _core.Renderer(
             "" if device is None else str(device),
             volume._core,
@@ -317,6 +346,7 @@ class Renderer:
                 "with_levels": levels,
                 "with_bounds": bounds,
                 "with_time_budget": time_budget,
+                "with_rays": rays,
                 "profiling": profiling,
                 "quick": quick,
             },
@@ -361,6 +391,7 @@ class Renderer:
         voxel_pixels: float = 0.0,
         voxel_error: float = 0.0,
         time_budget: float | None = None,
+        ambient: int = 0,
         on_pass: Callable[[Progress], bool | None] | None = None,
     ) -> Image:
         """Draws a frame. Decoded blocks are kept for the next.
@@ -391,6 +422,10 @@ class Renderer:
             Decoded voxels may be off by so much from the compressed ones.
         time_budget
             Draws what can be drawn in so many seconds. Needs time_budget=True.
+        ambient
+            Rays of each hit, up to 255, that find out how much of the sky it sees, which makes
+            depth visible: 16 and more look smooth. Each takes about as long as the frame without.
+            Needs rays=True.
         on_pass
             Called after each pass with the picture so far; False from it stops the frame.
 
@@ -399,7 +434,7 @@ class Renderer:
         Error
             A request that the renderer was not made for, in one line. The next is not affected.
         """
-        self._check(max_error, voxel_pixels, time_budget, outputs)
+        self._check(max_error, voxel_pixels, time_budget, ambient, outputs)
         picture_size = self.size if size is None else size_of(size)
         request = request_for(
             isovalue,
@@ -414,6 +449,7 @@ class Renderer:
             voxel_pixels=voxel_pixels,
             voxel_error=voxel_error,
             time_budget=time_budget,
+            ambient=ambient,
         )
         # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
         # pass would cost time.
@@ -426,6 +462,7 @@ class Renderer:
         max_error: float | None,
         voxel_pixels: float,
         time_budget: float | None,
+        ambient: int,
         outputs: Sequence[str],
     ) -> None:
         unknown = set(outputs) - {*ALL_OUTPUTS, "bounds"}
@@ -436,10 +473,19 @@ class Renderer:
             "bounds": ("max_error", max_error is not None or "bounds" in outputs),
             "levels": ("voxel_pixels", voxel_pixels > 0),
             "time_budget": ("time_budget", time_budget is not None),
+            "rays": ("ambient", ambient != 0),
         }
         for option, (argument, is_asked) in asked.items():
             if is_asked and not self._can[option]:
                 raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
+
+    def cast_rays(
+        self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
+    ) -> dict[str, npt.NDArray[Any]]:
+        """As Volume.cast_rays(), on the device, from compressed blocks: needs rays=True."""
+        if not self._can["rays"]:
+            raise _core.Error("cast_rays needs a renderer that was made with rays=True")
+        return cast_rays(self._core, rays, isovalue, normals)
 
     def passes(self, isovalue: float, **request: Any) -> Iterator[Image]:
         """The picture after each pass, the last one finished; arguments as render().
@@ -461,7 +507,7 @@ class Renderer:
                 return
 
         def on_pass(progress: Progress) -> bool:
-            if progress.completed_percent == 100:
+            if progress.completed_percent == 100 and not request.get("ambient"):
                 return True  # the finished picture follows
             statistics: dict[str, Any] = {"passes": progress.passes, "complete": False}
             statistics["completed_percent"] = progress.completed_percent

@@ -6,7 +6,7 @@ import html
 import os
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,13 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._arrays import as_source
+from isowave._levels import Level
+from isowave._mesh import Mesh
 from isowave._renderer import (
     Camera,
     Image,
     Renderer,
+    cast_rays,
     draw,
     is_smooth,
     needed_options,
@@ -249,8 +252,12 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
 class Volume:
     """A compressed volume. It cannot be changed, and threads may share it.
 
-    Made by compress() and open().
+    Made by compress() and open(). It is an array of float32, (z, y, x), that is decoded where it is
+    indexed: volume[10], volume[10:20, ::4, -1]. Level has more of that.
     """
+
+    ndim = 3
+    dtype = Level.dtype  # of what indexing gives
 
     def __init__(self, core: _core.Volume) -> None:
         self._core = core
@@ -264,6 +271,11 @@ class Volume:
         """Voxels along (z, y, x)."""
         x, y, z = self._core.dims
         return z, y, x
+
+    @property
+    def size(self) -> int:
+        """Voxels."""
+        return self.levels[0].size
 
     @property
     def spacing(self) -> tuple[float, float, float]:
@@ -284,7 +296,7 @@ class Volume:
         return np.ascontiguousarray(columns.T)
 
     @property
-    def dtype(self) -> np.dtype[Any]:
+    def source_dtype(self) -> np.dtype[Any]:
         """Of the voxels before compression."""
         return np.dtype(self._core.source_type)
 
@@ -327,20 +339,45 @@ class Volume:
             raise ValueError(f"level {level} of a volume that has {self.num_levels}: from 0 on")
         return level
 
-    def decode(self, level: int = 0) -> npt.NDArray[np.float32]:
-        """All voxels, float32, (z, y, x).
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """The levels of detail as arrays, the volume itself first: volume.levels[2][5]."""
+        return tuple(Level(self._core, number) for number in range(self.num_levels))
 
-        level: of detail; each has half the voxels of the last along each axis.
+    def decode(self, level: int = 0, region: Any = ...) -> npt.NDArray[np.float32]:
+        """Voxels of a level of detail, float32, (z, y, x).
+
+        Parameters
+        ----------
+        level
+            Each has half the voxels of the last along each axis.
+        region
+            What one would index an array of the level with: numpy.s_[10:20, :, 5]. Only the blocks
+            of 4 x 4 x 4 voxels that hold these voxels are decoded.
+
+        Raises
+        ------
+        ValueError
+            There is no such level.
+        IndexError
+            The region is none of the level, in one line.
         """
-        return self._core.decode(self._checked(level))
+        voxels: npt.NDArray[np.float32] = np.asarray(self.levels[self._checked(level)][region])
+        return voxels
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __iter__(self) -> Iterator[npt.NDArray[np.float32]]:
+        return iter(self.levels[0])
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.levels[0][key]
 
     def __array__(
         self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
     ) -> npt.NDArray[Any]:
-        if copy is False:
-            raise ValueError("a volume is decoded into a new array: copy=False is not possible")
-        voxels: npt.NDArray[Any] = self.decode()
-        return voxels if dtype is None else voxels.astype(dtype)
+        return self.levels[0].__array__(dtype, copy)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .zfp file, which open() and the program read; whole, or not at all."""
@@ -433,12 +470,14 @@ class Volume:
         return self._host
 
     def cast_rays(
-        self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
+        self,
+        rays: npt.ArrayLike,
+        isovalue: float,
+        *,
+        normals: str = "smooth",
+        device: str | int | None = None,
     ) -> dict[str, npt.NDArray[Any]]:
         """Where rays of any origin and direction first cross the isosurface.
-
-        On the host, without a device. The first call decodes the whole volume, which takes 4.4
-        bytes a voxel until the volume goes: at most a quarter of the host's memory.
 
         Parameters
         ----------
@@ -448,6 +487,11 @@ class Volume:
             The surface is where the trilinear field crosses this value.
         normals
             "smooth", or "cell": of the trilinear field itself.
+        device
+            "gpu", "cpu", an index, or a part of a name: casts them there, from compressed blocks.
+            None: on the host, where the first call decodes the whole volume, which takes 4.4 bytes
+            a voxel until the volume goes; volumes that would take more than a quarter of the host's
+            memory are left to the default device. The result is the same.
 
         Returns
         -------
@@ -456,20 +500,59 @@ class Volume:
             space, of length 1, away from larger values. position: (..., 3), world space, nan where
             nothing is hit. cell: (..., 3), (z, y, x) of the voxel at the cell's lowest corner.
         """
-        array = np.ascontiguousarray(rays, np.float64)
-        if array.ndim == 0 or array.shape[-1] != 6:
-            raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
-        smooth = is_smooth(normals)
         with self._lock:
-            host = self._host_renderer()
-        found = host.cast_rays(array.reshape(-1, 6), isovalue, smooth)
-        lead = array.shape[:-1]
-        return {
-            "t_hit": found["depth"].reshape(lead),
-            "normals": found["normals"].reshape(*lead, 3),
-            "position": found["positions"].reshape(*lead, 3),
-            "cell": found["cells"][..., ::-1].reshape(*lead, 3),
-        }
+            if device is None and self._fits_host():
+                host = self._host_renderer()
+            else:
+                renderer = self._renderer_for({"device": device, "rays": True})
+                return renderer.cast_rays(rays, isovalue, normals=normals)
+        return cast_rays(host, rays, isovalue, normals)
+
+    def _fits_host(self) -> bool:
+        try:
+            self._host_renderer()
+        except _core.Error:
+            return False
+        return True
+
+    def extract(
+        self,
+        isovalue: float,
+        *,
+        level: int = 0,
+        normals: bool = True,
+        device: str | int | None = None,
+        memory_budget: int | None = None,
+        progress: Progress | None = None,
+    ) -> Mesh:
+        """The isosurface as triangles, by marching cubes on the device.
+
+        The result is in memory; `isowave extract` writes surfaces that are larger to a file.
+
+        Parameters
+        ----------
+        isovalue
+            The surface is where the field crosses this value along edges between voxels.
+        level
+            Of detail; each has half the voxels of the last along each axis.
+        normals
+            Of vertices: central differences of voxels. Without, fewer blocks are decoded.
+        device
+            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
+        memory_budget
+            Of device memory [bytes]; None: three quarters of it.
+        progress
+            Called with what is done and how much of it, 0 to 1.
+        """
+        found = self._core.extract(
+            "" if device is None else str(device),
+            isovalue,
+            self._checked(level),
+            normals,
+            memory_budget or 0,
+            progress,
+        )
+        return Mesh(found["vertices"], found["faces"], found["normals"] if normals else None)
 
     def verify(
         self,
@@ -516,7 +599,7 @@ class Volume:
     def __repr__(self) -> str:
         shape = " x ".join(str(n) for n in self.shape)
         return (
-            f"<isowave.Volume {shape} (z, y, x) {self.dtype}, "
+            f"<isowave.Volume {shape} (z, y, x) {self.source_dtype}, "
             f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel>"
         )
 
@@ -525,7 +608,7 @@ class Volume:
         rows = {
             "shape (z, y, x)": " x ".join(str(n) for n in self.shape),
             "spacing": ", ".join(f"{s:g}" for s in self.spacing),
-            "values": f"{self.dtype}, {least:g} to {largest:g}",
+            "values": f"{self.source_dtype}, {least:g} to {largest:g}",
             "compressed": f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel",
             "largest error": "not known" if self.max_error is None else f"{self.max_error:.3g}",
             "levels of detail": str(self.num_levels),

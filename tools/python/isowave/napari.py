@@ -2,8 +2,8 @@
 
 napari chooses a level by the zoom in 2D, and in 3D always shows the coarsest of a layer. So a layer
 has the levels from the volume itself to the finest that a texture holds, and none coarser:
-3D shows that one. Levels are decoded when they are looked at; `decode` gives whole levels, so a
-level is decoded whole, and kept as float32 for as long as the layer lives.
+3D shows that one. Slices decode their own blocks of 4 x 4 x 4 voxels, each time; a level that is
+shown whole is kept as float32 for as long as the layer lives.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 import os
 import threading
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave._core import Error
+from isowave._levels import Level, split_key
 from isowave._renderer import Camera, Image, vector
 from isowave._volume import Volume, open
 
@@ -34,101 +34,72 @@ SILHOUETTE = 10.0
 LayerData = tuple[Any, dict[str, Any], str]
 
 
-class Level:
-    """A level of a volume as napari wants arrays: decoded when it is first indexed.
+class ShownLevel(Level):
+    """A level of a volume as napari wants arrays.
 
     Voxel k of level n lies at voxel 2^n k of the volume, and napari takes the ratio of their sides
     for the ratio of their voxels. So of the level's voxels those are shown that make it so: sides
     divided by 2^n, rounded up. What lies behind the volume's last voxel goes. Where 2^n does not
     divide a side, napari shows the level up to one of its voxels away from its place.
+
+    napari cuts out what its canvas shows, through all slices, before it takes one of them. So a box
+    of a level is decoded when it is indexed in turn, or made an array.
     """
 
-    ndim = 3
-    dtype = np.dtype(np.float32)
-
-    def __init__(self, volume: Volume, level: int) -> None:
-        self._volume, self._level = volume, level
-        z, y, x = (-(-n // (1 << level)) for n in volume.shape)
-        self.shape = (z, y, x)
+    def __init__(self, volume: Volume, number: int) -> None:
+        super().__init__(volume._core, number, [-(-n // (1 << number)) for n in volume.shape])
         self._lock = threading.Lock()
         self._voxels: npt.NDArray[np.float32] | None = None
 
     @property
-    def size(self) -> int:
-        z, y, x = self.shape
-        return z * y * x
-
-    @property
-    def nbytes(self) -> int:
-        """When it is decoded."""
-        return self.size * self.dtype.itemsize
-
-    @property
-    def is_decoded(self) -> bool:
+    def is_kept(self) -> bool:
+        """Whether all of it has been decoded."""
         return self._voxels is not None
 
-    def __len__(self) -> int:
-        return self.shape[0]
-
     def __getitem__(self, key: Any) -> Any:
-        return self._decoded()[key]
+        ranges, then = split_key(key, self.shape)
+        if then == (slice(None),) * 3:
+            return Box(self, ranges)
+        return self._decode(ranges)[then]
 
-    def __array__(
-        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
-    ) -> npt.NDArray[Any]:
-        return np.array(self._decoded(), dtype=dtype, copy=copy)
-
-    def __repr__(self) -> str:
-        return f"<level {self._level} of {self._volume!r}>"
-
-    def _decoded(self) -> npt.NDArray[np.float32]:
-        with self._lock:  # napari slices in threads, too
-            if self._voxels is None:
-                z, y, x = self.shape
-                self._voxels = self._volume.decode(self._level)[:z, :y, :x]
-            return self._voxels
-
-
-def host_memory() -> int:
-    """Of the machine [bytes]."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return 1 << 63  # not told
+    def _decode(self, ranges: Sequence[range]) -> npt.NDArray[np.float32]:
+        if self._voxels is None:
+            if [*ranges] != [range(n) for n in self.shape]:
+                return super()._decode(ranges)
+            with self._lock:  # napari slices in threads, too
+                if self._voxels is None:
+                    self._voxels = super()._decode(ranges)
+                    self._voxels.setflags(write=False)  # what is indexed is a part of it
+        z, y, x = (slice(r.start, r.stop, r.step) for r in ranges)
+        return self._voxels[z, y, x]
 
 
-def levels_of(
-    volume: Volume, *, texture: int = LARGEST_TEXTURE, memory: int | None = None
-) -> tuple[int, list[Level]]:
-    """The levels of a layer, finest first, and which one of the volume the first is.
+class Box(Level):
+    """Some of a level's voxels, not decoded yet."""
 
-    Parameters
-    ----------
-    texture
-        Voxels that a 3D texture may have: the last level is the first that does not exceed it, or
-        the volume's coarsest.
-    memory
-        Decoded levels may take as much [bytes]; finer ones are left out, with a warning. None: half
-        of the machine's.
+    def __init__(self, level: ShownLevel, ranges: Sequence[range]) -> None:
+        super().__init__(level._core, level._number, [len(r) for r in ranges])
+        self._level, self._ranges = level, ranges
+
+    def _decode(self, ranges: Sequence[range]) -> npt.NDArray[np.float32]:
+        inside = zip(self._ranges, ranges)
+        return self._level._decode([box[r.start : r.stop : r.step] for box, r in inside])
+
+
+def levels_of(volume: Volume, *, texture: int = LARGEST_TEXTURE) -> list[ShownLevel]:
+    """The levels of a layer, finest first.
+
+    texture: voxels that a 3D texture may have. The last level is the first that does not exceed it,
+    or the volume's coarsest.
     """
-    levels = [Level(volume, level) for level in range(volume.num_levels)]
-    budget = host_memory() // 2 if memory is None else memory
-    first, last = 0, 0
-    while first + 1 < len(levels) and levels[first].nbytes > budget:
-        first += 1
-    if first > 0:
-        warnings.warn(
-            f"the volume takes {levels[0].nbytes / 2**30:.1f} GiB decoded: "
-            f"the layer begins with level {first}",
-            stacklevel=2,
-        )
-    last = first
+    levels = [ShownLevel(volume, number) for number in range(volume.num_levels)]
+    last = 0
     while last + 1 < len(levels) and not fits_texture(levels[last], texture):
         last += 1
-    return first, levels[first : last + 1]
+    return levels[: last + 1]
 
 
-def fits_texture(level: Level, texture: int) -> bool:
+def fits_texture(level: ShownLevel, texture: int) -> bool:
     return level.size <= texture and max(level.shape) <= LONGEST_SIDE
 
 
@@ -138,11 +109,10 @@ def layer_data(volume: Volume, **options: Any) -> LayerData:
     Scale and translate are the volume's spacing and origin, (z, y, x); affine is there where the
     volume's axes are not those of the world. options: of levels_of().
     """
-    first, levels = levels_of(volume, **options)
-    scale = [2**first * s for s in volume.spacing]
+    levels = levels_of(volume, **options)
     attributes: dict[str, Any] = {
         "multiscale": True,
-        "scale": scale,
+        "scale": list(volume.spacing),
         "translate": list(volume.origin),
         "metadata": {"isowave": volume},
     }
@@ -164,7 +134,7 @@ def add_volume(viewer: Any, volume: Volume, **options: Any) -> Any:
 
     options: of levels_of(), and of viewer.add_image().
     """
-    own = {name: options.pop(name) for name in ("texture", "memory") if name in options}
+    own = {"texture": options.pop("texture")} if "texture" in options else {}
     levels, attributes, _ = layer_data(volume, **own)
     return viewer.add_image(levels, **{**attributes, **options})
 

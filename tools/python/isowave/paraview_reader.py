@@ -32,17 +32,11 @@ from vtkmodules.numpy_interface import dataset_adapter
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
 
-# libcfitsio, which ParaView may have loaded, has functions of the same names as libzfp: with this
-# flag, libraries call those that they were linked with.
-flags = sys.getdlopenflags()
-sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))
 try:
     import isowave
 except ImportError:
     sys.path.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     import isowave
-finally:
-    sys.setdlopenflags(flags)
 
 
 @smproxy.reader(

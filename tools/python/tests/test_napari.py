@@ -6,7 +6,7 @@ import types
 
 import numpy as np
 import pytest
-from conftest import sphere_voxels
+from conftest import RecordingCore, sphere_voxels
 
 npe2 = pytest.importorskip("npe2", reason="npe2 is not installed")
 components = pytest.importorskip("napari.components", reason="napari is not installed")
@@ -108,14 +108,21 @@ def test_bad_files_get_one_line(tmp_path):
         assert "\n" not in str(raised.value) and name in str(raised.value)
 
 
-def test_levels_are_decoded_when_they_are_looked_at(volume):
-    first, levels = ours.levels_of(volume, texture=1)
-    assert first == 0 and len(levels) == volume.num_levels == 4
+def recorded(volume):
+    """The same volume; how many blocks each decoding takes is in ._core.blocks."""
+    return isowave.Volume(RecordingCore(volume._core))
+
+
+def test_slices_decode_their_own_blocks(volume):
+    volume = recorded(volume)
+    levels = ours.levels_of(volume, texture=1)
+    assert len(levels) == volume.num_levels == 4
     assert [level.shape for level in levels] == [SHAPE, (20, 23, 25), (10, 12, 13), (5, 6, 7)]
-    assert not any(level.is_decoded for level in levels)
+    assert volume._core.blocks == []
     z, y, x = levels[1].shape
     assert np.array_equal(levels[1][4], volume.decode(1)[4, :y, :x])
-    assert [level.is_decoded for level in levels] == [False, True, False, False]
+    assert volume._core.blocks == [6 * 7, 6 * 6 * 7]
+    assert not any(level.is_kept for level in levels)
     for k, level in enumerate(levels):
         z, y, x = level.shape
         assert level.ndim == 3 and level.size == z * y * x and len(level) == z
@@ -124,27 +131,42 @@ def test_levels_are_decoded_when_they_are_looked_at(volume):
         assert np.array_equal(voxels, volume.decode(k)[:z, :y, :x])
 
 
+def test_boxes_are_decoded_when_they_are_indexed(volume):
+    volume = recorded(volume)
+    level, voxels = ours.levels_of(volume)[0], volume.decode()
+    volume._core.blocks.clear()
+    box = level[2:30, ::3, 5:]
+    assert box.shape == (28, 15, 45) and box.dtype == np.float32 and volume._core.blocks == []
+    assert np.array_equal(box[7], voxels[9, ::3, 5:])
+    assert np.array_equal(box[-1, ::-2, 1:9:3], voxels[29, ::3, 5:][::-2, 1:9:3])
+    assert volume._core.blocks == [11 * 12, 8 * 3]
+    assert np.array_equal(np.asarray(box), voxels[2:30, ::3, 5:])
+    assert level[5:5, :, :][0:3].shape == (0, 45, 50)
+
+
+def test_whole_levels_are_kept(volume):
+    volume = recorded(volume)
+    level = ours.levels_of(volume)[0]
+    whole = level[...]
+    assert level.is_kept and volume._core.blocks == [10 * 12 * 13]
+    assert isinstance(whole, np.ndarray) and np.array_equal(whole, np.asarray(level))
+    assert np.array_equal(level[3, ::-2], whole[3, ::-2])
+    assert volume._core.blocks == [10 * 12 * 13]
+    with pytest.raises(ValueError, match="read-only"):
+        whole[0, 0, 0] = 1
+
+
 def test_the_layer_ends_with_the_first_level_that_fits_a_texture(volume):
-    assert len(ours.levels_of(volume)[1]) == 1
+    assert len(ours.levels_of(volume)) == 1
     for k in range(volume.num_levels):
-        size = ours.Level(volume, k).size
-        assert len(ours.levels_of(volume, texture=size)[1]) == k + 1
-        assert len(ours.levels_of(volume, texture=size - 1)[1]) == min(k + 2, volume.num_levels)
+        size = ours.ShownLevel(volume, k).size
+        assert len(ours.levels_of(volume, texture=size)) == k + 1
+        assert len(ours.levels_of(volume, texture=size - 1)) == min(k + 2, volume.num_levels)
 
 
 def test_a_side_longer_than_textures_have_is_halved():
     volume = isowave.compress(np.zeros((9, 9, 2049), np.uint8), exact=True, levels=0)
-    assert [level.shape for level in ours.levels_of(volume)[1]] == [(9, 9, 2049), (5, 5, 1025)]
-
-
-def test_levels_beyond_the_memory_are_left_out(volume):
-    memory = ours.Level(volume, 1).nbytes
-    with pytest.warns(UserWarning, match="the layer begins with level 1"):
-        levels, attributes, _ = ours.layer_data(volume, memory=memory)
-    assert levels[0].shape == (20, 23, 25)
-    assert attributes["scale"] == [6, 4, 2] and tuple(attributes["translate"]) == ORIGIN
-    with pytest.warns(UserWarning, match="the layer begins with level 2"):
-        assert ours.levels_of(volume, memory=memory - 1)[0] == 2
+    assert [level.shape for level in ours.levels_of(volume)] == [(9, 9, 2049), (5, 5, 1025)]
 
 
 def test_a_viewer_opens_a_file(plugin, viewer, path):
@@ -156,12 +178,32 @@ def test_a_viewer_opens_a_file(plugin, viewer, path):
 
 
 def test_a_viewer_decodes_what_it_shows(viewer, volume):
+    volume = recorded(volume)
     layer = ours.add_volume(viewer, volume, texture=10 * 12 * 13, name="ball", colormap="bone")
     assert layer.name == "ball" and layer.colormap.name == "bone"
-    assert [level.is_decoded for level in layer.data] == [False, False, True]
+    # napari begins with a slice of the coarsest level, which has 3 x 3 x 4 blocks.
+    assert volume._core.blocks and max(volume._core.blocks) <= 3 * 4
+    volume._core.blocks.clear()
+    layer.data_level = 0
+    layer.corner_pixels = np.array([[0, 0, 0], [39, 44, 49]])
+    volume._core.blocks.clear()
+    viewer.dims.set_current_step(0, 5)
+    assert volume._core.blocks == [12 * 13, 3 * 4]  # of one slice; the thumbnail's
+    assert np.array_equal(layer._slice.image.raw, volume[5])
+    layer.corner_pixels = np.array([[0, 8, 0], [39, 15, 3]])
+    layer.refresh()
+    assert volume._core.blocks[-2:] == [2 * 1, 3 * 4]
+    viewer.dims.order = (2, 0, 1)
+    layer.data_level = 0
+    layer.corner_pixels = np.array([[0, 0, 0], [39, 44, 49]])
+    volume._core.blocks.clear()
+    viewer.dims.set_current_step(2, 49)
+    assert volume._core.blocks == [10 * 12, 3 * 3]
+    viewer.dims.order = (0, 1, 2)
+    assert not any(level.is_kept for level in layer.data)
     viewer.dims.ndisplay = 3
     assert layer.data_level == 2
-    assert [level.is_decoded for level in layer.data] == [False, False, True]
+    assert [level.is_kept for level in layer.data] == [False, False, True]
     # napari places voxel k of a level by these; 45 and 50 are not multiples of 4.
     factors = layer.downsample_factors
     assert factors[2, 0] == 4 and np.array_equal(factors[1, [0, 2]], [2, 2])

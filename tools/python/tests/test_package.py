@@ -34,7 +34,7 @@ def test_volume_says_what_it_is(volume):
     assert volume.spacing == (3, 2, 1)
     assert volume.origin == (30, 20, 10)
     assert np.array_equal(volume.direction, np.eye(3))
-    assert volume.dtype == np.float32
+    assert volume.dtype == volume.source_dtype == np.float32
     voxels = sphere_voxels()
     assert volume.value_range == (voxels.min(), voxels.max())
     assert np.abs(volume.decode() - voxels).max() == pytest.approx(volume.max_error)
@@ -61,7 +61,7 @@ def test_every_type_is_compressed_without_loss_where_asked(dtype):
     voxels = np.arange(5 * 4 * 3).reshape(5, 4, 3).astype(dtype)
     exact = np.issubdtype(dtype, np.integer)
     volume = isowave.compress(voxels, exact=exact, tolerance=None if exact else 1e-3)
-    assert volume.dtype == np.dtype(dtype)
+    assert volume.source_dtype == np.dtype(dtype)
     assert np.abs(volume.decode() - voxels).max() <= (0 if exact else 1e-3)
 
 
@@ -176,10 +176,38 @@ def test_rays_of_any_origin(volume):
     assert one["t_hit"].shape == () and one["normals"].shape == (3,)
     away = volume.cast_rays([[*camera.eye, *(np.array(camera.eye) - camera.at)]], 6)
     assert np.isinf(away["t_hit"]).all() and np.isnan(away["position"]).all()
-    for bad in ([1, 2, 3], np.zeros((2, 6)), [[0, 0, 0, np.nan, 0, 1]]):
-        with pytest.raises((ValueError, isowave.Error)) as raised:
-            volume.cast_rays(bad, 6)
-        assert "\n" not in str(raised.value)
+    for device in (None, "cpu"):
+        again = volume.cast_rays(rays, 6, device=device)
+        for name, values in found.items():
+            assert np.array_equal(again[name], values, equal_nan=name == "position")
+        for bad in ([1, 2, 3], np.zeros((2, 6)), [[0, 0, 0, np.nan, 0, 1]]):
+            with pytest.raises((ValueError, isowave.Error)) as raised:
+                volume.cast_rays(bad, 6, device=device)
+            assert "\n" not in str(raised.value)
+
+
+def test_ambient_rays_darken_what_sees_little_of_the_sky():
+    """The inside of a hollow ball, the same on host and device; depth stays."""
+    z, y, x = np.indices((30, 28, 26))
+    shell = np.abs(np.sqrt((z - 14.5) ** 2 + (y - 13.5) ** 2 + (x - 12.5) ** 2) - 9)
+    hollow = isowave.compress(10 - shell, rate=16)
+    camera = isowave.Camera((12.5, 13.5, 14.5), (13.5, 13.5, 14.5))
+    plain = hollow.render(9, size=SIZE, camera=camera)
+    renderer = hollow.renderer(size=SIZE, rays=True)
+    dark = renderer.render(9, camera=camera, ambient=8)
+    assert np.array_equal(dark.depth, plain.depth)
+    assert (dark.rgb < plain.rgb).all(), "none of the sky is seen from within"
+    assert dark.statistics["ambient_passes"] >= 8
+    assert np.array_equal(hollow.render(9, size=SIZE, camera=camera, ambient=8).rgb, dark.rgb)
+    outside = hollow.camera(9, size=SIZE)
+    plain, lit = (renderer.render(9, camera=outside, ambient=n) for n in (0, 8))
+    assert np.array_equal(lit.rgb, plain.rgb), "a ball from outside sees all of the sky"
+    last = [image.rgb for image in renderer.passes(9, camera=camera, ambient=3)][-1]
+    assert np.array_equal(last, renderer.render(9, camera=camera, ambient=3).rgb)
+    with pytest.raises(isowave.Error, match="rays=True"):
+        hollow.renderer(size=SIZE).render(9, ambient=1)
+    with pytest.raises(isowave.Error, match="256 ambient rays of a hit are too many"):
+        renderer.render(9, ambient=256)
 
 
 def test_device_and_host_draw_the_same_bits(volume):

@@ -1,6 +1,6 @@
 """The reader in ParaView: pvpython of the system, or what ISOWAVE_PVPYTHON names.
 
-Debian's python3-paraview cannot be installed beside the libvtk9-dev of `tools/setup --peer`.
+`tools/test --long` brings one (tests/paraview_test.sh).
 """
 
 import json
@@ -28,14 +28,18 @@ DIRECTION = np.array([[C, -S, 0], [S, C, 0], [0, 0, 1]]) @ np.array(
 SCRIPT = """
 import inspect
 import json
+import os
 import sys
+
+plugin, folder = sys.argv[1:]
+sys.path.append(os.path.dirname(os.path.dirname(plugin)))
+import isowave  # before the reader; libcfitsio is loaded, and has some of libzfp's names
 
 if not hasattr(inspect, "getargspec"):  # Debian 12's ParaView is older than its Python
     inspect.getargspec = inspect.getfullargspec
 
 from paraview.simple import *
 
-plugin, folder = sys.argv[1:]
 LoadPlugin(plugin, ns=globals())
 
 import numpy as np

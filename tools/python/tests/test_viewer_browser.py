@@ -173,6 +173,7 @@ def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:
         outputs=("rgb",),
         max_error=None,
         time_budget=None,
+        ambient=0,
         on_pass=lambda image: True,
     )
     difference = np.asarray(shot).astype(int) - expected.rgb
@@ -249,7 +250,7 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
         assert at["label"] and at["visible"], at
         seen.append(at["name"])
     expected = "picture toggle isovalue slider reset shot copy paste color background max_error"
-    expected += " samples time_budget budget summary"
+    expected += " samples ambient time_budget budget summary"
     assert seen == expected.split()
 
 
@@ -286,12 +287,13 @@ def test_colours_and_quality(page: Any) -> None:
         page.get_by_label("Largest error").fill("0.5")
         page.keyboard.press("Enter")
         page.get_by_label("Samples per pixel").select_option("4")
+        page.get_by_label("Ambient rays").select_option("8")
 
     quality()
     page.wait_for_timeout(100)
     rests(page)
     assert {**state(page), "color": "3366cc", "background": "203040"} == state(page)
-    assert [state(page)[k] for k in ("samples", "error")] == ["2", "0.5"]
+    assert [state(page)[k] for k in ("samples", "error", "ambient")] == ["2", "0.5", "8"]
     assert "4 rays a pixel" in page.locator(".facts").inner_text()
     assert "within 0.5 px" in page.locator(".facts").inner_text()
     # A frame keeps an error or a time; what was given last counts.

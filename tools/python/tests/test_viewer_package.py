@@ -31,6 +31,7 @@ WISH: dict[str, Any] = {
     "samples": 1,
     "max_error": None,
     "time_budget": None,
+    "ambient": 0,
 }
 
 
@@ -54,7 +55,7 @@ class Front:
         self.heads = list[dict[str, Any]]()
         self.pictures = list[bytes]()
         self.session = Session(scene, self._take)
-        self.session.receive({"type": "hello", "version": 1})
+        self.session.receive({"type": "hello", "version": 2})
 
     def _take(self, head: dict[str, Any], data: bytes | None) -> None:
         with self.changed:
@@ -113,6 +114,7 @@ def test_the_host_draws_the_devices_bits(volume: isowave.Volume) -> None:
             outputs=("rgb",),
             max_error=None,
             time_budget=None,
+            ambient=0,
             on_pass=lambda so_far: so_far.completed_percent <= 100,
         )
         assert image.complete and image.statistics["passes"] > 0

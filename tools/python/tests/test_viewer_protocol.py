@@ -27,16 +27,17 @@ WISH: dict[str, Any] = {
     "samples": 2,
     "max_error": 0.5,
     "time_budget": None,
+    "ambient": 16,
 }
 
 
 def test_messages_are_read() -> None:
-    assert check({"type": "hello", "version": 1}) == Hello()
+    assert check({"type": "hello", "version": 2}) == Hello()
     assert check({"type": "ack", "frame": 3}) == Ack(3)
     assert check({"type": "budget", "bytes": None}) == Budget(None)
     assert check({"type": "budget", "bytes": 5}) == Budget(5)
     view = View((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
-    wish = Wish(7, 80, (64, 48), view, (1, 0.5, 0), (1, 1, 1), 2, 0.5, None)
+    wish = Wish(7, 80, (64, 48), view, (1, 0.5, 0), (1, 1, 1), 2, 0.5, None, 16)
     assert check(parse(json.dumps(WISH))) == wish
 
 
@@ -55,6 +56,9 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"size": "64x48"}, "size"),
     ({"samples": 9}, "samples"),
     ({"samples": 0}, "samples"),
+    ({"ambient": 256}, "ambient"),
+    ({"ambient": -1}, "ambient"),
+    ({"ambient": 1.5}, "ambient"),
     ({"color": [0, 0, 1.01]}, "color"),
     ({"background": [0, 0]}, "background"),
     ({"max_error": 0}, "max_error"),
@@ -114,12 +118,12 @@ def test_texts_that_are_refused(text: str, message: str) -> None:
 
 def test_another_version_is_told_to_reload() -> None:
     with pytest.raises(ProtocolError, match="reload"):
-        check({"type": "hello", "version": 2})
+        check({"type": "hello", "version": 3})
 
 
 VALID: list[dict[str, Any]] = [
     WISH,
-    {"type": "hello", "version": 1},
+    {"type": "hello", "version": 2},
     {"type": "ack", "frame": 0},
     {"type": "budget", "bytes": 1 << 30},
     {**WISH, "camera": None},
@@ -187,7 +191,7 @@ def test_fuzz() -> None:
     for i in range(count):
         if session is None:
             session = Session(scene, post, rate=1e9, burst=1e9)
-            session.receive({"type": "hello", "version": 1})
+            session.receive({"type": "hello", "version": 2})
         message = copy.deepcopy(chance.choice(VALID))
         for _ in range(chance.randrange(3)):
             message = mutated(message, chance) if isinstance(message, dict) else message
@@ -217,7 +221,7 @@ def test_fuzz() -> None:
     # Somebody else sees a picture.
     sent.clear()
     other = Session(scene, post)
-    other.receive({"type": "hello", "version": 1})
+    other.receive({"type": "hello", "version": 2})
     other.receive({**WISH, "id": 1})
     while scene.step():
         other.receive({"type": "ack", "frame": sum(h["type"] == "picture" for h in sent)})

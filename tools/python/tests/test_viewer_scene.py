@@ -47,7 +47,7 @@ class Eye:
     def wish(self, isovalue: float = 80.0, size: tuple[int, int] = (64, 48), **more: Any) -> int:
         self.wishes += 1
         fields = dict(view=None, color=(1, 0.5, 0), background=(1, 1, 1), samples=1)
-        fields |= dict(max_error=None, time_budget=None) | more
+        fields |= dict(max_error=None, time_budget=None, ambient=0) | more
         wish = Wish(id=self.wishes, isovalue=isovalue, size=size, **fields)  # type: ignore
         self.scene.receive(self.client, wish)
         return self.wishes
@@ -157,6 +157,7 @@ def test_the_last_picture_is_lossless_to_the_bit() -> None:
         outputs=("rgb",),
         max_error=None,
         time_budget=None,
+        ambient=0,
         on_pass=lambda image: True,
     )
     png = Image.open(io.BytesIO(eye.data[max(eye.data)]))
@@ -447,7 +448,7 @@ def test_the_host_draws_while_the_device_is_prepared(works: bool) -> None:
     client = scene.join(post)
     assert client is not None
     wish = dict(isovalue=80.0, size=(32, 32), view=None, color=(1, 1, 1), background=(0, 0, 0))
-    more: dict[str, Any] = dict(wish, samples=1, max_error=None, time_budget=None)
+    more: dict[str, Any] = dict(wish, samples=1, max_error=None, time_budget=None, ambient=0)
     scene.receive(client, Wish(id=1, **more))
     assert came(stage="lossless", wish=1)
     assert not [h for h in heads if h.get("state") in ("ready", "failed")] and not volume.frames
@@ -511,6 +512,40 @@ def test_a_renderer_that_cannot_grow_draws_smaller_pictures() -> None:
     run(scene)
     assert len(volume.renderers) == 3  # the first, the one too large, the first again
     assert (volume.frames[-1].size, volume.frames[-1].samples) == ((32, 24), 2)
+
+
+def test_whole_pictures_have_ambient_rays_and_a_renderer_for_them() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), ambient=16)
+    run(scene)
+    assert [r["rays"] for r in volume.renderers] == [False, True]
+    drawn = [(frame.size, frame.ambient) for frame in volume.frames]
+    assert drawn == [((16, 12), 0), ((64, 48), 16)], "none in the first picture"
+    eye.ack()
+    eye.wish(81.0, size=(64, 48))
+    run(scene)
+    assert volume.frames[-1].ambient == 0 and len(volume.renderers) == 2
+
+
+def test_without_memory_for_ambient_rays_pictures_have_none() -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return RuntimeError("too large") if options["rays"] else None
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    for isovalue in (80.0, 81.0):
+        eye.wish(isovalue, size=(64, 48), ambient=16)
+        run(scene)
+        eye.ack()
+        assert volume.frames[-1].ambient == 0
+    assert [r["rays"] for r in volume.renderers] == [False, True, False], "not tried again"
+    scene.receive(eye.client, Budget(1 << 30))
+    eye.wish(82.0, size=(64, 48), ambient=16)
+    run(scene)
+    assert volume.renderers[-2]["rays"], "tried again with another budget"
 
 
 def test_the_first_isovalue_divides_the_histogram() -> None:
@@ -582,7 +617,7 @@ def test_a_client_whose_transport_fails_is_forgotten() -> None:
 def test_there_are_at_most_so_many_clients() -> None:
     scene = make_scene(FakeVolume(), Clock(), max_clients=2)
     sessions = [Session(scene, lambda head, data: None) for _ in range(3)]
-    hello = {"type": "hello", "version": 1}
+    hello = {"type": "hello", "version": 2}
     sessions[0].receive(hello)
     sessions[1].receive(hello)
     with pytest.raises(ProtocolError, match="too many clients"):
@@ -596,7 +631,7 @@ def test_sessions_begin_with_hello_and_limit_the_rate() -> None:
     session = Session(scene, lambda head, data: None, rate=10, burst=3, clock=clock)
     with pytest.raises(ProtocolError, match="must be hello"):
         session.receive({"type": "ack", "frame": 0})
-    session.receive({"type": "hello", "version": 1})
+    session.receive({"type": "hello", "version": 2})
     session.receive({"type": "ack", "frame": 0})
     with pytest.raises(ProtocolError, match="too many messages"):
         session.receive({"type": "ack", "frame": 0})
@@ -625,10 +660,10 @@ def test_100_reconnects_leave_nothing() -> None:
 
     for i in range(100):
         session = Session(scene, post)
-        session.receive({"type": "hello", "version": 1})
+        session.receive({"type": "hello", "version": 2})
         wish = {"type": "wish", "id": 1, "isovalue": 80, "size": [32, 32], "camera": None}
         wish |= {"color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
-        session.receive(wish | {"max_error": None, "time_budget": None})
+        session.receive(wish | {"max_error": None, "time_budget": None, "ambient": 0})
         if i % 10 == 0:
             assert ready.wait(60)
         ready.clear()

@@ -30,13 +30,13 @@ from isowave.viewer.scene import Scene
 from isowave.viewer.server import Limits, Server, main, make_parser, parse_bytes, parse_size, serve
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
-HELLO = '{"type": "hello", "version": 1}'
+HELLO = '{"type": "hello", "version": 2}'
 
 
 def wish_text(wish_id: int, isovalue: float = 80) -> str:
     wish = {"type": "wish", "id": wish_id, "isovalue": isovalue, "size": [32, 24]}
     wish |= {"camera": None, "color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
-    return json.dumps(wish | {"max_error": None, "time_budget": None})
+    return json.dumps(wish | {"max_error": None, "time_budget": None, "ambient": 0})
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from isowave.viewer import widget as widget_module  # noqa: E402
 from isowave.viewer.widget import MAX_VIEWS, Widget, show  # noqa: E402
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
-HELLO = {"type": "hello", "version": 1}
+HELLO = {"type": "hello", "version": 2}
 WISH: dict[str, Any] = {
     "type": "wish",
     "id": 1,
@@ -37,6 +37,7 @@ WISH: dict[str, Any] = {
     "samples": 1,
     "max_error": None,
     "time_budget": None,
+    "ambient": 0,
 }
 
 

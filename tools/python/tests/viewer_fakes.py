@@ -52,6 +52,7 @@ class Drawn:
     camera: FakeCamera
     max_error: float | None
     time_budget: float | None
+    ambient: int
     outputs: tuple[str, ...]
     passes: int = 0
     stopped: bool = False
@@ -70,7 +71,7 @@ class FakeVolume:
     renderers: list[dict[str, Any]] = field(default_factory=list)
     shape: tuple[int, int, int] = (SIDE, SIDE, SIDE)
     spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
+    source_dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
     value_range: tuple[float, float] = (0.0, VALUES)
     nbytes: int = 65536
     bits_per_voxel: float = 2.0
@@ -119,14 +120,19 @@ class FakeRenderer:
         outputs: Sequence[str],
         max_error: float | None,
         time_budget: float | None,
+        ambient: int,
         on_pass: Callable[[FakeProgress], bool] | None,
     ) -> FakeImage:
         width, height = self._options["size"]
         if size[0] * size[1] * samples**2 > width * height * self._options["samples"] ** 2:
             raise RuntimeError("the renderer was not made for so many rays")
+        if ambient and not self._options["rays"]:
+            raise RuntimeError("the renderer was not made for ambient rays")
         if math.isnan(isovalue):
             raise RuntimeError("the isovalue is not a number")
-        drawn = Drawn(isovalue, size, samples, camera, max_error, time_budget, tuple(outputs))
+        drawn = Drawn(
+            isovalue, size, samples, camera, max_error, time_budget, ambient, tuple(outputs)
+        )
         self._volume.frames.append(drawn)
         picture = self._picture(isovalue, camera, size, color, background)
         cached, image = isovalue in self._cache, picture

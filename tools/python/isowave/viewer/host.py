@@ -45,6 +45,7 @@ class HostRenderer:
         outputs: Sequence[str],
         max_error: float | None,
         time_budget: float | None,
+        ambient: int,
         on_pass: Callable[[Any], bool] | None,
     ) -> Image:
         from isowave._renderer import Image, draw, request_for
@@ -57,6 +58,7 @@ class HostRenderer:
             color=color,
             background=background,
             outputs=outputs,
+            ambient=ambient,
         )
         frame = draw(self._core, request, on_pass, interrupts=False)
         return Image(frame, camera, isovalue, samples)

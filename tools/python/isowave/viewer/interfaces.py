@@ -95,6 +95,7 @@ class RendererLike(Protocol):
         outputs: Sequence[str],
         max_error: float | None,
         time_budget: float | None,
+        ambient: int,
         on_pass: Callable[[Any], bool] | None,
     ) -> ImageLike:
         ...
@@ -112,7 +113,7 @@ class VolumeLike(Protocol):
         ...
 
     @property
-    def dtype(self) -> np.dtype[Any]:
+    def source_dtype(self) -> np.dtype[Any]:
         ...
 
     @property

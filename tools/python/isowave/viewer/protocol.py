@@ -8,7 +8,7 @@ looks nowhere.
     {"type": "hello", "version": 1}
     {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
      "color": [r, g, b], "background": [r, g, b], "samples": 1, "max_error": 0.5 | null,
-     "time_budget": 100 | null}
+     "time_budget": 100 | null, "ambient": 0}
     {"type": "ack", "frame": 3}
     {"type": "budget", "bytes": 600000000 | null}
 
@@ -25,10 +25,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-VERSION: Final = 1
+VERSION: Final = 2
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
+MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it
 MAX_TIME_BUDGET: Final = 10_000  # ms
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
@@ -67,6 +68,7 @@ class Wish:
     samples: int  # rays of a pixel along each axis
     max_error: float | None  # of the surface [pixels]; None: full detail
     time_budget: float | None  # of a picture [ms], without max_error; None: as long as it takes
+    ambient: int  # rays of a hit that find out how much of the sky it sees
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,7 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
         max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
         time_budget=_optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget"),
+        ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
     )
 
 
@@ -225,7 +228,8 @@ _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Mess
     "hello": (dict.fromkeys(("type", "version")), _read_hello),
     "wish": (
         dict.fromkeys(
-            "type id isovalue size camera color background samples max_error time_budget".split()
+            "type id isovalue size camera color background samples max_error time_budget"
+            " ambient".split()
         ),
         _read_wish,
     ),

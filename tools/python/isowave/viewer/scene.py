@@ -16,7 +16,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Final
 
@@ -83,6 +83,7 @@ class RendererOptions:
     size: tuple[int, int]
     samples: int
     memory_budget: int | None
+    ambient: bool = False  # pictures may have ambient rays, which takes memory
 
     @property
     def rays(self) -> int:
@@ -153,7 +154,7 @@ class Scene:
         self._fallback: RendererOptions | None = None  # worked before
         self._host: RendererLike | None = None  # draws until there is a renderer
         self._making: threading.Thread | None = None  # the first renderer
-        self._ray_limit = MAX_RAYS
+        self._ray_limit, self._may_have_ambient = MAX_RAYS, True
         self._thread: threading.Thread | None = None
         if start:
             self._thread = threading.Thread(target=self._work, name="isowave-viewer", daemon=True)
@@ -193,7 +194,7 @@ class Scene:
             elif isinstance(message, Wish):
                 self._take_wish(client, message)
             elif isinstance(message, Budget):
-                self._want(RendererOptions(self._wanted.size, self._wanted.samples, message.bytes))
+                self._want(replace(self._wanted, memory_budget=message.bytes))
             self._changed.notify_all()
 
     @property
@@ -336,6 +337,7 @@ class Scene:
             max_error=wish.max_error,
             outputs=("rgb",),
             time_budget=None if wish.time_budget is None else wish.time_budget / 1000,
+            ambient=0 if stage is Stage.FIRST or not self._has_ambient() else wish.ambient,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.stopped:
@@ -430,6 +432,7 @@ class Scene:
             outputs=("depth", "bounds"),
             max_error=None if wish.max_error is None else wish.max_error * pixels,
             time_budget=None,
+            ambient=0,
             on_pass=lambda so_far: client.wish is wish and not self._closing,
         )
         with self._changed:
@@ -442,17 +445,24 @@ class Scene:
     # Renderers.
 
     def _grow(self, wish: Wish, stage: Stage) -> bool:
-        """Wants a renderer for more rays, if the wish has more and there may be so many."""
-        rays = count_rays(wish.size, wish.samples)
-        if stage is Stage.FIRST or rays <= self._wanted.rays or rays > self._ray_limit:
+        """Wants a renderer for more rays, or ambient ones, if the wish has them and there may be."""
+        wanted = self._wanted
+        more = wanted.rays < count_rays(wish.size, wish.samples) <= self._ray_limit
+        ambient = wanted.ambient or (wish.ambient > 0 and self._may_have_ambient)
+        if stage is Stage.FIRST or (not more and ambient == wanted.ambient):
             return False
-        self._want(RendererOptions(wish.size, wish.samples, self._wanted.memory_budget))
+        size, samples = (wish.size, wish.samples) if more else (wanted.size, wanted.samples)
+        self._want(RendererOptions(size, samples, wanted.memory_budget, ambient))
         return True
+
+    def _has_ambient(self) -> bool:
+        """The host, which draws before there is a renderer of the device, always has."""
+        return self._made is None or self._made.ambient
 
     def _want(self, options: RendererOptions) -> None:
         with self._changed:
             if options.memory_budget != self._wanted.memory_budget:
-                self._ray_limit = MAX_RAYS
+                self._ray_limit, self._may_have_ambient = MAX_RAYS, True
             self._wanted, self._failed = options, False
 
     def _make_renderer(self) -> None:
@@ -470,6 +480,7 @@ class Scene:
                 levels=self._volume.num_levels > 1,
                 bounds=True,
                 time_budget=True,
+                rays=wanted.ambient,
             )
         except Exception as error:
             self._renderer_failed(wanted, error)
@@ -491,6 +502,8 @@ class Scene:
                     self._wanted = fallback
                     if wanted.rays > fallback.rays:
                         self._ray_limit = fallback.rays
+                    if wanted.ambient and not fallback.ambient:
+                        self._may_have_ambient = False
             for client in list(self._clients):
                 self._post_error(client, error, None)
             self._broadcast(self._status())
@@ -613,7 +626,7 @@ class Scene:
                 "title": self._title,
                 "shape": [int(n) for n in volume.shape],
                 "spacing": [float(s) for s in volume.spacing],
-                "dtype": str(volume.dtype),
+                "dtype": str(volume.source_dtype),
                 "range": list(self._range),
                 "bits_per_voxel": float(volume.bits_per_voxel),
                 "max_error": _finite(volume.max_error),

@@ -23,20 +23,21 @@
 /** @typedef {[number, number, number]} Vec */
 /** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
 /** @typedef {{isovalue: number, camera: ?Camera, color: string, background: ?string,
- *    samples: number, max_error: ?number, time_budget: ?number}} State what the URL keeps */
+ *    samples: number, max_error: ?number, time_budget: ?number, ambient: number}} State what the URL keeps */
 /** @typedef {Record<string, any>} Message */
 /**
  * @typedef {{send: (message: Message) => void, wheel: (view: View) => boolean, hash: boolean,
  *    isDark: () => boolean}} Home where a view is. wheel: whether the wheel is the view's
  */
 
-const VERSION = 1;
+const VERSION = 2;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
 const ORBIT_STEP = Math.PI / 36; // of an arrow key
 const PAN_STEP = 0.05; // of the picture's height
 const ZOOM_STEP = 1.15;
+const AMBIENT = [8, 16, 32, 64]; // rays of a hit that one can choose
 const DARK = "(prefers-color-scheme: dark)";
 const THUMB = 12; // width of the slider's thumb, CSS pixels
 
@@ -144,6 +145,7 @@ export function writeHash(state) {
   if (state.samples > 1) parts.samples = state.samples;
   if (state.max_error) parts.error = short(state.max_error);
   if (state.time_budget) parts.ms = short(state.time_budget);
+  if (state.ambient) parts.ambient = state.ambient;
   if (camera) {
     for (const key of ["eye", "at", "up"]) parts[key] = camera[key].map(short).join(",");
     parts.fovy = short(camera.fovy_deg);
@@ -172,6 +174,7 @@ export function readHash(hash) {
     samples: [1, 2, 3, 4].find((n) => n === number("samples", 1, 4)),
     max_error: number("error", 0.001, 1000),
     time_budget: parts.has("error") ? undefined : number("ms", 1, 10000),
+    ambient: [0, ...AMBIENT].find((n) => n === number("ambient", 0, 255)),
   };
   if (parts.has("eye")) {
     try {
@@ -234,6 +237,9 @@ const HTML = `
     <label>Samples per pixel <select name="samples"><option value="1">1</option>
       <option value="2">4</option><option value="3">9</option><option value="4">16</option></select>
     </label>
+    <label title="Rays of each point that find out how much of the sky it sees">Ambient rays
+      <select name="ambient"><option value="0">none</option>${
+  AMBIENT.map((n) => `<option>${n}</option>`).join("")}</select></label>
     <label>Time budget <span class="unit"><input name="time_budget" type="number"
       min="1" max="10000" step="any"
       placeholder="none"> ms</span></label>
@@ -362,7 +368,7 @@ class View {
     this.field = (name) => this.find(`[name=${name}]`);
     /** @type {State} */
     this.state = { isovalue: NaN, camera: null, color: "#dbbd87", background: null, samples: 1,
-      max_error: null, time_budget: null };
+      max_error: null, time_budget: null, ambient: 0 };
     if (home.hash) Object.assign(this.state, readHash(location.hash));
     this.wish = 0;
     this.shown = { wish: -1, frame: -1 };
@@ -634,6 +640,7 @@ class View {
     this.field("color").value = state.color;
     this.field("background").value = this.backgroundShown();
     this.field("samples").value = state.samples;
+    this.field("ambient").value = state.ambient;
     this.set("max_error", state.max_error ?? "");
     this.set("time_budget", state.time_budget ?? "");
     this.drawHistogram();
@@ -788,6 +795,7 @@ class View {
     number("max_error", "change", null);
     number("time_budget", "change", null);
     number("samples", "change");
+    number("ambient", "change");
     on(this.field("slider"), "input", (e) => this.change({ isovalue: Number(e.target.value) }));
     for (const name of ["color", "background"]) {
       on(this.field(name), "input", (e) => this.change({ [name]: e.target.value }));

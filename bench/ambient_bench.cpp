@@ -1,0 +1,45 @@
+// Between two rounds of ambient rays: counts those of the last, and makes the next (ambient.cl).
+// All hits of a frame.
+
+#include "bench/rays_rig.hpp"
+#include "core/stages/ambient.hpp"
+
+namespace isowave::core::bench {
+namespace {
+
+struct AmbientInput : RaysRig {
+  AmbientInput(ocl::Device &device, std::int64_t width)
+      : RaysRig(device, width), ambient(device, rays.num_rays) {
+    rays.given = {device, "given rays", rays.num_rays};
+    rays.given_hits = {device, "hits of given rays", rays.num_rays};
+    rays.open_counts = {device, "open ambient rays", rays.num_rays};
+    VolumeInfo info;
+    info.dims = {params.grid.dims_x, params.grid.dims_y, params.grid.dims_z};
+    ambient.begin(info, 2);
+    ambient(rays, 0);
+    rays.given_hits.copy(rays.hits, rays.num_rays);  // all closed
+    ambient(rays, 1);
+    for (const uchar count : rays.open_counts.read()) check(count == 0, "rays that are open");
+  }
+
+  Ambient ambient;
+};
+
+void ambient(benchmark::State &state) {
+  auto &in = input<AmbientInput>(state.range(0));
+  const auto hits = static_cast<double>(in.num_hits);
+  measure(
+      state, {hits, hits * (sizeof(HitRecord) + sizeof(float) + sizeof(GivenRay) + 2)}, [] {},
+      [&] { in.ambient(in.rays, 1); });
+  state.counters["hits"] = hits;
+}
+
+const bool kRegistered = [] {
+  stage_benchmark("ambient", ambient)
+      ->ArgName("width")
+      ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
+  return true;
+}();
+
+}  // namespace
+}  // namespace isowave::core::bench

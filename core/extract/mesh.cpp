@@ -1,0 +1,45 @@
+#include "core/extract/mesh.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace isowave::core {
+
+void Mesh::begin(const MeshSize &size) {
+  vertices.clear();
+  normals.clear();
+  triangles.clear();
+  vertices.reserve(size.num_vertices);
+  if (size.has_normals) normals.reserve(size.num_vertices);
+  triangles.reserve(size.num_triangles);
+}
+
+void Mesh::add(const MeshPart &part) {
+  vertices.insert(vertices.end(), part.vertices.begin(), part.vertices.end());
+  normals.insert(normals.end(), part.normals.begin(), part.normals.end());
+  triangles.insert(triangles.end(), part.triangles.begin(), part.triangles.end());
+}
+
+MeshPlacement::MeshPlacement(const VolumeInfo &info)
+    : origin_(info.origin),
+      to_world_(info.index_to_world()),
+      gradient_to_world_(glm::transpose(glm::inverse(to_world_))),
+      mirrored_(glm::determinant(to_world_) < 0) {}
+
+glm::vec3 MeshPlacement::position(const glm::uvec3 &block, const MeshVertex &vertex) const {
+  const glm::uvec3 voxel(vertex.edge & 3u, vertex.edge >> 2 & 3u, vertex.edge >> 4 & 3u);
+  glm::dvec3 index(4u * block + voxel);
+  index[static_cast<int>(vertex.edge >> 6 & 3u)] += double{vertex.t};
+  return glm::vec3(origin_ + to_world_ * index);
+}
+
+glm::vec3 MeshPlacement::normal(const Gradient &gradient) const {
+  glm::dvec3 direction(gradient.x, gradient.y, gradient.z);
+  const double largest =
+      std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
+  if (!(largest > 0) || std::isinf(largest)) return glm::vec3(0);
+  direction = gradient_to_world_ * (direction / largest);
+  return glm::vec3(-direction / glm::length(direction));
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,53 @@
+#pragma once
+// Rounds of ambient rays: how open hits are (kernels_cl/ambient.cl).
+
+#include <cstdint>
+#include <vector>
+
+#include "core/stages/levelled_kernel.hpp"
+#include "core/volume/volume.hpp"
+#include "kernels_cl/portable/ambient.h"
+
+namespace isowave::core {
+
+/// Throws  Error: more rays than ISO_MAX_AMBIENT_RAYS
+void check_ambient_rays(std::uint32_t num_rays);
+
+/// info: of the finest level of detail that draws the frame.
+AmbientParams make_ambient_params(const VolumeInfo &info);
+
+/// Returns  [num_rays][ISO_AMBIENT_PATTERNS], distributed by their cosine with z: point k + (p +
+///          1/2) / ISO_AMBIENT_PATTERNS of a spiral, turned by p / ISO_AMBIENT_PATTERNS
+std::vector<AmbientDirection> make_ambient_directions(std::uint32_t num_rays);
+
+class Ambient {
+ public:
+  static ocl::BufferSizes sizes();
+  /// levels: frames may have several levels of detail.
+  Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels = false);
+
+  /// Before the rounds of a frame.
+  ///
+  /// Waits  where the number of rays is not that of the frame before
+  void begin(const VolumeInfo &info, std::uint32_t num_rays);
+
+  /// Counts the rays of round - 1 that met nothing, and makes the rays of a round, unless it is the
+  /// last: begin()'s num_rays.
+  ///
+  /// In     rays.hits of the frame; rays.given_hits of round - 1
+  /// Out    rays.open_counts, num_ambient; rays.given
+  /// Waits  no
+  void operator()(Wavefront &rays, std::uint32_t round);
+
+ private:
+  ocl::Range range_;
+  ocl::Buffer<AmbientDirection> directions_;
+  std::uint32_t num_rays_ = 0;
+  AmbientParams params_{};
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, AmbientParams, ocl::In<AmbientDirection>,
+                 uint, uint, ocl::In<HitRecord>, ocl::In<HitRecord>, ocl::Out<GivenRay>,
+                 ocl::Out<uchar>>
+      kernel_;
+};
+
+}  // namespace isowave::core

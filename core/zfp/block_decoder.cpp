@@ -1,0 +1,26 @@
+#include "core/zfp/block_decoder.hpp"
+
+#include <cmath>
+
+#include "kernels_cl/portable/zfp_codec.h"
+
+namespace isowave::core {
+
+void BlockDecoder::load(std::uint64_t first, std::uint64_t count) {
+  if (!volume_.file) return;
+  first_bit_ = volume_.block_begin(first);
+  const std::uint64_t num_bits = volume_.block_begin(first + count) - first_bit_;
+  const std::uint64_t num_words = (num_bits + 31) / 32;
+  read_.assign(num_words + kDecoderAhead, 0);
+  volume_.read_words(first_bit_, std::span(read_).first(num_words));
+}
+
+void BlockDecoder::decode(std::uint64_t id, std::span<float, ISO_BLOCK_VOXELS> voxels) const {
+  const std::vector<std::uint32_t> &words = volume_.file ? read_ : volume_.words;
+  zfp_decode_block(words.data(), volume_.block_begin(id) - first_bit_, volume_.block_bits(id),
+                   volume_.precision.min_exponent, voxels.data());
+  if (!volume_.precision.whole_numbers) return;
+  for (float &voxel : voxels) voxel = std::rint(voxel) + 0.0f;  // as the kernels do
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,40 @@
+/// ambient.cl -- between the rounds of ambient rays: counts which rays of a round met nothing, and
+/// makes those of the next (portable/ambient.h).
+///
+///   [ smooth normals ] -> ambient -> [ pipeline `rays` on these rays -> ambient ]*
+#define ISO_FOUND local
+#include "device/level_borders.h"
+#include "portable/ambient.h"
+
+/// frame_params, frames, num_frames  as start_rays
+/// directions  [num_rounds][ISO_AMBIENT_PATTERNS]
+/// round       0..num_rounds: the rays to make; num_rounds: none
+/// In      hits [pixel]: of the frame; given [pixel], given_hits [pixel]: the rays of the round
+///         before, and what they met
+/// Out     open_counts [pixel]: rays of the rounds before that met nothing, 0 where there is no
+/// hit;
+///         given [pixel]
+/// Launch  grid-stride over pixels
+kernel void ambient(const FrameParams frame_params, global const FrameParams *frames,
+                    uint num_frames, const AmbientParams params,
+                    global const AmbientDirection *directions, uint round, uint num_rounds,
+                    global const HitRecord *hits, global const HitRecord *given_hits,
+                    global GivenRay *given, global uchar *open_counts) {
+  const FrameParams *frame = &frame_params;
+  for (uint pixel = get_global_id(0); pixel < frame->view.width * frame->view.height;
+       pixel += get_global_size(0)) {
+    const HitRecord hit = hits[pixel];
+    if (hit.t == INFINITY) {
+      given[pixel] = no_ray();
+      open_counts[pixel] = 0;
+      continue;
+    }
+    open_counts[pixel] =
+        (uchar)(round == 0 ? 0u : open_counts[pixel] + (given_hits[pixel].t == INFINITY));
+    if (round == num_rounds) continue;
+    ISO_FRAME_OF(level, hit.block_id);
+    given[pixel] = ambient_ray(
+        frame, level, ISO_LEVELS ? level_of(frames, num_frames, hit.block_id) : 0u, &params, hit,
+        pixel, directions[round * ISO_AMBIENT_PATTERNS + ambient_pattern(frame, pixel)]);
+  }
+}

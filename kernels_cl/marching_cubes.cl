@@ -1,0 +1,189 @@
+/// marching_cubes.cl -- triangles and vertices of listed blocks, whose values are cached
+/// (Block-Compressed Marching Cubes, Usher and Pascucci 2020).
+///
+///   marching_cubes_count -> prefix sums of both counts -> marching_cubes_write
+///
+/// Counting looks at signs alone, 64 of them in a word. Vertices are numbered through all listed
+/// blocks, in the order of the list, so that triangles name those of neighbours.
+#include "portable/block_table.h"
+#include "portable/marching_cubes.h"
+
+#include "device/work_group.h"
+
+/// Of the dual grid of block b: which voxels of its blocks are inside, corner x + 2y + 4z; 0 of
+/// those that there are not.
+ISO_INLINE void dual_grid_inside(const FrameParams *frame, global const BlockEntry *table,
+                                 global const ulong *inside, BlockCoords b, ulong *bits) {
+  for (uint corner = 0; corner < 8; ++corner) {
+    uint slot = ISO_BLOCK_ABSENT;
+    if (dual_grid_block(frame, b, corner) != ISO_INVALID_ID)
+      slot = cached_slot(frame, table, b.x + (corner & 1), b.y + (corner >> 1 & 1),
+                         b.z + (corner >> 2));
+    bits[corner] = slot == ISO_BLOCK_ABSENT ? 0 : inside[slot];
+  }
+}
+
+/// Entries [begin, end) of the list.
+///
+/// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+/// Out             edges, num_vertices, num_triangles [list]
+/// Launch          grid-stride over entries
+kernel void marching_cubes_count(const FrameParams frame_params, uint begin, uint end,
+                                 global const uint *block_ids, global const BlockEntry *table,
+                                 global const ulong *inside, global const uchar *cell_triangles,
+                                 global BlockEdges *edges, global uint *num_vertices,
+                                 global uint *num_triangles) {
+  const FrameParams *frame = &frame_params;
+  const BlockGrid grid = frame_params.grid;
+  for (uint i = begin + get_global_id(0); i < end; i += get_global_size(0)) {
+    const BlockCoords b = block_coords(frame, block_ids[i]);
+    ulong of_blocks[8], v[8];
+    dual_grid_inside(frame, table, inside, b, of_blocks);
+    corners_inside(of_blocks, v);
+    const BlockEdges own = crossed_edges(&grid, b, v);
+    const ulong changing = changing_cells(of_blocks) & domain_of_block(&grid, b, 1, 1, 1);
+    uint triangles = 0;
+    for (uint cell = 0; cell < 64; ++cell) {
+      if ((changing >> cell & 1) != 0)
+        triangles += cell_triangles[ISO_CASE_BYTES * cell_signs(v, cell)];
+    }
+    edges[i].x = own.x;
+    edges[i].y = own.y;
+    edges[i].z = own.z;
+    num_vertices[i] = vertex_count(own);
+    num_triangles[i] = triangles;
+  }
+}
+
+/// The cached neighbourhood of a block.
+typedef struct Neighbourhood {
+  local const uint *slots; /* [27] of blocks -1 .. 1 along x, y, z */
+  global const float *values;
+} Neighbourhood;
+
+/// The voxel (x,y,z), -4 .. 7 along each axis, counted from the block's first one.
+ISO_INLINE float voxel_near(const Neighbourhood *n, int x, int y, int z) {
+  const uint vx = (uint)(x + 4), vy = (uint)(y + 4), vz = (uint)(z + 4);
+  const uint slot = n->slots[(vx >> 2) + 3 * (vy >> 2) + 9 * (vz >> 2)];
+  return n->values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
+}
+
+/// The central differences at a voxel of block b or next to it; one-sided at the domain's border.
+ISO_INLINE void voxel_gradient(const BlockGrid *grid, const Neighbourhood *n, BlockCoords b, int x,
+                               int y, int z, float *gradient) {
+  const int px = (int)(4 * b.x) + x, py = (int)(4 * b.y) + y, pz = (int)(4 * b.z) + z;
+  const int last_x = (int)grid->dims_x - 1, last_y = (int)grid->dims_y - 1,
+            last_z = (int)grid->dims_z - 1;
+  gradient[0] = voxel_derivative(voxel_near(n, x - (px > 0), y, z),
+                                 voxel_near(n, x + (px < last_x), y, z), px, last_x);
+  gradient[1] = voxel_derivative(voxel_near(n, x, y - (py > 0), z),
+                                 voxel_near(n, x, y + (py < last_y), z), py, last_y);
+  gradient[2] = voxel_derivative(voxel_near(n, x, y, z - (pz > 0)),
+                                 voxel_near(n, x, y, z + (pz < last_z)), pz, last_z);
+}
+
+/// Entries [begin, end) of the list, a work-group each: work-item v has voxel and cell v.
+///
+/// listed_masks, listed_offsets  of active_blocks.cl
+/// edges                         [list] of marching_cubes_count
+/// vertex_offsets                [list + 1] prefix sums of its counts; triangle_offsets as well
+/// with_gradients                0: gradients are not written
+/// Out     from the first vertex and triangle of entry `begin` on: vertices, gradients (x, y, z of
+///         each), triangles, which name vertices by their number among those of the whole list
+/// Launch  groups of 64, which stride over entries
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching_cubes_write(
+    const FrameParams frame_params, uint begin, uint end, uint with_gradients,
+    global const uint *block_ids, global const uint *listed_masks,
+    global const uint *listed_offsets, global const BlockEntry *table,
+    global const float *cache_values, global const ulong *inside,
+    global const uchar *cell_triangles, global const BlockEdges *edges,
+    global const uint *vertex_offsets, global const uint *triangle_offsets,
+    global MeshVertex *vertices, global float *gradients, global MeshTriangle *triangles) {
+  const FrameParams *frame = &frame_params;
+  const BlockGrid grid = frame_params.grid;
+  local uint slots[27], first_vertex[8], sums[ISO_GROUP_SIZE];
+  local ulong edges_x[8], edges_y[8], edges_z[8], of_blocks[8];
+  const uint item = get_local_id(0);
+  const int x = item & 3, y = item >> 2 & 3, z = item >> 4;
+  const Neighbourhood near_block = {slots, cache_values};
+  for (uint i = begin + get_group_id(0); i < end; i += get_num_groups(0)) {
+    const BlockCoords b = block_coords(frame, block_ids[i]);
+    barrier(CLK_LOCAL_MEM_FENCE); /* all are through with the block before */
+    if (item < 27) {
+      const uint nx = b.x + item % 3 - 1, ny = b.y + item / 3 % 3 - 1, nz = b.z + item / 9 - 1;
+      slots[item] = nx < grid.blocks_x && ny < grid.blocks_y && nz < grid.blocks_z
+                        ? cached_slot(frame, table, nx, ny, nz)
+                        : ISO_BLOCK_ABSENT;
+    }
+    if (item < 8) {
+      const uint nx = b.x + (item & 1), ny = b.y + (item >> 1 & 1), nz = b.z + (item >> 2);
+      uint entry = ISO_INVALID_ID, slot = ISO_BLOCK_ABSENT;
+      if (dual_grid_block(frame, b, item) != ISO_INVALID_ID) {
+        const uint coarse_x = (grid.blocks_x + 3) / 4, coarse_y = (grid.blocks_y + 3) / 4;
+        const uint coarse = nx / 4 + coarse_x * (ny / 4 + coarse_y * (nz / 4));
+        const uint bit = (nx & 3) + 4 * (ny & 3) + 16 * (nz & 3);
+        const ulong mask = (ulong)listed_masks[2 * coarse + 1] << 32 | listed_masks[2 * coarse];
+        if ((mask >> bit & 1) != 0)
+          entry = listed_offsets[coarse] + count_bits(mask & (((ulong)1 << bit) - 1));
+        slot = cached_slot(frame, table, nx, ny, nz);
+      }
+      of_blocks[item] = slot == ISO_BLOCK_ABSENT ? 0 : inside[slot];
+      first_vertex[item] = entry == ISO_INVALID_ID ? 0 : vertex_offsets[entry];
+      edges_x[item] = entry == ISO_INVALID_ID ? 0 : edges[entry].x;
+      edges_y[item] = entry == ISO_INVALID_ID ? 0 : edges[entry].y;
+      edges_z[item] = entry == ISO_INVALID_ID ? 0 : edges[entry].z;
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+
+    const uint first_of_batch = vertex_offsets[begin];
+    for (uint axis = 0; axis < 3; ++axis) {
+      const ulong own = axis == 0 ? edges_x[0] : axis == 1 ? edges_y[0] : edges_z[0];
+      if ((own >> item & 1) != 0) {
+        const uint place = first_vertex[0] - first_of_batch +
+                           vertex_rank(edges_x[0], edges_y[0], edges_z[0], axis, item);
+        const int ux = x + (axis == 0), uy = y + (axis == 1), uz = z + (axis == 2);
+        const float lower = voxel_near(&near_block, x, y, z),
+                    upper = voxel_near(&near_block, ux, uy, uz);
+        const float t = edge_crossing(lower, upper, frame->surface.isovalue);
+        vertices[place].edge = (i - begin) << ISO_VERTEX_BLOCK_SHIFT | axis << 6 | item;
+        vertices[place].t = t;
+        if (with_gradients != 0) {
+          float at_lower[3], at_upper[3];
+          voxel_gradient(&grid, &near_block, b, x, y, z, at_lower);
+          voxel_gradient(&grid, &near_block, b, ux, uy, uz, at_upper);
+          const Gradient g = vertex_gradient(at_lower, at_upper, t, axis, upper - lower);
+          gradients[3 * place] = g.x;
+          gradients[3 * place + 1] = g.y;
+          gradients[3 * place + 2] = g.z;
+        }
+      }
+    }
+
+    uint signs = 0, total;
+    if ((domain_of_block(&grid, b, 1, 1, 1) >> item & 1) != 0) {
+      for (uint corner = 0; corner < 8; ++corner) {
+        const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
+        const ulong bits = of_blocks[(cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2)];
+        signs |= (uint)(bits >> ((cx & 3) + 4 * (cy & 3) + 16 * (cz & 3)) & 1) << corner;
+      }
+    }
+    global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
+    const uint num_triangles = own_triangles[0];
+    const uint place =
+        triangle_offsets[i] - triangle_offsets[begin] + group_scan(sums, num_triangles, &total);
+    for (uint triangle = 0; triangle < num_triangles; ++triangle) {
+      uint numbers[3];
+      for (uint k = 0; k < 3; ++k) {
+        const uint edge = own_triangles[1 + 3 * triangle + k], corner = edge_corner(edge);
+        const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
+        const uint block = (cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2);
+        numbers[k] = first_vertex[block] + vertex_rank(edges_x[block], edges_y[block],
+                                                       edges_z[block], edge_axis(edge),
+                                                       (cx & 3) + 4 * (cy & 3) + 16 * (cz & 3));
+      }
+      triangles[place + triangle].a = numbers[0];
+      triangles[place + triangle].b = numbers[1];
+      triangles[place + triangle].c = numbers[2];
+    }
+  }
+}

@@ -1,0 +1,105 @@
+// isowave extract, run as a user runs it: what it writes, and how it fails.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/run_program.hpp"
+
+namespace isowave::core {
+namespace {
+
+using test::expect_one_line_error;
+using test::ProgramResult;
+using test::quoted;
+using test::read_file;
+using test::run_command;
+using test::run_isowave;
+using testing::HasSubstr;
+
+const std::filesystem::path kFuel = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
+
+class CliExtract : public testing::Test {
+ protected:
+  /// Runs `isowave extract FUEL -i 10 ARGUMENTS --stats ...` and returns the statistics.
+  nlohmann::json extract(const std::string &arguments) {
+    const auto stats = folder_ / "stats.json";
+    const ProgramResult result = run_isowave("extract " + quoted(kFuel) + " -i 10 --exact " +
+                                             arguments + " --stats " + quoted(stats));
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    EXPECT_THAT(result.out, HasSubstr("wrote "));
+    return nlohmann::json::parse(read_file(stats));
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(CliExtract, BatchesGiveTheSameFile) {
+  const auto all = folder_ / "all.ply", few = folder_ / "few.ply";
+  const nlohmann::json at_once = extract("-o " + quoted(all)),
+                       batches = extract("--cache-slots 40 --stream host -o " + quoted(few));
+  EXPECT_EQ(read_file(all), read_file(few));
+  EXPECT_EQ(at_once["decoded_blocks"], at_once["needed_blocks"]);
+  EXPECT_GT(batches["decoded_blocks"], at_once["decoded_blocks"]);
+  const std::string header = read_file(all).substr(0, 300);
+  EXPECT_THAT(header, HasSubstr("element vertex " + at_once["vertices"].dump() + "\n"));
+  EXPECT_THAT(header, HasSubstr("element face " + at_once["triangles"].dump() + "\n"));
+  EXPECT_GT(at_once["triangles"].get<int>(), 1000);
+}
+
+TEST_F(CliExtract, EveryFormatAndOption) {
+  const nlohmann::json plain = extract("-o " + quoted(folder_ / "a.stl"));
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "a.stl"),
+            84 + 50 * plain["triangles"].get<std::size_t>());
+  const nlohmann::json bare = extract("--normals none -o " + quoted(folder_ / "a.ply"));
+  EXPECT_LT(bare["needed_blocks"], plain["needed_blocks"]);
+  EXPECT_EQ(bare["triangles"], plain["triangles"]);
+  EXPECT_THAT(read_file(folder_ / "a.ply").substr(0, 300),
+              testing::Not(HasSubstr("property float nx")));
+  const nlohmann::json coarse = extract("--level 1 -o " + quoted(folder_ / "a.obj"));
+  EXPECT_LT(coarse["triangles"], plain["triangles"]);
+  EXPECT_EQ(coarse["volume"]["dims"], (nlohmann::json{33, 17, 17}));
+  for (const char *name : {"a.vtp", "a.gltf", "a.glb"}) {
+    extract("--memory-budget 2MB -o " + quoted(folder_ / name));
+    EXPECT_GT(std::filesystem::file_size(folder_ / name), 1000u);
+  }
+}
+
+TEST_F(CliExtract, TheNameIsMadeUp) {
+  const ProgramResult result =
+      run_command("cd " + quoted(folder_.path()) + " && " + test::isowave_program() + " extract " +
+                  quoted(kFuel) + " -i 300");
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("0 vertices, 0 triangles"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "fuel_64x33x32_uint8_iso300.ply"));
+}
+
+TEST_F(CliExtract, WrongInputIsOneLine) {
+  const std::string fuel = "extract " + quoted(kFuel);
+  const std::string ply = " -o " + quoted(folder_ / "a.ply");
+  expect_one_line_error(fuel + ply, "--isovalue is required");
+  expect_one_line_error(fuel + " -i nan" + ply, "nan");
+  expect_one_line_error(fuel + " -i 10 -o " + quoted(folder_ / "a.off"), "end the name in");
+  expect_one_line_error(fuel + " -i 10 -o " + quoted(folder_ / "none" / "a.ply"), "none");
+  expect_one_line_error(fuel + " -i 10 --normals cell" + ply, "cell");
+  for (const auto &[arguments, text] :
+       {std::pair(" --level 9", "--level 9"),
+        {" --memory-budget 10kB", "a memory budget of 10000 bytes is too small"},
+        {" --cache-slots 9", "a block of the surface needs 17"}}) {
+    const ProgramResult result = run_isowave(fuel + " -i 10" + arguments + ply);
+    EXPECT_EQ(result.status, 1) << arguments;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(text));
+  }
+  const ProgramResult missing = run_isowave("extract missing_4x4x4_uint8.raw -i 10" + ply);
+  EXPECT_EQ(missing.status, 1);
+  EXPECT_THAT(missing.err, HasSubstr("missing_4x4x4_uint8.raw"));
+  EXPECT_EQ(folder_.num_files(), 0u) << "something was left behind";
+}
+
+}  // namespace
+}  // namespace isowave::core

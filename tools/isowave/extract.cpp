@@ -1,0 +1,167 @@
+// isowave extract: an isosurface as a file of triangles.
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/base/error.hpp"
+#include "core/extract/extractor.hpp"
+#include "core/extract/mesh_file.hpp"
+#include "core/view/detail.hpp"
+#include "tools/isowave/commands.hpp"
+#include "tools/isowave/compile_report.hpp"
+#include "tools/isowave/help_groups.hpp"
+#include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
+#include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/renderer_options.hpp"
+#include "tools/isowave/strict_options.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::core::tools {
+
+namespace {
+
+struct ExtractArgs {
+  std::string input, output, device, stats;
+  VolumeOptions volume;
+  CompressionOptions compression;
+  float isovalue = 0;
+  std::uint32_t level = 0;
+  std::string normals = "smooth", stream = "auto";
+  ExtractorOptions extractor;
+};
+
+const CompressedVolume &level_of(const CompressedVolume &volume, std::uint32_t level) {
+  const std::vector<const CompressedVolume *> levels = levels_of(volume, true);
+  if (level >= levels.size())
+    throw Error("--level {}: the volume has {}, and 0 is the finest", level, levels.size());
+  return *levels[level];
+}
+
+nlohmann::ordered_json stats_json(const ExtractArgs &options, const VolumeInfo &info,
+                                  ocl::Device &device, const ExtractStats &stats) {
+  return {{"program", program_name()},
+          {"device", device_json(device.info())},
+          {"volume", {{"file", options.input}, {"dims", {info.dims.x, info.dims.y, info.dims.z}}}},
+          {"isovalue", options.isovalue},
+          {"level", options.level},
+          {"normals", options.normals},
+          {"vertices", stats.size.num_vertices},
+          {"triangles", stats.size.num_triangles},
+          {"listed_blocks", stats.listed_blocks},
+          {"needed_blocks", stats.needed_blocks},
+          {"decoded_blocks", stats.decoded_blocks},
+          {"cache_slots", stats.cache_slots},
+          {"count_batches", stats.count_batches},
+          {"write_batches", stats.write_batches},
+          {"list_ms", stats.list_ms},
+          {"count_ms", stats.count_ms},
+          {"write_ms", stats.write_ms},
+          {"total_ms", stats.total_ms},
+          {"memory", memory_json(device.ledger())}};
+}
+
+void run_extract(ExtractArgs options) {
+  const bool names_output = options.output.empty();
+  if (names_output)
+    options.output = fmt::format("{}_iso{}.ply", volume_stem(options.input), options.isovalue);
+  mesh_format_of(options.output);  // or throws
+  Outputs outputs;
+  outputs.read_volume(options.input);
+  outputs.write("--output", options.output);
+  outputs.write("--stats", options.stats);
+  options.extractor.with_normals = options.normals == "smooth";
+  options.extractor.stream = stream_place_from_string(options.stream);
+  if (options.level > 0) want_levels(options.compression);
+
+  const ocl::DeviceInfo info = ocl::choose_device(options.device);
+  fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
+             info.name, info.platform);
+  ocl::Device device(info);
+  CompileReport compiling(device);
+  const CompressedVolume volume =
+      load_volume(options.input, to_overrides(options.volume), options.compression, &device);
+  const CompressedVolume &level = level_of(volume, options.level);
+  Extractor extractor(device, level, options.extractor);
+  MeshFile file(options.output);
+  const ExtractStats stats =
+      extractor.extract(options.isovalue, file, make_progress_bar("extracting"));
+  compiling.finish();
+  file.commit(make_progress_bar("writing"));
+  fmt::print("isovalue {}: {} vertices, {} triangles; {} blocks decoded, {:.1f} ms\n",
+             options.isovalue, with_commas(stats.size.num_vertices),
+             with_commas(stats.size.num_triangles), with_commas(stats.decoded_blocks),
+             stats.total_ms);
+  fmt::print("wrote {}: {} bytes; device memory: peak {:.1f} MiB{}\n", one_line(options.output),
+             with_commas(std::filesystem::file_size(options.output)),
+             double(device.ledger().peak()) / (1 << 20),
+             names_output ? "; --output names another file" : "");
+  if (!options.stats.empty())
+    write_json(stats_json(options, level.info, device, stats), options.stats);
+}
+
+}  // namespace
+
+void add_extract(CLI::App &app) {
+  const auto options = std::make_shared<ExtractArgs>();
+  CLI::App *command =
+      app.add_subcommand("extract", "Write an isosurface as triangles: PLY, STL, OBJ, VTP, glTF");
+  command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))
+      ->required();
+  command
+      ->add_option("-i,--isovalue", options->isovalue,
+                   "the value of the field whose surface is extracted")
+      ->check(fits_float32())
+      ->required();
+  command->add_option(
+      "--output,-o", options->output,
+      "file that ends in .ply, .stl, .obj, .vtp, .gltf or .glb; coordinates are the "
+      "volume's world [VOLUME_isoV.ply in the current folder]");
+  command
+      ->add_option(
+          "--level", options->level,
+          "level of detail, each of half the voxels along each axis; 0 is the volume itself")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--normals", options->normals,
+          "of vertices: smooth (central differences of voxels), or none, which needs fewer blocks")
+      ->check(CLI::IsMember({"smooth", "none"}))
+      ->capture_default_str();
+  command->add_option("--device", options->device,
+                      "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
+  add_volume_options(*command, options->volume);
+  add_compression_options(*command, options->compression);
+  command
+      ->add_option("--memory-budget", options->extractor.memory_budget,
+                   "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB "
+                   "(1024^3); surfaces that need more are gone through in batches [3/4 of the "
+                   "device's memory]")
+      ->transform(byte_count())
+      ->type_name("BYTES");
+  command
+      ->add_option("--cache-slots", options->extractor.cache_slots,
+                   "decoded blocks kept on the device at most, 17 to 2^26, without normals from 8 "
+                   "[as many as the surface needs]")
+      ->check(CLI::Range(8u, 1u << 26));
+  command
+      ->add_option("--stream", options->stream,
+                   "where the compressed volume is: device, host (blocks are uploaded when they "
+                   "are asked for), or auto (on the device if that leaves a quarter of the budget)")
+      ->check(CLI::IsMember({"auto", "device", "host"}))
+      ->capture_default_str();
+  command->add_option("--stats", options->stats, "JSON: blocks, batches, times, device memory");
+  group_options(
+      *command, "Options of every day",
+      {"--help", "--isovalue", "--output", "--level", "--normals", "--device", "--stats"});
+  group_volume_options(*command);
+  group_compression_options(*command);
+  group_options(*command, "Memory", {"--memory-budget", "--cache-slots", "--stream"});
+  command->callback([options] { run_extract(*options); });
+}
+
+}  // namespace isowave::core::tools

@@ -1,0 +1,184 @@
+"""Levels of detail as arrays: what is indexed is decoded, and nothing else."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+
+Shape = tuple[int, int, int]
+
+
+class Level:
+    """The voxels of a level of detail, (z, y, x), as an array that is decoded where it is indexed.
+
+    Made by Volume.levels. Indexing takes what numpy takes, and gives numpy arrays of float32 (a
+    number, where all three indices are integers). Of a file, only the blocks of 4 x 4 x 4 voxels
+    that hold what is asked for are read and decoded; lists and arrays of indices decode what lies
+    between the least and the largest, too. numpy.asarray(level) decodes everything;
+    dask.array.from_array(level, chunks=...) decodes chunks when they are computed: with sides that
+    are multiples of 4, no block twice.
+    """
+
+    ndim = 3
+    dtype = np.dtype(np.float32)
+
+    def __init__(self, core: _core.Volume, number: int, shape: Sequence[int] | None = None) -> None:
+        """shape: of the voxels from (0, 0, 0) on, where not all are wanted."""
+        self._core, self._number = core, number
+        nz, ny, nx = reversed(core.level_dims(number)) if shape is None else shape
+        self._shape = (nz, ny, nx)
+
+    @property
+    def shape(self) -> Shape:
+        """Voxels along (z, y, x). Voxel k of level n lies at voxel 2^n k of the volume."""
+        return self._shape
+
+    @property
+    def size(self) -> int:
+        """Voxels."""
+        nz, ny, nx = self._shape
+        return nz * ny * nx
+
+    @property
+    def nbytes(self) -> int:
+        """When all is decoded."""
+        return self.size * self.dtype.itemsize
+
+    def __len__(self) -> int:
+        return self._shape[0]
+
+    def __iter__(self) -> Iterator[npt.NDArray[np.float32]]:
+        return (self[z] for z in range(len(self)))
+
+    def __getitem__(self, key: Any) -> Any:
+        ranges, then = split_key(key, self._shape)
+        return self._decode(ranges)[then]
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]:
+        if copy is False:
+            raise ValueError("voxels are decoded into a new array: copy=False is not possible")
+        voxels: npt.NDArray[Any] = self[...]
+        return voxels if dtype is None else voxels.astype(dtype, copy=False)
+
+    def __repr__(self) -> str:
+        shape = " x ".join(str(n) for n in self._shape)
+        return f"<isowave.Level {self._number}, {shape} (z, y, x) {self.dtype}>"
+
+    def _decode(self, ranges: Sequence[range]) -> npt.NDArray[np.float32]:
+        """Of ascending ranges within the shape."""
+        if not all(ranges):  # the library knows no empty regions
+            return np.empty([len(r) for r in ranges], np.float32)
+        z, y, x = ranges
+        return self._core.decode(
+            self._number,
+            (x.start, y.start, z.start),
+            (x[-1] + 1, y[-1] + 1, z[-1] + 1),
+            (x.step, y.step, z.step),
+        )
+
+
+def split_key(key: Any, shape: Sequence[int]) -> tuple[list[range], tuple[Any, ...]]:
+    """What must be decoded for array[key], and what to index that with.
+
+    Returns an ascending range of voxels for each axis, and a key of numpy's for the array of them.
+
+    Raises
+    ------
+    IndexError
+        As numpy does: out of bounds, too many indices, something else than indices.
+    """
+    ranges: list[range] = []
+    then: list[Any] = []
+    for item in whole_key(key, shape):
+        if item is None or item is Ellipsis:
+            then.append(item)
+            continue
+        axis = len(ranges)
+        wanted, rest = (
+            split_slice(item, shape[axis])
+            if isinstance(item, slice)
+            else split_indices(item, axis, shape[axis])
+        )
+        ranges.append(wanted)
+        then.append(rest)
+    return ranges, tuple(then)
+
+
+def whole_key(key: Any, shape: Sequence[int]) -> list[Any]:
+    """With an item for each axis; masks as arrays of indices. '...' stands for no more axes."""
+    items = [as_item(item) for item in (key if isinstance(key, tuple) else (key,))]
+    given = sum(axes_of(item) for item in items)
+    if given > len(shape):
+        raise IndexError(f"{given} indices for voxels that have {len(shape)} axes")
+    gaps = [i for i, item in enumerate(items) if item is Ellipsis]
+    if len(gaps) > 1:
+        raise IndexError("'...' can stand only once in an index")
+    at = gaps[0] if gaps else len(items)
+    items[at:at] = [slice(None)] * (len(shape) - given)
+    whole: list[Any] = []
+    axis = 0
+    for item in items:
+        if is_mask(item):
+            sides = tuple(shape[axis : axis + item.ndim])
+            if item.shape != sides:
+                raise IndexError(f"a mask of shape {item.shape} for voxels of shape {sides}")
+            whole.extend(item.nonzero())
+        else:
+            whole.append(item)
+        axis += axes_of(item)
+    return whole
+
+
+def as_item(item: Any) -> Any:
+    """Indices as an array, without axes for a single one."""
+    if item is None or item is Ellipsis or isinstance(item, slice):
+        return item
+    array = np.asarray(item)
+    if array.size == 0 and array.dtype.kind == "f":  # numpy's choice for []
+        array = array.astype(np.intp)
+    if array.dtype == object:
+        try:
+            array = np.asarray(operator.index(item))
+        except TypeError:
+            pass
+    if array.dtype.kind not in "iub" or (array.dtype == bool and array.ndim == 0):
+        raise IndexError(f"voxels are indexed by integers, slices and '...': not by {item!r:.60}")
+    return array
+
+
+def is_mask(item: Any) -> bool:
+    return isinstance(item, np.ndarray) and item.dtype == bool
+
+
+def axes_of(item: Any) -> int:
+    """How many axes it indexes."""
+    if item is None or item is Ellipsis:
+        return 0
+    return int(item.ndim) if is_mask(item) else 1
+
+
+def split_slice(item: slice, size: int) -> tuple[range, slice]:
+    wanted = range(*item.indices(size))
+    if wanted.step > 0 or not wanted:
+        return wanted, slice(None)
+    return wanted[::-1], slice(None, None, -1)
+
+
+def split_indices(item: npt.NDArray[Any], axis: int, size: int) -> tuple[range, Any]:
+    outside = item[(item < -size) | (item >= size)]
+    if outside.size:
+        raise IndexError(f"index {outside.flat[0]} on axis {axis}, which has {size} voxels")
+    if not item.size:
+        return range(0), item
+    indices = np.where(item < 0, item + size, item)
+    first, last = int(indices.min()), int(indices.max())
+    rest = indices - first
+    return range(first, last + 1), rest if rest.ndim else int(rest)

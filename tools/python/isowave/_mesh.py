@@ -1,0 +1,45 @@
+"""Isosurfaces as triangle meshes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles that share their vertices, as Volume.extract gives them.
+
+    Each edge of a triangle belongs to another one, too, but for those in the volume's border.
+    """
+
+    #: float32 (n, 3): world space, (x, y, z).
+    vertices: npt.NDArray[np.float32]
+    #: uint32 (m, 3): numbers of vertices, counter-clockwise seen from where values are lower.
+    faces: npt.NDArray[np.uint32]
+    #: float32 (n, 3), world space: of length 1, away from larger values. None: not asked for.
+    normals: npt.NDArray[np.float32] | None
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a .ply, .stl, .obj, .vtp, .gltf or .glb file; whole, or not at all."""
+        _core.save_mesh(self.vertices, self.faces, self.normals, os.fspath(path))
+
+    def to_pyvista(self) -> Any:
+        """A pyvista.PolyData with the normals as point data. Needs pyvista."""
+        import pyvista
+
+        vertices: Any = self.vertices
+        faces: Any = self.faces.astype(np.int64)
+        mesh = pyvista.PolyData.from_regular_faces(vertices, faces)
+        if self.normals is not None:
+            mesh.point_data.active_normals = self.normals
+        return mesh
+
+    def __repr__(self) -> str:
+        return f"<isowave.Mesh {len(self.vertices)} vertices, {len(self.faces)} faces>"

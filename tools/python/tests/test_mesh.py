@@ -1,0 +1,142 @@
+"""Volume.extract: meshes without cracks, equal to VTK's on the decoded voxels."""
+
+import numpy as np
+import pytest
+
+import isowave
+
+
+def noise(shape, seed, values=None):
+    random = np.random.default_rng(seed)
+    if values is not None:
+        return random.integers(0, values, shape).astype(np.float32)
+    return random.normal(size=shape).astype(np.float32)
+
+
+def expect_closed(mesh, last):
+    """Each edge has another triangle the other way round, unless it lies in the border."""
+    edges = np.concatenate([mesh.faces[:, [i, (i + 1) % 3]] for i in range(3)]).astype(np.int64)
+    keys = edges[:, 0] << 32 | edges[:, 1]
+    assert len(np.unique(keys)) == len(keys)
+    is_open = ~np.isin(edges[:, 1] << 32 | edges[:, 0], keys)
+    a, b = (mesh.vertices[edges[is_open, i]] for i in range(2))
+    in_border = ((a == b) & ((a == 0) | (a == np.asarray(last)))).any(axis=1)
+    assert in_border.all()
+    assert len(np.unique(mesh.faces)) == len(mesh.vertices)
+
+
+def with_vtk(pipeline, voxels, isovalue):
+    """Vertices and number of triangles by a filter of VTK's."""
+    from vtkmodules import vtkFiltersCore
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+
+    image = vtkImageData()
+    image.SetDimensions(*voxels.shape[::-1])
+    image.GetPointData().SetScalars(numpy_to_vtk(voxels.ravel(), deep=True))
+    contour = getattr(vtkFiltersCore, pipeline)()
+    contour.SetInputData(image)
+    contour.SetValue(0, isovalue)
+    contour.Update()
+    result = contour.GetOutput()
+    return vtk_to_numpy(result.GetPoints().GetData()), result.GetNumberOfCells()
+
+
+CASES = [
+    (noise((9, 10, 11), 1), 0.1),
+    (noise((17, 5, 33), 2), -0.5),
+    (noise((24, 25, 26), 3), 0.0),
+    (noise((13, 14, 15), 4, values=5), 2.0),  # voxels on the surface
+    (noise((16, 16, 16), 5, values=5), 2.5),
+]
+
+
+@pytest.mark.parametrize("array, isovalue", CASES)
+def test_mesh_is_that_of_vtk(array, isovalue):
+    pytest.importorskip("vtkmodules")
+    exact = {"exact": True} if (array == array.round()).all() else {"rate": 16}
+    volume = isowave.compress(array.astype(np.uint8) if "exact" in exact else array, **exact)
+    voxels = volume.decode()
+    mesh = volume.extract(isovalue)
+    vertices, num_triangles = with_vtk("vtkFlyingEdges3D", voxels, isovalue)
+    assert len(mesh.faces) == num_triangles
+    assert len(mesh.vertices) == len(vertices)
+    # A crossing is a quotient of differences, each rounded to float32; places are below 2^6, where
+    # float32 has steps of 2^-18.
+    tolerance = 2.0**-17
+
+    def by_edge(points):
+        """The edges that points are on, as numbers, and how far they are from voxels."""
+        off = np.abs(points - points.round())
+        along = np.arange(3) == off.argmax(axis=1)[:, None]
+        lower = np.where(along, np.floor(points), points.round()).astype(np.int64)
+        return (lower << np.array([0, 16, 32])).sum(axis=1) * 4 + off.argmax(axis=1), off.max(
+            axis=1
+        )
+
+    (ours, from_voxel), (theirs, _) = by_edge(mesh.vertices), by_edge(vertices)
+    assert (from_voxel[~np.isin(ours, theirs)] <= 2 * tolerance).all()
+    _, i, j = np.intersect1d(ours, theirs, return_indices=True)
+    assert len(i) > len(ours) / 3
+    assert np.abs(mesh.vertices[i] - vertices[j]).max() <= tolerance
+    expect_closed(mesh, np.array(array.shape[::-1]) - 1)
+
+
+def test_budget_level_and_normals():
+    z, y, x = np.mgrid[:40, :36, :38].astype(np.float32)
+    volume = isowave.compress(
+        np.sqrt((x - 18) ** 2 + (y - 18) ** 2 + (z - 20) ** 2), tolerance=1e-4, levels=2
+    )
+    mesh = volume.extract(12)
+    assert mesh.vertices.dtype == np.float32 and mesh.faces.dtype == np.uint32
+    assert mesh.vertices.shape == mesh.normals.shape
+    outwards = mesh.vertices - np.array([18, 18, 20])
+    radius = np.linalg.norm(outwards, axis=1)
+    assert np.abs(radius - 12).max() < 1 / (8 * 12) + 1e-3  # a chord of a voxel bends by so much
+    # Values grow outwards, and normals point away from larger ones.
+    assert ((outwards / radius[:, None] * mesh.normals).sum(axis=1) < -0.99).all()
+    assert len(mesh.vertices) - 3 * len(mesh.faces) // 2 + len(mesh.faces) == 2  # a sphere
+
+    bounded = volume.extract(12, memory_budget=500_000)
+    np.testing.assert_array_equal(bounded.vertices, mesh.vertices)
+    np.testing.assert_array_equal(bounded.faces, mesh.faces)
+    assert volume.extract(12, normals=False).normals is None
+    coarse = volume.extract(12, level=1)
+    assert 0 < len(coarse.faces) < len(mesh.faces) / 2
+
+
+def test_progress_and_errors():
+    volume = isowave.compress(noise((8, 8, 8), 6), rate=16)
+    told = []
+    volume.extract(0, progress=lambda what, done: told.append((what, done)))
+    assert told[-1] == ("extracting", 1)
+
+    def interrupt(what, done):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        volume.extract(0, progress=interrupt)
+    with pytest.raises(ValueError, match="level 1 of a volume"):
+        volume.extract(0, level=1)
+    with pytest.raises(isowave.Error, match="too small"):
+        volume.extract(0, memory_budget=1000)
+    empty = volume.extract(1e9)
+    assert empty.vertices.shape == (0, 3) and empty.faces.shape == (0, 3)
+
+
+def test_files(tmp_path):
+    volume = isowave.compress(noise((8, 9, 10), 7), rate=16)
+    mesh = volume.extract(0)
+    for ending in ("ply", "stl", "obj", "vtp", "gltf", "glb"):
+        mesh.save(tmp_path / f"a.{ending}")
+    pyvista = pytest.importorskip("pyvista")
+    for ending in ("ply", "vtp", "obj"):
+        read = pyvista.read(tmp_path / f"a.{ending}")
+        # Of OBJ's text, VTK makes float64.
+        np.testing.assert_array_equal(np.asarray(read.points, np.float32), mesh.vertices)
+        np.testing.assert_array_equal(read.regular_faces, mesh.faces)
+    surface = mesh.to_pyvista()
+    np.testing.assert_array_equal(surface.point_data.active_normals, mesh.normals)
+    assert surface.n_cells == len(mesh.faces)
+    with pytest.raises(isowave.Error, match="end the name"):
+        mesh.save(tmp_path / "a.off")
