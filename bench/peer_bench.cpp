@@ -47,7 +47,8 @@ struct Options {
   std::vector<std::uint32_t> size = {1280, 720};
 };
 
-constexpr std::array<const char *, 4> kSides = {"rays", "blocks", "mesh_low", "mesh_medium"};
+constexpr std::array<const char *, 5> kSides = {"host", "rays", "blocks", "mesh_low",
+                                                "mesh_medium"};
 
 /// VmHWM of /proc/self/status [bytes]: the most memory that the process has had since reset_peak().
 std::uint64_t peak_memory() {
@@ -71,6 +72,7 @@ std::unique_ptr<PeerSide> make_side(const Options &options) {
   const ImageSize size{options.size.at(0), options.size.at(1)};
   if (options.side.starts_with("mesh"))
     return make_mesh_side(std::move(volume), camera, size, options.side == "mesh_medium");
+  if (options.side == "host") return make_host_side(std::move(volume), camera, size);
   return make_renderer_side(std::move(volume), camera, size,
                             options.side == "rays" ? PipelineKind::kRays : PipelineKind::kBlocks,
                             options.device);
@@ -230,6 +232,10 @@ void print_size(const ordered_json &size) {
                  side.at("device_byte_count").at("max").get<double>() / kMiB);
       continue;
     }
+    if (!side.contains("triangle_count")) {
+      fmt::print("\n");
+      continue;
+    }
     fmt::print("; {:.0f} triangles, packets of {:.0f}\n",
                side.at("triangle_count").at("median").get<double>(),
                side.at("packet_count").at("median").get<double>());
@@ -267,7 +273,9 @@ void compare(const Options &options, const std::string &command, const std::stri
       "\nmesh_low, mesh_medium: Flying Edges of VTK, tree (build quality low, medium) and rays of "
       "Embree on "
       "all\n"
-      "processors; rays, blocks: our pipelines. Median (min..max) over rounds and isovalues. new "
+      "processors; rays, blocks: our pipelines; host: ours without OpenCL, which decodes all of "
+      "the\n"
+      "volume first. Median (min..max) over rounds and isovalues. new "
       "isovalue: "
       "from there\n"
       "to the finished hits, nothing decoded before; cache kept: with what the isovalue before "

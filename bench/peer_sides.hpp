@@ -65,4 +65,9 @@ std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Came
                                              ImageSize size, PipelineKind pipeline,
                                              const std::string &device);
 
+/// Our renderer without OpenCL, on all processors. new_ms: with nothing decoded, from the
+/// compressed volume on; new_kept_ms: with the volume decoded.
+std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const Camera &camera,
+                                         ImageSize size);
+
 }  // namespace isowave::core::bench

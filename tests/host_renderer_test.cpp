@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <isowave/isowave.hpp>
 #include <thread>
@@ -183,13 +184,14 @@ TEST(HostLoops, AllGiveTheSameBits) {
   smooth_gradients(frame, volume.voxels, smooth);
   for (const HostLoops &loops : all_host_loops()) {
     std::vector<HitRecord> hits(64 * 48, no_hit());
-    EXPECT_EQ(loops.trace(frame, blocks.field(), {0, 0, 64, 48}, true, hits.data()),
-              test::num_hits(expected));
-    expect_same_hits(hits, smooth, 64);
-    std::ranges::fill(hits, no_hit());
-    EXPECT_EQ(loops.trace(frame, blocks.field(), {0, 0, 64, 48}, false, hits.data()),
-              test::num_hits(expected));
-    expect_same_hits(hits, expected, 64);
+    for (const auto trace : {loops.trace, loops.trace_rays}) {
+      for (const bool is_smooth : {true, false}) {
+        std::ranges::fill(hits, no_hit());
+        EXPECT_EQ(trace(frame, blocks.field(), {0, 0, 64, 48}, is_smooth, hits.data()),
+                  test::num_hits(expected));
+        expect_same_hits(hits, is_smooth ? smooth : expected, 64);
+      }
+    }
     std::vector<uchar> counts(64 * 48);
     loops.ambient(frame, blocks.field(), {0, 0, 64, 48}, ambient, hits.data(), counts.data());
     EXPECT_EQ(counts, open);
@@ -206,6 +208,77 @@ TEST(HostLoops, AllGiveTheSameBits) {
       EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
     }
   }
+}
+
+/// A tile that ends within packets of 4 x 2 rays: nothing beyond it is drawn, nothing missing.
+TEST(HostLoops, TilesOfAnySize) {
+  const glm::uvec3 dims(20, 21, 22);
+  const TestVolume volume(dims, test::gyroid_field(9), 8);
+  HostBlocks blocks(volume.compressed, 0);
+  blocks.select(0.2f);
+  FrameParams frame =
+      make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 0.2f);
+  const auto whole = render_scalar(frame, volume.voxels);
+  frame.surface = blocks.surface();
+  for (const RayTile tile : {RayTile{20, 15, 37, 32}, {21, 16, 22, 17}, {30, 20, 30, 20}}) {
+    std::vector<HitRecord> expected(whole.size(), no_hit()), hits = expected;
+    for (uint y = tile.begin_y; y < tile.end_y; ++y) {
+      for (uint x = tile.begin_x; x < tile.end_x; ++x) expected[x + 64 * y] = whole[x + 64 * y];
+    }
+    EXPECT_EQ(host_loops().trace(frame, blocks.field(), tile, false, hits.data()),
+              test::num_hits(expected));
+    expect_same_hits(hits, expected, 64);
+  }
+}
+
+/// Packets against rays alone: odd volumes, eyes anywhere, ties. ISOWAVE_FUZZ_RAYS: so many rays,
+/// instead of half a million.
+TEST(HostLoops, PacketsFindWhatRaysAloneFind) {
+  const char *asked = std::getenv("ISOWAVE_FUZZ_RAYS");
+  const std::uint64_t num_rays = asked != nullptr ? std::strtoull(asked, nullptr, 10) : 500'000;
+  const ImageSize size{41, 31};
+  Random random(17);
+  std::uint64_t rays = 0, num_hits = 0;
+  for (std::uint32_t volume_number = 0; rays < num_rays; ++volume_number) {
+    const auto dim = [&] { return static_cast<std::uint32_t>(random.in(2, 46)); };
+    const glm::uvec3 dims(dim(), dim(), dim());
+    const bool is_whole = volume_number % 3 == 1;
+    const TestVolume volume(dims,
+                            volume_number % 3 == 0 ? test::gyroid_field(random.in(6, 60))
+                            : is_whole             ? test::plateau_field()
+                                                   : test::noise_field(volume_number),
+                            16);
+    const float isovalue = is_whole ? volume.voxels[volume.voxels.size() / 2]
+                                    : static_cast<float>(random.in(-0.9, 0.9));
+    HostBlocks blocks(volume.compressed, 0);
+    blocks.select(isovalue);
+    std::vector<Camera> cameras = hard_cameras(dims);
+    const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
+    const auto anywhere = [&](double margin) {
+      return extent * glm::dvec3(random.in(-margin, 1 + margin), random.in(-margin, 1 + margin),
+                                 random.in(-margin, 1 + margin));
+    };
+    for (int i = 0; i < 8; ++i) {
+      const glm::dvec3 eye = anywhere(i < 4 ? 0 : 2);
+      cameras.push_back(test::camera_along(i % 2 == 0 ? glm::round(eye) : eye,
+                                           anywhere(0) + glm::dvec3(0.01, 0.02, 0.03) - eye,
+                                           {0.3, 1, 0.2}, random.in(2, 110)));
+    }
+    for (std::size_t view = 0; view < cameras.size(); ++view, rays += size.num_rays()) {
+      FrameParams frame = make_frame_params(volume.info(), cameras[view], size, isovalue);
+      frame.surface = blocks.surface();
+      std::vector<HitRecord> expected(size.num_rays(), no_hit()), hits = expected;
+      const RayTile all = {0, 0, size.width, size.height};
+      num_hits += host_loops().trace_rays(frame, blocks.field(), all, false, expected.data());
+      host_loops().trace(frame, blocks.field(), all, false, hits.data());
+      expect_same_hits(hits, expected, size.width);
+      ASSERT_FALSE(HasFailure()) << fmt::format("volume {} ({}x{}x{}), isovalue {}, view {}",
+                                                volume_number, dims.x, dims.y, dims.z, isovalue,
+                                                view);
+    }
+  }
+  RecordProperty("rays", std::to_string(rays));
+  EXPECT_GT(num_hits, rays / 20);
 }
 
 TEST(HostRenderer, BandsGrowFromTheTopAndCanBeStopped) {

@@ -1,5 +1,6 @@
 #include "core/host/host_loops.hpp"
 
+#include "core/host/host_packets.hpp"
 #include "core/stages/solvers.hpp"
 #include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/cell_intersect.h"
@@ -195,20 +196,30 @@ inline bool trace_ray(const FrameParams &frame, const HostField &field, const Ac
   return false;
 }
 
-inline uint trace(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                  bool is_smooth, HitRecord *hits) {
+/// Gives the hits of a tile smooth gradients.
+inline void smooth(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                   HitRecord *hits) {
+  const LastPlanes last = last_planes(&frame);
+  for (uint y = tile.begin_y; y < tile.end_y; ++y) {
+    for (uint x = tile.begin_x; x < tile.end_x; ++x) {
+      HitRecord *hit = hits + x + frame.view.width * y;
+      if (hit->block_id != ISO_INVALID_ID) smooth_gradient(frame, field, last, hit);
+    }
+  }
+}
+
+inline uint trace_rays(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                       bool is_smooth, HitRecord *hits) {
   const LastPlanes last = last_planes(&frame);
   const ActiveBox box = active_box(frame.surface, last);
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
       const uint ray_id = x + frame.view.width * y;
-      const Ray ray = make_ray(&frame, ray_id);
-      if (!trace_ray(frame, field, box, last, ray, hits + ray_id)) continue;
-      if (is_smooth) smooth_gradient(frame, field, last, hits + ray_id);
-      ++num_hits;
+      num_hits += trace_ray(frame, field, box, last, make_ray(&frame, ray_id), hits + ray_id);
     }
   }
+  if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
   return num_hits;
 }
 
@@ -262,9 +273,9 @@ ISO_WHOLE_LOOP BlockRange decode_anywhere(const EncodedBlock &block, float *valu
 ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
   return inside(values, isovalue);
 }
-ISO_WHOLE_LOOP uint trace_anywhere(const FrameParams &frame, const HostField &field,
-                                   const RayTile &tile, bool is_smooth, HitRecord *hits) {
-  return trace(frame, field, tile, is_smooth, hits);
+ISO_WHOLE_LOOP uint trace_rays_anywhere(const FrameParams &frame, const HostField &field,
+                                        const RayTile &tile, bool is_smooth, HitRecord *hits) {
+  return trace_rays(frame, field, tile, is_smooth, hits);
 }
 ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &field,
                                   const IndexRay *rays, uint num_rays, bool is_smooth,
@@ -291,7 +302,13 @@ ISO_WIDE_LOOP ulong inside_wide(const float *values, float isovalue) {
 }
 ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, const RayTile &tile,
                               bool is_smooth, HitRecord *hits) {
-  return trace(frame, field, tile, is_smooth, hits);
+  const uint num_hits = trace_packets(frame, field, tile, hits);
+  if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
+  return num_hits;
+}
+ISO_WIDE_LOOP uint trace_rays_wide(const FrameParams &frame, const HostField &field,
+                                   const RayTile &tile, bool is_smooth, HitRecord *hits) {
+  return trace_rays(frame, field, tile, is_smooth, hits);
 }
 ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                              uint num_rays, bool is_smooth, HitRecord *hits) {
@@ -316,10 +333,10 @@ bool is_wide() {
 #endif
 
 constexpr HostLoops kLoops[] = {
-    {decode_anywhere, inside_anywhere, trace_anywhere, cast_anywhere, ambient_anywhere,
-     shade_anywhere},
+    {decode_anywhere, inside_anywhere, trace_rays_anywhere, trace_rays_anywhere, cast_anywhere,
+     ambient_anywhere, shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
-    {decode_wide, inside_wide, trace_wide, cast_wide, ambient_wide, shade_wide},
+    {decode_wide, inside_wide, trace_wide, trace_rays_wide, cast_wide, ambient_wide, shade_wide},
 #endif
 };
 

@@ -54,13 +54,16 @@ struct HostLoops {
   /// Which voxels of a block are inside, bit x + 4y + 16z.
   ulong (*inside)(const float *values, float isovalue);
   /// Writes the hits of a tile of the frame's rays into hits [height * width], those of rays that
-  /// hit something alone.
+  /// hit something alone. Eight rays at a time where the processor can (host_packets.hpp).
   ///
   /// frame      its surface's box is that of the field's active blocks
   /// is_smooth  hits have smooth gradients (Normals::kSmooth)
   /// Returns    how many there are
   uint (*trace)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                 bool is_smooth, HitRecord *hits);
+  /// The same, ray by ray: what trace() is judged by.
+  uint (*trace_rays)(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                     bool is_smooth, HitRecord *hits);
   /// Writes the hits of rays into hits [num_rays], those of rays that hit something alone.
   ///
   /// frame      as for trace(); its view is not used

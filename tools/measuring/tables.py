@@ -299,6 +299,7 @@ def leaks(rows):
 
 def peer(rows):
     sides = {
+        "host": "without OpenCL",
         "rays": "pipeline rays",
         "blocks": "pipeline blocks",
         "mesh_low": "Flying Edges, Embree (low quality)",

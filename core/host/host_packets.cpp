@@ -1,0 +1,38 @@
+#include "core/host/host_packets.hpp"
+
+#ifdef ISO_HAS_PACKETS
+#include <immintrin.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/stages/solvers.hpp"
+#include "kernels_cl/portable/cell_intersect.h"
+
+// Compilers split vectors that are too wide for a function's processor before they inline it. So
+// all that has such vectors is compiled for the processor; what both kinds run is included before.
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2,bmi,bmi2,fma,popcnt"))), \
+                             apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2,bmi,bmi2,fma,popcnt")
+#endif
+#include "core/host/packet_trace.hpp"
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+namespace isowave::core {
+
+uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                   HitRecord *hits) {
+  return packets::trace_tile(frame, field, tile, hits);
+}
+
+}  // namespace isowave::core
+#endif
