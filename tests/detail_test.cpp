@@ -241,7 +241,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, LevelsOnDevice, testing::ValuesIn(devices_unde
 TEST_P(LevelsOnDevice, SmallFrameIsTheTwins) {
   const CompressedVolume volume = pyramid_of({9, 10, 11}, test::noise_field(8));
   EXPECT_GT(check(volume, {orbit_cameras(volume.info, 1)[0]}, 0.1f, 1.4,
-                  {.size = is_simulator(device_.info()) ? kTiny : kSmall, .cache_slots = 20}),
+                  {.size = kSmall, .cache_slots = 20}),
             0u);
 }
 

@@ -79,7 +79,7 @@ TEST_P(RenderOnDevice, SmallOneCellOneBlockAndThinVolumes) {
   for (const glm::uvec3 dims : {glm::uvec3(2, 2, 2), {4, 4, 4}, {5, 2, 9}, {2, 13, 6}}) {
     SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
     const TestVolume volume(dims, test::noise_field(4), 16);
-    EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, small_size()), 5u);
+    EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, kSmall), 5u);
   }
 }
 
