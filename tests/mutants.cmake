@@ -115,12 +115,12 @@ function(add_device_mutant name pipelines file from to)
   set(mutant device_${name})
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${mutant})
   copy_with_bug(${mutant} "\\.(h|cl)$" ${file} "${from}" "${to}")
-  file(GLOB_RECURSE kernels ${folder}/kernels_cl/*.cl)
+  file(GLOB_RECURSE files ${folder}/kernels_cl/*.cl ${folder}/kernels_cl/*.h)
   add_custom_command(
     OUTPUT ${folder}/kernels.cpp
     COMMAND ${CMAKE_COMMAND} -D "output=${folder}/kernels.cpp" -D "folder=${folder}/kernels_cl"
-            -D "kernels=${kernels}" -P ${embed_kernels_script}
-    DEPENDS ${kernels} ${folder}/kernels_cl/${file} ${embed_kernels_script} VERBATIM)
+            -D "files=${files}" -P ${embed_kernels_script}
+    DEPENDS ${files} ${embed_kernels_script} VERBATIM)
   # The linker takes these kernels, and not those of isowave_kernels behind them.
   add_executable(mutant_${mutant} $<TARGET_OBJECTS:device_mutant_main> ${folder}/kernels.cpp)
   target_link_libraries(mutant_${mutant} PRIVATE isowave_reference)

@@ -39,13 +39,6 @@ bool reports_event_times(const cl::Context &context, const cl::CommandQueue &que
   }
 }
 
-std::string_view kernel_text(std::string_view stem) {
-  for (const KernelSource &source : kernel_sources()) {
-    if (source.stem == stem) return source.text;
-  }
-  throw std::invalid_argument(fmt::format("no kernel file '{}.cl' is part of this program", stem));
-}
-
 /// Bits agree between devices only under these options (kernels_cl/README.md).
 std::string build_options(const DeviceInfo &device, Defines defines) {
   std::string options = "-cl-std=CL1.2";
@@ -115,7 +108,7 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
   const std::string options = build_options(info_, defines);
   const Compiling now = compiling();
   try {
-    cl::Program program(context_, std::string(kernel_text(stem)));
+    cl::Program program(context_, kernel_text(stem));
     program.build(device_, options.c_str());
     return programs_.emplace(std::move(key), std::move(program)).first->second;
   } catch (const cl::BuildError &error) {
