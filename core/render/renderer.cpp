@@ -78,6 +78,7 @@ struct FrameOfPicture {
 
 std::vector<VolumeInfo> infos_of(const std::vector<Level> &levels) {
   std::vector<VolumeInfo> infos;
+  infos.reserve(levels.size());
   for (const Level &level : levels) infos.push_back(level.info);
   return infos;
 }
