@@ -445,7 +445,7 @@ class Scene:
     # Renderers.
 
     def _grow(self, wish: Wish, stage: Stage) -> bool:
-        """Wants a renderer for more rays, or ambient ones, if the wish has them and there may be."""
+        """Wants a renderer for more rays, or ambient ones, if the wish has such and may."""
         wanted = self._wanted
         more = wanted.rays < count_rays(wish.size, wish.samples) <= self._ray_limit
         ambient = wanted.ambient or (wish.ambient > 0 and self._may_have_ambient)

@@ -23,7 +23,8 @@
 /** @typedef {[number, number, number]} Vec */
 /** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
 /** @typedef {{isovalue: number, camera: ?Camera, color: string, background: ?string,
- *    samples: number, max_error: ?number, time_budget: ?number, ambient: number}} State what the URL keeps */
+ *    samples: number, max_error: ?number, time_budget: ?number, ambient: number}} State
+ *    what the URL keeps */
 /** @typedef {Record<string, any>} Message */
 /**
  * @typedef {{send: (message: Message) => void, wheel: (view: View) => boolean, hash: boolean,
