@@ -29,24 +29,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void prefix_t
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void prefix_tile_offsets(
     uint count, global uint *tile_sums, global uint *values) {
   local uint sums[ISO_GROUP_SIZE];
-  const uint num_tiles = (count + TILE - 1) / TILE;
-  uint carry = 0;
-  for (uint first = 0; first < num_tiles; first += TILE) {
-    const uint begin = first + get_local_id(0) * ISO_SCAN_ITEMS;
-    uint own[ISO_SCAN_ITEMS];
-    uint sum = 0, total;
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      own[i] = begin + i < num_tiles ? tile_sums[begin + i] : 0;
-      sum += own[i];
-    }
-    uint before = carry + group_scan(sums, sum, &total);
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      if (begin + i < num_tiles) tile_sums[begin + i] = before;
-      before += own[i];
-    }
-    carry += total;
-  }
-  if (get_local_id(0) == 0) values[count] = carry;
+  const uint total = scan_table(sums, tile_sums, (count + TILE - 1) / TILE);
+  if (get_local_id(0) == 0) values[count] = total;
 }
 
 /// values[i] = sum of values[0..i), in place.

@@ -16,23 +16,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exc
     global uint *values, global uint *counts, uint count_field, uint divisor, uint total_field) {
   local uint sums[ISO_GROUP_SIZE];
   const uint count = (counts[count_field] + divisor - 1) / divisor;
-  uint carry = 0;
-  for (uint tile = 0; tile < count; tile += TILE) {
-    const uint begin = tile + get_local_id(0) * ISO_SCAN_ITEMS;
-    uint own[ISO_SCAN_ITEMS];
-    uint sum = 0, total;
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      own[i] = begin + i < count ? values[begin + i] : 0;
-      sum += own[i];
-    }
-    uint before = carry + group_scan(sums, sum, &total);
-    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
-      if (begin + i < count) values[begin + i] = before;
-      before += own[i];
-    }
-    carry += total;
-  }
-  if (get_local_id(0) == 0 && total_field != ISO_INVALID_ID) counts[total_field] = carry;
+  const uint total = scan_table(sums, values, count);
+  if (get_local_id(0) == 0 && total_field != ISO_INVALID_ID) counts[total_field] = total;
 }
 
 /// tile_sums[tile] = number of nonzero mask entries of the tile.

@@ -23,6 +23,29 @@ ISO_INLINE uint group_scan(local uint *sums, uint value, uint *total) {
   return inclusive - value;
 }
 
+/// values[i] = sum of values[0..i), in place, for `count` entries. Returns the sum of all. sums
+/// [ISO_GROUP_SIZE]. All items of the only work-group must call it: for short tables.
+ISO_INLINE uint scan_table(local uint *sums, global uint *values, uint count) {
+  const uint step = ISO_GROUP_SIZE * ISO_SCAN_ITEMS;
+  uint carry = 0;
+  for (uint first = 0; first < count; first += step) {
+    const uint begin = first + get_local_id(0) * ISO_SCAN_ITEMS;
+    uint own[ISO_SCAN_ITEMS];
+    uint sum = 0, total;
+    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
+      own[i] = begin + i < count ? values[begin + i] : 0;
+      sum += own[i];
+    }
+    uint before = carry + group_scan(sums, sum, &total);
+    for (uint i = 0; i < ISO_SCAN_ITEMS; ++i) {
+      if (begin + i < count) values[begin + i] = before;
+      before += own[i];
+    }
+    carry += total;
+  }
+  return carry;
+}
+
 /// Appends an entry to list [*count]. All items must call it. Returns its place.
 /// goes_on: this work-item has one. counters [2] of the work-group: 0 on entry and on return.
 ISO_INLINE uint append_entry(int goes_on, uint entry, volatile local uint *counters,
