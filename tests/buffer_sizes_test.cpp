@@ -324,7 +324,7 @@ TEST_P(BufferSizesMakeBuffersOnDevice, SmallOfTheirElementsAlone) {
 }
 
 /// The scratch of macrocells' build, too: what is booked at the most is what is stated.
-TEST_P(BufferSizesMakeBuffersOnDevice, SmallSetupScratchIsTheRestOfThePeak) {
+TEST_P(BufferSizesMakeBuffersOnDevice, SetupScratchIsTheRestOfThePeak) {
   for (const glm::uvec3 &dims : {glm::uvec3(1), glm::uvec3(70, 33, 9), glm::uvec3(4, 4, 800)}) {
     const CompressedVolume volume = compress_with_libzfp(random_voxels(dims, 0, 1, 6), dims, 64);
     ocl::Device device(GetParam());
