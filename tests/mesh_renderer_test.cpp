@@ -83,7 +83,7 @@ TEST_P(MeshRendererOnDevice, FurtherFramesDrawTheMeshThatIsThere) {
   }
   EXPECT_EQ(renderer.render(cameras[0], 0.2f, ImageSize{20, 11}).decoded_blocks, 0u);
   expect_same_hits(renderer.hits(), expected_hits(volume, cameras[0], {20, 11}, 0.2f), 20);
-  renderer.clear();
+  renderer.clear_cache();
   const MeshFrameStats cold = renderer.render(cameras[0], 0.2f);
   EXPECT_EQ(cold.decoded_blocks, cold.needed_blocks);
 }

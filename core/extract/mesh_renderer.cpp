@@ -68,7 +68,14 @@ MeshRenderer::MeshRenderer(ocl::Device &device, const CompressedVolume &volume,
       shade_(device, options.size.num_rays()),
       size_(options.size) {}
 
-void MeshRenderer::clear() {
+void MeshRenderer::clear_cache() {
+  isovalue_.reset();
+  blocks_.clear_cache();
+  device_.finish();
+}
+
+/// Gives back what an unfinished frame has left.
+void MeshRenderer::drop_all() {
   isovalue_.reset();
   mesh_.reset();
   lists_.reset();
@@ -294,7 +301,7 @@ MeshFrameStats MeshRenderer::render(const Camera &camera, float isovalue,
     if (!is_kept_) draw_batches();
     device_.finish();
   } catch (...) {  // blocks may have slots, but no values
-    clear();
+    drop_all();
     throw;
   }
   blocks_.rays().frame = frame_;  // for shading

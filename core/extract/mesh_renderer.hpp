@@ -76,8 +76,9 @@ class MeshRenderer {
   /// Returns  the picture of the hit buffer, as Renderer::shade()
   Image8 shade(const Appearance &appearance = {});
 
-  /// Forgets the mesh and all decoded blocks, and gives their memory back: for measurements.
-  void clear();
+  /// Forgets the mesh and all decoded blocks, so that the next frame is a cold one: for
+  /// measurements. Their memory stays.
+  void clear_cache();
 
  private:
   /// Of the surface at hand, on the device.
@@ -90,6 +91,7 @@ class MeshRenderer {
     PrefixSum sum;
   };
 
+  void drop_all();
   void find_surface(float isovalue);
   void make_lists();
   void plan_within_budget();

@@ -144,6 +144,12 @@ void SurfaceBlocks::open_cache(std::uint32_t num_slots) {
   cached_isovalue_ = isovalue;
 }
 
+void SurfaceBlocks::clear_cache() {
+  if (!cache_) return;
+  cache_->clear();
+  num_free_ = cache_->num_slots;
+}
+
 void SurfaceBlocks::drop_cache() {
   cache_.reset();
   decode_.reset();

@@ -70,6 +70,8 @@ class SurfaceBlocks {
   /// Has a cache of so many slots for the isovalue of find(). One that is there and has as many is
   /// kept, with its blocks.
   void open_cache(std::uint32_t num_slots);
+  /// Forgets all decoded blocks; their slots stay.
+  void clear_cache();
   /// Forgets all decoded blocks, and gives their memory back.
   void drop_cache();
 
