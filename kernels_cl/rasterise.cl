@@ -31,17 +31,30 @@ kernel void raster_clear(const FrameParams frame_params, global uint *depth, glo
 }
 
 /// One pixel's turn with one triangle.
-ISO_INLINE void offer(const FrameParams *frame, const EyeTriangle *corners, uint triangle,
-                      uint pixel, uint turn, volatile global uint *depth,
+ISO_INLINE void offer(const FrameParams *frame, const ViewTriangle *corners, uint triangle,
+                      uint column, uint row, uint turn, volatile global uint *depth,
                       volatile global uint *triangles) {
-  const Ray ray = make_ray(frame, pixel);
+  const uint pixel = column + frame->view.width * row;
   TriangleHit hit;
-  if (!ray_meets_triangle(&ray, corners, &hit)) return;
+  if (!ray_meets_triangle(column_u(frame, column), row_v(frame, row), corners, &hit)) return;
   if (turn == DEPTH_TURN) {
-    atomic_min(&depth[pixel], as_uint(hit.t));
-  } else if (depth[pixel] == as_uint(hit.t)) {
+    atomic_min(&depth[pixel], as_uint(hit.forward));
+  } else if (depth[pixel] == as_uint(hit.forward)) {
     atomic_min(&triangles[pixel], triangle);
   }
+}
+
+/// The turn of every step-th pixel of the triangle's box, from pixel `first` on.
+ISO_INLINE void offer_some(const FrameParams *frame, const RasterView *view,
+                           global const BlockVertex *vertices, uint triangle, uint first, uint step,
+                           uint turn, volatile global uint *depth,
+                           volatile global uint *triangles) {
+  const ViewTriangle corners = view_triangle(frame, view, vertices + 3 * (ulong)triangle);
+  const PixelBox box = triangle_box(frame, view, &corners);
+  const uint pixels = box_pixels(box), columns = box.end_x - box.begin_x;
+  for (uint i = first; i < pixels; i += step)
+    offer(frame, &corners, triangle, box.begin_x + i % columns, box.begin_y + i / columns, turn,
+          depth, triangles);
 }
 
 /// Triangles [0, count) of a part.
@@ -64,7 +77,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void raster_p
     if (item == 0) num_shared = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
     if (triangle < count) {
-      const EyeTriangle corners = eye_triangle(frame, vertices + 3 * (ulong)triangle);
+      const ViewTriangle corners = view_triangle(frame, &view, vertices + 3 * (ulong)triangle);
       const PixelBox box = triangle_box(frame, &view, &corners);
       const uint pixels = box_pixels(box);
       uint place = capacity;
@@ -74,20 +87,16 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void raster_p
       } else if (pixels > ALONE) {
         shared[atomic_inc(&num_shared)] = triangle;
       } else {
-        for (uint i = 0; i < pixels; ++i)
-          offer(frame, &corners, triangle, box_pixel(frame, box, i), turn, depth, triangles);
+        for (uint row = box.begin_y; row < box.end_y; ++row) {
+          for (uint column = box.begin_x; column < box.end_x; ++column)
+            offer(frame, &corners, triangle, column, row, turn, depth, triangles);
+        }
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     const uint num = num_shared;
-    for (uint k = 0; k < num; ++k) {
-      const uint one = shared[k];
-      const EyeTriangle corners = eye_triangle(frame, vertices + 3 * (ulong)one);
-      const PixelBox box = triangle_box(frame, &view, &corners);
-      const uint pixels = box_pixels(box);
-      for (uint i = item; i < pixels; i += ISO_GROUP_SIZE)
-        offer(frame, &corners, one, box_pixel(frame, box, i), turn, depth, triangles);
-    }
+    for (uint k = 0; k < num; ++k)
+      offer_some(frame, &view, vertices, shared[k], item, ISO_GROUP_SIZE, turn, depth, triangles);
     barrier(CLK_LOCAL_MEM_FENCE); /* all have read num_shared */
   }
 }
@@ -100,14 +109,9 @@ kernel void raster_listed(const FrameParams frame_params, const RasterView view,
                           global uint *triangles, uint capacity, global const uint *listed) {
   const FrameParams *frame = &frame_params;
   const uint num = min(listed[0], capacity);
-  for (uint k = 0; k < num; ++k) {
-    const uint one = listed[1 + k];
-    const EyeTriangle corners = eye_triangle(frame, vertices + 3 * (ulong)one);
-    const PixelBox box = triangle_box(frame, &view, &corners);
-    const uint pixels = box_pixels(box);
-    for (uint i = get_global_id(0); i < pixels; i += get_global_size(0))
-      offer(frame, &corners, one, box_pixel(frame, box, i), turn, depth, triangles);
-  }
+  for (uint k = 0; k < num; ++k)
+    offer_some(frame, &view, vertices, listed[1 + k], get_global_id(0), get_global_size(0), turn,
+               depth, triangles);
 }
 
 /// Hits of the pixels for which the part has a nearer triangle than the parts before; no triangle
@@ -116,19 +120,20 @@ kernel void raster_listed(const FrameParams frame_params, const RasterView view,
 /// In      vertices of the part; triangles [pixel]
 /// Out     hits [pixel]
 /// Launch  grid-stride over pixels
-kernel void raster_hits(const FrameParams frame_params, global const BlockVertex *vertices,
-                        global uint *triangles, global HitRecord *hits) {
+kernel void raster_hits(const FrameParams frame_params, const RasterView view,
+                        global const BlockVertex *vertices, global uint *triangles,
+                        global HitRecord *hits) {
   const FrameParams *frame = &frame_params;
-  const uint count = frame->view.width * frame->view.height;
+  const uint width = frame->view.width, count = width * frame->view.height;
   for (uint pixel = get_global_id(0); pixel < count; pixel += get_global_size(0)) {
     const uint triangle = triangles[pixel];
     if (triangle == ISO_INVALID_ID) continue;
-    global const BlockVertex *corners = vertices + 3 * (ulong)triangle;
-    const EyeTriangle seen = eye_triangle(frame, corners);
-    const Ray ray = make_ray(frame, pixel);
+    global const BlockVertex *own = vertices + 3 * (ulong)triangle;
+    const ViewTriangle corners = view_triangle(frame, &view, own);
+    const float u = column_u(frame, pixel % width), v = row_v(frame, pixel / width);
     TriangleHit at;
-    if (ray_meets_triangle(&ray, &seen, &at)) {
-      const HitRecord hit = triangle_hit(frame, corners, at);
+    if (ray_meets_triangle(u, v, &corners, &at)) {
+      const HitRecord hit = triangle_hit(frame, own, u, v, at);
       if (hit.t < hits[pixel].t) hits[pixel] = hit;
     }
     triangles[pixel] = ISO_INVALID_ID;

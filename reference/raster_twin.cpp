@@ -1,6 +1,7 @@
 #include "reference/raster_twin.hpp"
 
 #include "core/base/parallel_for.hpp"
+#include "core/stages/rasterise.hpp"
 #include "kernels_cl/portable/raster.h"
 #include "reference/mesh_twin.hpp"
 
@@ -32,19 +33,21 @@ std::vector<BlockVertex> triangles_scalar(const glm::uvec3 &dims, std::span<cons
 
 std::vector<HitRecord> rasterise_scalar(const FrameParams &frame,
                                         std::span<const BlockVertex> vertices, unsigned threads) {
-  std::vector<EyeTriangle> triangles;
+  const RasterView view = make_raster_view(frame.view);
+  std::vector<ViewTriangle> triangles;
   for (std::size_t i = 0; i < vertices.size(); i += 3)
-    triangles.push_back(eye_triangle(&frame, &vertices[i]));
+    triangles.push_back(view_triangle(&frame, &view, &vertices[i]));
   std::vector<HitRecord> hits(std::size_t{frame.view.width} * frame.view.height, no_hit());
   parallel_for(frame.view.height, threads, [&](std::uint64_t row, std::uint32_t) {
+    const float v = row_v(&frame, static_cast<uint>(row));
     for (uint column = 0; column < frame.view.width; ++column) {
-      const auto pixel = static_cast<uint>(row * frame.view.width + column);
-      const Ray ray = make_ray(&frame, pixel);
+      const float u = column_u(&frame, column);
+      HitRecord &nearest = hits[row * frame.view.width + column];
       for (std::size_t i = 0; i < triangles.size(); ++i) {
         TriangleHit at;
-        if (!ray_meets_triangle(&ray, &triangles[i], &at)) continue;
-        const HitRecord hit = triangle_hit(&frame, &vertices[3 * i], at);
-        if (hit.t < hits[pixel].t) hits[pixel] = hit;
+        if (!ray_meets_triangle(u, v, &triangles[i], &at)) continue;
+        const HitRecord hit = triangle_hit(&frame, &vertices[3 * i], u, v, at);
+        if (hit.t < nearest.t) nearest = hit;
       }
     }
   });

@@ -33,12 +33,17 @@ constexpr ImageSize kMedium{96, 64};
 
 // ---- a ray and a triangle
 
+/// Corners in view coordinates: forward, right, up.
 struct TestTriangle {
-  EyeTriangle corners;
+  ViewTriangle corners;
   glm::dvec3 a, b, c;
 
   TestTriangle(const glm::vec3 &p, const glm::vec3 &q, const glm::vec3 &r) : a(p), b(q), c(r) {
     corners = {{p.x, q.x, r.x}, {p.y, q.y, r.y}, {p.z, q.z, r.z}};
+  }
+  bool is_met(float u, float v) const {
+    TriangleHit hit;
+    return ray_meets_triangle(u, v, &corners, &hit) != 0;
   }
 };
 
@@ -50,29 +55,26 @@ glm::dvec3 meet_exactly(const TestTriangle &triangle, const glm::dvec3 &directio
   return {scale * glm::dot(ac, q), scale * glm::dot(s, p), scale * glm::dot(direction, q)};
 }
 
-Ray ray_along(const glm::vec3 &d) {
-  return {make_ray_axis(0, d.x), make_ray_axis(0, d.y), make_ray_axis(0, d.z)};
-}
-
 TEST(RayTriangle, IsTheTextbooks) {
   Random random(1);
   std::uniform_real_distribution<float> place(-1, 1);
   const auto vector = [&] { return glm::vec3(place(random), place(random), place(random)); };
   std::size_t num_met = 0, num_close = 0;
   for (int i = 0; i < 200'000; ++i) {
-    const glm::vec3 middle = 20.0f * vector(), direction = glm::normalize(middle + 1.5f * vector());
-    const TestTriangle triangle(middle + vector(), middle + vector(), middle + vector());
-    const Ray ray = ray_along(direction);
+    const glm::vec3 middle = glm::vec3(8 * place(random), 0, 0) + 2.0f * vector();
+    const float u = place(random), v = place(random);
+    const TestTriangle triangle(middle + 4.0f * vector(), middle + 4.0f * vector(),
+                                middle + 4.0f * vector());
     TriangleHit hit;
-    const bool met = ray_meets_triangle(&ray, &triangle.corners, &hit) != 0;
-    const glm::dvec3 exact = meet_exactly(triangle, direction);
-    // Seen along the ray, corners are off by 2^-22 of their largest coordinate, below 22. Weights
-    // change by that over the least height of the triangle that is seen, its doubled area over its
-    // longest edge.
+    const bool met = ray_meets_triangle(u, v, &triangle.corners, &hit) != 0;
+    const glm::dvec3 direction(1, u, v), exact = meet_exactly(triangle, direction);
+    // Seen along the ray, corners, whose coordinates are below 14, are off by 2^-24 of at most
+    // twice as much. Weights change by that over the least height of the triangle that is seen: its
+    // doubled area over its longest edge.
     const glm::dvec3 ab = triangle.b - triangle.a, ac = triangle.c - triangle.a;
-    const double area = std::abs(glm::dot(glm::cross(ab, ac), glm::dvec3(direction)));
+    const double area = std::abs(glm::dot(glm::cross(ab, ac), direction));
     const double longest = std::max({glm::length(ab), glm::length(ac), glm::length(ab - ac)});
-    const double off = 2 * 22 * 0x1p-22 * longest / area + 0x1p-20;
+    const double off = 2 * 28 * 0x1p-24 * 2 * longest / area + 0x1p-20;
     const double least = std::min({exact.y, exact.z, 1 - exact.y - exact.z});
     if (std::abs(least) < off || std::abs(exact.x) < 0.01 || off > 0.1) {
       ++num_close;  // too near to an edge to be judged
@@ -81,8 +83,8 @@ TEST(RayTriangle, IsTheTextbooks) {
     ASSERT_EQ(met, least > 0 && exact.x > 0) << "case " << i;
     if (!met) continue;
     ++num_met;
-    // t is that of a point of the triangle whose weights are off by as much.
-    ASSERT_NEAR(hit.t, exact.x, 3 * off * longest + 22 * 0x1p-20) << "case " << i;
+    // That of a point of the triangle whose weights are off by as much.
+    ASSERT_NEAR(hit.forward, exact.x, 3 * off * longest + 14 * 0x1p-20) << "case " << i;
     ASSERT_NEAR(hit.b, exact.y, off);
     ASSERT_NEAR(hit.c, exact.z, off);
   }
@@ -92,34 +94,30 @@ TEST(RayTriangle, IsTheTextbooks) {
 
 /// The ray goes right through a corner, or an edge: all that share it are met.
 TEST(RayTriangle, CornersAndEdgesBelongToAll) {
-  const glm::vec3 top(0, 0, 5);
+  const glm::vec3 top(5, 0, 0);
   std::vector<glm::vec3> around;
   for (int i = 0; i < 7; ++i)
-    around.emplace_back(std::sin(0.9f * float(i)), std::cos(0.9f * float(i)), 6 + 0.1f * float(i));
-  const Ray through_top = ray_along({0, 0, 1});
+    around.emplace_back(6 + 0.1f * float(i), std::sin(0.9f * float(i)), std::cos(0.9f * float(i)));
   for (std::size_t i = 0; i < around.size(); ++i) {
     const glm::vec3 &next = around[(i + 1) % around.size()];
     TriangleHit hit;
     const TestTriangle fan(top, around[i], next);
-    ASSERT_TRUE(ray_meets_triangle(&through_top, &fan.corners, &hit));
-    EXPECT_EQ(hit.t, 5);
-    // From both sides of the edge, whichever way round.
-    const Ray through_edge = ray_along(glm::normalize(top + around[i]));
-    const TestTriangle left(top, around[i], top + glm::vec3(3, 0, 1)),
-        right(around[i], top, top - glm::vec3(3, 0, 1));
-    EXPECT_TRUE(ray_meets_triangle(&through_edge, &left.corners, &hit) ||
-                ray_meets_triangle(&through_edge, &right.corners, &hit));
+    ASSERT_TRUE(ray_meets_triangle(0, 0, &fan.corners, &hit));
+    EXPECT_EQ(hit.forward, 5);
+    // An edge from both sides, whichever way round.
+    const glm::vec3 middle = 0.5f * (top + around[i]);
+    const float u = middle.y / middle.x, v = middle.z / middle.x;
+    const glm::vec3 aside = glm::cross(around[i] - top, glm::vec3(1, 0, 0));
+    EXPECT_TRUE(TestTriangle(top, around[i], top + aside).is_met(u, v) ||
+                TestTriangle(around[i], top, top - aside).is_met(u, v));
   }
 }
 
 TEST(RayTriangle, NothingBehindNorOnEdgeIsMet) {
-  const Ray ray = ray_along({0, 0, 1});
-  TriangleHit hit;
-  const TestTriangle behind({-1, -1, -2}, {1, -1, -2}, {0, 2, -2}),
-      edge_on({0, -1, 2}, {0, 1, 2}, {0, 0, 4}), point({0, 0, 2}, {0, 0, 2}, {0, 0, 2});
-  EXPECT_FALSE(ray_meets_triangle(&ray, &behind.corners, &hit));
-  EXPECT_FALSE(ray_meets_triangle(&ray, &edge_on.corners, &hit));
-  EXPECT_FALSE(ray_meets_triangle(&ray, &point.corners, &hit));
+  EXPECT_TRUE(TestTriangle({2, -1, -1}, {2, 1, -1}, {2, 0, 2}).is_met(0, 0));
+  EXPECT_FALSE(TestTriangle({-2, -1, -1}, {-2, 1, -1}, {-2, 0, 2}).is_met(0, 0));
+  EXPECT_FALSE(TestTriangle({2, 0, -1}, {2, 0, 1}, {4, 0, 0}).is_met(0, 0)) << "on edge";
+  EXPECT_FALSE(TestTriangle({2, 0, 0}, {2, 0, 0}, {2, 0, 0}).is_met(0, 0)) << "a point";
 }
 
 /// Signs are right where float32 alone cannot tell.

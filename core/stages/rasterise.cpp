@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 namespace isowave::core {
@@ -17,20 +16,12 @@ constexpr std::uint32_t kListed = 4096;
 }  // namespace
 
 RasterView make_raster_view(const View &view) {
-  const Projection projection = make_projection(view);
-  const glm::dmat3 rows = glm::transpose(projection.to_view);
-  // A corner is off by 2^-23 of its largest coordinate where it is rounded, the test's plane by
-  // 2^-22 through the ray's slopes and by 2^-24 through its own rounding, view coordinates by 2^-22
-  // of their largest product: together less than 2^-20, in the largest row.
-  double largest_row = 0;
-  for (int row = 0; row < 3; ++row)
-    largest_row = std::max(largest_row,
-                           std::abs(rows[row].x) + std::abs(rows[row].y) + std::abs(rows[row].z));
-  // Columns are computed from u with a few roundings, of numbers below twice the picture's size.
-  const double rounding = 0x1p-20 * std::max(view.width, view.height);
-  const glm::dvec2 margin = projection.margin + rounding,
-                   border = 1.0001 * (projection.border + projection.pixel * margin);
+  const glm::dmat3 rows =
+      glm::transpose(glm::inverse(glm::dmat3(glm::dvec3(view.fwd_x, view.fwd_y, view.fwd_z),
+                                             glm::dvec3(view.right_x, view.right_y, view.right_z),
+                                             glm::dvec3(view.up_x, view.up_y, view.up_z))));
   const auto to_float = [](double x) { return static_cast<float>(x); };
+  const double pixel = 2.0 * view.pixel_scale;  // step of u and v
   return {.forward_x = to_float(rows[0].x),
           .forward_y = to_float(rows[0].y),
           .forward_z = to_float(rows[0].z),
@@ -40,14 +31,16 @@ RasterView make_raster_view(const View &view) {
           .up_x = to_float(rows[2].x),
           .up_y = to_float(rows[2].y),
           .up_z = to_float(rows[2].z),
-          .border_u = to_float(border.x),
-          .border_v = to_float(border.y),
-          .columns_per_u = to_float(1 / projection.pixel),
+          .border_u = to_float(0.5 * pixel * view.width),
+          .border_v = to_float(0.5 * pixel * view.height),
+          .columns_per_u = to_float(1 / pixel),
           .centre_column = 0.5f * static_cast<float>(view.width - 1),
           .centre_row = 0.5f * static_cast<float>(view.height - 1),
-          .margin_x = to_float(margin.x),
-          .margin_y = to_float(margin.y),
-          .doubt = to_float(0x1p-20 * largest_row)};
+          // The test rounds a corner's place on its plane once, by 2^-24 of what cancels there; the
+          // projection rounds a quotient, which may be off by 2.5 ulp where a device does not
+          // divide exactly, and its product with columns_per_u. In the picture, which is where it
+          // matters, that is less than 2^-20 of the picture's larger side.
+          .margin = to_float(0x1p-20 * std::max(view.width, view.height))};
 }
 
 ocl::BufferSizes Rasterise::sizes(std::uint64_t num_rays) {
@@ -89,7 +82,7 @@ void Rasterise::operator()(const ocl::Buffer<BlockVertex> &vertices, std::uint32
           listed_);
     list_(pixels_range_, rays.frame, view_, turn, vertices, depth_, triangles_, kListed, listed_);
   }
-  hits_(pixels_range_, rays.frame, vertices, triangles_, rays.hits);
+  hits_(pixels_range_, rays.frame, view_, vertices, triangles_, rays.hits);
 }
 
 }  // namespace isowave::core

@@ -9,7 +9,7 @@
 
 namespace isowave::core {
 
-/// What triangle_box() needs of a view.
+/// What drawing triangles needs of a view.
 RasterView make_raster_view(const View &view);
 
 class Rasterise {
@@ -48,7 +48,8 @@ class Rasterise {
   ocl::Kernel<FrameParams, RasterView, uint, ocl::In<BlockVertex>, ocl::Out<uint>, ocl::Out<uint>,
               uint, ocl::In<uint>>
       list_;
-  ocl::Kernel<FrameParams, ocl::In<BlockVertex>, ocl::Out<uint>, ocl::Out<HitRecord>> hits_;
+  ocl::Kernel<FrameParams, RasterView, ocl::In<BlockVertex>, ocl::Out<uint>, ocl::Out<HitRecord>>
+      hits_;
 };
 
 }  // namespace isowave::core

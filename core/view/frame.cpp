@@ -165,34 +165,25 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   return frame;
 }
 
-Projection make_projection(const View &view) {
+ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface) {
+  if (surface.active_end_x == 0) return {};
+  const glm::dvec2 size(view.width, view.height);
   const glm::dmat3 basis(glm::dvec3(view.fwd_x, view.fwd_y, view.fwd_z),
                          glm::dvec3(view.right_x, view.right_y, view.right_z),
                          glm::dvec3(view.up_x, view.up_y, view.up_z));
-  Projection projection;
-  projection.to_view = glm::inverse(basis);
-  projection.pixel = 2.0 * view.pixel_scale;
-  const glm::dvec2 border = 0.5 * projection.pixel * glm::dvec2(view.width, view.height);
-  projection.border = border;
+  const glm::dmat3 to_view = glm::inverse(basis);
+  const glm::dvec3 eye(view.eye_x, view.eye_y, view.eye_z);
+  const double pixel = 2.0 * view.pixel_scale;   // step of u and v
+  const glm::dvec2 border = 0.5 * pixel * size;  // largest |u|, |v|
 
   // The direction of a ray is fwd + u right + v up, rounded a few times, or flushed. In units of
   // that basis: by how much?
-  const glm::dmat3 &to_view = projection.to_view;
   const glm::dmat3 sizes(glm::abs(basis[0]), glm::abs(basis[1]), glm::abs(basis[2]));
   const glm::dmat3 to_sizes(glm::abs(to_view[0]), glm::abs(to_view[1]), glm::abs(to_view[2]));
   const double length = glm::length(glm::dvec3(1, border.x, border.y));
   const glm::dvec3 off = to_sizes * (0x1p-21 * (sizes * glm::dvec3(1, border.x, border.y)) +
                                      double{ISO_SMALLEST_DIRECTION} * length);
-  projection.margin = (glm::dvec2(off.y, off.z) + border * off.x) / projection.pixel;
-  return projection;
-}
-
-ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface) {
-  if (surface.active_end_x == 0) return {};
-  const glm::dvec2 size(view.width, view.height);
-  const auto [to_view, pixel, border, margin_of_rays] = make_projection(view);
-  const glm::dvec3 eye(view.eye_x, view.eye_y, view.eye_z);
-  const glm::dvec2 margin = 1.0 + margin_of_rays;
+  const glm::dvec2 margin = 1.0 + (glm::dvec2(off.y, off.z) + border * off.x) / pixel;
 
   glm::dvec2 begin(std::numeric_limits<double>::infinity()), end = -begin;
   for (int corner = 0; corner < 8; ++corner) {

@@ -2,7 +2,6 @@
 // One frame's constants for kernels and twin: grid, camera in index space, isovalue.
 
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <vector>
 
 #include "core/view/camera.hpp"
@@ -63,17 +62,6 @@ FrameParams make_grid_params(const VolumeInfo &info);
 /// Throws  Error: a degenerate camera, or one too far away; what check_drawable() or
 ///         check_image_size() refuses
 View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size);
-
-/// Where index space is in the picture. A vector v is x fwd + y right + z up, of the basis in the
-/// view, for (x,y,z) = to_view v; a ray has (1, u, v), by u = (2 column + 1 - width) pixel_scale
-/// and v = (height - 1 - 2 row) pixel_scale.
-struct Projection {
-  glm::dmat3 to_view;
-  double pixel;       ///< step of u and v
-  glm::dvec2 border;  ///< half the picture: no |u|, |v| is larger
-  glm::dvec2 margin;  ///< how far a ray may be off as make_ray() rounds it [pixels]
-};
-Projection make_projection(const View &view);
 
 /// The rays, as make_ray() rounds them, that may meet the surface's active box.
 ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface);
