@@ -49,19 +49,22 @@ TEST_F(CliPaper, MeasuresAllMethods) {
     EXPECT_GE(isovalue, 20);
     EXPECT_LE(isovalue, 120);
   }
-  ASSERT_EQ(methods.size(), 9u) << "four with rays, two of triangles, three of another size";
-  const json &blocks = methods[0], &without = methods[1], &rays = methods[2], &bcmc = methods[4];
+  ASSERT_EQ(methods.size(), 10u) << "five with rays, two of triangles, three of another size";
+  const json &blocks = methods[0], &without = methods[1], &rays = methods[2], &tight = methods[4],
+             &bcmc = methods[5];
   EXPECT_EQ(blocks["method"], "blocks");
   EXPECT_EQ(rays["method"], "rays");
   EXPECT_EQ(bcmc["method"], "bcmc");
   EXPECT_EQ(blocks["new_ms"]["count"], 3);
   EXPECT_EQ(blocks["next_ms"]["count"], 3);
-  EXPECT_EQ(methods[6]["size"], json({32, 24}));
+  EXPECT_EQ(tight["cache_slots"], rays["active_blocks"]["max"]);
+  EXPECT_LT(tight["device_bytes"], rays["device_bytes"]);
+  EXPECT_EQ(methods[7]["size"], json({32, 24}));
   EXPECT_GT(without["passes"]["mean"], blocks["passes"]["mean"]) << "without speculation";
   EXPECT_EQ(without["n_spec"]["max"], 1);
   EXPECT_GE(blocks["visible_blocks"]["mean"], 1);
   EXPECT_TRUE(rays["visible_blocks"].is_null());
-  for (const json *method : {&blocks, &without, &rays}) {
+  for (const json *method : {&blocks, &without, &rays, &tight}) {
     const json &completed = (*method)["completed_percent"];
     EXPECT_TRUE(std::ranges::is_sorted(completed));
     EXPECT_DOUBLE_EQ(completed.back().get<double>(), 100);
@@ -87,7 +90,7 @@ TEST_F(CliPaper, MeasuresAllMethods) {
 
 TEST_F(CliPaper, ABudgetThatIsTooSmallIsSaidInOneLine) {
   const json said = measure(kFuel + " --scaling 32x24 --bcmc-budget 100kB");
-  const json &bounded = said["volumes"][0]["methods"][5];
+  const json &bounded = said["volumes"][0]["methods"][6];
   EXPECT_THAT(bounded["refused"], HasSubstr("a memory budget of 100000 bytes is too small"));
   EXPECT_THAT(out_, HasSubstr("bcmc bounded       a memory budget of 100000 bytes is too small"));
 }
@@ -96,7 +99,7 @@ TEST_F(CliPaper, NoTriangles) {
   const json said = measure(kFuel + " --scaling 32x24 --range 1000 1001");
   for (const json &method : said["volumes"][0]["methods"])
     EXPECT_EQ(method["active_blocks"]["max"], 0);
-  EXPECT_EQ(said["volumes"][0]["methods"][4]["triangles"]["max"], 0);
+  EXPECT_EQ(said["volumes"][0]["methods"][5]["triangles"]["max"], 0);
   EXPECT_EQ(said["volumes"][0]["agreement"]["percent"], 100);
 }
 

@@ -13,6 +13,8 @@
 //   completed      after each pass: rays that have ended, of all pixels, or of those that met an
 //                  active block; a frame that is through counts as 100
 //   progress       of cold first views, waited for after each pass: ms since the frame's beginning
+//   cache          of rays: "default" slots, or as many as the cold frames needed at most, "one
+//                  frame"
 //   device_bytes   the peak of all buffers; cache_bytes: those of the block cache among them
 
 #include "tools/isowave/bench_paper.hpp"
@@ -143,10 +145,12 @@ void print_method(const ordered_json &row) {
                : fmt::format("{:.2f}", found->at("median").get<double>());
   };
   const bool is_bcmc = row.at("method") == "bcmc";
-  const std::string name =
-      is_bcmc ? row.at("memory_budget") == 0 ? "bcmc growing" : "bcmc bounded"
-              : fmt::format("{} {}", row.at("method").get<std::string>(),
-                            row.at("speculation").get<bool>() ? "" : "without spec.");
+  const std::string name = is_bcmc
+                               ? row.at("memory_budget") == 0 ? "bcmc growing" : "bcmc bounded"
+                               : fmt::format("{} {}", row.at("method").get<std::string>(),
+                                             row.at("cache") != "default"        ? "one frame"
+                                             : row.at("speculation").get<bool>() ? ""
+                                                                                 : "without spec.");
   if (is_bcmc && !row.at("refused").is_null()) {
     fmt::print("{:<18} {}\n", name, row.at("refused").get<std::string>());
     return;
@@ -181,13 +185,18 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
     methods.push_back(std::move(row));
   };
   std::uint64_t bytes_of_rays = 0;
+  double most_active = 0;  // blocks of a cold frame
   for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
     for (const bool speculation : {true, false}) {
       add(measure_rays(device, run, {pipeline, speculation}, parts));
-      if (pipeline == PipelineKind::kRays && speculation)
-        bytes_of_rays = methods.back().at("device_bytes").get<std::uint64_t>();
+      if (pipeline != PipelineKind::kRays || !speculation) continue;
+      bytes_of_rays = methods.back().at("device_bytes").get<std::uint64_t>();
+      most_active = methods.back().at("active_blocks").at("max").get<double>();
     }
   }
+  add(measure_rays(
+      device, run,
+      {.cache_slots = std::max(kMinCacheSlots, static_cast<std::uint32_t>(most_active))}, parts));
   add(measure_bcmc(device, run, 0, parts));
   add(measure_bcmc(device, few, options.bcmc_budget != 0 ? options.bcmc_budget : bytes_of_rays,
                    parts));

@@ -105,7 +105,7 @@ FrameRequest request_of(const PaperRun &run, std::size_t isovalue, std::size_t v
       .camera = run.cameras[view], .isovalue = run.isovalues[isovalue], .normals = Normals::kCell};
 }
 
-/// Calls visit(isovalue, view) for the first `count` isovalues from all cameras.
+/// Calls visit(isovalue, view) for all isovalues, from all cameras.
 void each_frame(const PaperRun &run, const auto &visit) {
   for (std::size_t i = 0; i < run.isovalues.size(); ++i) {
     for (std::size_t view = 0; view < run.cameras.size(); ++view) visit(i, view);
@@ -116,6 +116,7 @@ RendererOptions options_of(const PaperRun &run, const RayMethod &method) {
   RendererOptions options{.size = run.size, .pipeline = method.pipeline};
   if (!method.speculation) options.max_speculation = 1;
   options.per_ray_speculation = method.pipeline == PipelineKind::kRays && method.speculation;
+  options.cache_slots = method.cache_slots;
   options.with_shading = false;
   return options;
 }
@@ -172,6 +173,7 @@ ordered_json measure_rays(const ocl::DeviceInfo &device_info, const PaperRun &ru
   ordered_json json = {
       {"method", to_string(method.pipeline)},
       {"speculation", method.speculation},
+      {"cache", method.cache_slots == 0 ? "default" : "one frame"},
       {"size", {run.size.width, run.size.height}},
       {"isovalues", run.isovalues.size()},
       {"views", run.cameras.size()},

@@ -30,7 +30,8 @@ struct PaperParts {
 /// One way to draw with rays.
 struct RayMethod {
   PipelineKind pipeline = PipelineKind::kRays;
-  bool speculation = true;  ///< `blocks`: global, the paper's; `rays`: each ray by its own
+  bool speculation = true;        ///< `blocks`: global, the paper's; `rays`: each ray by its own
+  std::uint32_t cache_slots = 0;  ///< 0: the renderer's default
 };
 
 /// What frames took: see bench_paper.cpp for what it says.
