@@ -31,7 +31,7 @@ typedef struct LatticePoint {
 
 /// Steps from a block's first voxel. voxels: 0 to 4.
 ISO_INLINE uint block_steps(float voxels) {
-  return (uint)(voxels * ISO_STEPS_PER_VOXEL + 0.5f);
+  return (uint)fma(voxels, ISO_STEPS_PER_VOXEL, 0.5f);
 }
 
 /// x, y, z: voxels from the block's first one, 0 to 4.
