@@ -122,10 +122,12 @@ class MeshTwin {
       if ((cells >> cell & 1) == 0) continue;
       const uchar *entry =
           &cell_triangles().at(std::size_t{ISO_CASE_BYTES} * cell_signs(signs.data(), cell));
-      for (std::uint32_t i = 0; i < entry[0]; ++i)
+      for (std::uint32_t i = 0; i < entry[0]; ++i) {
         mesh_.triangles.push_back({vertex_of(b, cell, entry[1 + 3 * i]),
                                    vertex_of(b, cell, entry[2 + 3 * i]),
                                    vertex_of(b, cell, entry[3 + 3 * i])});
+        mesh_.triangle_blocks.emplace_back(b.x, b.y, b.z);
+      }
     }
   }
 

@@ -18,6 +18,7 @@ struct BlockMesh {
   std::vector<MeshVertex> vertices{};  ///< edge: bits 0..7 alone
   std::vector<Gradient> gradients{};   ///< [vertices]
   std::vector<MeshTriangle> triangles{};
+  std::vector<glm::uvec3> triangle_blocks{};  ///< [triangles] whose cell it is in
 };
 
 /// voxels: [nz][ny][nx].

@@ -17,8 +17,10 @@
 #include "core/render/pipeline.hpp"
 #include "core/stages/active_blocks.hpp"
 #include "core/stages/ambient.hpp"
+#include "core/stages/block_triangles.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/marching_cubes.hpp"
+#include "core/stages/rasterise.hpp"
 #include "core/stages/resident.hpp"
 #include "core/stages/shade.hpp"
 #include "core/zfp/zfp_encode.hpp"
@@ -92,10 +94,12 @@ struct Maker {
 };
 
 void check_wavefront(ocl::Device &device) {
-  for (const Wavefront::Limits &limits : {Wavefront::Limits{1},
-                                          {.num_rays = 1000, .with_pairs = false},
-                                          {333, true, 4},
-                                          {.num_rays = 50, .with_given = true}})
+  for (const Wavefront::Limits &limits :
+       {Wavefront::Limits{1},
+        {.num_rays = 1000, .with_pairs = false},
+        {333, true, 4},
+        {.num_rays = 50, .with_given = true},
+        {.num_rays = 60, .with_pairs = false, .with_walks = false}})
     expect_books(device, Wavefront::sizes(limits), [&] { return Wavefront(device, limits); });
 }
 
@@ -193,6 +197,15 @@ void check_marching_cubes(ocl::Device &device) {
   expect_books(device, SurfaceCounts::sizes(77), [&] { return SurfaceCounts(device, 77); });
 }
 
+void check_block_triangles(ocl::Device &device) {
+  expect_books(device, BlockTriangles::sizes(), [&] { return BlockTriangles(device); });
+}
+
+void check_rasterise(ocl::Device &device) {
+  for (const uint rays : {1u, 1000u})
+    expect_books(device, Rasterise::sizes(rays), [&] { return Rasterise(device, rays); });
+}
+
 void check_radix_sort(ocl::Device &device) {
   for (const auto &[count, group_size] : {std::pair(1u, 8u), {128u, 8u}, {129u, 8u}, {5000u, 64u}})
     expect_books(device, RadixSort::sizes(count, group_size),
@@ -277,6 +290,8 @@ constexpr std::array kMakers = {Maker{"Wavefront", check_wavefront},
                                 Maker{"PrefixSum", check_prefix_sum},
                                 Maker{"ActiveBlocks", check_active_blocks},
                                 Maker{"MarchingCubes", check_marching_cubes},
+                                Maker{"BlockTriangles", check_block_triangles},
+                                Maker{"Rasterise", check_rasterise},
                                 Maker{"RadixSort", check_radix_sort},
                                 Maker{"Group", check_group},
                                 Maker{"Shade", check_shade},

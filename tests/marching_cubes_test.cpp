@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -14,18 +13,11 @@
 #include "kernels_cl/portable/smooth_gradient.h"
 #include "reference/mesh_twin.hpp"
 #include "tests/mesh_checks.hpp"
-#include "tests/stage_world.hpp"
+#include "tests/surface_support.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave::core {
 namespace {
-
-/// Few values, so that many voxels equal the isovalue, and every sign is there.
-std::vector<float> coarse_noise(const glm::uvec3 &dims, uint seed) {
-  std::vector<float> voxels = random_voxels(dims, -2.5f, 2.5f, seed);
-  for (float &voxel : voxels) voxel = std::round(voxel);
-  return voxels;
-}
 
 Mesh unplaced(const BlockMesh &blocks, const glm::uvec3 &dims) {
   VolumeInfo info;
@@ -133,23 +125,13 @@ class MarchingCubesOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     SCOPED_TRACE(fmt::format("{}x{}x{}, isovalue {}, pieces of {}", dims.x, dims.y, dims.z,
                              isovalue, piece));
     const BlockMesh expected = extract_scalar(dims, voxels, isovalue);
-    FrameParams frame = plain_frame(dims, 64);
-    frame.surface.isovalue = isovalue;
-    const auto num_blocks = static_cast<uint>(block_count(frame.grid));
-    StageWorld world(device_, frame, std::max(num_blocks, 8u), 8);
-    const std::uint64_t num_coarse = num_macrocells(frame.grid);
-    const std::vector<uint> all_active = active_masks(world.frame);
-    const ocl::Buffer<uint> masks(device_, "masks", std::span<const uint>(all_active));
-    ActiveBlocks listed(device_, num_coarse);
-    const uint num_listed = listed.count(world.frame, masks);
+    CachedSurface cached(device_, dims, voxels, isovalue, gradients);
+    StageWorld &world = cached.world;
+    const FrameParams &frame = world.frame;
+    ActiveBlocks &listed = cached.listed;
+    const uint num_listed = cached.num_listed;
     SurfaceCounts surface(device_, num_listed);
-    listed.list(world.frame, surface.block_ids);
-    RequestSurface request(device_, gradients);
-    world.begin_pass({}, 1);
-    request(surface.block_ids, 0, num_listed, world.cache, world.rays);
-    world.assign_slots();
-    world.fill_slots(voxels);  // NaN in padding, which no vertex may see
-    world.cache.classify(world.rays);
+    listed.list(frame, surface.block_ids);
 
     MarchingCubes cubes(device_, gradients);
     for (uint begin = 0; begin < num_listed; begin += piece)
@@ -189,23 +171,6 @@ class MarchingCubesOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                   std::memcmp(triangles.data(), &expected.triangles[first_triangle],
                               triangles.size() * sizeof(MeshTriangle)) == 0);
     }
-  }
-
-  /// All blocks that own cells.
-  static std::vector<uint> active_masks(const FrameParams &frame) {
-    const glm::uvec3 coarse =
-        (glm::uvec3(frame.grid.blocks_x, frame.grid.blocks_y, frame.grid.blocks_z) + 3u) / 4u;
-    std::vector<uint> masks(2 * std::size_t{coarse.x} * coarse.y * coarse.z);
-    for (uint z = 0; z < num_owning_blocks(frame.grid.dims_z); ++z) {
-      for (uint y = 0; y < num_owning_blocks(frame.grid.dims_y); ++y) {
-        for (uint x = 0; x < num_owning_blocks(frame.grid.dims_x); ++x) {
-          const uint cell = x / 4 + coarse.x * (y / 4 + coarse.y * (z / 4)),
-                     bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
-          masks[2 * std::size_t{cell} + bit / 32] |= 1u << bit % 32;
-        }
-      }
-    }
-    return masks;
   }
 
   ocl::Device device_{GetParam()};

@@ -9,15 +9,10 @@
 // isovalue. Else the surface is gone through in batches, twice; no vertex depends on them.
 
 #include <cstdint>
-#include <optional>
 
 #include "core/extract/mesh.hpp"
-#include "core/render/memory_plan.hpp"
-#include "core/stages/active_blocks.hpp"
+#include "core/extract/surface_blocks.hpp"
 #include "core/stages/marching_cubes.hpp"
-#include "core/stages/request_surface.hpp"
-#include "core/stages/zfp_decode.hpp"
-#include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
 
@@ -64,7 +59,7 @@ class Extractor {
   ExtractStats extract(float isovalue, MeshSink &sink, const Progress &progress = {});
 
   /// Forgets all decoded blocks: for measurements. No mesh depends on it.
-  void clear_cache() { cache_.reset(); }
+  void clear_cache() { blocks_.drop_cache(); }
 
  private:
   struct Run;
@@ -75,11 +70,7 @@ class Extractor {
     std::uint64_t bytes = 0;  ///< of all buffers
   };
 
-  BlockCache::Limits cache_limits(std::uint32_t num_slots) const;
-  std::uint64_t cache_bytes(std::uint32_t num_slots) const;
   Plan plan_for(std::uint64_t num_listed, std::uint64_t num_needed, float isovalue) const;
-  void open_cache(const Plan &plan, float isovalue);
-  bool bring(const SurfaceCounts &surface, std::uint32_t begin, std::uint32_t end);
   void count(Run &run);
   void write(Run &run);
   void give(Run &run, std::uint32_t begin);
@@ -87,22 +78,9 @@ class Extractor {
   ocl::Device &device_;
   ExtractorOptions options_;
   VolumeInfo info_;
-  FrameParams frame_;
   Gradients gradients_;
-  std::uint64_t budget_;
-  std::uint64_t fixed_bytes_ = 0;  ///< of the buffers that live as long as the extractor
-  DeviceStream stream_;
-  Macrocells macrocells_;
-  ActiveBlocks listed_;
-  RequestSurface request_;
+  SurfaceBlocks blocks_;
   MarchingCubes marching_cubes_;
-  Wavefront rays_;  ///< of it, cache and decoder use frame and counts alone
-  std::optional<BlockCache> cache_;
-  std::optional<ZfpDecode> decode_;  ///< for that cache
-  float cached_isovalue_ = 0;        ///< of its bits of voxels inside
-  std::uint32_t num_free_ = 0;       ///< of its slots
-  std::uint32_t pass_ = 1;           ///< the clock of its stamps
-  std::uint64_t num_decoded_ = 0;
 };
 
 }  // namespace isowave::core

@@ -4,7 +4,7 @@ namespace isowave::core {
 
 ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
   const std::uint64_t rays = limits.num_rays, pairs = limits.with_pairs ? rays : 0,
-                      given = limits.with_given ? rays : 0;
+                      given = limits.with_given ? rays : 0, walks = limits.with_walks ? rays : 0;
   return {ocl::buffer_size<PassCounts>("pass counts", 1),
           ocl::buffer_size<PassCounts>("pass counts, previous", 1),
           ocl::buffer_size<PassCounts>("pass counts, next", 1),
@@ -13,9 +13,9 @@ ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
           ocl::buffer_size<GivenRay>("given rays", given),
           ocl::buffer_size<HitRecord>("hits of given rays", given),
           ocl::buffer_size<uchar>("open ambient rays", given),
-          ocl::buffer_size<uint>("ray states", rays),
-          ocl::buffer_size<uint>("active ray ids", rays),
-          ocl::buffer_size<uint>("active ray ids, next", rays),
+          ocl::buffer_size<uint>("ray states", walks),
+          ocl::buffer_size<uint>("active ray ids", walks),
+          ocl::buffer_size<uint>("active ray ids, next", walks),
           ocl::buffer_size<uint>("mask", pairs),
           ocl::buffer_size<uint>("pair block ids", pairs),
           ocl::buffer_size<PairHit>("pair hits", pairs),

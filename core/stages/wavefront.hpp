@@ -47,6 +47,7 @@ struct Wavefront {
     bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
     std::size_t num_levels = 1;  ///< of detail
     bool with_given = false;     ///< there may be rays of RaySource::kGiven
+    bool with_walks = true;      ///< rays walk from block to block: not where triangles are drawn
   };
   static ocl::BufferSizes sizes(const Limits &limits);
 

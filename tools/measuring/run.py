@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import re
 import shlex
 import subprocess
 
@@ -91,16 +92,21 @@ class Run:
     def run(self, program, *arguments, remember=True, **options):
         """The program's standard output. Throws Failed with the last line that it said."""
         path = self.options.programs / program
+        if remember:
+            self.remember(program, *arguments, **options)
         arguments = [*map(str, arguments), *as_arguments(options)]
         command = [str(path), *arguments]
         done = subprocess.run(command, cwd=self.work, capture_output=True, text=True)
-        if remember:
-            self.commands.append(shlex.join([pathlib.Path(program).name, *arguments]))
         if done.returncode:
             said = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()
             asked = shlex.join([program, *arguments])
             raise Failed(f"{asked}: status {done.returncode}: {said[-1]}")
         return done.stdout
+
+    def remember(self, program, *arguments, **options):
+        """As a command that has been run."""
+        words = [pathlib.Path(program).name, *map(str, arguments), *as_arguments(options)]
+        self.commands.append(shlex.join(words))
 
     def read_json(self, name):
         return json.loads((self.work / name).read_text())
@@ -123,6 +129,20 @@ class Run:
             wanted = not names or self.options.quick or short_name(path) in names
             if wanted and path.exists():
                 yield path, isovalues
+
+    def every_volume(self):
+        """(path, isovalues or None) of all volumes of the folder whose names say what they are."""
+        if not self.options.volumes:
+            return
+        found = set()
+        for path in sorted(self.options.volumes.iterdir()):
+            name = path.name.lower()
+            with_dims = re.search(r"_\d+x\d+x\d+_(u?int|float)\d+\.raw(\.gz)?$", name)
+            if not (with_dims or name.endswith((".nrrd", ".nhdr", ".mha", ".mhd", ".zfp"))):
+                continue
+            if short_name(path) not in found:
+                found.add(short_name(path))
+                yield path, REAL_VOLUMES.get(path.name)
 
     def volume(self, field, *storage):
         """A synthetic volume of 8-bit integers, compressed with all levels; made once."""

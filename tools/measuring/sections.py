@@ -1,6 +1,6 @@
 """The sections that tools/measure knows: name -> function, and what each needs."""
 
-from measuring import accuracy, speed
+from measuring import accuracy, paper, speed
 
 SECTIONS = {
     section.__name__: section
@@ -20,6 +20,7 @@ SECTIONS = {
         accuracy.watertight,
         accuracy.stability,
         speed.peer,
+        paper.paper,
         accuracy.bits,
         accuracy.oracles,
         accuracy.certified,

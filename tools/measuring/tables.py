@@ -4,6 +4,8 @@ its own, the head first."""
 import pathlib
 import statistics
 
+from measuring import paper
+
 
 def ms(value):
     return f"{value:.2f}" if value < 20 else f"{value:.0f}"
@@ -445,6 +447,7 @@ TABLES = {
         ("watertight", watertight),
         ("stability", stability, leaks),
         ("peer", peer),
+        ("paper", *paper.TABLES),
         ("bits", bits),
         ("oracles", oracles),
         ("certified", certified),

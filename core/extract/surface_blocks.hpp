@@ -1,0 +1,132 @@
+#pragma once
+// The blocks that an isosurface passes, listed, and brought into a cache batch by batch: what is
+// common to all who make triangles of a compressed volume.
+//
+//   active blocks -> [ request -> cache -> decode ]*
+
+#include <cstdint>
+#include <optional>
+
+#include "core/render/memory_plan.hpp"
+#include "core/stages/active_blocks.hpp"
+#include "core/stages/macrocells.hpp"
+#include "core/stages/request_surface.hpp"
+#include "core/stages/zfp_decode.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+/// Not thread-safe, as the device.
+class SurfaceBlocks {
+ public:
+  struct Options {
+    Gradients gradients = Gradients::kNone;
+    std::uint64_t memory_budget = 0;          ///< bound on all device memory [bytes]
+    StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+    /// Of what the owner keeps on the device as long as this, beside what is here.
+    ocl::BufferSizes beside{};
+    /// Of a Wavefront: a picture, or one ray.
+    std::uint64_t num_rays = 1;
+  };
+
+  /// 3/4 of the device's memory: the budget of who was given none.
+  static std::uint64_t default_budget(const ocl::Device &device);
+
+  /// Uploads the volume and builds its macrocell ranges.
+  ///
+  /// device  must outlive this; volume, too
+  /// Throws  Error: the device's memory or the budget does not suffice
+  /// Waits   yes
+  SurfaceBlocks(ocl::Device &device, const CompressedVolume &volume, const Options &options);
+
+  /// Finds the blocks for an isovalue.
+  ///
+  /// Returns  how many there are
+  /// Throws   Error: a NaN isovalue
+  /// Waits    yes
+  std::uint32_t find(float isovalue);
+  /// Lists the blocks that find() found.
+  ///
+  /// Out    block_ids [find()]
+  /// Waits  no
+  void list(ocl::Buffer<uint> &block_ids) { listed_.list(frame_, block_ids); }
+  /// How many different blocks the first `count` entries of the list need. Takes count_bytes() of
+  /// device memory meanwhile.
+  ///
+  /// Waits  yes
+  std::uint32_t count_needed(const ocl::Buffer<uint> &block_ids, std::uint32_t count) {
+    return request_.count_needed(frame_, block_ids, count);
+  }
+  std::uint64_t count_bytes() const;
+
+  /// Slots that serve any surface, and the bytes of a cache with so many.
+  std::uint32_t least_slots() const { return blocks_of_block(gradients_); }
+  std::uint64_t cache_bytes(std::uint32_t num_slots) const;
+  /// Whether the device can allocate the values of so many slots.
+  bool can_have(std::uint32_t num_slots) const;
+  /// From `least_slots` to `wanted`, the most for which beside + cache_bytes() is within the
+  /// budget.
+  std::uint32_t most_slots(std::uint32_t wanted, std::uint64_t beside) const;
+  /// Has a cache of so many slots for the isovalue of find(). One that is there and has as many is
+  /// kept, with its blocks.
+  void open_cache(std::uint32_t num_slots);
+  /// Forgets all decoded blocks; their slots stay.
+  void clear_cache();
+  /// Forgets all decoded blocks, and gives their memory back.
+  void drop_cache();
+
+  /// Has what the entries [begin, end) of a list need cached. Returns false where that is more than
+  /// there are slots: then it is not.
+  ///
+  /// Waits  yes
+  bool bring(const ocl::Buffer<uint> &block_ids, std::uint32_t begin, std::uint32_t end);
+
+  const FrameParams &frame() const { return frame_; }  ///< grid, isovalue
+  const ActiveBlocks &listed() const { return listed_; }
+  const BlockCache &cache() const { return *cache_; }  ///< of open_cache()
+  /// Slots of the cache; 0: there is none.
+  std::uint32_t num_slots() const { return cache_ ? cache_->num_slots : 0; }
+  std::uint32_t num_cached() const { return cache_ ? cache_->num_slots - num_free_ : 0; }
+  std::uint64_t num_decoded() const { return num_decoded_; }  ///< so far
+  std::uint64_t budget() const { return budget_; }
+  /// Of all buffers that live as long as this, those of `beside` among them.
+  std::uint64_t fixed_bytes() const { return fixed_bytes_; }
+  /// The hits of a picture, and what cache and decoder use of frames.
+  Wavefront &rays() { return rays_; }
+  Macrocells &macrocells() { return macrocells_; }
+
+ private:
+  BlockCache::Limits cache_limits(std::uint32_t num_slots) const;
+
+  ocl::Device &device_;
+  Gradients gradients_;
+  FrameParams frame_;
+  std::uint64_t budget_, fixed_bytes_;
+  DeviceStream stream_;
+  Macrocells macrocells_;
+  ActiveBlocks listed_;
+  RequestSurface request_;
+  Wavefront rays_;
+  std::optional<BlockCache> cache_;
+  std::optional<ZfpDecode> decode_;  ///< for that cache
+  float cached_isovalue_ = 0;        ///< of its bits of voxels inside
+  std::uint32_t num_free_ = 0;       ///< of its slots
+  std::uint32_t pass_ = 1;           ///< the clock of its stamps
+  std::uint64_t num_decoded_ = 0;
+};
+
+/// Batches of blocks: as many at a time as the cache has turned out to hold.
+class BatchSize {
+ public:
+  BatchSize(std::uint32_t num_slots, std::uint64_t num_needed);
+
+  std::uint32_t size() const { return size_; }  ///< at least 1
+  void served();
+  /// A batch of so many did not fit.
+  void refused(std::uint32_t size);
+
+ private:
+  std::uint32_t size_;
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,106 @@
+/// block_triangles.cl -- triangles of listed blocks, whose values are cached, with vertices of
+/// their own (Block-Compressed Marching Cubes, Usher and Pascucci 2020).
+///
+///   block_triangles_count -> prefix sum of the counts -> block_triangles_write
+///
+/// What is drawn, and not kept for anything else, needs no more: no neighbour's vertices, and no
+/// gradients. marching_cubes.cl makes meshes whose triangles share their vertices.
+#include "device/dual_grid_inside.h"
+#include "device/work_group.h"
+#include "portable/block_vertex.h"
+#include "portable/marching_cubes.h"
+
+/// Entries [begin, end) of the list.
+///
+/// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+/// Out             num_triangles: of entry i at i - first
+/// Launch          grid-stride over entries
+kernel void block_triangles_count(const FrameParams frame_params, uint begin, uint end, uint first,
+                                  global const uint *block_ids, global const BlockEntry *table,
+                                  global const ulong *inside, global const uchar *cell_triangles,
+                                  global uint *num_triangles) {
+  const FrameParams *frame = &frame_params;
+  const BlockGrid grid = frame_params.grid;
+  for (uint i = begin + get_global_id(0); i < end; i += get_global_size(0)) {
+    const BlockCoords b = block_coords(frame, block_ids[i]);
+    ulong of_blocks[8], v[8];
+    dual_grid_inside(frame, table, inside, b, of_blocks);
+    corners_inside(of_blocks, v);
+    const ulong changing = changing_cells(of_blocks) & domain_of_block(&grid, b, 1, 1, 1);
+    uint triangles = 0;
+    for (uint cell = 0; cell < 64; ++cell) {
+      if ((changing >> cell & 1) != 0)
+        triangles += cell_triangles[ISO_CASE_BYTES * cell_signs(v, cell)];
+    }
+    num_triangles[i - first] = triangles;
+  }
+}
+
+/// Voxel (x,y,z) of a dual grid, 0 to 4 along each axis. slots [8]: of its blocks.
+ISO_INLINE float dual_grid_voxel(local const uint *slots, global const float *values, uint x,
+                                 uint y, uint z) {
+  const uint slot = slots[(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2)];
+  return values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)];
+}
+
+/// The vertex on an edge of cell (x,y,z) of a block.
+ISO_INLINE uint edge_steps(local const uint *slots, global const float *values, float isovalue,
+                           uint x, uint y, uint z, uint edge) {
+  const uint corner = edge_corner(edge), axis = edge_axis(edge);
+  const uint lx = x + (corner & 1), ly = y + (corner >> 1 & 1), lz = z + (corner >> 2);
+  const float t = edge_crossing(
+      dual_grid_voxel(slots, values, lx, ly, lz),
+      dual_grid_voxel(slots, values, lx + (axis == 0), ly + (axis == 1), lz + (axis == 2)),
+      isovalue);
+  return pack_steps((float)lx + (axis == 0 ? t : 0.0f), (float)ly + (axis == 1 ? t : 0.0f),
+                    (float)lz + (axis == 2 ? t : 0.0f));
+}
+
+/// Entries [begin, end) of the list, a work-group each: work-item v has cell v.
+///
+/// offsets  prefix sums of the counts: of entry i at i - first
+/// Out      vertices [3 * triangles]: triangle offsets[i - first] + k - skipped for the k-th of
+///          entry i, counter-clockwise seen from where values are lower
+/// Launch   groups of 64, which stride over entries
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void block_triangles_write(
+    const FrameParams frame_params, uint begin, uint end, uint first, uint skipped,
+    global const uint *block_ids, global const BlockEntry *table, global const float *cache_values,
+    global const ulong *inside, global const uchar *cell_triangles, global const uint *offsets,
+    global BlockVertex *vertices) {
+  const FrameParams *frame = &frame_params;
+  const BlockGrid grid = frame_params.grid;
+  local uint slots[8], sums[ISO_GROUP_SIZE];
+  local ulong of_blocks[8];
+  const uint item = get_local_id(0);
+  const uint x = item & 3, y = item >> 2 & 3, z = item >> 4;
+  for (uint i = begin + get_group_id(0); i < end; i += get_num_groups(0)) {
+    const uint block_id = block_ids[i];
+    const BlockCoords b = block_coords(frame, block_id);
+    barrier(CLK_LOCAL_MEM_FENCE); /* all are through with the block before */
+    if (item < 8) {
+      slots[item] = ISO_BLOCK_ABSENT;
+      if (dual_grid_block(frame, b, item) != ISO_INVALID_ID)
+        slots[item] =
+            cached_slot(frame, table, b.x + (item & 1), b.y + (item >> 1 & 1), b.z + (item >> 2));
+      of_blocks[item] = slots[item] == ISO_BLOCK_ABSENT ? 0 : inside[slots[item]];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+
+    uint signs = 0, total;
+    if ((domain_of_block(&grid, b, 1, 1, 1) >> item & 1) != 0) {
+      for (uint corner = 0; corner < 8; ++corner) {
+        const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
+        const ulong bits = of_blocks[(cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2)];
+        signs |= (uint)(bits >> ((cx & 3) + 4 * (cy & 3) + 16 * (cz & 3)) & 1) << corner;
+      }
+    }
+    global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
+    const uint num_triangles = own_triangles[0];
+    const uint place = offsets[i - first] - skipped + group_scan(sums, num_triangles, &total);
+    for (uint k = 0; k < 3 * num_triangles; ++k) {
+      vertices[3 * place + k].steps =
+          edge_steps(slots, cache_values, frame->surface.isovalue, x, y, z, own_triangles[1 + k]);
+      vertices[3 * place + k].block_id = block_id;
+    }
+  }
+}

@@ -1,0 +1,58 @@
+#pragma once
+// What `isowave bench paper` measures of one volume: frames of the ray pipelines and of
+// Block-Compressed Marching Cubes, at the same isovalues, from the same cameras, on the same
+// device.
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/render/renderer.hpp"
+#include "core/view/camera.hpp"
+
+namespace isowave::core::tools {
+
+/// The protocol of one volume: each isovalue is drawn from each camera, in this order.
+struct PaperRun {
+  const CompressedVolume &volume;
+  std::vector<float> isovalues;
+  std::vector<Camera> cameras;
+  ImageSize size;
+};
+
+/// Parts of the protocol for what takes longer than a frame is worth.
+struct PaperParts {
+  std::uint32_t cold = 10;      ///< isovalues whose first view is drawn from an empty cache, too
+  std::uint32_t progress = 10;  ///< isovalues whose first view is timed pass by pass
+};
+
+/// One way to draw with rays.
+struct RayMethod {
+  PipelineKind pipeline = PipelineKind::kRays;
+  bool speculation = true;        ///< `blocks`: global, the paper's; `rays`: each ray by its own
+  std::uint32_t cache_slots = 0;  ///< 0: the renderer's default
+};
+
+/// What frames took: see bench_paper.cpp for what it says.
+///
+/// Throws  Error
+nlohmann::ordered_json measure_rays(const ocl::DeviceInfo &device, const PaperRun &run,
+                                    const RayMethod &method, const PaperParts &parts);
+
+/// The same of triangles. memory_budget: 0: cache and mesh grow.
+///
+/// Returns  {"refused": MESSAGE} beside what was asked for where the device's memory, or the
+///          budget, does not suffice
+nlohmann::ordered_json measure_bcmc(const ocl::DeviceInfo &device, const PaperRun &run,
+                                    std::uint64_t memory_budget, const PaperParts &parts);
+
+/// Pixels for which the default rays and the triangles agree, of the run's first isovalue and view:
+/// both have no hit, or hits within the diagonal of a voxel. {"percent": P, "hits_percent": H};
+/// null where the mesh is too large for the device.
+///
+/// pictures  names of files for both pictures: NAME_rays.png, NAME_bcmc.png; empty: none
+nlohmann::ordered_json compare_methods(const ocl::DeviceInfo &device, const PaperRun &run,
+                                       const std::string &pictures);
+
+}  // namespace isowave::core::tools
