@@ -27,17 +27,11 @@ kernel void marching_cubes_count(const FrameParams frame_params, uint begin, uin
     dual_grid_inside(frame, table, inside, b, of_blocks);
     corners_inside(of_blocks, v);
     const BlockEdges own = crossed_edges(&grid, b, v);
-    const ulong changing = changing_cells(of_blocks) & domain_of_block(&grid, b, 1, 1, 1);
-    uint triangles = 0;
-    for (uint cell = 0; cell < 64; ++cell) {
-      if ((changing >> cell & 1) != 0)
-        triangles += cell_triangles[ISO_CASE_BYTES * cell_signs(v, cell)];
-    }
     edges[i].x = own.x;
     edges[i].y = own.y;
     edges[i].z = own.z;
     num_vertices[i] = vertex_count(own);
-    num_triangles[i] = triangles;
+    num_triangles[i] = count_triangles(&grid, b, of_blocks, v, cell_triangles);
   }
 }
 
@@ -145,14 +139,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
       }
     }
 
-    uint signs = 0, total;
-    if ((domain_of_block(&grid, b, 1, 1, 1) >> item & 1) != 0) {
-      for (uint corner = 0; corner < 8; ++corner) {
-        const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
-        const ulong bits = of_blocks[(cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2)];
-        signs |= (uint)(bits >> ((cx & 3) + 4 * (cy & 3) + 16 * (cz & 3)) & 1) << corner;
-      }
-    }
+    uint total;
+    const uint signs = signs_of_cell(&grid, b, of_blocks, (uint)x, (uint)y, (uint)z);
     global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
     const uint num_triangles = own_triangles[0];
     const uint place =

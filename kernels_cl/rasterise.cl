@@ -69,12 +69,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void raster_p
     global const BlockVertex *vertices, global uint *depth, global uint *triangles, uint capacity,
     volatile global uint *listed) {
   const FrameParams *frame = &frame_params;
-  local uint shared[ISO_GROUP_SIZE], num_shared;
+  local uint large[ISO_GROUP_SIZE], num_large;
   const uint item = get_local_id(0);
   for (uint first = get_group_id(0) * ISO_GROUP_SIZE; first < count;
        first += get_num_groups(0) * ISO_GROUP_SIZE) {
     const uint triangle = first + item;
-    if (item == 0) num_shared = 0;
+    if (item == 0) num_large = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
     if (triangle < count) {
       const ViewTriangle corners = view_triangle(frame, &view, vertices + 3 * (ulong)triangle);
@@ -85,7 +85,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void raster_p
       if (place < capacity) {
         listed[1 + place] = triangle;
       } else if (pixels > ALONE) {
-        shared[atomic_inc(&num_shared)] = triangle;
+        large[atomic_inc(&num_large)] = triangle;
       } else {
         for (uint row = box.begin_y; row < box.end_y; ++row) {
           for (uint column = box.begin_x; column < box.end_x; ++column)
@@ -94,10 +94,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void raster_p
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    const uint num = num_shared;
+    const uint num = num_large;
     for (uint k = 0; k < num; ++k)
-      offer_some(frame, &view, vertices, shared[k], item, ISO_GROUP_SIZE, turn, depth, triangles);
-    barrier(CLK_LOCAL_MEM_FENCE); /* all have read num_shared */
+      offer_some(frame, &view, vertices, large[k], item, ISO_GROUP_SIZE, turn, depth, triangles);
+    barrier(CLK_LOCAL_MEM_FENCE); /* all have read num_large */
   }
 }
 

@@ -97,8 +97,10 @@ TEST_F(CliPaper, ABudgetThatIsTooSmallIsSaidInOneLine) {
 
 TEST_F(CliPaper, NoTriangles) {
   const json said = measure(kFuel + " --scaling 32x24 --range 1000 1001");
-  for (const json &method : said["volumes"][0]["methods"])
+  for (const json &method : said["volumes"][0]["methods"]) {
+    if (!method.value("refused", json()).is_null()) continue;  // a budget for rays without a block
     EXPECT_EQ(method["active_blocks"]["max"], 0);
+  }
   EXPECT_EQ(said["volumes"][0]["methods"][5]["triangles"]["max"], 0);
   EXPECT_EQ(said["volumes"][0]["agreement"]["percent"], 100);
 }

@@ -1,8 +1,10 @@
-/// dual_grid_inside.h -- which voxels of a cached dual grid are inside. OpenCL C 1.2.
+/// dual_grid_inside.h -- which voxels of a cached dual grid are inside, and so which triangles its
+/// cells have. OpenCL C 1.2.
 #ifndef ISOWAVE_DUAL_GRID_INSIDE_H
 #define ISOWAVE_DUAL_GRID_INSIDE_H
 
 #include "portable/block_table.h"
+#include "portable/marching_cubes.h"
 
 /// Of the dual grid of block b: which voxels of its blocks are inside, corner x + 2y + 4z; 0 of
 /// those that there are not.
@@ -15,6 +17,35 @@ ISO_INLINE void dual_grid_inside(const FrameParams *frame, global const BlockEnt
                          b.z + (corner >> 2));
     bits[corner] = slot == ISO_BLOCK_ABSENT ? 0 : inside[slot];
   }
+}
+
+/// Triangles of block b's cells.
+///
+/// bits            dual_grid_inside(); v: corners_inside() of these
+/// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+ISO_INLINE uint count_triangles(const BlockGrid *grid, BlockCoords b, const ulong *bits,
+                                const ulong *v, global const uchar *cell_triangles) {
+  const ulong changing = changing_cells(bits) & domain_of_block(grid, b, 1, 1, 1);
+  uint triangles = 0;
+  for (uint cell = 0; cell < 64; ++cell) {
+    if ((changing >> cell & 1) != 0)
+      triangles += cell_triangles[ISO_CASE_BYTES * cell_signs(v, cell)];
+  }
+  return triangles;
+}
+
+/// cell_signs() of cell (x,y,z) of block b, by a work-item for itself; 0 of one that there is not.
+/// bits: dual_grid_inside().
+ISO_INLINE uint signs_of_cell(const BlockGrid *grid, BlockCoords b, local const ulong *bits, uint x,
+                              uint y, uint z) {
+  uint signs = 0;
+  if ((domain_of_block(grid, b, 1, 1, 1) >> (x + 4 * y + 16 * z) & 1) == 0) return 0;
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
+    const ulong of_block = bits[(cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2)];
+    signs |= (uint)(of_block >> ((cx & 3) + 4 * (cy & 3) + 16 * (cz & 3)) & 1) << corner;
+  }
+  return signs;
 }
 
 #endif

@@ -170,8 +170,9 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
   const std::array<float, 2> range = range_of(options, volume);
   const PaperRun run{volume, random_isovalues(options.isovalues, range, options.seed),
                      orbit_cameras(info, options.views), parse_size(options.size)};
-  PaperRun part = run;  // a tenth of the isovalues
-  part.isovalues.resize((run.isovalues.size() + 9) / 10);
+  PaperRun part = run;  // a tenth of the isovalues, but four, if there are as many
+  part.isovalues.resize(
+      std::min(run.isovalues.size(), std::max<std::size_t>(4, run.isovalues.size() / 10)));
   PaperRun few = part;  // a frame may take as long as a new mesh
   few.cameras.resize(std::min<std::size_t>(2, run.cameras.size()));
   const PaperParts parts;
@@ -184,19 +185,18 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
     print_method(row);
     methods.push_back(std::move(row));
   };
-  std::uint64_t bytes_of_rays = 0;
   double most_active = 0;  // blocks of a cold frame
   for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
     for (const bool speculation : {true, false}) {
       add(measure_rays(device, run, {pipeline, speculation}, parts));
       if (pipeline != PipelineKind::kRays || !speculation) continue;
-      bytes_of_rays = methods.back().at("device_bytes").get<std::uint64_t>();
       most_active = methods.back().at("active_blocks").at("max").get<double>();
     }
   }
   add(measure_rays(
       device, run,
       {.cache_slots = std::max(kMinCacheSlots, static_cast<std::uint32_t>(most_active))}, parts));
+  const auto bytes_of_rays = methods.back().at("device_bytes").get<std::uint64_t>();
   add(measure_bcmc(device, run, 0, parts));
   add(measure_bcmc(device, few, options.bcmc_budget != 0 ? options.bcmc_budget : bytes_of_rays,
                    parts));
@@ -286,11 +286,12 @@ void add_bench_paper(CLI::App &bench) {
           ->capture_default_str();
   CLI::Option *size =
       command->add_option("--size", options->size, "picture size WxH")->capture_default_str();
-  CLI::Option *scaling = command
-                             ->add_option("--scaling", options->scaling,
-                                          "further sizes, for a tenth of the isovalues; a list")
-                             ->delimiter(',')
-                             ->capture_default_str();
+  CLI::Option *scaling =
+      command
+          ->add_option("--scaling", options->scaling,
+                       "further sizes, for a tenth of the isovalues, at least four; a list")
+          ->delimiter(',')
+          ->capture_default_str();
   command
       ->add_option("--range", options->range,
                    "isovalues of interest, LOW HIGH [the middle 80 % of the values]")
@@ -300,7 +301,7 @@ void add_bench_paper(CLI::App &bench) {
   command
       ->add_option("--bcmc-budget", options->bcmc_budget,
                    "memory budget of Block-Compressed Marching Cubes where that is bounded [what "
-                   "pipeline rays takes]")
+                   "pipeline rays takes with slots for a frame]")
       ->transform(byte_count())
       ->type_name("BYTES");
   command->add_flag("--quick", options->quick,

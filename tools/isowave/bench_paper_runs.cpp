@@ -210,7 +210,10 @@ ordered_json measure_bcmc(const ocl::DeviceInfo &device_info, const PaperRun &ru
                        {"refused", nullptr}};
   ocl::Device device(device_info);
   try {
-    MeshRenderer renderer(device, run.volume, {.size = run.size, .memory_budget = memory_budget});
+    MeshRenderer renderer(device, run.volume,
+                          {.size = run.size,
+                           .memory_budget = memory_budget,
+                           .stream = StreamPlace::kDevice});  // where rays have it, too
     renderer.render(run.cameras[0], run.isovalues[0]);
     renderer.clear_cache();
     std::vector<double> new_ms, next_ms, cold_ms, surface_ms, listed, needed, triangles, decoded,
