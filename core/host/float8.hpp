@@ -16,16 +16,18 @@
 /// A function that is called so rarely, or so seldom, that it must not burden its callers.
 #define ISO_RARE [[maybe_unused]] static __attribute__((noinline, cold))
 #define ISO_SELDOM [[maybe_unused]] static __attribute__((noinline))
-/// A loop over axes 0, 1, 2, unrolled: compilers leave those with long bodies as they are.
+// NOLINTBEGIN(bugprone-macro-parentheses): names of variables
+/// A loop over 0, 1, 2, unrolled: compilers leave those with long bodies as they are.
 #if defined(__clang__)
-#define ISO_EACH_AXIS(axis) _Pragma("unroll") for (int axis = 0; axis < 3; ++axis)
+#define ISO_EACH_OF_3(i) _Pragma("unroll") for (int i = 0; i < 3; ++i)
 #else
-#define ISO_EACH_AXIS(axis) _Pragma("GCC unroll 3") for (int axis = 0; axis < 3; ++axis)
+#define ISO_EACH_OF_3(i) _Pragma("GCC unroll 3") for (int i = 0; i < 3; ++i)
 #endif
 /// A loop over the lanes of a mask.
 #define ISO_EACH_LANE(lane, mask)                                                              \
   for (unsigned left_##lane = bits_of(mask), lane = first_lane(left_##lane); left_##lane != 0; \
        left_##lane &= left_##lane - 1, lane = first_lane(left_##lane))
+// NOLINTEND(bugprone-macro-parentheses)
 
 namespace isowave::core::packets {
 

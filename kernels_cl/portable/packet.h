@@ -218,7 +218,7 @@ ISO_RARE Exits settle_exits(const PacketRays *r, Floats far_x, Floats far_y, Flo
   ISO_EACH_LANE(lane, lanes) {
     const Ray ray = ray_of_lane(r, lane);
     const int first = first_exit(&ray, far_x[lane], far_y[lane], far_z[lane]).axis;
-    for (int axis = 0; axis < 3; ++axis) settled.on[axis][lane] = axis == first ? -1 : 0;
+    ISO_EACH_OF_3(axis) settled.on[axis][lane] = axis == first ? -1 : 0;
   }
   return settled;
 }
@@ -286,7 +286,7 @@ ISO_INLINE Entry last_entry(const PacketRays *r, const Floats *near) {
   entry.before = floats(-ISO_NEVER);
   entry.at.axis = ints(ISO_AXIS_START);
   entry.at.plane = floats(0.0f);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &r->axis[axis];
     const Floats t = pick(a->d == 0.0f, floats(-ISO_NEVER), packet_float_t(a, near[axis]));
     const Mask later = t > entry.t;

@@ -118,34 +118,34 @@ ISO_INLINE Floats far_planes(const Packet *p, int axis, int size, Ints region) {
 
 /// The blocks where rays are, x, y and z.
 ISO_INLINE void blocks_at(const Packet *p, Ints *at) {
-  ISO_EACH_AXIS(axis) at[axis] = regions(p, ISO_BLOCKS, axis);
+  ISO_EACH_OF_3(axis) at[axis] = regions(p, ISO_BLOCKS, axis);
 }
 
 /// Lanes whose region is to be entered.
 ISO_INLINE Mask is_wanted(const PacketLevel *level) {
-  const Ints half = pick(level->place < 32, level->low, level->high);
-  return -((half >> (level->place & 31)) & 1);
+  const Ints bits = pick(level->place < 32, level->low, level->high);
+  return -((bits >> (level->place & 31)) & 1);
 }
 
 /// A packet with the rays p->rays.axis, none of which walks yet.
 ISO_INLINE void open_packet(Packet *p, const PacketScene *scene) {
   const Floats none = floats(0.0f);
   const Ints zero = ints(0);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     const Mask up = p->rays.axis[axis].up;
     const Ints stride = ints(axis == 0 ? 1 : (axis == 1 ? 4 : 16)),
                coarse = ints(axis == 0 ? 1 : scene->columns * (axis == 1 ? 1 : scene->rows));
     p->last[axis] = floats((float)scene->last[axis]);
     p->end[axis] = far_planes(p, axis, ISO_REGION_SIZE(ISO_MACROCELLS),
                               pick(up, ints(scene->final[axis]), ints(scene->first[axis])));
-    for (int level = 0; level < 3; ++level) {
+    ISO_EACH_OF_3(level) {
       const Ints of_level = level == ISO_MACROCELLS ? coarse : stride;
       p->level[level].stride[axis] = pick(up, of_level, -of_level);
       p->level[level].far[axis] = none;
     }
     p->found.cell[axis] = none;
   }
-  for (int level = 0; level < 3; ++level) {
+  ISO_EACH_OF_3(level) {
     p->level[level].place = p->level[level].low = p->level[level].high = zero;
     p->at[level] = zero;
   }
@@ -188,7 +188,7 @@ ISO_RARE Entered settle_box_entries(const PacketRays *r, const PacketScene *scen
 ISO_INLINE Mask enter_box(PacketRays *r, const PacketScene *scene) {
   Floats near[3], exit = floats(ISO_NEVER);
   Mask beside = ints(0);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &r->axis[axis];
     const Floats begin = floats((float)scene->begin[axis]), end = floats((float)scene->end[axis]),
                  far_t = packet_float_t(a, pick(a->up, end, begin));
@@ -214,7 +214,7 @@ ISO_INLINE void begin_at_box(Packet *p, const PacketScene *scene, Mask lanes) {
   PacketLevel *level = &p->level[ISO_MACROCELLS];
   const Floats t = entry_t(&p->rays);
   Ints place = ints(0);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     Range range;
     range.first = ints(scene->first[axis]);
     range.last = ints(scene->final[axis]);
@@ -226,6 +226,49 @@ ISO_INLINE void begin_at_box(Packet *p, const PacketScene *scene, Mask lanes) {
   p->at[ISO_MACROCELLS] = lanes;
 }
 
+ISO_RARE Crossings settle_block_entries(const PacketRays *r, const PacketScene *scene, Ints x,
+                                        Ints y, Ints z, Mask lanes, Crossings entered) {
+  Crossings settled = entered;
+  ISO_EACH_LANE(lane, lanes) {
+    const Ray ray = ray_of_lane(r, lane);
+    const int at[3] = {x[lane], y[lane], z[lane]};
+    const int axis = region_entry(&ray, at[0], at[1], at[2], 4, last_planes(scene->frame)).axis;
+    settled.axis[lane] = axis;
+    if (axis != ISO_AXIS_START) {
+      const int near = 4 * (r->axis[axis].up[lane] != 0 ? at[axis] : at[axis] + 1);
+      settled.plane[lane] = (float)(near < scene->last[axis] ? near : scene->last[axis]);
+    }
+  }
+  return settled;
+}
+
+/// Puts lanes back into the active blocks (at [3]: x, y, z) that they have come to before.
+ISO_INLINE void begin_at_blocks(Packet *p, const PacketScene *scene, const Ints *at, Mask lanes) {
+  PacketLevel *blocks = &p->level[ISO_BLOCKS], *macrocells = &p->level[ISO_MACROCELLS];
+  Floats near[3];
+  Ints place = ints(0), coarse = ints(0);
+  ISO_EACH_OF_3(axis) {
+    const Floats begin = to_floats(4 * at[axis]), whole = begin + 4.0f,
+                 end = smaller(whole, p->last[axis]);
+    const Mask up = p->rays.axis[axis].up;
+    near[axis] = pick(up, begin, end);
+    blocks->far[axis] = pick(up, end, begin);
+    macrocells->far[axis] = far_planes(p, axis, ISO_REGION_SIZE(ISO_MACROCELLS), at[axis] >> 2);
+    place += (at[axis] & 3) << (2 * axis);
+    coarse += (at[axis] >> 2) * (axis == 0 ? 1 : scene->columns * (axis == 1 ? 1 : scene->rows));
+  }
+  blocks->place = place;
+  macrocells->place = coarse;
+  macrocell_bits(scene->field, coarse, lanes, &blocks->low, &blocks->high);
+  const Entry entry = last_entry(&p->rays, near);
+  const Mask doubt = lanes & entry_in_doubt(&entry);
+  p->rays.entered = entry.at;
+  if (ISO_UNLIKELY(any(doubt))) {
+    p->rays.entered = settle_block_entries(&p->rays, scene, at[0], at[1], at[2], doubt, entry.at);
+  }
+  p->at[ISO_BLOCKS] = lanes;
+}
+
 // ---- The walk
 
 /// Lets lanes enter the regions of a level within those of the next larger one, where they are.
@@ -234,7 +277,7 @@ ISO_INLINE void enter_regions(Packet *p, const PacketScene *scene, int level, Ma
   PacketLevel *l = &p->level[level];
   const Floats t = entry_t(&p->rays);
   Ints places = ints(0);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     Range range;
     range.first = regions(p, level + 1, axis) * 4;
     const Ints end = range.first + 3, last = ints((scene->last[axis] - 1) / size);
@@ -254,7 +297,7 @@ ISO_INLINE Mask leave_regions(Packet *p, int level, Mask lanes, Exits *exits) {
   const float size = (float)ISO_REGION_SIZE(level);
   PacketLevel *l = &p->level[level];
   Mask left = ints(0);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     const Mask on = exits->on[axis];
     const Floats far = l->far[axis],
                  end = level == ISO_MACROCELLS
@@ -283,7 +326,7 @@ ISO_INLINE void step_to_next(Packet *p, int level) {
   const Mask lanes = p->at[level];
   const Floats *far = p->level[level].far;
   const Exits exits = find_exits(&p->rays, far, lanes);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     p->rays.entered.axis = pick(exits.on[axis], ints(axis), p->rays.entered.axis);
     p->rays.entered.plane = pick(exits.on[axis], far[axis], p->rays.entered.plane);
   }
@@ -347,7 +390,7 @@ ISO_INLINE void find_segments(const PacketRays *r, Crossings enter, Crossings ex
                               const Floats *cell, Segments *s) {
   s->enter = crossing_t(r, enter);
   s->exit = crossing_t(r, exit);
-  ISO_EACH_AXIS(axis) {
+  ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &r->axis[axis];
     const Floats near = pick(a->up, floats(0.0f), floats(1.0f)), far = 1.0f - near;
     s->a[axis] = pick(enter.axis == axis, near, packet_local_position(a, s->enter, cell[axis]));
@@ -415,14 +458,14 @@ ISO_INLINE void keep_found(FoundCells *found, Brackets brackets, Crossings enter
   found->enter.plane = pick(hit, enter.plane, found->enter.plane);
   found->exit.axis = pick(hit, exit.axis, found->exit.axis);
   found->exit.plane = pick(hit, exit.plane, found->exit.plane);
-  ISO_EACH_AXIS(axis) found->cell[axis] = pick(hit, cell[axis], found->cell[axis]);
+  ISO_EACH_OF_3(axis) found->cell[axis] = pick(hit, cell[axis], found->cell[axis]);
   found->lo = pick(hit, brackets.lo, found->lo);
   found->hi = pick(hit, brackets.hi, found->hi);
 }
 
 ISO_INLINE Mask load_cells(const PacketScene *scene, const Floats *cell, Mask lanes, Floats *w) {
   Ints at[3];
-  ISO_EACH_AXIS(axis) at[axis] = to_ints(cell[axis]);
+  ISO_EACH_OF_3(axis) at[axis] = to_ints(cell[axis]);
   return load_corners(scene->field, scene->frame, at, lanes, w);
 }
 
@@ -431,7 +474,7 @@ ISO_INLINE void test_cells(Packet *p, const PacketScene *scene, Mask standing) {
   const Floats *far = p->level[ISO_CELLS].far;
   Floats cell[3];
   Segments s;
-  ISO_EACH_AXIS(axis) cell[axis] = pick(p->rays.axis[axis].up, far[axis] - 1.0f, far[axis]);
+  ISO_EACH_OF_3(axis) cell[axis] = pick(p->rays.axis[axis].up, far[axis] - 1.0f, far[axis]);
   const Mask waits = load_cells(scene, cell, standing, s.w), lanes = standing & ~waits;
   p->waits |= waits;
   const Exits exits = find_exits(&p->rays, far, lanes);
@@ -444,7 +487,7 @@ ISO_INLINE void test_cells(Packet *p, const PacketScene *scene, Mask standing) {
   const Mask on = lanes & ~found.lanes;
   if (!any(on)) return;
   Exits on_exits;
-  ISO_EACH_AXIS(axis) on_exits.on[axis] = exits.on[axis] & on;
+  ISO_EACH_OF_3(axis) on_exits.on[axis] = exits.on[axis] & on;
   p->rays.entered.axis = pick(on, exit.axis, p->rays.entered.axis);
   p->rays.entered.plane = pick(on, exit.plane, p->rays.entered.plane);
   leave_by(p, ISO_CELLS, on, on_exits);
