@@ -25,6 +25,17 @@ typedef struct PacketProgress {
   uint num_blocks;  ///< blocks that they were intersected in
 } PacketProgress;
 
+/// A block that a work-item's rays have come to in this pass, in which the cache does not change.
+typedef struct OpenedBlock {
+  uint block_id; /* ISO_INVALID_ID: none so far */
+  uint have;     /* corners of the dual grid; see open_block() */
+  uint cells_low, cells_high;
+  uint slots[8];
+} OpenedBlock;
+
+/// Of them, each that is at such a place in its macrocell.
+#define ISO_OPENED_BLOCKS 64u
+
 /// Blocks come from the cache.
 typedef struct PacketField {
   global const uint *macrocell_masks;
@@ -33,15 +44,12 @@ typedef struct PacketField {
   global const float *values;
   global uint *slot_stamps;
   uint stamp;
-  local uint *slots; /* [lane][8]: of the dual grid of the block that it opened last, each
-                        ISO_GROUP_SIZE apart */
-  local uint *have;  /* [lane]: which of them are cached; see open_block() */
+  local OpenedBlock *opened; /* [ISO_OPENED_BLOCKS] */
+  local uint *scratch;       /* [8 * ISO_GROUP_SIZE] */
+  local uint *slots;         /* [lane][8]: of the block that it has opened last */
+  local uint *have;          /* [lane] */
   PacketProgress *progress;
 } PacketField;
-
-ISO_INLINE local uint *slots_of_lane(const PacketField *field, uint lane) {
-  return field->slots + 8 * ISO_GROUP_SIZE * lane;
-}
 
 ISO_INLINE void macrocell_bits(const PacketField *field, Ints macrocells, Mask lanes, Ints *low,
                                Ints *high) {
@@ -56,7 +64,28 @@ ISO_INLINE void macrocell_bits(const PacketField *field, Ints macrocells, Mask l
   *high = pick(lanes, highs, *high);
 }
 
-/// Most lanes come to the same block, which is looked up once for all of them.
+/// Looks block b up, unless a ray has been there before. Cached blocks are stamped.
+ISO_INLINE local const OpenedBlock *find_opened(const PacketField *field, const FrameParams *frame,
+                                                BlockCoords b) {
+  const uint block_id = block_id_at(frame, b.x, b.y, b.z);
+  local OpenedBlock *opened = &field->opened[(b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3)];
+  if (opened->block_id != block_id) {
+    uint have;
+    const ulong cells = open_block(frame, field->table, field->inside, b, field->scratch, &have);
+    for (uint corner = 0; corner < 8; ++corner)
+      opened->slots[corner] = field->scratch[corner * ISO_GROUP_SIZE];
+    if ((have & 1u) != 0)
+      field->slot_stamps[opened->slots[0]] =
+          field->stamp; /* for all of the dual grid: last_use() */
+    opened->block_id = block_id;
+    opened->have = have;
+    opened->cells_low = (uint)cells;
+    opened->cells_high = (uint)(cells >> 32);
+  }
+  return opened;
+}
+
+/// Most lanes come to the same block.
 ISO_INLINE Mask open_blocks(const PacketField *field, const FrameParams *frame, const Ints *at,
                             Mask lanes, Ints *low, Ints *high) {
   PacketProgress *progress = field->progress;
@@ -68,24 +97,22 @@ ISO_INLINE Mask open_blocks(const PacketField *field, const FrameParams *frame, 
     const Mask here =
         left & (at[0] == at[0][first]) & (at[1] == at[1][first]) & (at[2] == at[2][first]);
     BlockCoords b;
-    uint have;
     b.x = (uint)at[0][first];
     b.y = (uint)at[1][first];
     b.z = (uint)at[2][first];
-    local uint *slots = slots_of_lane(field, first);
-    const ulong cells = open_block(frame, field->table, field->inside, b, slots, &have);
+    local const OpenedBlock *opened = find_opened(field, frame, b);
     left &= ~here;
-    if ((have & 1u) == 0) {
+    if ((opened->have & 1u) == 0) {
       waits |= here;
     } else {
-      field->slot_stamps[slots[0]] = field->stamp; /* for all of the dual grid: see last_use() */
-      *low = pick(here, ints((int)(uint)cells), *low);
-      *high = pick(here, ints((int)(uint)(cells >> 32)), *high);
+      const uint8 slots = vload8(0, opened->slots);
+      const uint have = opened->have;
+      *low = pick(here, ints((int)opened->cells_low), *low);
+      *high = pick(here, ints((int)opened->cells_high), *high);
+      progress->num_blocks += popcount(bits_of(here));
       ISO_EACH_LANE(lane, here) {
-        for (uint corner = 0; corner < 8; ++corner)
-          slots_of_lane(field, lane)[corner * ISO_GROUP_SIZE] = slots[corner * ISO_GROUP_SIZE];
+        vstore8(slots, lane, field->slots);
         field->have[lane] = have;
-        ++progress->num_blocks;
       }
     }
   }
@@ -103,10 +130,10 @@ ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame,
       waits[lane] = -1;
       --field->progress->num_blocks;
     } else {
-      local const uint *slots = slots_of_lane(field, lane);
+      local const uint *slots = field->slots + 8 * lane;
       _Pragma("unroll") for (int corner = 0; corner < 8; ++corner) {
         const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
-        const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+        const uint slot = slots[(vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)];
         values[corner * ISO_LANES + lane] =
             field
                 ->values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))];
@@ -241,7 +268,8 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     global const uint *active_ray_ids, global uint *next_active_ray_ids, global uint *ray_block_ids,
     global HitRecord *hits, global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint slots[8 * ISO_LANES * ISO_GROUP_SIZE], have[ISO_LANES];
+  local OpenedBlock opened[ISO_OPENED_BLOCKS];
+  local uint slots[8 * ISO_LANES], have[ISO_LANES], scratch[8 * ISO_GROUP_SIZE];
   const uint num_rays = prev->next_active_count,
              chunk_packets = begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS;
   const uint num_chunks = begins != 0 ? tiles_along(frame->view.width, ISO_TILE_COLUMNS) *
@@ -258,9 +286,12 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
   field.values = cache_values;
   field.slot_stamps = slot_stamps;
   field.stamp = read_stamp(counts->pass);
+  field.opened = opened;
+  field.scratch = scratch;
   field.slots = slots;
   field.have = have;
   field.progress = &progress;
+  for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
   const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
   if (get_global_id(0) == 0) {
     open_march(frame, prev, counts, next_counts, cache);
