@@ -4,10 +4,9 @@
 /// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort
 /// and no composite: a ray's blocks come in ray order, so its first change is its hit.
 #define ISO_FOUND local
-#include "device/block_requests.h"
 #include "device/level_borders.h"
 #include "device/march_block.h"
-#include "device/pass_counts.h"
+#include "device/march_pass.h"
 #include "device/ray_lanes.h"
 #include "device/ray_source.h"
 #include "device/work_group.h"
@@ -43,15 +42,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   const uint stamp = read_stamp(counts->pass);
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
-    open_next_counts(frame, counts, next_counts);
-    open_requests(cache);
-    cache->first_block_id = ISO_INVALID_ID;
+    open_march(frame, prev, counts, next_counts, cache);
     counts->active_count = num_rays;
-    counts->window_count = counts->pass == counts->frame_pass
-                               ? first_window(frame)
-                               : next_window(frame, prev->window_count, prev->next_active_count,
-                                             prev->requested_count, counts->decoded_count);
-    counts->free_count = cache->free_count;
   }
   if (item == 0) counters[0] = group_hits = group_blocks = 0;
   barrier(CLK_LOCAL_MEM_FENCE);

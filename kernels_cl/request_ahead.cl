@@ -27,6 +27,19 @@ ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntr
   request_corners(frame, b, missing, requests);
 }
 
+#ifdef ISO_CPU
+#define ISO_LOOKS_FIRST 1
+#else
+#define ISO_LOOKS_FIRST 0
+#endif
+
+/// Corners (bits 0..7) of the 2^3 blocks from b on that there are in the volume.
+ISO_INLINE uint existing_corners(const FrameParams *frame, BlockCoords b) {
+  return (b.x + 1 < frame->grid.blocks_x ? 0xFFu : 0x55u) &
+         (b.y + 1 < frame->grid.blocks_y ? 0xFFu : 0x33u) &
+         (b.z + 1 < frame->grid.blocks_z ? 0xFFu : 0x0Fu);
+}
+
 /// Of the rays that wait, the first counts->window_count ask for the blocks that they touch in
 /// their next active blocks: N_Spec of them (Sec. 4), or, with
 /// frame->schedule.per_ray_speculation, a number of their own.
@@ -84,12 +97,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
         for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
           const uint block_id = found[at * ISO_GROUP_SIZE + item];
           const BlockCoords b = block_coords(level, block_id);
-          const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
-          request_touched(level, table, slot_stamps, stamp, b, touched, requests);
+          const int is_first = i == 0 && asked + at == 0;
           ++num_pairs;
-          if (i == 0 && asked + at == 0) {
-            cache->first_block_id = block_id;
-            cache->first_touched = touched;
+          /* A CPU sees faster that all of them have been asked for than which the ray touches. */
+          if (!ISO_LOOKS_FIRST || is_first ||
+              unasked_corners(level, b, existing_corners(level, b), requests) != 0) {
+            const uint touched = touched_blocks(&ray, (int)b.x, (int)b.y, (int)b.z, last);
+            request_touched(level, table, slot_stamps, stamp, b, touched, requests);
+            if (is_first) {
+              cache->first_block_id = block_id;
+              cache->first_touched = touched;
+            }
           }
         }
         asked += num_found;

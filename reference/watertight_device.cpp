@@ -147,7 +147,7 @@ void judge_view(const GridLevels &levels, const RandomView &view,
 
 std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKind pipeline,
                                                 std::uint64_t num_rays, std::uint32_t seed,
-                                                Solver solver, RayBands bands) {
+                                                Solver solver, RayBands bands, RayPackets packets) {
   const bool with_levels = bands == RayBands::kLevels;
   std::vector<WatertightResult> results;
   for (const ClosedSurface &surface : closed_surfaces()) {
@@ -160,6 +160,7 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
                        .pipeline = pipeline,
                        .cache_slots = kCacheSlots,
                        .solver = solver,
+                       .packets = packets,
                        .with_levels = with_levels,
                        .with_shading = false});
     WatertightResult result{surface.name + std::string(with_levels ? ", levels" : "")};

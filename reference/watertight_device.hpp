@@ -18,6 +18,7 @@ namespace isowave::core {
 /// pipeline `rays` alone.
 std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKind pipeline,
                                                 std::uint64_t num_rays, std::uint32_t seed,
-                                                Solver solver, RayBands bands = RayBands::kOne);
+                                                Solver solver, RayBands bands = RayBands::kOne,
+                                                RayPackets packets = RayPackets::kAuto);
 
 }  // namespace isowave::core

@@ -11,6 +11,7 @@
 
 #include "core/ocl/kernel_cache.hpp"
 #include "core/render/renderer.hpp"
+#include "core/stages/march_packets.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
 #include "tests/setting.hpp"
@@ -109,8 +110,10 @@ TEST_P(CompileOnDevice, EverySolverAndGroupingIsCompiled) {
 }
 
 TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
-  const auto stems = [&](RendererOptions options, bool shading = false) {
+  const auto stems = [&](RendererOptions options, bool shading = false,
+                         RayPackets packets = RayPackets::kOff) {
     ocl::Device device(GetParam());
+    options.packets = packets;
     options.with_shading = shading;
     Renderer renderer(device, volume_, options);
     renderer.render({.camera = cameras_[0],
@@ -131,6 +134,14 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
   EXPECT_THAT(stems({.size = kSize, .with_levels = true}),
               ElementsAre("block_cache", "macrocells", "march x2", "request_ahead x2",
                           "start_rays x2", "zfp_decode"));
+  if (MarchPackets::suits(GetParam())) {
+    EXPECT_THAT(
+        stems({.size = kSize}, false, RayPackets::kAuto),
+        ElementsAre("block_cache", "macrocells", "march_packets", "request_ahead", "zfp_decode"));
+    EXPECT_THAT(stems({.size = kSize, .with_levels = true}, false, RayPackets::kAuto),
+                ElementsAre("block_cache", "macrocells", "march", "march_packets",
+                            "request_ahead x2", "start_rays", "zfp_decode"));
+  }
   // Where one work-group scans alone, a GPU gives it more work-items.
   const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";
   EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks}),

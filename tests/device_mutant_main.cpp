@@ -1,5 +1,6 @@
 // A program whose kernels have one planted bug (mutants.cmake). Arguments: the pipelines that have
-// it. Succeeds if the watertight test finds leaks in each of them.
+// it, blocks, rays or packets (rays in packets). Succeeds if the watertight test finds leaks in
+// each of them.
 
 #include <fmt/format.h>
 
@@ -12,11 +13,12 @@ int main(int argc, char **argv) {
   ocl::Device device(ocl::choose_device());
   bool all_leak = argc > 1;
   for (int i = 1; i < argc; ++i) {
-    const PipelineKind pipeline =
-        std::string_view(argv[i]) == "blocks" ? PipelineKind::kBlocks : PipelineKind::kRays;
+    const std::string_view name = argv[i];
+    const PipelineKind pipeline = name == "blocks" ? PipelineKind::kBlocks : PipelineKind::kRays;
+    const RayPackets packets = name == "packets" ? RayPackets::kOn : RayPackets::kOff;
     std::uint64_t leaks = 0;
-    for (const WatertightResult &result :
-         run_watertight_on(device, pipeline, 100000, 20231, kDefaultSolver))
+    for (const WatertightResult &result : run_watertight_on(
+             device, pipeline, 100000, 20231, kDefaultSolver, RayBands::kOne, packets))
       leaks += result.leaks;
     fmt::print("pipeline {}: {} leaks\n", argv[i], leaks);
     all_leak = all_leak && leaks > 0;

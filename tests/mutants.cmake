@@ -129,11 +129,17 @@ function(add_device_mutant name pipelines file from to)
   set_tests_properties(mutant.${mutant} PROPERTIES ENVIRONMENT ISOWAVE_DEVICE=cpu TIMEOUT 300)
 endfunction()
 
-add_device_mutant(none_at_all "rays;blocks" macrocells.cl "/// macrocells.cl" "/// macrocells.cl")
+add_device_mutant(none_at_all "rays;packets;blocks" macrocells.cl
+  "/// macrocells.cl" "/// macrocells.cl")
 set_tests_properties(mutant.device_none_at_all PROPERTIES WILL_FAIL TRUE)
-add_device_mutant(own_voxels_only "rays;blocks" macrocells.cl
+add_device_mutant(own_voxels_only "rays;packets;blocks" macrocells.cl
   "    range = join(range, (corner & 4 ?"
   "    if (corner == 0) range = join(range, (corner & 4 ?")
 add_device_mutant(half_of_macrocells "rays;blocks" device/block_walk.h
   "(bit < 32 ? low >> bit : high >> (bit - 32)) & 1u" "(bit < 32 ? low >> bit : 0u) & 1u")
 add_device_mutant(lost_results blocks device/closest_pair.h "atomic_min(" "atomic_max(")
+add_device_mutant(half_of_blocks packets portable/packet_walk.h
+  "pick(level->place < 32, level->low, level->high)"
+  "pick(level->place < 32, level->low, ints(0))")
+add_device_mutant(one_crossing_of_packets packets portable/packet_walk.h
+  "lanes & ((in0 ^ in1) | (in0 ^ in2) | (in0 ^ in3))" "lanes & (in0 ^ in3)")

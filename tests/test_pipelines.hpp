@@ -16,12 +16,14 @@ struct PipelineOnDevice {
   Grouping grouping;
   ClosestHit closest;
   bool per_ray_speculation;
+  RayPackets packets = RayPackets::kAuto;
 
   RendererOptions with(RendererOptions options) const {
     options.pipeline = pipeline;
     options.grouping = grouping;
     options.closest = closest;
     options.per_ray_speculation = per_ray_speculation;
+    options.packets = packets;
     return options;
   }
 };
@@ -30,7 +32,7 @@ inline void PrintTo(const PipelineOnDevice &param, std::ostream *out) {
   *out << param.name << " on " << param.device.name;
 }
 
-/// On llvmpipe one of each pipeline.
+/// On llvmpipe one of each pipeline. Rays go in packets where those suit, and one by one.
 inline std::vector<PipelineOnDevice> pipelines_under_test() {
   std::vector<PipelineOnDevice> params;
   for (const ocl::DeviceInfo &device : devices_under_test()) {
@@ -43,8 +45,8 @@ inline std::vector<PipelineOnDevice> pipelines_under_test() {
                       Grouping::kCounting, ClosestHit::kAtomicMin, false});
     params.push_back({device, "blocks_per_ray", PipelineKind::kBlocks, Grouping::kCounting,
                       ClosestHit::kAtomicMin, true});
-    params.push_back(
-        {device, "rays", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, false});
+    params.push_back({device, "rays", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit,
+                      false, RayPackets::kOff});
   }
   return params;
 }

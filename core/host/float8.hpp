@@ -1,5 +1,6 @@
 #pragma once
-// Eight float32 or int32 at a time, by AVX2 and fused multiply-add. For host_packets.cpp alone,
+// Eight float32 or int32 at a time, by AVX2 and fused multiply-add: what kernels_cl/portable/
+// packet.h needs, as kernels_cl/device/float8.h has it for OpenCL. For host_packets.cpp alone,
 // which compiles it for processors that have these.
 
 #include <immintrin.h>
@@ -9,18 +10,35 @@
 
 #include "kernels_cl/portable/shared_types.h"
 
+#define ISO_PACKET_NAMESPACE_BEGIN namespace isowave::core::packets {
+#define ISO_PACKET_NAMESPACE_END }
+#define ISO_UNLIKELY(condition) __builtin_expect(condition, 0)
+/// A function that is called so rarely, or so seldom, that it must not burden its callers.
+#define ISO_RARE [[maybe_unused]] static __attribute__((noinline, cold))
+#define ISO_SELDOM [[maybe_unused]] static __attribute__((noinline))
+// NOLINTBEGIN(bugprone-macro-parentheses): names of variables
+/// A loop over 0, 1, 2, unrolled: compilers leave those with long bodies as they are.
+#if defined(__clang__)
+#define ISO_EACH_OF_3(i) _Pragma("unroll") for (int i = 0; i < 3; ++i)
+#else
+#define ISO_EACH_OF_3(i) _Pragma("GCC unroll 3") for (int i = 0; i < 3; ++i)
+#endif
+/// A loop over the lanes of a mask.
+#define ISO_EACH_LANE(lane, mask)                                                              \
+  for (unsigned left_##lane = bits_of(mask), lane = first_lane(left_##lane); left_##lane != 0; \
+       left_##lane &= left_##lane - 1, lane = first_lane(left_##lane))
+// NOLINTEND(bugprone-macro-parentheses)
+
 namespace isowave::core::packets {
 
 using Floats = float __attribute__((vector_size(32)));
 using Ints = std::int32_t __attribute__((vector_size(32)));
 using Mask = Ints;  ///< -1 or 0 in each lane
 
-inline constexpr int kLanes = 8;
-
-inline Floats eight(float x) {
+inline Floats floats(float x) {
   return Floats{x, x, x, x, x, x, x, x};
 }
-inline Ints eight(int x) {
+inline Ints ints(int x) {
   return Ints{x, x, x, x, x, x, x, x};
 }
 
@@ -32,18 +50,8 @@ inline bool any(Mask mask) {
   return bits_of(mask) != 0;
 }
 
-/// Calls body(lane) for each lane of a mask.
-template <class Body>
-inline void for_each_lane(Mask mask, Body body) {
-  for (unsigned bits = bits_of(mask); bits != 0; bits &= bits - 1) body(std::countr_zero(bits));
-}
-
-/// Calls body(axis) for 0, 1, 2. Compilers leave loops of long bodies as they are.
-template <class Body>
-inline void for_each_axis(Body body) {
-  body(0);
-  body(1);
-  body(2);
+inline unsigned first_lane(unsigned bits) {
+  return static_cast<unsigned>(std::countr_zero(bits));
 }
 
 inline Floats to_floats(Ints x) {
@@ -56,13 +64,13 @@ inline Ints to_ints(Floats x) {
 
 /// a in the lanes of a mask, b in others. What compilers make of mask ? a : b compares the mask
 /// with 0 first.
-inline Floats select(Mask mask, Floats a, Floats b) {
+inline Floats pick(Mask mask, Floats a, Floats b) {
   return reinterpret_cast<Floats>(_mm256_blendv_ps(
       reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(mask)));
 }
-inline Ints select(Mask mask, Ints a, Ints b) {
+inline Ints pick(Mask mask, Ints a, Ints b) {
   return reinterpret_cast<Ints>(
-      select(mask, reinterpret_cast<Floats>(a), reinterpret_cast<Floats>(b)));
+      pick(mask, reinterpret_cast<Floats>(a), reinterpret_cast<Floats>(b)));
 }
 
 inline Floats smaller(Floats a, Floats b) {
@@ -93,7 +101,7 @@ inline Floats floor(Floats x) {
   return reinterpret_cast<Floats>(_mm256_floor_ps(reinterpret_cast<__m256>(x)));
 }
 /// The nearest whole number; halves to an even one.
-inline Floats nearest(Floats x) {
+inline Floats rint(Floats x) {
   return reinterpret_cast<Floats>(
       _mm256_round_ps(reinterpret_cast<__m256>(x), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC));
 }

@@ -37,6 +37,7 @@ struct Capabilities {
   std::uint64_t local_memory = 0;         ///< bytes per work-group
   std::uint32_t max_work_group_size = 0;
   std::uint32_t compute_units = 0;
+  std::uint32_t native_float_width = 0;  ///< floats in a vector of its processors
 };
 
 struct DeviceInfo {

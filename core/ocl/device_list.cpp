@@ -83,6 +83,7 @@ Capabilities probe(const cl::Device &device, std::uint32_t version) {
   result.max_work_group_size =
       static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
   result.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+  result.native_float_width = device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>();
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include "core/stages/initial_rays.hpp"
 #include "core/stages/intersect.hpp"
 #include "core/stages/march.hpp"
+#include "core/stages/march_packets.hpp"
 #include "core/stages/request_ahead.hpp"
 #include "core/stages/speculation.hpp"
 #include "core/stages/start_rays.hpp"
@@ -75,16 +76,26 @@ class BlocksPipeline : public Pipeline {
 
 class RaysPipeline : public Pipeline {
  public:
-  RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver, RaySource source)
+  RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver, RaySource source,
+               RayPackets packets)
       : state_(state),
         start_rays_(state.device, state.rays.num_rays, group_size, has_levels(state), source),
         march_(state.device, state.rays.num_rays, group_size, solver, has_levels(state), source),
-        request_ahead_(state.device, state.rays.num_rays, group_size, has_levels(state), source) {}
+        request_ahead_(state.device, state.rays.num_rays, group_size, has_levels(state), source) {
+    const bool wanted = packets == RayPackets::kAuto ? MarchPackets::suits(state.device.info())
+                                                     : packets == RayPackets::kOn;
+    if (wanted && MarchPackets::has(solver) && source == RaySource::kCamera)
+      march_packets_.emplace(state.device, state.rays.num_rays, solver);
+  }
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("start_rays");
     if (unanswered_) state_.rays.forget_rays();
-    start_rays_(macrocells(), state_.rays);
+    if (in_packets()) {
+      march_packets_->begin_frame(state_.rays);
+    } else {
+      start_rays_(macrocells(), state_.rays);
+    }
   }
 
   void enqueue_pass() override {
@@ -93,7 +104,11 @@ class RaysPipeline : public Pipeline {
     if (unanswered_) state_.provide_blocks(rays.previous_counts, asked_);
     {
       const auto stage = state_.device.timer().stage("march");
-      march_(macrocells(), state_.cache, rays);
+      if (in_packets()) {
+        (*march_packets_)(macrocells(), state_.cache, rays);
+      } else {
+        march_(macrocells(), state_.cache, rays);
+      }
     }
     const auto stage = state_.device.timer().stage("request");
     request_ahead_(macrocells(), state_.cache, rays);
@@ -106,10 +121,13 @@ class RaysPipeline : public Pipeline {
  private:
   static bool has_levels(const FrameState &state) { return state.levels.size() > 1; }
   const Macrocells &macrocells() const { return state_.levels[0].macrocells; }
+  /// Of the frame at work.
+  bool in_packets() const { return march_packets_ && !draws_levels(state_.rays); }
 
   FrameState &state_;
   StartRays start_rays_;
   March march_;
+  std::optional<MarchPackets> march_packets_;  ///< instead of both
   RequestAhead request_ahead_;
   bool unanswered_ = false;  ///< the last pass may have asked for blocks, and left rays
   LevelRange asked_;         ///< of these levels
@@ -149,15 +167,17 @@ void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
                                         const Group::Limits &limits, Solver solver,
-                                        ClosestHit closest) {
+                                        ClosestHit closest, RayPackets packets) {
   if (kind == PipelineKind::kBlocks)
     return std::make_unique<BlocksPipeline>(state, limits, solver, closest);
-  return std::make_unique<RaysPipeline>(state, limits.group_size, solver, RaySource::kCamera);
+  return std::make_unique<RaysPipeline>(state, limits.group_size, solver, RaySource::kCamera,
+                                        packets);
 }
 
 std::unique_ptr<Pipeline> make_given_pipeline(FrameState &state, std::uint32_t group_size,
                                               Solver solver) {
-  return std::make_unique<RaysPipeline>(state, group_size, solver, RaySource::kGiven);
+  return std::make_unique<RaysPipeline>(state, group_size, solver, RaySource::kGiven,
+                                        RayPackets::kOff);
 }
 
 }  // namespace isowave::core

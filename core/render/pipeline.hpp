@@ -5,7 +5,8 @@
 //   blocks  [ traverse -> request -> cache -> decode -> group -> intersect -> composite ]*
 //           the paper's (Sec. 3.3 to 4.4)
 //   rays    start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
-//           each ray intersects what it meets, as far as it is cached
+//           each ray intersects what it meets, as far as it is cached; on CPUs march_packets does
+//           the work of start_rays and march
 
 #include <cstdint>
 #include <memory>
@@ -29,6 +30,9 @@ enum class PipelineKind {
   kRays
 };
 std::string_view to_string(PipelineKind kind);
+
+/// Packets of eight rays; where they cannot be had (MarchPackets), there are none.
+enum class RayPackets { kAuto, kOn, kOff };
 
 /// The volume on the device, or one of its levels of detail.
 struct Level {
@@ -84,7 +88,7 @@ ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits);
 /// `state` must outlive the pipeline.
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
                                         const Group::Limits &limits, Solver solver,
-                                        ClosestHit closest);
+                                        ClosestHit closest, RayPackets packets = RayPackets::kAuto);
 
 /// Pipeline `rays` for the rays state.rays.given: what they hit is in given_hits. state.rays.frame
 /// has as many as a picture has pixels.

@@ -111,6 +111,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
        may_begin_normals = is_smooth && is_one_pass_ && !in_step(on_pass);
   for (bool finished = false; !finished && !stats.cancelled;) {
     pipeline_->enqueue_pass();
+    has_picture_ = true;  // the hits of the frame before are gone, at the latest now
     readback_.push(state_.rays.counts);
     if (std::exchange(may_begin_normals, false)) {
       enqueue_normals(true);
@@ -243,7 +244,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       value_range_(volume.value_range),
       size_(options_.size),
       pipeline_(make_pipeline(options_.pipeline, state_, plan_.limits.pairs, options_.solver,
-                              options_.closest)),
+                              options_.closest, options_.packets)),
       smooth_normals_(device, state_.rays.num_rays, options_.group_size, state_.levels.size() > 1),
       shade_(device, options_.size.num_rays()),
       readback_(device) {
@@ -326,7 +327,6 @@ void Renderer::begin_frame(const FrameRequest &request) {
   state_.rays.num_ambient = 0;
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
   pipeline_->begin_frame();
-  has_picture_ = true;
 }
 
 /// Makes the levels, the cache and the rays' constants those of the frame, that its rays can begin.

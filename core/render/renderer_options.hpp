@@ -18,7 +18,9 @@ struct RendererOptions {
       64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
   bool per_ray_speculation = true;  ///< each ray by what it has missed, not all alike
   Solver solver = kDefaultSolver;   ///< root finder in a cell
-  std::uint32_t group_size = 64;    ///< work-items per work-group, a power of two in 8..256
+  /// Whether rays march in packets of eight (pipeline `rays`); kAuto: where MarchPackets suits.
+  RayPackets packets = RayPackets::kAuto;
+  std::uint32_t group_size = 64;  ///< work-items per work-group, a power of two in 8..256
   /// How a pass's pairs are gathered by block.
   Grouping grouping = kDefaultGrouping;
   ClosestHit closest =

@@ -8,6 +8,11 @@
 
 namespace isowave::core {
 
+/// Is the frame at work drawn by other levels than the finest?
+inline bool draws_levels(const Wavefront &rays) {
+  return rays.num_level_frames > 1 || rays.frame.place.begin_z != 0;
+}
+
 template <class... Params>
 class LevelledKernel {
  public:
@@ -19,8 +24,7 @@ class LevelledKernel {
 
   /// The version for the frame at work.
   ocl::Kernel<Params...> &of(const Wavefront &rays) {
-    return levels_ && (rays.num_level_frames > 1 || rays.frame.place.begin_z != 0) ? *levels_
-                                                                                   : finest_;
+    return levels_ && draws_levels(rays) ? *levels_ : finest_;
   }
 
  private:

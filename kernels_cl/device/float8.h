@@ -1,0 +1,57 @@
+/// float8.h -- eight float32 or int32 at a time: what portable/packet.h needs, as
+/// core/host/float8.hpp has it for C++. OpenCL C 1.2.
+#ifndef ISOWAVE_FLOAT8_H
+#define ISOWAVE_FLOAT8_H
+
+#include "portable/shared_types.h"
+
+#define ISO_PACKET_NAMESPACE_BEGIN
+#define ISO_PACKET_NAMESPACE_END
+#define ISO_UNLIKELY(condition) (condition)
+/// A function that is called so rarely, or so seldom, that it must not burden its callers.
+#define ISO_RARE static __attribute__((noinline))
+#define ISO_SELDOM static __attribute__((noinline))
+/// A loop over 0, 1, 2, unrolled: else what it goes through would be kept in memory.
+#define ISO_EACH_OF_3(i) _Pragma("unroll") for (int i = 0; i < 3; ++i)
+/// A loop over the lanes of a mask.
+#define ISO_EACH_LANE(lane, mask)                                                          \
+  for (uint left_##lane = bits_of(mask), lane = first_lane(left_##lane); left_##lane != 0; \
+       left_##lane &= left_##lane - 1, lane = first_lane(left_##lane))
+
+typedef float8 Floats;
+typedef int8 Ints;
+typedef int8 Mask;  ///< -1 or 0 in each lane
+
+#define floats(x) ((float8)(x))
+#define ints(x) ((int8)(x))
+#define to_floats(x) convert_float8(x)
+/// Towards 0.
+#define to_ints(x) convert_int8(x)
+/// a in the lanes of a mask, b in others.
+#define pick(mask, a, b) select(b, a, mask)
+#define smaller(a, b) select(b, a, (a) < (b))
+#define larger(a, b) select(b, a, (a) > (b))
+
+#if defined(__AVX__)
+typedef float MaskRegister __attribute__((__vector_size__(32)));
+#endif
+
+/// Lane i in bit i.
+ISO_INLINE uint bits_of(Mask mask) {
+#if defined(__AVX__) /* else compilers combine lane after lane, which takes ten times as long */
+  return (uint)__builtin_ia32_movmskps256(__builtin_astype(mask, MaskRegister));
+#else
+  const int8 bits = mask & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+  const int4 four = bits.lo | bits.hi;
+  const int2 two = four.lo | four.hi;
+  return (uint)(two.x | two.y);
+#endif
+}
+/// As the function of OpenCL C, faster.
+#undef any
+#define any(mask) (bits_of(mask) != 0)
+ISO_INLINE uint first_lane(uint bits) {
+  return 31u - clz(bits & (0u - bits));
+}
+
+#endif

@@ -1,0 +1,333 @@
+/// march_packets.cl -- pipeline `rays` on CPUs: what start_rays and march do, eight rays at a time
+/// (Sec. 3.2, 3.3, 3.7).
+///
+/// begin_packets -> march_packets -> request_ahead -> [ cache -> decode -> march_packets ->
+/// request_ahead ]*. The first march makes the rays of the picture, in packets of 4 x 2; later ones
+/// take those that wait, eight neighbours of the list. One level of detail, rays of the camera, and
+/// solver `bernstein` alone: march has the others.
+#define ISO_FOUND local
+#include "device/float8.h"
+#include "device/march_block.h"
+#include "device/march_pass.h"
+
+#define ISO_LANES 8u
+// A work-item takes a chunk of packets at a time: a tile of the picture, wide enough that the hits
+// of its rows are cleared in long runs, or as many of a list.
+#define ISO_TILE_COLUMNS 128u
+#define ISO_TILE_ROWS 8u
+#define ISO_TILE_PACKETS (ISO_TILE_COLUMNS * ISO_TILE_ROWS / ISO_LANES)
+#define ISO_LIST_PACKETS 32u
+
+/// What has become of the rays of a packet.
+typedef struct PacketProgress {
+  Mask met;         ///< have come to an active block
+  Mask moved;       ///< to a second one
+  uint num_blocks;  ///< blocks that they were intersected in
+} PacketProgress;
+
+/// A block that a work-item's rays have come to in this pass, in which the cache does not change.
+typedef struct OpenedBlock {
+  uint block_id; /* ISO_INVALID_ID: none so far */
+  uint have;     /* corners of the dual grid; see open_block() */
+  uint cells_low, cells_high;
+  uint slots[8];
+} OpenedBlock;
+
+/// Of them, each that is at such a place in its macrocell.
+#define ISO_OPENED_BLOCKS 64u
+
+/// Blocks come from the cache.
+typedef struct PacketField {
+  global const uint *macrocell_masks;
+  global BlockEntry *table;
+  global const ulong *inside;
+  global const float *values;
+  global uint *slot_stamps;
+  uint stamp;
+  local OpenedBlock *opened; /* [ISO_OPENED_BLOCKS] */
+  local uint *scratch;       /* [8 * ISO_GROUP_SIZE] */
+  local uint *slots;         /* [lane][8]: of the block that it has opened last */
+  local uint *have;          /* [lane] */
+  PacketProgress *progress;
+} PacketField;
+
+ISO_INLINE void macrocell_bits(const PacketField *field, Ints macrocells, Mask lanes, Ints *low,
+                               Ints *high) {
+  const Ints at = 2 * (macrocells & lanes);
+  global const uint *masks = field->macrocell_masks;
+  const Ints lows = as_int8((uint8)(masks[at.s0], masks[at.s1], masks[at.s2], masks[at.s3],
+                                    masks[at.s4], masks[at.s5], masks[at.s6], masks[at.s7]));
+  ++masks;
+  const Ints highs = as_int8((uint8)(masks[at.s0], masks[at.s1], masks[at.s2], masks[at.s3],
+                                     masks[at.s4], masks[at.s5], masks[at.s6], masks[at.s7]));
+  *low = pick(lanes, lows, *low);
+  *high = pick(lanes, highs, *high);
+}
+
+/// Looks block b up, unless a ray has been there before. Cached blocks are stamped.
+ISO_INLINE local const OpenedBlock *find_opened(const PacketField *field, const FrameParams *frame,
+                                                BlockCoords b) {
+  const uint block_id = block_id_at(frame, b.x, b.y, b.z);
+  local OpenedBlock *opened = &field->opened[(b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3)];
+  if (opened->block_id != block_id) {
+    uint have;
+    const ulong cells = open_block(frame, field->table, field->inside, b, field->scratch, &have);
+    for (uint corner = 0; corner < 8; ++corner)
+      opened->slots[corner] = field->scratch[corner * ISO_GROUP_SIZE];
+    if ((have & 1u) != 0)
+      field->slot_stamps[opened->slots[0]] =
+          field->stamp; /* for all of the dual grid: last_use() */
+    opened->block_id = block_id;
+    opened->have = have;
+    opened->cells_low = (uint)cells;
+    opened->cells_high = (uint)(cells >> 32);
+  }
+  return opened;
+}
+
+/// Most lanes come to the same block.
+ISO_INLINE Mask open_blocks(const PacketField *field, const FrameParams *frame, const Ints *at,
+                            Mask lanes, Ints *low, Ints *high) {
+  PacketProgress *progress = field->progress;
+  Mask waits = ints(0), left = lanes;
+  progress->moved |= progress->met & lanes;
+  progress->met |= lanes;
+  while (any(left)) {
+    const uint first = first_lane(bits_of(left));
+    const Mask here =
+        left & (at[0] == at[0][first]) & (at[1] == at[1][first]) & (at[2] == at[2][first]);
+    BlockCoords b;
+    b.x = (uint)at[0][first];
+    b.y = (uint)at[1][first];
+    b.z = (uint)at[2][first];
+    local const OpenedBlock *opened = find_opened(field, frame, b);
+    left &= ~here;
+    if ((opened->have & 1u) == 0) {
+      waits |= here;
+    } else {
+      const uint8 slots = vload8(0, opened->slots);
+      const uint have = opened->have;
+      *low = pick(here, ints((int)opened->cells_low), *low);
+      *high = pick(here, ints((int)opened->cells_high), *high);
+      progress->num_blocks += popcount(bits_of(here));
+      ISO_EACH_LANE(lane, here) {
+        vstore8(slots, lane, field->slots);
+        field->have[lane] = have;
+      }
+    }
+  }
+  return waits;
+}
+
+ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame, const Ints *at,
+                             Mask lanes, Floats *w) {
+  float values[8 * ISO_LANES]; /* [corner][lane] */
+  Mask waits = ints(0);
+  for (uint i = 0; i < 8 * ISO_LANES; ++i) values[i] = 0.0f;
+  ISO_EACH_LANE(lane, lanes) {
+    const int x = at[0][lane] & 3, y = at[1][lane] & 3, z = at[2][lane] & 3;
+    if ((cell_blocks(x, y, z) & ~field->have[lane]) != 0) {
+      waits[lane] = -1;
+      --field->progress->num_blocks;
+    } else {
+      local const uint *slots = field->slots + 8 * lane;
+      _Pragma("unroll") for (int corner = 0; corner < 8; ++corner) {
+        const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
+        const uint slot = slots[(vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)];
+        values[corner * ISO_LANES + lane] =
+            field
+                ->values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))];
+      }
+    }
+  }
+  _Pragma("unroll") for (int corner = 0; corner < 8; ++corner) w[corner] =
+      vload8(corner, values) - frame->surface.isovalue;
+  return waits;
+}
+
+#include "portable/packet_walk.h"
+
+/// Says that a frame begins. One work-item.
+///
+/// counts  of the last pass of the frame before
+/// next    of this frame's first pass
+kernel void begin_packets(global const PassCounts *counts, global PassCounts *next) {
+  next->last_frame_pass = counts->frame_pass;
+  next->frame_pass = next->pass;
+}
+
+/// The rays of a packet, and which of them there are.
+typedef struct PacketSource {
+  Mask lanes;
+  Ints ray_ids, column, row;
+  Ints log_ahead;  ///< of each RayEntry
+} PacketSource;
+
+ISO_INLINE uint tiles_along(uint rays, uint tile_rays) {
+  return (rays + tile_rays - 1) / tile_rays;
+}
+
+/// Packet `packet` of the picture's tile `tile`: those of 16 columns, then of the next 16.
+ISO_INLINE PacketSource picture_packet(const View *view, uint tile, uint packet) {
+  const uint tiles_x = tiles_along(view->width, ISO_TILE_COLUMNS), packets_y = ISO_TILE_ROWS / 2;
+  const uint x = ISO_TILE_COLUMNS * (tile % tiles_x) + 16 * (packet / 4 / packets_y) +
+                 4 * (packet % 4),
+             y = ISO_TILE_ROWS * (tile / tiles_x) + 2 * (packet / 4 % packets_y);
+  PacketSource source;
+  source.column = (int)x + (int8)(0, 1, 2, 3, 0, 1, 2, 3);
+  source.row = (int)y + (int8)(0, 0, 0, 0, 1, 1, 1, 1);
+  source.ray_ids = source.column + (int)view->width * source.row;
+  source.log_ahead = ints(ISO_FIRST_LOG_AHEAD);
+  source.lanes = (source.column < (int)view->width) & (source.row < (int)view->height);
+  return source;
+}
+
+/// hits = no_hit() of a tile.
+ISO_INLINE void clear_hits(const View *view, uint tile, global HitRecord *hits) {
+  const uint tiles_x = tiles_along(view->width, ISO_TILE_COLUMNS);
+  const uint begin_x = ISO_TILE_COLUMNS * (tile % tiles_x),
+             begin_y = ISO_TILE_ROWS * (tile / tiles_x),
+             end_x = min(begin_x + ISO_TILE_COLUMNS, view->width),
+             end_y = min(begin_y + ISO_TILE_ROWS, view->height);
+  const HitRecord none = no_hit();
+  for (uint y = begin_y; y < end_y; ++y) {
+    for (uint x = begin_x; x < end_x; ++x) hits[x + view->width * y] = none;
+  }
+}
+
+/// Those of its rays that may meet the box of the active blocks.
+ISO_INLINE Mask on_screen(ScreenBox box, PacketSource source) {
+  return source.lanes & (source.column >= (int)box.begin_x) & (source.column < (int)box.end_x) &
+         (source.row >= (int)box.begin_y) & (source.row < (int)box.end_y);
+}
+
+/// Packet `packet` of a list of rays.
+ISO_INLINE PacketSource listed_packet(const View *view, global const uint *entries, uint num_rays,
+                                      uint packet) {
+  PacketSource source;
+  source.lanes = source.column = source.row = source.ray_ids = source.log_ahead = ints(0);
+  for (uint lane = 0; lane < ISO_LANES; ++lane) {
+    const uint i = ISO_LANES * packet + lane;
+    if (i < num_rays) {
+      const RayEntry entry = unpack_entry(entries[i]);
+      source.lanes[lane] = -1;
+      source.ray_ids[lane] = (int)entry.pixel;
+      source.column[lane] = (int)(entry.pixel % view->width);
+      source.row[lane] = (int)(entry.pixel / view->width);
+      source.log_ahead[lane] = (int)entry.log_ahead;
+    }
+  }
+  return source;
+}
+
+/// Puts rays that wait back to the blocks where they stand.
+ISO_INLINE void resume(Packet *p, const PacketScene *scene, PacketSource source,
+                       global const uint *ray_block_ids) {
+  Ints at[3];
+  at[0] = at[1] = at[2] = ints(0);
+  ISO_EACH_LANE(lane, source.lanes) {
+    const BlockCoords b = block_coords(scene->frame, ray_block_ids[source.ray_ids[lane]]);
+    at[0][lane] = (int)b.x;
+    at[1][lane] = (int)b.y;
+    at[2][lane] = (int)b.z;
+  }
+  begin_at_blocks(p, scene, at, source.lanes);
+}
+
+/// Lists the rays that wait, and where.
+ISO_INLINE void list_waiting(const Packet *p, const FrameParams *frame, PacketSource source,
+                             Mask moved, volatile global uint *count, global uint *list,
+                             global uint *ray_block_ids) {
+  Ints at[3];
+  uint place = atomic_add(count, popcount(bits_of(p->waits)));
+  blocks_at(p, at);
+  ISO_EACH_LANE(lane, p->waits) {
+    const uint pixel = (uint)source.ray_ids[lane], log_ahead = (uint)source.log_ahead[lane];
+    ray_block_ids[pixel] =
+        block_id_at(frame, (uint)at[0][lane], (uint)at[1][lane], (uint)at[2][lane]);
+    list[place] = pack_entry(pixel, moved[lane] != 0 ? further_ahead(log_ahead) : log_ahead, 0);
+    ++place;
+  }
+}
+
+/// Walks rays on until they hit, leave or wait: those of the picture, in the first pass of a frame,
+/// or those that wait.
+///
+/// begins           1: the first pass of a frame
+/// macrocell_masks  as traverse
+/// In      active_ray_ids [prev->next_active_count] and ray_block_ids [pixel] of the rays that
+///         wait; begins: none
+/// Out     as march; begins: hits of all pixels, and counts->active_count, the rays that have met
+/// an
+///         active block
+/// Launch  groups of one work-item, which stride over chunks of packets
+kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
+    const FrameParams frame_params, uint begins, global const uint *macrocell_masks,
+    global BlockEntry *table, global const ulong *inside, global const float *cache_values,
+    global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
+    global const uint *active_ray_ids, global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global HitRecord *hits, global uint *slot_stamps, global CacheState *cache) {
+  const FrameParams *frame = &frame_params;
+  local OpenedBlock opened[ISO_OPENED_BLOCKS];
+  local uint slots[8 * ISO_LANES], have[ISO_LANES], scratch[8 * ISO_GROUP_SIZE];
+  const uint num_rays = prev->next_active_count,
+             chunk_packets = begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS;
+  const uint num_chunks = begins != 0 ? tiles_along(frame->view.width, ISO_TILE_COLUMNS) *
+                                            tiles_along(frame->view.height, ISO_TILE_ROWS)
+                                      : tiles_along(num_rays, ISO_LANES * ISO_LIST_PACKETS);
+  uint num_met = 0, num_hits = 0;
+  PacketProgress progress;
+  PacketField field;
+  PacketScene scene;
+  progress.num_blocks = 0;
+  field.macrocell_masks = macrocell_masks;
+  field.table = table;
+  field.inside = inside;
+  field.values = cache_values;
+  field.slot_stamps = slot_stamps;
+  field.stamp = read_stamp(counts->pass);
+  field.opened = opened;
+  field.scratch = scratch;
+  field.slots = slots;
+  field.have = have;
+  field.progress = &progress;
+  for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
+  const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
+  if (get_global_id(0) == 0) {
+    open_march(frame, prev, counts, next_counts, cache);
+    if (begins == 0) counts->active_count = num_rays;
+  }
+  for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0)) {
+    if (begins != 0) clear_hits(&frame->view, chunk, hits);
+    for (uint packet = 0; packet < chunk_packets; ++packet) {
+      const PacketSource source = begins != 0
+                                      ? picture_packet(&frame->view, chunk, packet)
+                                      : listed_packet(&frame->view, active_ray_ids, num_rays,
+                                                      ISO_LIST_PACKETS * chunk + packet);
+      Packet p;
+      progress.met = progress.moved = ints(0);
+      p.waits = p.found.lanes = ints(0);
+      if (is_active_somewhere && any(source.lanes)) {
+        make_packet_axes(&frame->view, source.column, source.row, p.rays.axis);
+        open_packet(&p, &scene);
+        if (begins != 0) {
+          const Mask on = on_screen(frame->screen, source);
+          if (any(on)) begin_at_box(&p, &scene, on & enter_box(&p.rays, &scene));
+        } else {
+          resume(&p, &scene, source, ray_block_ids);
+        }
+        walk_packet(&p, &scene);
+      }
+      if (any(p.found.lanes)) write_hits(&p, &scene, source.ray_ids, ISO_ROOT_STEPS, hits);
+      if (any(p.waits)) {
+        list_waiting(&p, frame, source, progress.moved, &counts->next_active_count,
+                     next_active_ray_ids, ray_block_ids);
+      }
+      num_met += popcount(bits_of(progress.met));
+      num_hits += popcount(bits_of(p.found.lanes));
+    }
+  }
+  if (num_hits != 0) atomic_add(&counts->hit_count, num_hits);
+  if (progress.num_blocks != 0) atomic_add(&counts->granted_count, progress.num_blocks);
+  if (begins != 0 && num_met != 0) atomic_add(&counts->active_count, num_met);
+}
