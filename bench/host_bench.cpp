@@ -85,7 +85,9 @@ void measure(const Options &options) {
   const ImageSize size{options.size.at(0), options.size.at(1)};
   double decode_ms = 0;
   std::unique_ptr<HostBlocks> blocks;
-  decode_ms = milliseconds([&] { blocks = std::make_unique<HostBlocks>(volume, options.threads); });
+  decode_ms = milliseconds([&] {
+    blocks = std::make_unique<HostBlocks>(volume, HostBlocks::kNoLimit, options.threads);
+  });
   fmt::print("{}: {} x {} x {}, decoded in {:.1f} ms; {} threads; ms, medians\n", options.volume,
              volume.info.dims.x, volume.info.dims.y, volume.info.dims.z, decode_ms,
              thread_count(options.threads));

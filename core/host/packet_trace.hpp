@@ -449,6 +449,7 @@ inline void walk_blocks(Packet &p, const PacketScene &scene) {
           regions(p, kBlocks, 0) +
           static_cast<int>(grid.blocks_x) *
               (regions(p, kBlocks, 1) + static_cast<int>(grid.blocks_y) * regions(p, kBlocks, 2));
+      for_each_lane(wanted, [&](int lane) { scene.field->open(static_cast<uint>(block[lane])); });
       gather_halves(scene.field->changing, block, wanted, &p.level[kCells].low,
                     &p.level[kCells].high);
       enter_regions<kCells>(p, scene, wanted);
