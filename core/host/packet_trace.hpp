@@ -440,6 +440,15 @@ inline void walk_macrocells(Packet &p, const PacketScene &scene) {
   }
 }
 
+/// HostField::open() for lanes: once for each block, of which there are few.
+inline void open_blocks(const HostField &field, Ints block, Mask lanes) {
+  for (unsigned left = bits_of(lanes); left != 0;) {
+    const int number = block[std::countr_zero(left)];
+    field.open(static_cast<uint>(number));
+    left &= ~bits_of(block == number);
+  }
+}
+
 inline void walk_blocks(Packet &p, const PacketScene &scene) {
   while (any(p.at[kBlocks])) {
     const Mask wanted = p.at[kBlocks] & is_wanted(p.level[kBlocks]);
@@ -449,7 +458,7 @@ inline void walk_blocks(Packet &p, const PacketScene &scene) {
           regions(p, kBlocks, 0) +
           static_cast<int>(grid.blocks_x) *
               (regions(p, kBlocks, 1) + static_cast<int>(grid.blocks_y) * regions(p, kBlocks, 2));
-      for_each_lane(wanted, [&](int lane) { scene.field->open(static_cast<uint>(block[lane])); });
+      open_blocks(*scene.field, block, wanted);
       gather_halves(scene.field->changing, block, wanted, &p.level[kCells].low,
                     &p.level[kCells].high);
       enter_regions<kCells>(p, scene, wanted);
