@@ -26,7 +26,8 @@ class HostBlocks final : private BlockMaker {
   static std::uint64_t least_bytes(const VolumeInfo &info);
   static constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
 
-  /// Decodes the finest level once, for the ranges alone.
+  /// Decodes the finest level once, for the ranges alone. Meanwhile 128 bytes for each block of a
+  /// layer along z come on top of bytes().
   ///
   /// volume        must outlive this
   /// memory_limit  of bytes(); at least least_bytes()
@@ -108,7 +109,6 @@ class HostBlocks final : private BlockMaker {
   std::size_t block_at(const glm::uvec3 &block) const {
     return block.x + blocks_.x * (block.y + std::size_t{blocks_.y} * block.z);
   }
-  glm::uvec3 place_of_block(std::size_t block) const;
   float *values() const { return static_cast<float *>(values_.memory.data()); }
   ulong *changing() const { return static_cast<ulong *>(changing_.memory.data()); }
 
