@@ -1,5 +1,6 @@
 // host_bench: frames that are drawn without OpenCL (core/host), ray by ray and in packets of eight
-// rays, in turns in one process. Ends with an error where a bit of a hit differs.
+// rays, in turns in one process; and with nothing decoded before. Ends with an error where a bit of
+// a hit differs.
 //
 //   host_bench VOLUME [--isovalues 40,80,120] [--views 3] [--rounds 5]
 
@@ -83,16 +84,19 @@ std::vector<float> isovalues_of(const Options &options, const CompressedVolume &
 void measure(const Options &options) {
   const CompressedVolume volume = tools::load_volume(options.volume, {}, options.compression);
   const ImageSize size{options.size.at(0), options.size.at(1)};
-  double decode_ms = 0;
+  double ranges_ms = 0;
   std::unique_ptr<HostBlocks> blocks;
-  decode_ms = milliseconds([&] { blocks = std::make_unique<HostBlocks>(volume, options.threads); });
-  fmt::print("{}: {} x {} x {}, decoded in {:.1f} ms; {} threads; ms, medians\n", options.volume,
-             volume.info.dims.x, volume.info.dims.y, volume.info.dims.z, decode_ms,
+  ranges_ms = milliseconds([&] {
+    blocks = std::make_unique<HostBlocks>(volume, HostBlocks::kNoLimit, options.threads);
+  });
+  fmt::print("{}: {} x {} x {}, value ranges in {:.1f} ms; {} threads; ms, medians\n",
+             options.volume, volume.info.dims.x, volume.info.dims.y, volume.info.dims.z, ranges_ms,
              thread_count(options.threads));
   struct Way {
     std::string name;
     Trace trace;
     bool is_smooth;
+    bool is_cold = false;  ///< with nothing decoded
   };
   std::vector<Way> ways;
   for (const HostLoops &loops : all_host_loops()) {
@@ -101,7 +105,9 @@ void measure(const Options &options) {
     ways.push_back({"rays" + processor, loops.trace_rays, false});
     if (loops.trace != loops.trace_rays)
       ways.push_back({"packets" + processor, loops.trace, false});
-    if (best) ways.push_back({"as drawn, smooth normals", loops.trace, true});
+    if (!best) continue;
+    ways.push_back({"as drawn, smooth normals", loops.trace, true});
+    ways.push_back({"the same, nothing decoded", loops.trace, true, true});
   }
   std::map<std::string, std::vector<double>> times;
   std::uint64_t num_rays = 0, num_hits = 0, num_differing = 0;
@@ -113,10 +119,13 @@ void measure(const Options &options) {
       frame.surface = blocks->surface();
       frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
       std::vector<HitRecord> expected;
+      std::vector<HitRecord> first(size.num_rays(), no_hit());
+      draw(frame, blocks->field(), host_loops().trace, true, options.threads, first);
       for (std::uint32_t round = 0; round < options.rounds; ++round) {
         for (std::size_t i = 0; i < ways.size(); ++i) {
           const Way &way = ways[round == 0 ? i : (i + round) % ways.size()];
           std::vector<HitRecord> hits(size.num_rays(), no_hit());
+          if (way.is_cold) blocks->forget();
           times[way.name].push_back(milliseconds([&] {
             draw(frame, blocks->field(), way.trace, way.is_smooth, options.threads, hits);
           }));
@@ -131,7 +140,7 @@ void measure(const Options &options) {
       }
     }
   }
-  fmt::print("  {:<28}{:8.1f}\n", "new isovalue: its cells", median(select_ms));
+  fmt::print("  {:<28}{:8.1f}\n", "new isovalue: its blocks", median(select_ms));
   for (const Way &way : ways) fmt::print("  {:<28}{:8.1f}\n", way.name, median(times[way.name]));
   fmt::print("  {} rays, {} hits, {} differ from those ray by ray\n", num_rays, num_hits,
              num_differing);

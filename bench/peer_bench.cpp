@@ -4,6 +4,7 @@
 //
 //   peer_bench [--dims 256 512] [--rounds 5] [--isovalues 126,128,130] --json peer.json
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sys/wait.h>
@@ -16,8 +17,11 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -42,13 +46,13 @@ struct Options {
   std::vector<std::uint32_t> dims = {256, 512};
   std::string volume, device, json;
   std::string side;  ///< of a child process
-  std::uint32_t rate = 4, rounds = 5;
+  std::vector<std::string> sides;
+  std::uint32_t rate = 4, rounds = 5, views = 100;
   std::vector<float> isovalues = {126, 128, 130};
   std::vector<std::uint32_t> size = {1280, 720};
 };
 
-constexpr std::array<const char *, 5> kSides = {"host", "rays", "blocks", "mesh_low",
-                                                "mesh_medium"};
+const std::vector<std::string> kSides = {"host", "rays", "blocks", "mesh_low", "mesh_medium"};
 
 /// VmHWM of /proc/self/status [bytes]: the most memory that the process has had since reset_peak().
 std::uint64_t peak_memory() {
@@ -64,10 +68,9 @@ void reset_peak() {
   std::ofstream("/proc/self/clear_refs") << "5";
 }
 
-// ---- a child: reads an isovalue a line, answers a line of JSON
+// ---- a child: reads an isovalue a line, and of how many views; answers a line of JSON
 
-std::unique_ptr<PeerSide> make_side(const Options &options) {
-  CompressedVolume volume = tools::load_volume(options.volume, {}, {.rate = options.rate});
+std::unique_ptr<PeerSide> make_side(const Options &options, CompressedVolume volume) {
   const Camera camera = orbit_cameras(volume.info, 1)[0];
   const ImageSize size{options.size.at(0), options.size.at(1)};
   if (options.side.starts_with("mesh"))
@@ -79,10 +82,18 @@ std::unique_ptr<PeerSide> make_side(const Options &options) {
 }
 
 void serve(const Options &options) {
-  const auto side = make_side(options);
+  CompressedVolume volume = tools::load_volume(options.volume, {}, {.rate = options.rate});
+  const VolumeInfo info = volume.info;
+  const auto side = make_side(options, std::move(volume));
   reset_peak();
   std::cout << "{}" << std::endl;  // ready
-  for (float isovalue = 0; std::cin >> isovalue;) {
+  float isovalue = 0;
+  for (std::uint32_t views = 0; std::cin >> isovalue >> views;) {
+    if (views > 0) {
+      const auto cameras = orbit_cameras(info, views);
+      std::cout << ordered_json(side->draw_views(isovalue, cameras)).dump() << std::endl;
+      continue;
+    }
     Measured measured = side->draw(isovalue);
     measured["peak_byte_count"] = static_cast<double>(peak_memory());
     std::cout << ordered_json(measured).dump() << std::endl;
@@ -96,14 +107,14 @@ class Child {
  public:
   Child(const std::string &program, std::vector<std::string> arguments) {
     std::array<int, 2> to_child{}, from_child{};
-    if (pipe(to_child.data()) != 0 || pipe(from_child.data()) != 0)
+    // Not for the children that follow: this one would not see the end of its input.
+    if (pipe2(to_child.data(), O_CLOEXEC) != 0 || pipe2(from_child.data(), O_CLOEXEC) != 0)
       throw Error("no pipe for a child process");
     arguments.insert(arguments.begin(), program);
     pid_ = fork();
     if (pid_ == 0) {
       dup2(to_child[0], STDIN_FILENO);
       dup2(from_child[1], STDOUT_FILENO);
-      for (const int end : {to_child[0], to_child[1], from_child[0], from_child[1]}) close(end);
       std::vector<char *> argv;
       argv.reserve(arguments.size() + 1);
       for (std::string &argument : arguments) argv.push_back(argument.data());
@@ -126,22 +137,27 @@ class Child {
   Child &operator=(const Child &) = delete;
 
   /// Its next line. Throws Error when it has ended.
-  Measured answer() {
+  nlohmann::json answer() {
     std::string line;
     for (int c = 0; (c = std::fgetc(in_)) != '\n';) {
       if (c == EOF) throw Error("a side ended before its answer");
       line += static_cast<char>(c);
     }
-    return nlohmann::json::parse(line).get<Measured>();
+    return nlohmann::json::parse(line);
   }
 
-  Measured draw(float isovalue) {
-    fmt::print(out_, "{}\n", isovalue);
+  Measured draw(float isovalue) { return ask(isovalue, 0).get<Measured>(); }
+  std::vector<double> draw_views(float isovalue, std::uint32_t views) {
+    return ask(isovalue, views).get<std::vector<double>>();
+  }
+
+ private:
+  nlohmann::json ask(float isovalue, std::uint32_t views) {
+    fmt::print(out_, "{} {}\n", isovalue, views);
     std::fflush(out_);
     return answer();
   }
 
- private:
   pid_t pid_ = -1;
   std::FILE *in_ = nullptr, *out_ = nullptr;
 };
@@ -155,27 +171,62 @@ std::array<double, 3> load_average() {
   return load;
 }
 
+/// After how many views the sums of the times of a side's are above those of a peer's for the first
+/// time; nothing: never.
+std::optional<std::size_t> overtaken_after(const std::vector<double> &side,
+                                           const std::vector<double> &peer) {
+  double of_side = 0, of_peer = 0;
+  for (std::size_t view = 0; view < side.size(); ++view) {
+    of_side += side[view];
+    of_peer += peer[view];
+    if (of_side > of_peer) return view + 1;
+  }
+  return {};
+}
+
+/// Views on an orbit, of one isovalue that begins with nothing decoded or extracted, side by side.
+ordered_json measure_views(const Options &options,
+                           const std::vector<std::unique_ptr<Child>> &children) {
+  const float isovalue = options.isovalues.at(options.isovalues.size() / 2);
+  std::vector<std::vector<double>> times;
+  for (const auto &child : children) times.push_back(child->draw_views(isovalue, options.views));
+  ordered_json json = {{"isovalue", isovalue}, {"count", options.views}};
+  for (std::size_t side = 0; side < children.size(); ++side) {
+    ordered_json &of_side = json["sides"][options.sides[side]];
+    of_side["view_ms"] = times[side];
+    of_side["total_ms"] = std::accumulate(times[side].begin(), times[side].end(), 0.0);
+    if (options.sides[side].starts_with("mesh")) continue;
+    for (std::size_t peer = 0; peer < children.size(); ++peer) {
+      if (!options.sides[peer].starts_with("mesh")) continue;
+      const auto views = overtaken_after(times[side], times[peer]);
+      of_side["overtaken_after"][options.sides[peer]] = views ? ordered_json(*views) : nullptr;
+    }
+  }
+  return json;
+}
+
 /// One size: rounds x isovalues, in turns that change their order. The first turn of each isovalue
 /// is not counted.
 ordered_json measure(const Options &options, const std::string &program,
                      const std::string &volume) {
-  std::array<std::unique_ptr<Child>, kSides.size()> children;
+  const std::vector<std::string> &sides = options.sides;
+  std::vector<std::unique_ptr<Child>> children(sides.size());
   const auto load_before = load_average();
-  for (std::size_t side = 0; side < kSides.size(); ++side) {
+  for (std::size_t side = 0; side < sides.size(); ++side) {
     children[side] = std::make_unique<Child>(
         program,
-        std::vector<std::string>{"--side", kSides[side], "--volume", volume, "--device",
+        std::vector<std::string>{"--side", sides[side], "--volume", volume, "--device",
                                  options.device, "--rate", std::to_string(options.rate), "--size",
                                  fmt::format("{}x{}", options.size.at(0), options.size.at(1))});
     children[side]->answer();
   }
-  std::array<Samples, kSides.size()> samples;
+  std::vector<Samples> samples(sides.size());
   std::size_t turn = 0;
   for (std::uint32_t round = 0; round <= options.rounds; ++round) {
     for (const float isovalue : options.isovalues) {
-      std::array<double, kSides.size()> hits{};
-      for (std::size_t i = 0; i < kSides.size(); ++i) {
-        const std::size_t side = (turn + i) % kSides.size();
+      std::vector<double> hits(sides.size());
+      for (std::size_t i = 0; i < sides.size(); ++i) {
+        const std::size_t side = (turn + i) % sides.size();
         for (const auto &[name, value] : children[side]->draw(isovalue)) {
           if (round > 0) samples[side][name].push_back(value);
           if (name == "hit_count") hits[side] = value;
@@ -188,14 +239,14 @@ ordered_json measure(const Options &options, const std::string &program,
                     fmt::join(hits, ", "));
     }
   }
-  ordered_json json = {{"volume", volume},
-                       {"load_average_before", load_before},
-                       {"load_average_after", load_average()}};
-  for (std::size_t side = 0; side < kSides.size(); ++side) {
+  ordered_json json = {{"volume", volume}, {"load_average_before", load_before}};
+  for (std::size_t side = 0; side < sides.size(); ++side) {
     for (const auto &[name, values] : samples[side]) {
-      json["sides"][kSides[side]][name] = spread_json(spread_of(values));
+      json["sides"][sides[side]][name] = spread_json(spread_of(values));
     }
   }
+  if (options.views > 0) json["views"] = measure_views(options, children);
+  json["load_average_after"] = load_average();
   return json;
 }
 
@@ -233,7 +284,9 @@ void print_size(const ordered_json &size) {
       continue;
     }
     if (!side.contains("triangle_count")) {
-      fmt::print("\n");
+      fmt::print(", of it ranges and decoded blocks {:.0f} MiB; the ranges once took {} ms\n",
+                 side.at("renderer_byte_count").at("max").get<double>() / kMiB,
+                 cell(side, "open_ms"));
       continue;
     }
     fmt::print("; {:.0f} triangles, packets of {:.0f}\n",
@@ -246,16 +299,30 @@ void print_size(const ordered_json &size) {
   }
 }
 
+void print_views(const ordered_json &views) {
+  fmt::print("{} views of isovalue {}:\n", views.at("count").get<std::uint32_t>(),
+             views.at("isovalue").get<float>());
+  for (const auto &[name, side] : views.at("sides").items()) {
+    fmt::print("  {:<12} {:>8.0f} ms", name, side.at("total_ms").get<double>());
+    if (side.contains("overtaken_after")) {
+      for (const auto &[peer, count] : side.at("overtaken_after").items()) {
+        fmt::print("; {} {}", peer,
+                   count.is_null() ? std::string("never ahead")
+                                   : fmt::format("ahead after {}", count.get<std::size_t>()));
+      }
+    }
+    fmt::print("\n");
+  }
+}
+
 void compare(const Options &options, const std::string &command, const std::string &program) {
   ocl::Device device(ocl::choose_device(options.device));
   ordered_json json = {{"program", "peer_bench"}, {"command", command}, {"date", utc_now()}};
   for (const auto &[name, value] : run_info(device)) json["context"][name] = value;
   json["context"]["processors"] = std::thread::hardware_concurrency();
-  json["options"] = {{"rate", options.rate},
-                     {"isovalues", options.isovalues},
-                     {"rounds", options.rounds},
-                     {"width", options.size.at(0)},
-                     {"height", options.size.at(1)}};
+  json["options"] = {{"rate", options.rate},        {"isovalues", options.isovalues},
+                     {"rounds", options.rounds},    {"views", options.views},
+                     {"width", options.size.at(0)}, {"height", options.size.at(1)}};
   fmt::print("{}\n", command);
   for (const auto &[name, value] : json.at("context").items())
     fmt::print("  {:<16}{}\n", name, value.dump());
@@ -268,24 +335,19 @@ void compare(const Options &options, const std::string &command, const std::stri
   for (const std::string &volume : volumes) {
     json["sizes"].push_back(measure(options, program, volume));
     print_size(json["sizes"].back());
+    if (options.views > 0) print_views(json["sizes"].back().at("views"));
   }
   fmt::print(
-      "\nmesh_low, mesh_medium: Flying Edges of VTK, tree (build quality low, medium) and rays of "
-      "Embree on "
-      "all\n"
-      "processors; rays, blocks: our pipelines; host: ours without OpenCL, which decodes all of "
-      "the\n"
-      "volume first. Median (min..max) over rounds and isovalues. new "
-      "isovalue: "
-      "from there\n"
-      "to the finished hits, nothing decoded before; cache kept: with what the isovalue before "
-      "left decoded; "
-      "warm:\n"
-      "the same view again; next: one degree further; of processors: their time, of all threads, "
-      "which the "
-      "load of\n"
-      "others hardly changes; peak: memory of the side's process, without what loading the volume "
-      "took.\n");
+      "\nmesh_low, mesh_medium: Flying Edges of VTK, tree (build quality low, medium) and rays of\n"
+      "Embree on all processors; rays, blocks: our pipelines; host: ours without OpenCL. Median\n"
+      "(min..max) over rounds and isovalues. new isovalue: from there to the finished hits, "
+      "nothing\n"
+      "decoded before; cache kept: with what the isovalue before left decoded; warm: the same "
+      "view\n"
+      "again; next: one degree further; of processors: their time, of all threads, which the load "
+      "of\n"
+      "others hardly changes; peak: memory of the side's process, without what loading the volume\n"
+      "took; views: the first one from the new isovalue on.\n");
   if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
@@ -312,6 +374,13 @@ void add_options(CLI::App &app, Options &options) {
                  "times that every isovalue is drawn, after one that is not counted")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
+  app.add_option("--views", options.views,
+                 "views on an orbit that each side then draws of one isovalue; 0: none")
+      ->check(CLI::Range(0u, 100000u))
+      ->capture_default_str();
+  app.add_option("--sides", options.sides, fmt::format("{} [all]", fmt::join(kSides, ", ")))
+      ->delimiter(',')
+      ->check(CLI::IsMember(kSides));
   app.add_option("--size", options.size, "picture size WxH [1280x720]")
       ->delimiter('x')
       ->expected(2);
@@ -331,6 +400,7 @@ int main(int argc, char **argv) {
   options.device = "cpu";
   isowave::core::bench::add_options(app, options);
   app.callback([&] {
+    if (options.sides.empty()) options.sides = isowave::core::bench::kSides;
     if (options.side.empty()) {
       isowave::core::bench::check_options(app, options);
       isowave::core::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),

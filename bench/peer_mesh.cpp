@@ -149,7 +149,10 @@ class MeshTree {
     rtcCommitScene(scene_);
     if (rtcGetDeviceError(device) != RTC_ERROR_NONE) throw Error("Embree could not build its tree");
   }
-  ~MeshTree() { rtcReleaseScene(scene_); }
+  ~MeshTree() {
+    if (scene_ != nullptr) rtcReleaseScene(scene_);
+  }
+  MeshTree(MeshTree &&other) noexcept : scene_(std::exchange(other.scene_, nullptr)) {}
   MeshTree(const MeshTree &) = delete;
   MeshTree &operator=(const MeshTree &) = delete;
 
@@ -195,19 +198,8 @@ class MeshSide : public PeerSide {
 
   Measured draw(float isovalue) override {
     Measured measured;
+    const MeshTree tree = make_tree(isovalue, measured);
     Stopwatch watch;
-    contour_->SetValue(0, isovalue);
-    contour_->Update();
-    watch.lap(measured, "extract");
-    // Built twice, and the second counts. Embree takes the tree's memory from the system each time;
-    // where that is a virtual machine which gave it back to its host between two frames, to fetch
-    // it costs more than the build.
-    { const MeshTree first(device_, contour_->GetOutput(), quality_); }
-    watch = {};
-    const MeshTree tree(device_, contour_->GetOutput(), quality_);
-    watch.lap(measured, "build");
-    if (!packets_chosen_) choose_packets(tree);
-    watch = {};
     measured["hit_count"] = double(trace(tree, camera_));
     watch.lap(measured, "trace");
     trace(tree, camera_);
@@ -223,7 +215,38 @@ class MeshSide : public PeerSide {
     return measured;
   }
 
+  std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) override {
+    Measured measured;
+    const MeshTree tree = make_tree(isovalue, measured);
+    std::vector<double> times;
+    for (const Camera &camera : cameras) {
+      Stopwatch watch;
+      trace(tree, camera);
+      watch.lap(measured, "view");
+      times.push_back(measured.at("view_ms"));
+    }
+    times.at(0) += measured.at("extract_ms") + measured.at("build_ms");
+    return times;
+  }
+
  private:
+  /// The tree over the triangles of an isovalue: extract_ms and build_ms.
+  MeshTree make_tree(float isovalue, Measured &measured) {
+    Stopwatch watch;
+    contour_->SetValue(0, isovalue);
+    contour_->Update();
+    watch.lap(measured, "extract");
+    // Built twice, and the second counts. Embree takes the tree's memory from the system each time;
+    // where that is a virtual machine which gave it back to its host between two frames, to fetch
+    // it costs more than the build.
+    { const MeshTree first(device_, contour_->GetOutput(), quality_); }
+    watch = {};
+    MeshTree tree(device_, contour_->GetOutput(), quality_);
+    watch.lap(measured, "build");
+    if (!packets_chosen_) choose_packets(tree);
+    return tree;
+  }
+
   std::uint64_t trace(const MeshTree &tree, const Camera &camera) const {
     return packets_of_16_ ? trace_packets<Packet16>(tree.scene(), camera, size_)
                           : trace_packets<Packet8>(tree.scene(), camera, size_);

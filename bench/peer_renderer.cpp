@@ -12,6 +12,42 @@ namespace isowave::core::bench {
 
 namespace {
 
+/// PeerSide::draw(). previous: the last isovalue, so that a new one's masks have to be made again.
+template <class Side>
+Measured measure(Side &side, const Camera &camera, float previous, float isovalue) {
+  Measured measured;
+  Stopwatch watch;
+  side.draw(camera, isovalue);
+  watch.lap(measured, "new_kept");
+  side.draw(camera, previous);
+  side.forget();
+  watch = {};
+  measured["hit_count"] = static_cast<double>(side.draw(camera, isovalue).rays_hit);
+  watch.lap(measured, "new");
+  side.draw(camera, isovalue);
+  watch.lap(measured, "warm");
+  side.draw(turned(camera), isovalue);
+  watch.lap(measured, "next");
+  return measured;
+}
+
+/// PeerSide::draw_views().
+template <class Side>
+std::vector<double> measure_views(Side &side, float previous, float isovalue,
+                                  const std::vector<Camera> &cameras) {
+  side.draw(cameras.at(0), previous);
+  side.forget();
+  std::vector<double> times;
+  for (const Camera &camera : cameras) {
+    Measured measured;
+    Stopwatch watch;
+    side.draw(camera, isovalue);
+    watch.lap(measured, "view");
+    times.push_back(measured.at("view_ms"));
+  }
+  return times;
+}
+
 class RendererSide : public PeerSide {
  public:
   RendererSide(const CompressedVolume &volume, const Camera &camera, ImageSize size,
@@ -21,30 +57,22 @@ class RendererSide : public PeerSide {
         renderer_(device_, volume, {.size = size, .pipeline = pipeline}) {}
 
   Measured draw(float isovalue) override {
-    Measured measured;
-    Stopwatch watch;
-    draw(camera_, isovalue);
-    watch.lap(measured, "new_kept");
-    draw(camera_, previous_);
-    renderer_.clear_cache();
-    watch = {};
-    measured["hit_count"] = static_cast<double>(draw(camera_, isovalue).rays_hit);
-    watch.lap(measured, "new");
-    draw(camera_, isovalue);
-    watch.lap(measured, "warm");
-    draw(turned(camera_), isovalue);
-    watch.lap(measured, "next");
+    Measured measured = measure(*this, camera_, previous_, isovalue);
     measured["device_byte_count"] = static_cast<double>(device_.ledger().peak());
     previous_ = isovalue;
     return measured;
   }
+  std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) override {
+    return measure_views(*this, previous_, isovalue, cameras);
+  }
 
- private:
+  void forget() { renderer_.clear_cache(); }
   /// Like a mesh of triangles, with what a cell knows.
   FrameStats draw(const Camera &camera, float isovalue) {
     return renderer_.render({.camera = camera, .isovalue = isovalue, .normals = Normals::kCell});
   }
 
+ private:
   Camera camera_;
   float previous_ = 0;
   ocl::Device device_;
@@ -54,34 +82,35 @@ class RendererSide : public PeerSide {
 class HostSide : public PeerSide {
  public:
   HostSide(CompressedVolume volume, const Camera &camera, ImageSize size)
-      : volume_(std::move(volume)), camera_(camera), size_(size), renderer_(volume_) {}
-
-  Measured draw(float isovalue) override {
-    Measured measured;
+      : volume_(std::move(volume)), camera_(camera), size_(size) {
     Stopwatch watch;
-    draw(camera_, isovalue);
-    watch.lap(measured, "new_kept");
-    renderer_.reset();  // its memory is free before that of the next is taken
-    watch = {};
     renderer_.emplace(volume_);
-    measured["hit_count"] = static_cast<double>(draw(camera_, isovalue).rays_hit);
-    watch.lap(measured, "new");
-    draw(camera_, isovalue);
-    watch.lap(measured, "warm");
-    draw(turned(camera_), isovalue);
-    watch.lap(measured, "next");
-    return measured;
+    watch.lap(opened_, "open");
   }
 
- private:
+  Measured draw(float isovalue) override {
+    Measured measured = measure(*this, camera_, previous_, isovalue);
+    measured.insert(opened_.begin(), opened_.end());
+    measured["renderer_byte_count"] = static_cast<double>(renderer_->memory_bytes());
+    previous_ = isovalue;
+    return measured;
+  }
+  std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) override {
+    return measure_views(*this, previous_, isovalue, cameras);
+  }
+
+  void forget() { renderer_->clear_cache(); }
   FrameStats draw(const Camera &camera, float isovalue) {
     return renderer_->render(
         {.camera = camera, .isovalue = isovalue, .size = size_, .normals = Normals::kCell});
   }
 
+ private:
   CompressedVolume volume_;
   Camera camera_;
+  float previous_ = 0;
   ImageSize size_;
+  Measured opened_;
   std::optional<HostRenderer> renderer_;
 };
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/render/pipeline.hpp"
 #include "core/view/camera.hpp"
@@ -51,6 +52,9 @@ class PeerSide {
   /// from the isovalue to the finished hits; warm_ms: the same view again; next_ms: then one degree
   /// further; hit_count; and the side's own.
   virtual Measured draw(float isovalue) = 0;
+  /// Draws views of an isovalue one after the other. Returns the ms of each: of the first one from
+  /// the isovalue, with nothing decoded, to the finished hits.
+  virtual std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) = 0;
 };
 
 /// Triangles of VTK's Flying Edges, Embree's tree over them, and its rays: threads on all
@@ -65,8 +69,8 @@ std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Came
                                              ImageSize size, PipelineKind pipeline,
                                              const std::string &device);
 
-/// Our renderer without OpenCL, on all processors. new_ms: with nothing decoded, from the
-/// compressed volume on; new_kept_ms: with the volume decoded.
+/// Our renderer without OpenCL, on all processors: new_ms and new_kept_ms as above. open_ms: the
+/// value ranges of the volume's blocks, once.
 std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const Camera &camera,
                                          ImageSize size);
 

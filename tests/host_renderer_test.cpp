@@ -9,6 +9,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <isowave/isowave.hpp>
 #include <thread>
 
@@ -154,7 +156,8 @@ TEST(HostRenderer, FilesAndMemoryGiveTheSame) {
     const TestVolume volume = goal ? TestVolume(test::grid_info(dims), voxels, *goal)
                                    : TestVolume(test::grid_info(dims), voxels, 7);
     write_zfp_file(volume.compressed, folder / "a.zfp");
-    HostRenderer from_file(open_zfp_file(folder / "a.zfp")), from_memory(volume.compressed);
+    const CompressedVolume file = open_zfp_file(folder / "a.zfp");
+    HostRenderer from_file(file), from_memory(volume.compressed);
     const FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.2f, kOdd};
     EXPECT_GT(from_file.render(request).rays_hit, 100u);
     from_memory.render(request);
@@ -166,7 +169,7 @@ TEST(HostRenderer, FilesAndMemoryGiveTheSame) {
 TEST(HostLoops, AllGiveTheSameBits) {
   const auto reader = open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz");
   const TestVolume volume(*reader, 6);
-  HostBlocks blocks(volume.compressed, 0);
+  HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
   blocks.select(10);
   FrameParams frame =
       make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 10);
@@ -198,7 +201,10 @@ TEST(HostLoops, AllGiveTheSameBits) {
     std::vector<std::uint8_t> row(3 * 64);
     loops.shade(frame, shading, 1, 23, hits.data(), nullptr, 0, row.data());
     EXPECT_EQ(std::memcmp(row.data(), picture.pixels.data() + 23 * row.size(), row.size()), 0);
+    std::size_t num_compared = 0;
     for (std::uint32_t id = 0; id < volume.compressed.block_count(); ++id) {
+      if (!blocks.is_decoded(id)) continue;
+      ++num_compared;
       float values[64];
       loops.decode({volume.compressed.words.data(), volume.compressed.block_begin(id),
                     volume.compressed.block_bits(id), volume.compressed.precision.min_exponent,
@@ -207,6 +213,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
       ASSERT_EQ(std::memcmp(values, blocks.field().values + 64 * id, sizeof(values)), 0) << id;
       EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
     }
+    EXPECT_GT(num_compared, 100u);
   }
 }
 
@@ -214,7 +221,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
 TEST(HostLoops, TilesOfAnySize) {
   const glm::uvec3 dims(20, 21, 22);
   const TestVolume volume(dims, test::gyroid_field(9), 8);
-  HostBlocks blocks(volume.compressed, 0);
+  HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
   blocks.select(0.2f);
   FrameParams frame =
       make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 0.2f);
@@ -250,7 +257,7 @@ TEST(HostLoops, PacketsFindWhatRaysAloneFind) {
                             16);
     const float isovalue = is_whole ? volume.voxels[volume.voxels.size() / 2]
                                     : static_cast<float>(random.in(-0.9, 0.9));
-    HostBlocks blocks(volume.compressed, 0);
+    HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
     blocks.select(isovalue);
     std::vector<Camera> cameras = hard_cameras(dims);
     const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
@@ -388,16 +395,116 @@ TEST(HostRenderer, RaysThatCannotBeTracedAreOneLine) {
 
 TEST(HostRenderer, MemoryIsStatedAndLimited) {
   const TestVolume volume({34, 21, 18}, test::gyroid_field(9), 8);
-  // 9 x 6 x 5 blocks of 64 float32, their two float32 of range and two words of 64 bits; 3 x 2 x 2
-  // macrocells of such a word; 256 thresholds.
-  const std::uint64_t bytes = 9 * 6 * 5 * (256 + 8 + 16) + 3 * 2 * 2 * 8 + 256 * 4;
-  EXPECT_EQ(HostRenderer(volume.compressed, {.memory_limit = bytes}).memory_bytes(), bytes);
-  EXPECT_THAT(error_of([&] { HostRenderer(volume.compressed, {.memory_limit = bytes - 1}); }),
-              testing::AllOf(HasSubstr("takes 1 MiB"), HasSubstr("0 MiB are allowed")));
+  // 9 x 6 x 5 blocks with two bytes of state; 3 x 2 x 2 macrocells of 64 ranges, one of their own
+  // and a mask; a byte for each page of 64 float32 and of a word of 64 bits a block; 256
+  // thresholds. One ray at a time needs eight blocks and their cells that change.
+  const std::uint64_t page = ReservedMemory::page_bytes(), blocks = 9 * 6 * 5;
+  const std::uint64_t bytes = 2 * blocks + 3 * 2 * 2 * (65 * 8 + 8) +
+                              (256 * blocks + page - 1) / page + (8 * blocks + page - 1) / page +
+                              256 * 4;
+  HostRenderer renderer(volume.compressed, {.memory_limit = bytes + 9 * page});
+  EXPECT_EQ(renderer.memory_bytes(), bytes);
+  EXPECT_THAT(
+      error_of([&] { HostRenderer(volume.compressed, {.memory_limit = bytes + 9 * page - 1}); }),
+      testing::AllOf(HasSubstr("takes 1 MiB"), HasSubstr("0 MiB are allowed")));
   CompressedVolume huge;
   huge.info = test::grid_info(glm::uvec3(65'536, 65'536, 1'000));
   EXPECT_THAT(error_of([&] { HostRenderer{huge}; }),
               HasSubstr(fmt::format("{} MiB are allowed", host_memory() / 4 >> 20)));
+  // Whole pages of what frames decode come on top.
+  HostRenderer free(volume.compressed);
+  free.render({orbit_cameras(volume.info(), 1)[0], 0.2f, kOdd});
+  EXPECT_GT(free.num_decoded_blocks(), 100u);
+  EXPECT_GE(free.memory_bytes(), bytes + 256 * free.num_decoded_blocks());
+  EXPECT_EQ((free.memory_bytes() - bytes) % page, 0u);
+  EXPECT_LE(free.memory_bytes(), bytes + (256 * blocks + page - 1) / page * page +
+                                     (8 * blocks + page - 1) / page * page);
+}
+
+/// Where the blocks of a frame do not fit, they are decoded more than once: the same bits, of hits,
+/// ambient rays and rays of any origin.
+TEST(HostRenderer, AnyLimitGivesTheSameBits) {
+  const glm::uvec3 dims(70, 41, 53);
+  const TestVolume volume(dims, test::gyroid_field(13), 9);
+  FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.2f, ImageSize{41, 33}};
+  request.ambient_rays = 3;
+  const std::vector<WorldRay> rays = any_rays(dims, 3000);
+  HostRenderer whole(volume.compressed);
+  whole.render(request);
+  EXPECT_GT(test::num_hits(whole.hits()), 300u);
+  const auto cast = whole.cast_rays(rays, 0.1f, Normals::kSmooth);
+  const std::uint64_t least = HostBlocks::least_bytes(volume.info());
+  std::uint64_t fewest = ~std::uint64_t{0};
+  for (const std::uint64_t pages : {0, 5, 50}) {
+    for (const std::uint32_t threads : {1, 2}) {
+      SCOPED_TRACE(fmt::format("{} pages more, {} threads", pages, threads));
+      const std::uint64_t limit = least + pages * ReservedMemory::page_bytes();
+      HostRenderer renderer(volume.compressed, {.memory_limit = limit, .num_threads = threads});
+      for (const bool is_watched : {false, true}) {
+        if (is_watched)
+          request.on_pass = [&](const PassStats &) { return renderer.memory_bytes() <= limit; };
+        EXPECT_FALSE(renderer.render(request).cancelled);
+        request.on_pass = {};
+        expect_same_hits(renderer.hits(), whole.hits(), 41);
+        EXPECT_EQ(renderer.open().counts, whole.open().counts);
+      }
+      expect_same_hits(renderer.cast_rays(rays, 0.1f, Normals::kSmooth), cast, 1);
+      EXPECT_LE(renderer.memory_bytes(), limit);
+      EXPECT_GT(renderer.num_decoded_blocks(), 2 * whole.num_decoded_blocks());
+      fewest = std::min(fewest, renderer.num_decoded_blocks());
+    }
+  }
+  EXPECT_GT(fewest, whole.num_decoded_blocks());
+}
+
+TEST(HostRenderer, FurtherFramesDecodeWhatTheyDoNotFind) {
+  const TestVolume volume({44, 41, 37}, test::gyroid_field(13), 9);
+  HostRenderer renderer(volume.compressed);
+  const FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.2f, kOdd};
+  const auto decoded_by = [&] {
+    const std::uint64_t before = renderer.num_decoded_blocks();
+    renderer.render(request);
+    return renderer.num_decoded_blocks() - before;
+  };
+  const std::uint64_t first = decoded_by();
+  const std::vector<HitRecord> hits = renderer.hits();
+  EXPECT_GT(first, 100u);
+  EXPECT_EQ(decoded_by(), 0u);
+  const std::uint64_t bytes = renderer.memory_bytes();
+  renderer.clear_cache();
+  EXPECT_EQ(decoded_by(), first);
+  EXPECT_EQ(renderer.memory_bytes(), bytes);
+  expect_same_hits(renderer.hits(), hits, kOdd.width);
+}
+
+/// A file that becomes shorter between two frames, and is mended.
+TEST(HostRenderer, FilesThatCannotBeReadAreOneLine) {
+  const TestVolume volume({44, 41, 37}, test::gyroid_field(13), 9);
+  const test::TemporaryFolder folder;
+  const auto path = folder / "a.zfp";
+  write_zfp_file(volume.compressed, path);
+  const CompressedVolume file = open_zfp_file(path);
+  HostRenderer renderer(file);
+  const FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.2f, kOdd};
+  const std::uintmax_t size = std::filesystem::file_size(path);
+  std::vector<char> bytes(size);
+  std::ifstream(path, std::ios::binary).read(bytes.data(), std::streamsize(size));
+  std::filesystem::resize_file(path, size / 3);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_THAT(error_of([&] { renderer.render(request); }), HasSubstr("a.zfp"));
+    EXPECT_THAT(error_of([&] { renderer.shade(); }), HasSubstr("no picture"));
+  }
+  const std::vector<WorldRay> rays = any_rays(volume.info().dims, 500);
+  EXPECT_THAT(error_of([&] { renderer.cast_rays(rays, 0.2f, Normals::kSmooth); }),
+              HasSubstr("a.zfp"));
+  EXPECT_THAT(error_of([&] { HostRenderer{file}; }), HasSubstr("a.zfp"));
+  std::fstream(path, std::ios::binary | std::ios::in | std::ios::out)
+      .write(bytes.data(), std::streamsize(size));
+  renderer.render(request);
+  HostRenderer from_memory(volume.compressed);
+  from_memory.render(request);
+  EXPECT_GT(test::num_hits(from_memory.hits()), 100u);
+  expect_same_hits(renderer.hits(), from_memory.hits(), kOdd.width);
 }
 
 TEST(HostRenderer, RequestsThatFailAreOneLine) {

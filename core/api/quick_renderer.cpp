@@ -62,7 +62,7 @@ Renderer &QuickRenderer::Implementation::device_renderer() {
   return made.value();
 }
 
-/// Null where the device's renderer is ready, or the volume cannot be decoded.
+/// Null where the device's renderer is ready, or the host cannot draw the volume.
 HostRenderer *QuickRenderer::Implementation::host_renderer() {
   if (done) {
     host.reset();

@@ -1,6 +1,8 @@
 #include "core/host/host_blocks.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <limits>
 #include <mutex>
 
@@ -15,21 +17,27 @@ namespace {
 
 /// Blocks whose bits are read at a time.
 constexpr std::uint64_t kRunBlocks = 1024;
+/// Macrocells that a thread looks at at a time.
+constexpr std::uint64_t kRunMacrocells = 1024;
 constexpr std::uint32_t kEdge = ISO_MACROCELL_BLOCKS;
 
-glm::uvec3 blocks_of(const BlockGrid &grid) {
-  return {grid.blocks_x, grid.blocks_y, grid.blocks_z};
-}
+/// How far a block is, in decoded_ and opened_. In opened_, numbers from kFirstSelection on: it is
+/// open for that selection; for any other it is as if it were kNone.
+constexpr uchar kNone = 0, kBeingMade = 1, kFirstSelection = 2;
+static_assert(HostField::kDecoded > kBeingMade);
 
-/// Item `id` of a grid, x first.
-glm::uvec3 place_of(std::uint64_t id, const glm::uvec3 &size) {
+/// Where the blocks of a dual grid lie on pages of their own.
+constexpr std::uint64_t kLeastPages = 8 + 1;
+
+/// Item `number` of a grid of at most ISO_MAX_BLOCK_IDS, x first. By 32 bits, which processors
+/// divide faster.
+glm::uvec3 place_of(std::uint64_t number, const glm::uvec3 &size) {
+  const auto id = static_cast<std::uint32_t>(number);
   return {id % size.x, id / size.x % size.y, id / size.x / size.y};
 }
 
-/// Blocks that own dual cells, along each axis.
-glm::uvec3 owning_blocks(const BlockGrid &grid) {
-  return {num_owning_blocks(grid.dims_x), num_owning_blocks(grid.dims_y),
-          num_owning_blocks(grid.dims_z)};
+glm::uvec3 corner_of(uint corner) {
+  return {corner & 1, corner >> 1 & 1, corner >> 2};
 }
 
 void add(std::optional<BlockBox> &box, const glm::ivec3 &block) {
@@ -44,108 +52,195 @@ void add(std::optional<BlockBox> &box, const std::optional<BlockBox> &other) {
   add(box, other->end - 1);
 }
 
+void add(BlockRange &range, const BlockRange &by) {
+  range.min = std::min(range.min, by.min);
+  range.max = std::max(range.max, by.max);
+}
+
+void fill(std::vector<std::atomic<uchar>> &states, uchar value) {
+  for (std::atomic<uchar> &state : states) state.store(value, std::memory_order_relaxed);
+}
+
+std::uint64_t num_pages(std::uint64_t num_bytes) {
+  return (num_bytes + ReservedMemory::page_bytes() - 1) / ReservedMemory::page_bytes();
+}
+
 }  // namespace
+
+HostBlocks::Pages::Pages(std::uint64_t num_bytes)
+    : memory(num_bytes), taken(num_pages(num_bytes)) {}
 
 std::uint64_t HostBlocks::bytes(const VolumeInfo &info) {
   const BlockGrid grid = make_grid(info);
-  return block_count(grid) *
-             (ISO_BLOCK_VOXELS * sizeof(float) + sizeof(BlockRange) + 2 * sizeof(ulong)) +
-         num_macrocells(grid) * sizeof(ulong) + kNumThresholds * sizeof(float);
+  const std::uint64_t num_blocks = block_count(grid), macrocells = num_macrocells(grid);
+  return macrocells * (65 * sizeof(BlockRange) + sizeof(ulong)) + 2 * num_blocks +
+         num_pages(num_blocks * ISO_BLOCK_VOXELS * sizeof(float)) +
+         num_pages(num_blocks * sizeof(ulong)) + kNumThresholds * sizeof(float);
 }
 
-HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint32_t num_threads)
-    : num_threads_(num_threads),
-      grid_(make_grid(volume.info)),
-      values_(std::make_unique_for_overwrite<float[]>(ISO_BLOCK_VOXELS * volume.block_count())),
-      ranges_(volume.block_count()),
-      inside_(volume.block_count()),
-      changing_(volume.block_count()),
-      masks_(num_macrocells(grid_)) {
-  const HostLoops &loops = host_loops();
-  const std::uint64_t num_blocks = volume.block_count();
-  const glm::uvec3 dims = volume.info.dims, blocks = blocks_of(grid_);
+std::uint64_t HostBlocks::least_bytes(const VolumeInfo &info) {
+  return bytes(info) + kLeastPages * ReservedMemory::page_bytes();
+}
+
+HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit,
+                       std::uint32_t num_threads)
+    : volume_(&volume),
+      memory_limit_(memory_limit),
+      num_threads_(num_threads),
+      blocks_(volume.num_blocks()),
+      macrocells_((blocks_ + kEdge - 1u) / kEdge),
+      masks_(num_macrocells(make_grid(volume.info))),
+      values_(volume.block_count() * ISO_BLOCK_VOXELS * sizeof(float)),
+      changing_(volume.block_count() * sizeof(ulong)),
+      decoded_(volume.block_count()),
+      opened_(volume.block_count()),
+      num_bytes_(bytes(volume.info)),
+      selection_(kFirstSelection) {
+  find_ranges();
+}
+
+/// As far as decode() needs it, in host memory.
+EncodedBlock HostBlocks::encoded(std::size_t block) const {
+  return {.words = volume_->words.data(),
+          .first_bit = volume_->block_begin(block),
+          .num_bits = volume_->block_bits(block),
+          .min_exponent = volume_->precision.min_exponent,
+          .whole_numbers = volume_->precision.whole_numbers,
+          .size_x = 4,
+          .size_y = 4,
+          .size_z = 4};
+}
+
+// ---- Value ranges
+
+/// Layer by layer of blocks, since a block's dual cells have voxels of the layer above it.
+void HostBlocks::find_ranges() {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  ranges_.low.assign(64 * masks_.size(), kInfinity);
+  ranges_.high.assign(64 * masks_.size(), -kInfinity);
+  macrocell_ranges_.low.assign(masks_.size(), kInfinity);
+  macrocell_ranges_.high.assign(masks_.size(), -kInfinity);
+  std::vector<float> sampled(2 * range_sample(volume_->block_count()).count);
+  std::vector<BlockRange> layer(8 * std::size_t{blocks_.x} * blocks_.y), above(layer.size());
+  ranges_of_layer(0, layer, sampled);
+  for (std::uint32_t z = 0; z < blocks_.z; ++z) {
+    if (z + 1 < blocks_.z) ranges_of_layer(z + 1, above, sampled);
+    set_dual_ranges(z, layer, above);
+    layer.swap(above);
+  }
+  thresholds_ = range_thresholds(std::move(sampled));
+}
+
+/// Of the parts of all blocks of a layer, into ranges [block][8]. sampled: gets the ranges of those
+/// blocks that thresholds are made of.
+void HostBlocks::ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
+                                 std::span<float> sampled) const {
+  const std::uint64_t num_blocks = std::uint64_t{blocks_.x} * blocks_.y, layer = z * num_blocks;
+  const RangeSample sample = range_sample(volume_->block_count());
   parallel_for(
       (num_blocks + kRunBlocks - 1) / kRunBlocks, num_threads_,
       [&](std::uint64_t run, std::uint32_t) {
-        const std::uint64_t first = run * kRunBlocks,
-                            end = std::min(num_blocks, first + kRunBlocks);
-        const std::uint64_t begin_bit = volume.block_begin(static_cast<std::uint32_t>(first)),
-                            end_bit = volume.block_begin(static_cast<std::uint32_t>(end));
-        std::vector<uint> words((end_bit - begin_bit + 31) / 32 + kDecoderAhead);
-        volume.read_words(begin_bit, words);
-        for (std::uint64_t id = first; id < end; ++id) {
-          const auto block = static_cast<std::uint32_t>(id);
-          const glm::uvec3 size = glm::min(dims - 4u * place_of(id, blocks), glm::uvec3(4));
-          ranges_[id] = loops.decode({.words = words.data(),
-                                      .first_bit = volume.block_begin(block) - begin_bit,
-                                      .num_bits = volume.block_bits(block),
-                                      .min_exponent = volume.precision.min_exponent,
-                                      .whole_numbers = volume.precision.whole_numbers,
-                                      .size_x = size.x,
-                                      .size_y = size.y,
-                                      .size_z = size.z},
-                                     values_.get() + ISO_BLOCK_VOXELS * id);
+        const std::uint64_t first = layer + run * kRunBlocks,
+                            end = layer + std::min(num_blocks, (run + 1) * kRunBlocks);
+        std::vector<uint> words;
+        std::uint64_t begin_bit = 0;
+        if (volume_->file) {
+          begin_bit = volume_->block_begin(first);
+          words.resize((volume_->block_begin(end) - begin_bit + 31) / 32 + kDecoderAhead);
+          volume_->read_words(begin_bit, words);
+        }
+        for (std::uint64_t block = first; block < end; ++block) {
+          EncodedBlock bits = encoded(block);
+          const glm::uvec3 size = volume_->info.dims - 4u * place_of(block, blocks_);
+          bits.size_x = std::min(size.x, 4u);
+          bits.size_y = std::min(size.y, 4u);
+          bits.size_z = std::min(size.z, 4u);
+          if (volume_->file) bits.words = words.data();
+          bits.first_bit -= begin_bit;
+          BlockRange *parts = ranges.data() + 8 * (block - layer);
+          host_loops().ranges(bits, parts);
+          const std::uint64_t number = block / sample.stride;
+          if (number >= sample.count ||
+              sampled_block(static_cast<uint>(number * sample.stride), sample.stride) != block)
+            continue;
+          sampled[2 * number] = parts[0].min;
+          sampled[2 * number + 1] = parts[0].max;
         }
       });
-  const RangeSample sample = range_sample(num_blocks);
-  std::vector<float> values;
-  for (std::uint32_t i = 0; i < sample.count; ++i) {
-    const BlockRange &range = ranges_[sampled_block(i * sample.stride, sample.stride)];
-    values.push_back(range.min);
-    values.push_back(range.max);
-  }
-  thresholds_ = range_thresholds(std::move(values));
 }
 
-/// Voxel by voxel only where they are on both sides. Rounding keeps the order of differences.
-ulong HostBlocks::inside_of(std::size_t block, float isovalue) const {
-  if (ranges_[block].min - isovalue >= 0.0f) return ~ulong{0};
-  if (!(ranges_[block].max - isovalue >= 0.0f)) return 0;
-  return host_loops().inside(values_.get() + ISO_BLOCK_VOXELS * block, isovalue);
+/// Of the blocks of layer z, from ranges_of_layer() of it and of the one above.
+void HostBlocks::set_dual_ranges(std::uint32_t z, std::span<const BlockRange> layer,
+                                 std::span<const BlockRange> above) {
+  const glm::uvec3 dims = volume_->info.dims;
+  if (z >= num_owning_blocks(dims.z)) return;
+  const glm::uvec2 owning(num_owning_blocks(dims.x), num_owning_blocks(dims.y));
+  // Rows of macrocells, so that no two threads write to one.
+  parallel_for(macrocells_.y, num_threads_, [&](std::uint64_t row, std::uint32_t) {
+    const auto begin = static_cast<uint>(kEdge * row), end = std::min(begin + kEdge, owning.y);
+    for (uint y = begin; y < end; ++y) {
+      for (uint x = 0; x < owning.x; ++x) {
+        BlockRange range = layer[8 * (x + std::size_t{blocks_.x} * y)];
+        for (uint corner = 1; corner < 8; ++corner) {
+          const glm::uvec3 at = glm::uvec3(x, y, z) + corner_of(corner);
+          if (!glm::all(glm::lessThan(at, blocks_))) continue;
+          add(range,
+              (at.z > z ? above : layer)[8 * (at.x + std::size_t{blocks_.x} * at.y) + corner]);
+        }
+        const std::size_t macrocell =
+            x / kEdge + macrocells_.x * (row + std::size_t{macrocells_.y} * (z / kEdge));
+        const std::size_t i = 64 * macrocell + x % kEdge + 4 * (y % kEdge) + 16 * (z % kEdge);
+        ranges_.low[i] = range.min;
+        ranges_.high[i] = range.max;
+        float &low = macrocell_ranges_.low[macrocell], &high = macrocell_ranges_.high[macrocell];
+        low = std::min(low, range.min);
+        high = std::max(high, range.max);
+      }
+    }
+  });
 }
 
-/// Padding, and blocks beyond the volume, matter to cells outside it alone: any voxels stand for
-/// them.
-ulong HostBlocks::find_changing(const glm::uvec3 &block) const {
-  ulong inside[8], any = 0, all = ~ulong{0};
-  for (uint corner = 0; corner < 8; ++corner) {
-    const glm::uvec3 at = block + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
-    inside[corner] = inside_[block_at(glm::min(at, blocks_of(grid_) - 1u))];
-    any |= inside[corner];
-    all &= inside[corner];
-  }
-  return any == 0 || ~all == 0 ? 0 : changing_cells(inside);
+/// The box around the blocks for which there are bits in holds(macrocell), called by all threads.
+template <class Holds>
+std::optional<BlockBox> HostBlocks::box_of(Holds holds) const {
+  std::optional<BlockBox> box;
+  std::mutex box_mutex;
+  parallel_for((masks_.size() + kRunMacrocells - 1) / kRunMacrocells, num_threads_,
+               [&](std::uint64_t run, std::uint32_t) {
+                 std::optional<BlockBox> box_here;
+                 const std::size_t end = std::min(masks_.size(), (run + 1) * kRunMacrocells);
+                 for (std::size_t macrocell = run * kRunMacrocells; macrocell < end; ++macrocell) {
+                   const ulong mask = holds(macrocell);
+                   if (mask == 0) continue;
+                   const glm::uvec3 first = kEdge * place_of(macrocell, macrocells_);
+                   for (ulong bits = mask; bits != 0; bits &= bits - 1) {
+                     const auto bit = static_cast<uint>(std::countr_zero(bits));
+                     add(box_here, glm::ivec3(first + glm::uvec3(bit & 3, bit >> 2 & 3, bit >> 4)));
+                   }
+                 }
+                 const std::lock_guard lock(box_mutex);
+                 add(box, box_here);
+               });
+  return box;
 }
 
+/// A block has cells that change where its dual cells have voxels on both sides: any two of these
+/// voxels are connected by cells of the block, so that one of the cells has both.
 void HostBlocks::select(float isovalue) {
   if (selected_ == isovalue) return;
   selected_.reset();
-  const glm::uvec3 blocks = blocks_of(grid_), owning = owning_blocks(grid_),
-                   macrocells = (blocks + kEdge - 1u) / kEdge;
-  parallel_for((inside_.size() + kRunBlocks - 1) / kRunBlocks, num_threads_,
-               [&](std::uint64_t run, std::uint32_t) {
-                 const std::size_t end = std::min(inside_.size(), (run + 1) * kRunBlocks);
-                 for (std::size_t block = run * kRunBlocks; block < end; ++block)
-                   inside_[block] = inside_of(block, isovalue);
-               });
-  std::optional<BlockBox> box;
-  std::mutex box_mutex;
-  parallel_for(masks_.size(), num_threads_, [&](std::uint64_t macrocell, std::uint32_t) {
-    std::optional<BlockBox> box_here;
-    ulong mask = 0;
-    const glm::uvec3 first = kEdge * place_of(macrocell, macrocells);
-    for (uint bit = 0; bit < 64; ++bit) {
-      const glm::uvec3 block = first + glm::uvec3(bit & 3, bit >> 2 & 3, bit >> 4);
-      if (!glm::all(glm::lessThan(block, owning))) continue;
-      const ulong changing = changing_[block_at(block)] = find_changing(block);
-      if (changing == 0) continue;
-      mask |= ulong{1} << bit;
-      add(box_here, glm::ivec3(block));
-    }
-    masks_[macrocell] = mask;
-    if (!box_here) return;
-    const std::lock_guard lock(box_mutex);
-    add(box, box_here);
+  if (++selection_ == 0) {
+    fill(opened_, kNone);
+    selection_ = kFirstSelection;
+  }
+  const HostLoops &loops = host_loops();
+  const std::optional<BlockBox> box = box_of([&](std::size_t macrocell) {
+    const bool none = macrocell_ranges_.low[macrocell] - isovalue >= 0.0f ||
+                      !(macrocell_ranges_.high[macrocell] - isovalue >= 0.0f);
+    return masks_[macrocell] =
+               none ? 0
+                    : loops.inside(ranges_.high.data() + 64 * macrocell, isovalue) &
+                          ~loops.inside(ranges_.low.data() + 64 * macrocell, isovalue);
   });
   const BlockBox around = box.value_or(BlockBox{glm::ivec3(0), glm::ivec3(0)});
   surface_ = {.isovalue = isovalue,
@@ -159,62 +254,190 @@ void HostBlocks::select(float isovalue) {
   selected_ = isovalue;
 }
 
-/// Of all voxels of the blocks that a block's dual cells have voxels of.
-BlockRange HostBlocks::neighbours_range(const glm::uvec3 &block) const {
-  BlockRange range = ranges_[block_at(block)];
-  for (uint corner = 1; corner < 8; ++corner) {
-    const glm::uvec3 at = block + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
-    const BlockRange &other = ranges_[block_at(glm::min(at, blocks_of(grid_) - 1u))];
-    range.min = std::min(range.min, other.min);
-    range.max = std::max(range.max, other.max);
-  }
-  return range;
-}
-
-/// Of the voxels of a block's dual cells: its own, and the first layers of its neighbours.
-BlockRange HostBlocks::dual_range(const glm::uvec3 &block) const {
-  BlockRange range = ranges_[block_at(block)];
-  const glm::uvec3 begin = 4u * block,
-                   end = glm::min(begin + 5u, glm::uvec3(grid_.dims_x, grid_.dims_y, grid_.dims_z));
-  for (uint z = begin.z; z < end.z; ++z) {
-    for (uint y = begin.y; y < end.y; ++y) {
-      for (uint x = begin.x; x < end.x; ++x) {
-        const float value = values_[ISO_BLOCK_VOXELS * block_at({x / 4, y / 4, z / 4}) + x % 4 +
-                                    4 * (y % 4) + 16 * (z % 4)];
-        range.min = std::min(range.min, value);
-        range.max = std::max(range.max, value);
-      }
-    }
-  }
-  return range;
-}
-
 /// macrocell_masks() takes a block as active whose range, rounded outward to thresholds, has values
 /// below the isovalue and values not below it.
 std::optional<BlockBox> HostBlocks::rounded_box(float isovalue) const {
   const std::uint32_t index = threshold_index(thresholds_, double{isovalue});
   if (index == 0 || index == kNumThresholds) return {};
   const float below = thresholds_[index - 1], above = thresholds_[index];
-  const auto holds = [&](const BlockRange &range) {
-    return range.min < above && range.max > below;
+  const auto holds = [&](const DualRanges &ranges, std::size_t i) {
+    return ranges.low[i] < above && ranges.high[i] > below;
   };
-  const glm::uvec3 owning = owning_blocks(grid_);
-  std::optional<BlockBox> box;
-  std::mutex box_mutex;
-  parallel_for(owning.z, num_threads_, [&](std::uint64_t z, std::uint32_t) {
-    std::optional<BlockBox> box_here;
-    for (uint y = 0; y < owning.y; ++y) {
-      for (uint x = 0; x < owning.x; ++x) {
-        const glm::uvec3 block(x, y, z);
-        if (holds(ranges_[block_at(block)]) ||
-            (holds(neighbours_range(block)) && holds(dual_range(block))))
-          add(box_here, glm::ivec3(block));
-      }
-    }
-    const std::lock_guard lock(box_mutex);
-    add(box, box_here);
+  return box_of([&](std::size_t macrocell) {
+    ulong mask = 0;
+    if (!holds(macrocell_ranges_, macrocell)) return mask;
+    for (uint bit = 0; bit < 64; ++bit)
+      mask |= static_cast<ulong>(holds(ranges_, 64 * macrocell + bit)) << bit;
+    return mask;
   });
-  return box;
+}
+
+// ---- Blocks, when rays come to them
+//
+// A block's values are written by the thread that sets decoded_ from kNone to kBeingMade, and by no
+// other; it releases kDecoded after that. Who acquires kDecoded there may read them. opened_ and
+// changing() are the same. That thread has acquired kDecoded of the eight blocks of the dual grid
+// before it releases opened_; so who acquires opened_ may read the values of all eight, whoever
+// wrote them. Between two calls of run() nobody else is at work: parallel_for() has joined.
+
+HostField HostBlocks::field() {
+  return {values(), changing(), masks_.data(), decoded_.data(), opened_.data(), selection_, this};
+}
+
+void HostBlocks::run(std::uint64_t num_items,
+                     const std::function<void(std::uint64_t item, bool is_alone)> &work) {
+  std::vector<uchar> is_done(num_items);
+  for (;;) {
+    std::atomic<bool> any_done = false;
+    try {
+      parallel_for(num_items, num_threads_, [&](std::uint64_t item, std::uint32_t) {
+        if (is_done[item] != 0) return;
+        work(item, false);
+        is_done[item] = 1;
+        any_done.store(true, std::memory_order_relaxed);
+      });
+      return;
+    } catch (const NoRoom &) {
+      drop();
+    }
+    if (any_done) continue;
+    const auto next = std::ranges::find(is_done, 0);
+    is_alone_ = true;
+    try {
+      work(static_cast<std::uint64_t>(next - is_done.begin()), true);
+    } catch (...) {
+      is_alone_ = false;
+      throw;
+    }
+    is_alone_ = false;
+    *next = 1;
+  }
+}
+
+/// Does what needs some blocks at a time. A thread alone makes room for them.
+template <class Work>
+void HostBlocks::with_room(Work work) {
+  if (!is_alone_) return work();
+  try {
+    work();
+  } catch (const NoRoom &) {
+    drop();
+    work();
+  }
+}
+
+void HostBlocks::open(std::size_t block) {
+  const glm::uvec3 place = place_of(block, blocks_);
+  std::array<std::size_t, 8> dual_grid;
+  // Beyond the volume, any voxels do: they matter to cells outside it alone.
+  for (uint corner = 0; corner < 8; ++corner)
+    dual_grid[corner] = block_at(glm::min(place + corner_of(corner), blocks_ - 1u));
+  with_room([&] {
+    for (const std::size_t id : dual_grid) decode_once(id);
+    take_page(changing_, block * sizeof(ulong));
+    find_changing(block, dual_grid);
+  });
+}
+
+void HostBlocks::decode(std::span<const std::size_t> blocks) {
+  with_room([&] {
+    for (const std::size_t id : blocks) decode_once(id);
+  });
+}
+
+void HostBlocks::decode_once(std::size_t block) {
+  std::atomic<uchar> &state = decoded_[block];
+  uchar seen = state.load(std::memory_order_acquire);
+  while (seen != HostField::kDecoded) {
+    if (seen == kBeingMade) {
+      state.wait(kBeingMade, std::memory_order_acquire);
+      seen = state.load(std::memory_order_acquire);
+      continue;
+    }
+    // Acquires what a thread wrote that was stopped by an exception.
+    if (!state.compare_exchange_weak(seen, kBeingMade, std::memory_order_acquire)) continue;
+    try {
+      constexpr std::uint64_t kBytes = ISO_BLOCK_VOXELS * sizeof(float);
+      take_page(values_, block * kBytes);
+      decode_to(block, values() + ISO_BLOCK_VOXELS * block);
+      seen = HostField::kDecoded;
+    } catch (...) {
+      state.store(kNone, std::memory_order_release);
+      state.notify_all();
+      throw;
+    }
+    state.store(seen, std::memory_order_release);
+    state.notify_all();
+    num_decoded_.fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+void HostBlocks::decode_to(std::size_t block, float *values) const {
+  EncodedBlock bits = encoded(block);
+  std::array<uint, (ISO_MAX_BLOCK_BITS + 31) / 32 + kDecoderAhead> words;
+  if (volume_->file) {
+    volume_->read_words(bits.first_bit,
+                        std::span(words).first((bits.num_bits + 31) / 32 + kDecoderAhead));
+    bits.words = words.data();
+    bits.first_bit = 0;
+  }
+  host_loops().decode(bits, values);
+}
+
+/// Of the values of its decoded dual grid.
+void HostBlocks::find_changing(std::size_t block, std::span<const std::size_t, 8> dual_grid) {
+  std::atomic<uchar> &state = opened_[block];
+  uchar seen = state.load(std::memory_order_acquire);
+  while (seen != selection_) {
+    if (seen == kBeingMade) {
+      state.wait(kBeingMade, std::memory_order_acquire);
+      seen = state.load(std::memory_order_acquire);
+      continue;
+    }
+    if (!state.compare_exchange_weak(seen, kBeingMade, std::memory_order_acquire)) continue;
+    ulong inside[8];
+    for (uint corner = 0; corner < 8; ++corner) {
+      inside[corner] =
+          host_loops().inside(values() + ISO_BLOCK_VOXELS * dual_grid[corner], surface_.isovalue);
+    }
+    changing()[block] = changing_cells(inside);
+    seen = selection_;
+    state.store(seen, std::memory_order_release);
+    state.notify_all();
+  }
+}
+
+/// The page that this byte is on will be written to. It counts before it is marked as taken, so
+/// that none is ever written to without having been counted.
+void HostBlocks::take_page(Pages &pages, std::uint64_t byte) {
+  const std::uint64_t page_bytes = ReservedMemory::page_bytes();
+  std::atomic<uchar> &taken = pages.taken[byte / page_bytes];
+  if (taken.load(std::memory_order_relaxed) != 0) return;
+  if (num_bytes_.fetch_add(page_bytes, std::memory_order_relaxed) + page_bytes > memory_limit_) {
+    num_bytes_.fetch_sub(page_bytes, std::memory_order_relaxed);
+    throw NoRoom();
+  }
+  if (taken.exchange(1, std::memory_order_relaxed) != 0)
+    num_bytes_.fetch_sub(page_bytes, std::memory_order_relaxed);
+}
+
+bool HostBlocks::is_decoded(std::size_t block) const {
+  return decoded_[block].load(std::memory_order_relaxed) == HostField::kDecoded;
+}
+
+void HostBlocks::forget() {
+  fill(decoded_, kNone);
+  fill(opened_, kNone);
+}
+
+/// Forgets what is decoded, and gives its memory back.
+void HostBlocks::drop() {
+  forget();
+  for (Pages *pages : {&values_, &changing_}) {
+    pages->memory.release();
+    fill(pages->taken, 0);
+  }
+  num_bytes_ = bytes(volume_->info);
 }
 
 }  // namespace isowave::core

@@ -1,38 +1,68 @@
 #pragma once
-// A volume decoded into host memory, block by block, and where an isovalue is crossed in it.
+// A compressed volume for rays on the host: the value ranges of all blocks, and of those that rays
+// come to, the voxels and where an isovalue is crossed.
 
+#include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include "core/base/reserved_memory.hpp"
 #include "core/host/host_loops.hpp"
 #include "core/volume/block_box.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
 
-class HostBlocks {
+/// Not thread-safe, but for what rays call: BlockMaker.
+class HostBlocks final : private BlockMaker {
  public:
-  /// Memory of a volume with this grid.
+  /// Memory of a volume with this grid of which nothing is decoded.
   static std::uint64_t bytes(const VolumeInfo &info);
+  /// The least limit: room for what a single ray needs at a time comes on top.
+  static std::uint64_t least_bytes(const VolumeInfo &info);
+  static constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
 
-  /// Decodes the finest level.
+  /// Decodes the finest level once, for the ranges alone. Meanwhile 128 bytes for each block of a
+  /// layer along z come on top of bytes().
   ///
-  /// volume       need not outlive this
-  /// num_threads  0: one per processor
-  /// Throws       Error: a file that the volume is in has become shorter, or cannot be read
-  HostBlocks(const CompressedVolume &volume, std::uint32_t num_threads);
+  /// volume        must outlive this
+  /// memory_limit  of bytes(); at least least_bytes()
+  /// num_threads   0: one per processor
+  /// Throws        Error: a file that the volume is in has become shorter, or cannot be read
+  HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit, std::uint32_t num_threads);
+  HostBlocks(CompressedVolume &&, std::uint64_t, std::uint32_t) = delete;
 
-  /// Finds the cells whose corners are not all on one side of an isovalue, for field() and
-  /// surface(). Nothing to do where it is the one in use. Cells of no other can have a hit
-  /// (cell_intersect.h), so that rays may skip them.
+  /// Finds the blocks that have cells whose corners are not all on one side of an isovalue, for
+  /// field() and surface(). Nothing to do where it is the one in use. Other cells can have no hit
+  /// (cell_intersect.h), so that rays may skip them. What is decoded stays.
   void select(float isovalue);
 
-  /// What rays walk through. Stays valid until the next select().
-  HostField field() const { return {values_.get(), changing_.data(), masks_.data()}; }
+  /// What rays walk through, within run(). Stays valid until the next select().
+  HostField field();
   /// The selected isovalue, and the box around the blocks that have such a cell.
   const Surface &surface() const { return surface_; }
+
+  /// Calls work(item, is_alone) for each item below num_items on all threads; its rays decode what
+  /// they need. Where decoded blocks would pass the memory limit, items end with an exception, all
+  /// decoded blocks go, and such items are begun again. If not one of them can be done like that,
+  /// the next is done by one thread alone, with is_alone: its rays find room for what they need at
+  /// a time, so they must be traced one by one, not in packets.
+  ///
+  /// Throws  Error: a file cannot be read; what work throws
+  void run(std::uint64_t num_items,
+           const std::function<void(std::uint64_t item, bool is_alone)> &work);
+
+  /// Forgets what is decoded. Its memory is kept, and counts.
+  void forget();
+  bool is_decoded(std::size_t block) const;
+  /// Blocks that have been decoded for rays, from the start.
+  std::uint64_t num_decoded() const { return num_decoded_.load(std::memory_order_relaxed); }
+  /// At present: bytes() and what is decoded, in whole pages of the system.
+  std::uint64_t bytes() const { return num_bytes_.load(std::memory_order_relaxed); }
 
   /// The box around the blocks that hold an isovalue as far as Macrocells knows, which keeps value
   /// ranges in 8 bits: views that are made of it are those of a device.
@@ -41,20 +71,60 @@ class HostBlocks {
   std::optional<BlockBox> rounded_box(float isovalue) const;
 
  private:
-  BlockRange neighbours_range(const glm::uvec3 &block) const;
-  BlockRange dual_range(const glm::uvec3 &block) const;
-  std::size_t block_at(const glm::uvec3 &block) const {
-    return block.x + grid_.blocks_x * (block.y + std::size_t{grid_.blocks_y} * block.z);
-  }
-  ulong inside_of(std::size_t block, float isovalue) const;
-  ulong find_changing(const glm::uvec3 &block) const;
+  /// Decoded blocks would pass the memory limit.
+  struct NoRoom {};
 
+  /// An array of which parts are written to, page by page.
+  struct Pages {
+    Pages(std::uint64_t num_bytes);
+    ReservedMemory memory;
+    std::vector<std::atomic<uchar>> taken;  ///< [page]
+  };
+
+  /// Dual cells of each block [macrocell][64]: the order of masks. Blocks without such cells:
+  /// ranges that hold nothing.
+  struct DualRanges {
+    std::vector<float> low, high;
+  };
+
+  void open(std::size_t block) override;
+  void decode(std::span<const std::size_t> blocks) override;
+  template <class Work>
+  void with_room(Work work);
+  void drop();
+  void take_page(Pages &pages, std::uint64_t byte);
+  void decode_once(std::size_t block);
+  void decode_to(std::size_t block, float *values) const;
+  void find_changing(std::size_t block, std::span<const std::size_t, 8> dual_grid);
+
+  void find_ranges();
+  void ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
+                       std::span<float> sampled) const;
+  void set_dual_ranges(std::uint32_t z, std::span<const BlockRange> layer,
+                       std::span<const BlockRange> above);
+  template <class Holds>
+  std::optional<BlockBox> box_of(Holds holds) const;
+
+  EncodedBlock encoded(std::size_t block) const;
+  std::size_t block_at(const glm::uvec3 &block) const {
+    return block.x + blocks_.x * (block.y + std::size_t{blocks_.y} * block.z);
+  }
+  float *values() const { return static_cast<float *>(values_.memory.data()); }
+  ulong *changing() const { return static_cast<ulong *>(changing_.memory.data()); }
+
+  const CompressedVolume *volume_;
+  std::uint64_t memory_limit_;
   std::uint32_t num_threads_;
-  BlockGrid grid_;
-  std::unique_ptr<float[]> values_;  ///< [block][64]; not cleared: threads do while they decode
-  std::vector<BlockRange> ranges_;   ///< [block] of its own voxels
-  std::vector<ulong> inside_, changing_, masks_;
+  glm::uvec3 blocks_, macrocells_;  ///< numbers of, along each axis
+  DualRanges ranges_;
+  DualRanges macrocell_ranges_;  ///< [macrocell]
   std::vector<float> thresholds_;
+  std::vector<ulong> masks_;
+  Pages values_, changing_;  ///< [block][64]; [block]
+  std::vector<std::atomic<uchar>> decoded_, opened_;
+  std::atomic<std::uint64_t> num_bytes_, num_decoded_ = 0;
+  bool is_alone_ = false;
+  uchar selection_;
   std::optional<float> selected_;
   Surface surface_{};
 };

@@ -10,6 +10,7 @@
 // All that a loop calls becomes part of it, and so is compiled for the processor that it is for.
 #define ISO_WHOLE_LOOP __attribute__((flatten))
 #if defined(__x86_64__)
+#include <immintrin.h>
 #define ISO_HAS_WIDE_LOOPS 1
 #define ISO_WIDE_LOOP __attribute__((flatten, target("avx2,bmi,bmi2,fma,popcnt")))
 #endif
@@ -18,47 +19,44 @@ namespace isowave::core {
 
 namespace {
 
-/// Eight at a time: what compilers keep in vectors.
-inline BlockRange range_of_block(const float *values) {
-  float low[8], high[8];
-  for (int lane = 0; lane < 8; ++lane) low[lane] = high[lane] = values[lane];
-  for (int i = 8; i < 64; i += 8) {
-    for (int lane = 0; lane < 8; ++lane) {
-      const float value = values[i + lane];
-      low[lane] = value < low[lane] ? value : low[lane];
-      high[lane] = value > high[lane] ? value : high[lane];
-    }
-  }
-  BlockRange range = {low[0], high[0]};
-  for (int lane = 1; lane < 8; ++lane) {
-    range.min = low[lane] < range.min ? low[lane] : range.min;
-    range.max = high[lane] > range.max ? high[lane] : range.max;
-  }
-  return range;
+inline void decode(const EncodedBlock &block, float *values) {
+  zfp_decode_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
+  if (!block.whole_numbers) return;
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
 }
 
-/// Without the padding of a block at the volume's end.
-inline BlockRange range_within(const EncodedBlock &block, const float *values) {
-  BlockRange range = {values[0], values[0]};
-  for (uint z = 0; z < block.size_z; ++z) {
-    for (uint y = 0; y < block.size_y; ++y) {
-      for (uint x = 0; x < block.size_x; ++x) {
-        const float value = values[x + 4 * y + 16 * z];
-        range.min = value < range.min ? value : range.min;
-        range.max = value > range.max ? value : range.max;
+inline void widen(BlockRange &range, const BlockRange &by) {
+  range.min = by.min < range.min ? by.min : range.min;
+  range.max = by.max > range.max ? by.max : range.max;
+}
+
+inline void ranges_of_parts(const float *values, uint size_x, uint size_y, uint size_z,
+                            BlockRange *parts) {
+  for (uint part = 0; part < 8; ++part) parts[part] = {values[0], values[0]};
+  for (uint z = 0; z < size_z; ++z) {
+    for (uint y = 0; y < size_y; ++y) {
+      const float *row = values + 4 * y + 16 * z;
+      const BlockRange first = {row[0], row[0]};
+      BlockRange all = first;
+      for (uint x = 1; x < size_x; ++x) widen(all, {row[x], row[x]});
+      for (uint layers = 0; layers < 8; layers += 2) {
+        if (((layers & 2) != 0 && y != 0) || ((layers & 4) != 0 && z != 0)) continue;
+        widen(parts[layers], all);
+        widen(parts[layers + 1], first);
       }
     }
   }
-  return range;
 }
 
-inline BlockRange decode(const EncodedBlock &block, float *values) {
-  zfp_decode_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
-  if (block.whole_numbers) {
-    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
+/// Whole blocks have a loop of their own, which compilers unroll.
+inline void ranges(const EncodedBlock &block, BlockRange *parts) {
+  float values[ISO_BLOCK_VOXELS];
+  decode(block, values);
+  if (block.size_x == 4 && block.size_y == 4 && block.size_z == 4) {
+    ranges_of_parts(values, 4, 4, 4, parts);
+  } else {
+    ranges_of_parts(values, block.size_x, block.size_y, block.size_z, parts);
   }
-  return block.size_x == 4 && block.size_y == 4 && block.size_z == 4 ? range_of_block(values)
-                                                                     : range_within(block, values);
 }
 
 inline ulong inside(const float *values, float isovalue) {
@@ -83,10 +81,27 @@ inline void load_corners(const FrameParams &frame, const HostField &field, int x
   }
 }
 
+/// Decodes the blocks that the voxels of a smooth gradient are in.
+inline void decode_stencil(const FrameParams &frame, const HostField &field, const Stencil &s) {
+  const BlockCoords base = stencil_base(&s);
+  const uint corners = stencil_blocks(&s);
+  std::size_t blocks[8], num_blocks = 0;
+  bool all_decoded = true;
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((corners >> corner & 1u) == 0) continue;
+    const std::size_t block = level_block_at(&frame, base.x + (corner & 1),
+                                             base.y + (corner >> 1 & 1), base.z + (corner >> 2));
+    blocks[num_blocks++] = block;
+    all_decoded = all_decoded && field.is_decoded(block);
+  }
+  if (!all_decoded) field.maker->decode({blocks, num_blocks});
+}
+
 /// Gives a hit the smooth gradient, where there is one.
 inline void smooth_gradient(const FrameParams &frame, const HostField &field, LastPlanes last,
                             HitRecord *hit) {
   const Stencil s = stencil_of(block_coords(&frame, hit->block_id), hit->cell, last);
+  decode_stencil(frame, field, s);
   const StencilAxis axes[3] = {s.x, s.y, s.z};
   float corners[8], beyond[8], derivatives[3];
   for (uint axis = 0; axis < 3; ++axis) {
@@ -110,7 +125,9 @@ inline bool trace_block(const FrameParams &frame, const HostField &field, const 
                         const GridWalk &block, RayEvent enter, LastPlanes last, HitRecord *hit) {
   const BlockCoords b = {static_cast<uint>(block.x), static_cast<uint>(block.y),
                          static_cast<uint>(block.z)};
-  const ulong changing = field.changing[level_block_at(&frame, b.x, b.y, b.z)];
+  const std::size_t block_number = level_block_at(&frame, b.x, b.y, b.z);
+  field.open(block_number);
+  const ulong changing = field.changing[block_number];
   CellWalk at = enter_cells(&ray, b, enter, last);
   do {
     if ((changing >> cell_in_block(&at.cell) & 1u) == 0) continue;
@@ -267,8 +284,11 @@ inline void shade(const FrameParams &frame, const ShadeParams &params, uint samp
   }
 }
 
-ISO_WHOLE_LOOP BlockRange decode_anywhere(const EncodedBlock &block, float *values) {
-  return decode(block, values);
+ISO_WHOLE_LOOP void decode_anywhere(const EncodedBlock &block, float *values) {
+  decode(block, values);
+}
+ISO_WHOLE_LOOP void ranges_anywhere(const EncodedBlock &block, BlockRange *parts) {
+  ranges(block, parts);
 }
 ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
   return inside(values, isovalue);
@@ -294,11 +314,22 @@ ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &
 }
 
 #ifdef ISO_HAS_WIDE_LOOPS
-ISO_WIDE_LOOP BlockRange decode_wide(const EncodedBlock &block, float *values) {
-  return decode(block, values);
+ISO_WIDE_LOOP void decode_wide(const EncodedBlock &block, float *values) {
+  decode(block, values);
 }
+ISO_WIDE_LOOP void ranges_wide(const EncodedBlock &block, BlockRange *parts) {
+  ranges(block, parts);
+}
+/// By hand: compilers shift 64 numbers of 64 bits.
 ISO_WIDE_LOOP ulong inside_wide(const float *values, float isovalue) {
-  return inside(values, isovalue);
+  const __m256 from = _mm256_set1_ps(isovalue), zero = _mm256_setzero_ps();
+  ulong bits = 0;
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; v += 8) {
+    const __m256 w = _mm256_sub_ps(_mm256_loadu_ps(values + v), from);
+    const int inside = _mm256_movemask_ps(_mm256_cmp_ps(w, zero, _CMP_GE_OQ));
+    bits |= static_cast<ulong>(static_cast<uint>(inside)) << v;
+  }
+  return bits;
 }
 ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, const RayTile &tile,
                               bool is_smooth, HitRecord *hits) {
@@ -333,10 +364,11 @@ bool is_wide() {
 #endif
 
 constexpr HostLoops kLoops[] = {
-    {decode_anywhere, inside_anywhere, trace_rays_anywhere, trace_rays_anywhere, cast_anywhere,
-     ambient_anywhere, shade_anywhere},
+    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays_anywhere, trace_rays_anywhere,
+     cast_anywhere, ambient_anywhere, shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
-    {decode_wide, inside_wide, trace_wide, trace_rays_wide, cast_wide, ambient_wide, shade_wide},
+    {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays_wide, cast_wide, ambient_wide,
+     shade_wide},
 #endif
 };
 

@@ -4,6 +4,8 @@
 // with fused multiply-add, which the C library otherwise does in software. The same bits either
 // way.
 
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -13,7 +15,7 @@
 
 namespace isowave::core {
 
-/// The smallest and the largest voxel of a block.
+/// The smallest and the largest of some voxels.
 struct BlockRange {
   float min, max;
 };
@@ -28,11 +30,42 @@ struct EncodedBlock {
   uint size_x, size_y, size_z;  ///< voxels within the volume, 1 to 4
 };
 
-/// A decoded volume, and where an isovalue is crossed in it.
+/// Decodes blocks when the first ray comes to them. Thread-safe.
+class BlockMaker {
+ public:
+  /// Makes all that a ray needs in a block: the voxels of its dual grid, and its cells that change.
+  virtual void open(std::size_t block) = 0;
+  /// Decodes some blocks, up to eight.
+  virtual void decode(std::span<const std::size_t> blocks) = 0;
+
+ protected:
+  ~BlockMaker() = default;
+};
+
+/// A volume that is decoded where rays come, and where an isovalue is crossed in it. What is there
+/// stays for as long as rays are traced, but for rays of a thread that traces alone
+/// (HostBlocks::run): for these, until the next call of open() or of the maker.
 struct HostField {
-  const float *values;    ///< [block][64] x + 4y + 16z
-  const ulong *changing;  ///< [block] bit x + 4y + 16z: do the corners of the cell differ?
+  const float *values;    ///< [block][64] x + 4y + 16z; of decoded blocks
+  const ulong *changing;  ///< [block] bit x + 4y + 16z: do the corners of the cell differ? Of open
+                          ///< blocks
   const ulong *masks;     ///< [macrocell] bit x + 4y + 16z: has the block a cell that does?
+  const std::atomic<uchar> *decoded;  ///< [block] kDecoded: its values are there
+  const std::atomic<uchar> *opened;   ///< [block] selection: it is open
+  uchar selection;                    ///< which isovalue blocks are open for
+  BlockMaker *maker;
+
+  static constexpr uchar kDecoded = 2;
+
+  /// To be called before a ray looks into a block. What the thread wrote that made the block can be
+  /// read then: it released opened[block] after that.
+  void open(std::size_t block) const {
+    if (__builtin_expect(opened[block].load(std::memory_order_acquire) != selection, 0))
+      maker->open(block);
+  }
+  bool is_decoded(std::size_t block) const {
+    return decoded[block].load(std::memory_order_acquire) == kDecoded;
+  }
 };
 
 struct RayTile {
@@ -48,10 +81,12 @@ struct AmbientRays {
 
 struct HostLoops {
   /// Decodes a block to values [64].
-  ///
-  /// Returns  the range of the voxels within the volume
-  BlockRange (*decode)(const EncodedBlock &block, float *values);
-  /// Which voxels of a block are inside, bit x + 4y + 16z.
+  void (*decode)(const EncodedBlock &block, float *values);
+  /// The ranges of a block's voxels within the volume, in parts [8]: part 0 has all; another one,
+  /// of its first layer along each axis whose bit is set, x 1, y 2, z 4. That is what the dual
+  /// cells of the block before it along these axes have of it.
+  void (*ranges)(const EncodedBlock &block, BlockRange *parts);
+  /// Which of 64 values, such as the voxels of a block, are inside: bit i.
   ulong (*inside)(const float *values, float isovalue);
   /// Writes the hits of a tile of the frame's rays into hits [height * width], those of rays that
   /// hit something alone. Eight rays at a time where the processor can (host_packets.hpp).

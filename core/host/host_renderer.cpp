@@ -30,15 +30,21 @@ std::uint64_t mebibytes(std::uint64_t bytes) {
   return (bytes + (1u << 20) - 1) >> 20;
 }
 
-const CompressedVolume &checked(const CompressedVolume &volume,
-                                const HostRendererOptions &options) {
-  const std::uint64_t needed = HostBlocks::bytes(volume.info),
+/// The memory limit, if the volume can be drawn within it.
+std::uint64_t checked_limit(const VolumeInfo &info, const HostRendererOptions &options) {
+  const std::uint64_t needed = HostBlocks::least_bytes(info),
                       limit = options.memory_limit != 0 ? options.memory_limit : host_memory() / 4;
-  if (needed <= limit) return volume;
+  if (needed <= limit) return limit;
   throw Error(
-      "drawing on the host takes {} MiB of memory for the decoded volume, and {} MiB are allowed: "
-      "raise the limit, or draw on a device",
+      "drawing on the host takes {} MiB of memory at least, for value ranges of all blocks, and {} "
+      "MiB are allowed: raise the limit, or draw on a device",
       mebibytes(needed), limit >> 20);
+}
+
+/// The part of a tile in which rays may hit something.
+RayTile within(const RayTile &tile, const ScreenBox &box) {
+  return {std::max(tile.begin_x, box.begin_x), std::max(tile.begin_y, box.begin_y),
+          std::min(tile.end_x, box.end_x), std::min(tile.end_y, box.end_y)};
 }
 
 template <class Count>
@@ -51,7 +57,7 @@ Count rounded_up(Count count, std::uint32_t unit) {
 HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options)
     : info_(volume.info),
       num_threads_(options.num_threads),
-      blocks_(checked(volume, options), options.num_threads) {}
+      blocks_(volume, checked_limit(volume.info, options), options.num_threads) {}
 
 void HostRenderer::check(const FrameRequest &request) {
   if (request.voxel_pixels != 0)
@@ -74,23 +80,41 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   frame_ = frame;
   samples_ = size.samples;
   normals_ = request.normals;
-  hits_.assign(size.num_rays(), no_hit());
   open_ = {};
   FrameStats stats;
-  draw_bands(request, stats);
-  if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
+  try {
+    draw_bands(request, stats);
+    if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
+  } catch (...) {
+    hits_.clear();
+    throw;
+  }
   stats.total_ms = ms_since(begin);
   return stats;
 }
 
-/// Band by band, so that the picture so far can be shown; without on_pass, one has all.
+/// Band by band, so that the picture so far can be shown; without on_pass, one has all. Each tile
+/// first gets no hits, while it is in the processor's cache; what on_pass may see of others before
+/// that, too.
 void HostRenderer::draw_bands(const FrameRequest &request, FrameStats &stats) {
+  const std::size_t num_rays = std::size_t{frame_.view.width} * frame_.view.height;
+  if (request.on_pass) {
+    hits_.assign(num_rays, no_hit());
+  } else {
+    hits_.resize(num_rays);
+  }
   std::atomic<std::uint64_t> num_hits = 0;
+  const HostField field = blocks_.field();
   stats.cancelled = !for_bands(
       request.on_pass, request.ambient_rays != 0,
-      [&](const RayTile &tile) {
-        num_hits += host_loops().trace(frame_, blocks_.field(), tile, normals_ == Normals::kSmooth,
-                                       hits_.data());
+      [&](const RayTile &tile, bool is_alone) {
+        for (std::size_t y = tile.begin_y; y < tile.end_y; ++y) {
+          const auto row = hits_.begin() + static_cast<std::ptrdiff_t>(y * frame_.view.width);
+          std::fill(row + tile.begin_x, row + tile.end_x, no_hit());
+        }
+        const auto trace = is_alone ? host_loops().trace_rays : host_loops().trace;
+        num_hits += trace(frame_, field, within(tile, frame_.screen), normals_ == Normals::kSmooth,
+                          hits_.data());
       },
       [&](double percent) {
         PassStats pass;
@@ -109,10 +133,11 @@ void HostRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
   const AmbientRays rays{make_ambient_params(info_), directions.data(), request.ambient_rays};
   open_.counts.assign(hits_.size(), static_cast<uchar>(request.ambient_rays));
   open_.num_ambient = request.ambient_rays;
+  const HostField field = blocks_.field();
   stats.cancelled = !for_bands(
       request.on_pass, false,
-      [&](const RayTile &tile) {
-        host_loops().ambient(frame_, blocks_.field(), tile, rays, hits_.data(),
+      [&](const RayTile &tile, bool) {
+        host_loops().ambient(frame_, field, within(tile, frame_.screen), rays, hits_.data(),
                              open_.counts.data());
       },
       [&](double) {
@@ -124,33 +149,28 @@ void HostRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
   stats.ambient.ms = ms_since(begin);
 }
 
-/// Calls draw(tile) for the tiles of the frame's rays that may hit something, on all threads, in
-/// bands of whole rows of pixels from the top; after each band, on_pass(after(percent of the rows
-/// that are done)). Returns false where that says to stop, and there is more to draw: bands, or
-/// what follows.
+/// Calls draw(tile, is_alone), as HostBlocks::run() does, for the tiles of all of the frame's rays,
+/// in bands of whole rows of pixels from the top; after each band, on_pass(after(percent of the
+/// rows that are done)). Returns false where that says to stop, and there is more to draw: bands,
+/// or what follows.
 template <class Draw, class After>
 bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after) {
-  const ScreenBox &screen = frame_.screen;
-  const std::uint32_t rows = frame_.view.height,
+  const std::uint32_t width = frame_.view.width, rows = frame_.view.height,
                       tile_rows = std::max(kTileRays / samples_, 1u) * samples_;
-  const std::uint32_t tiles = rounded_up(frame_.view.width, kTileRays);
+  const std::uint32_t columns = rounded_up(width, kTileRays);
   const std::uint32_t band =
-      on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), tiles) : rows;
+      on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), columns)
+              : rows;
   for (std::uint32_t row = 0; row < rows; row += band) {
     const std::uint32_t end_row = std::min(rows - row, band) + row;
-    const std::uint32_t begin_y = std::max(row, screen.begin_y),
-                        end_y = std::min(end_row, screen.end_y);
-    if (begin_y < end_y && screen.begin_x < screen.end_x) {
-      const std::uint32_t columns = rounded_up(screen.end_x - screen.begin_x, kTileRays);
-      parallel_for(
-          std::uint64_t{columns} * rounded_up(end_y - begin_y, tile_rows), num_threads_,
-          [&](std::uint64_t tile, std::uint32_t) {
-            const auto x = static_cast<std::uint32_t>(screen.begin_x + tile % columns * kTileRays),
-                       y = static_cast<std::uint32_t>(begin_y + tile / columns * tile_rows);
-            draw(RayTile{x, y, std::min(x + kTileRays, screen.end_x),
-                         std::min(y + tile_rows, end_y)});
-          });
-    }
+    blocks_.run(
+        std::uint64_t{columns} * rounded_up(end_row - row, tile_rows),
+        [&](std::uint64_t tile, bool is_alone) {
+          const auto x = static_cast<std::uint32_t>(tile % columns * kTileRays),
+                     y = static_cast<std::uint32_t>(row + tile / columns * tile_rows);
+          draw(RayTile{x, y, std::min(x + kTileRays, width), std::min(y + tile_rows, end_row)},
+               is_alone);
+        });
     const PassStats pass = after(100.0 * end_row / rows);
     if (on_pass && !on_pass(pass) && (end_row < rows || more_follows)) return false;
   }
@@ -168,13 +188,12 @@ std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, f
   frame.surface = blocks_.surface();
   std::vector<HitRecord> hits(rays.size(), no_hit());
   const HostField field = blocks_.field();
-  parallel_for(
-      rounded_up(rays.size(), kRunRays), num_threads_, [&](std::uint64_t run, std::uint32_t) {
-        const std::size_t begin = run * kRunRays;
-        host_loops().cast(frame, field, index_rays.data() + begin,
-                          static_cast<uint>(std::min<std::size_t>(kRunRays, rays.size() - begin)),
-                          normals == Normals::kSmooth, hits.data() + begin);
-      });
+  blocks_.run(rounded_up(rays.size(), kRunRays), [&](std::uint64_t run, bool) {
+    const std::size_t begin = run * kRunRays;
+    host_loops().cast(frame, field, index_rays.data() + begin,
+                      static_cast<uint>(std::min<std::size_t>(kRunRays, rays.size() - begin)),
+                      normals == Normals::kSmooth, hits.data() + begin);
+  });
   return hits;
 }
 
@@ -195,10 +214,6 @@ Image8 HostRenderer::shade(const Appearance &appearance) const {
                        image.pixels.data() + 3 * image.width * row);
   });
   return image;
-}
-
-std::uint64_t HostRenderer::memory_bytes() const {
-  return HostBlocks::bytes(info_);
 }
 
 }  // namespace isowave::core

@@ -2,8 +2,9 @@
 // Draws isosurfaces of a compressed volume on the host, without OpenCL: pictures with the bits of a
 // device's, for as long as there is none, or its kernels are being compiled.
 //
-// The whole volume is decoded once. Rays skip what the isovalue cannot be in: macrocells of 4^3
-// blocks, blocks, and cells whose corners are on one side.
+// Value ranges of all blocks are made once. Rays skip what the isovalue cannot be in, macrocells of
+// 4^3 blocks, blocks, and cells whose corners are on one side; and decode the blocks that they come
+// to, which stay decoded for further frames.
 
 #include <cstdint>
 #include <span>
@@ -17,7 +18,8 @@
 namespace isowave::core {
 
 struct HostRendererOptions {
-  /// Bytes that it may take; 0: a quarter of the host's memory.
+  /// Bytes of value ranges and decoded blocks; 0: a quarter of the host's memory. The same bits
+  /// with any; slower where a frame's blocks do not fit, which go and are decoded anew then.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor
 };
@@ -25,24 +27,26 @@ struct HostRendererOptions {
 /// Not thread-safe.
 class HostRenderer {
  public:
-  /// Decodes the finest level of the volume.
+  /// Reads all of the finest level, for its value ranges.
   ///
-  /// volume  need not outlive the renderer
+  /// volume  must outlive the renderer
   /// Throws  Error: the limit does not suffice; a file that the volume is in cannot be read
-  HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options = {});
+  explicit HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options = {});
+  explicit HostRenderer(CompressedVolume &&, const HostRendererOptions & = {}) = delete;
 
   /// Draws one frame: the hits that core::Renderer finds, bit for bit. on_pass is called after each
   /// band of rows, from the top, by the calling thread.
   ///
   /// request  without levels of detail, voxel_error and bound; a size
-  /// Throws   Error: others; what make_frame_params() throws
+  /// Throws   Error: others; what make_frame_params() throws; a file cannot be read: then there are
+  ///          no hits()
   FrameStats render(const FrameRequest &request);
 
   /// The first hit of each ray. t counts in lengths of its direction. Leaves the last frame as it
   /// is.
   ///
   /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
-  ///         1e7 voxels away from the volume's origin
+  ///         1e7 voxels away from the volume's origin; a file cannot be read
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue, Normals normals);
 
   /// Throws  Error: a request that render() refuses
@@ -61,7 +65,11 @@ class HostRenderer {
   /// The picture of hits(), RGB.
   Image8 shade(const Appearance &appearance = {}) const;
 
-  std::uint64_t memory_bytes() const;  ///< of the decoded volume; pictures come on top
+  /// Forgets decoded blocks. Their memory is kept for others.
+  void clear_cache() { blocks_.forget(); }
+  std::uint64_t num_decoded_blocks() const { return blocks_.num_decoded(); }  ///< from the start
+  /// At present: value ranges and decoded blocks. Pictures come on top.
+  std::uint64_t memory_bytes() const { return blocks_.bytes(); }
 
  private:
   void draw_bands(const FrameRequest &request, FrameStats &stats);

@@ -2,6 +2,7 @@
 // Eight rays at a time through a HostField (kernels_cl/portable/packet_walk.h): the hits of the
 // scalar walk, bit for bit. For host_packets.cpp alone, which compiles it for processors with AVX2.
 
+#include <bit>
 #include <cstddef>
 
 #include "core/host/float8.hpp"
@@ -22,11 +23,18 @@ inline void macrocell_bits(const PacketField *field, Ints macrocells, Mask lanes
   gather_halves(field->masks, macrocells, lanes, low, high);
 }
 
+/// HostField::open() once for each block, of which there are few.
 inline Mask open_blocks(const PacketField *field, const FrameParams *frame, const Ints *at,
                         Mask lanes, Ints *low, Ints *high) {
   const auto columns = static_cast<int>(frame->grid.blocks_x),
              rows = static_cast<int>(frame->grid.blocks_y);
-  gather_halves(field->changing, at[0] + columns * (at[1] + rows * at[2]), lanes, low, high);
+  const Ints blocks = at[0] + columns * (at[1] + rows * at[2]);
+  for (unsigned left = bits_of(lanes); left != 0;) {
+    const int block = blocks[std::countr_zero(left)];
+    field->open(static_cast<uint>(block));
+    left &= ~bits_of(blocks == block);
+  }
+  gather_halves(field->changing, blocks, lanes, low, high);
   return ints(0);
 }
 

@@ -257,6 +257,7 @@ def peer(run):
         "bench/peer_bench",
         dims=32 if quick else (256, 512),
         rounds=1 if quick else 5,
+        views=3 if quick else 100,
         size="64x48" if quick else "1280x720",
         device=run.options.device,
         json="p.json",
@@ -276,7 +277,13 @@ def peer(run):
                 for name in ("new", "new_kept", "warm", "next")
                 if f"{name}_cpu_ms" in measured
             },
+            "open_ms": measured.get("open_ms"),
             "peak": measured["peak_byte_count"]["max"],
+            "views": {
+                "count": size["views"]["count"],
+                "total_ms": size["views"]["sides"][side]["total_ms"],
+                "overtaken_after": size["views"]["sides"][side].get("overtaken_after", {}),
+            },
         }
         for size in run.read_json("p.json")["sizes"]
         for side, measured in size["sides"].items()

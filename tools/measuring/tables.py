@@ -308,6 +308,7 @@ def peer(rows):
         "mesh_medium": "Flying Edges, Embree (medium quality)",
     }
     kinds = ("new", "new_kept", "warm", "next")
+    views = next((row["views"]["count"] for row in rows if "views" in row), None)
     yield (
         "volume",
         "side",
@@ -316,6 +317,7 @@ def peer(rows):
         "same view",
         "next view",
         "memory of the process",
+        *((f"{views} views from a new isovalue on", "the peer is ahead") if views else ()),
     )
     for row in rows:
         spreads = [row["ms"].get(kind) for kind in kinds]
@@ -323,7 +325,13 @@ def peer(rows):
             f"{ms(one['median'])} ({ms(one['min'])} to {ms(one['max'])})" if one else ""
             for one in spreads
         ]
-        yield name_of(row["volume"]), sides[row["side"]], *times, mebibytes(row["peak"])
+        cells = [name_of(row["volume"]), sides[row["side"]], *times, mebibytes(row["peak"])]
+        if views:
+            counts = [count for count in row["views"]["overtaken_after"].values() if count]
+            is_peer = row["side"].startswith("mesh")
+            cells.append(f"{row['views']['total_ms'] / 1000:.1f} s")
+            cells.append("" if is_peer else f"from view {min(counts)} on" if counts else "never")
+        yield cells
 
 
 def detail(rows):

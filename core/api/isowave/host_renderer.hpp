@@ -12,17 +12,18 @@
 namespace isowave {
 
 struct HostRendererOptions {
-  /// Of the decoded volume [bytes]; 0: a quarter of the host's memory. A volume takes 4.4 bytes a
-  /// voxel.
+  /// Of value ranges and decoded blocks [bytes]; 0: a quarter of the host's memory. Ranges take
+  /// 0.17 bytes a voxel. Frames are the same with any limit; where the blocks that a frame needs, 4
+  /// bytes a voxel, pass it, they are decoded more than once.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor. The result is the same for any number
 };
 
-/// Keeps the whole volume decoded in host memory. May be used from several threads: frames are
-/// drawn one after the other.
+/// Decodes the blocks that rays come to, and keeps them in host memory. May be used from several
+/// threads: frames are drawn one after the other.
 class HostRenderer {
  public:
-  /// Decodes the volume. Keeps it alive.
+  /// Reads the whole volume for its value ranges. Keeps it alive.
   ///
   /// Throws  Error: the memory limit does not suffice, a file that cannot be read
   explicit HostRenderer(std::shared_ptr<const Volume> volume,
@@ -36,8 +37,8 @@ class HostRenderer {
   /// request  without voxel_pixels, voxel_error, bound, max_surface_error, time_budget_ms and
   ///          want_bounds. on_pass is called after each band of rows, from the top, from the
   ///          calling thread; where it returns false, the rows below show the background.
-  /// Throws   Error: others, a degenerate camera, a NaN; further frames are drawn as if it had not
-  ///          been
+  /// Throws   Error: others, a degenerate camera, a NaN, a file that cannot be read; further frames
+  ///          are drawn as if it had not been
   Frame render(const FrameRequest &request);
   /// Whether render() draws such a request.
   static bool can_draw(const FrameRequest &request);
@@ -47,14 +48,15 @@ class HostRenderer {
   /// Returns  one row of rays.size() columns: depth, in lengths of the ray's direction; normals,
   ///          positions and hits; no picture
   /// Throws   Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more
-  ///          than 1e7 voxels from the volume's origin
+  ///          than 1e7 voxels from the volume's origin; a file cannot be read
   Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
 
   /// The view that Renderer::camera() takes, for a picture of that size.
   Camera camera(float isovalue, const ImageSize &size = {}) const;
 
   const std::shared_ptr<const Volume> &volume() const;
-  std::uint64_t memory_bytes() const;  ///< of the decoded volume; a frame's rays take 36 each
+  /// At present, of value ranges and decoded blocks; a frame's rays take 36 each.
+  std::uint64_t memory_bytes() const;
 
  private:
   struct Implementation;

@@ -488,9 +488,10 @@ class Volume:
             "smooth", or "cell": of the trilinear field itself.
         device
             "gpu", "cpu", an index, or a part of a name: casts them there, from compressed blocks.
-            None: on the host, where the first call decodes the whole volume, which takes 4.4 bytes
-            a voxel until the volume goes; volumes that would take more than a quarter of the host's
-            memory are left to the default device. The result is the same.
+            None: on the host, where the first call reads the whole volume for its value ranges.
+            These, 0.17 bytes a voxel, and the blocks that rays come to stay in memory until the
+            volume goes, a quarter of the host's at most; volumes whose ranges alone take more are
+            left to the default device. The result is the same.
 
         Returns
         -------

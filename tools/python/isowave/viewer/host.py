@@ -1,4 +1,4 @@
-"""Draws on the host while a device is prepared: the same bits, at once, whole in memory."""
+"""Draws on the host while a device is prepared: the same bits, at once."""
 
 from __future__ import annotations
 
