@@ -165,6 +165,49 @@ TEST(HostBlocks, ThreadsRaceForTheSameBlocks) {
   EXPECT_GT(most_decoded, 100u);
 }
 
+/// Two threads that come to each block at the same moment: neither looks at it before it is made.
+TEST(HostBlocks, ThreadsThatMeetAtABlockSeeItWhole) {
+  const TestVolume volume({46, 42, 38}, test::noise_field(6), 16);
+  const glm::uvec3 size = volume.compressed.num_blocks();
+  const std::size_t num_blocks = volume.compressed.block_count();
+  HostBlocks calm(volume.compressed, HostBlocks::kNoLimit, 0),
+      raced(volume.compressed, HostBlocks::kNoLimit, 0);
+  calm.select(0.4f);
+  raced.select(0.4f);
+  const HostField expected = calm.field();
+  for (std::size_t block = 0; block < num_blocks; ++block) expected.open(block);
+  std::atomic<int> num_wrong = 0;
+  for (int turn = 0; turn < 5; ++turn) {
+    raced.forget();
+    const HostField field = raced.field();
+    std::atomic<std::size_t> num_arrived = 0;
+    std::vector<std::jthread> threads;
+    for (int thread = 0; thread < 2; ++thread) {
+      threads.emplace_back([&] {
+        std::size_t num_met = 0;
+        for_each_block(size, [&](const glm::uvec3 &at, std::size_t block) {
+          ++num_arrived;
+          ++num_met;
+          for (int i = 0; num_arrived < 2 * num_met; ++i) {
+            if (i % 1000 == 999) std::this_thread::yield();
+          }
+          field.open(block);
+          // Of the dual grid, the one that is likely to be new.
+          const glm::uvec3 end = glm::min(at + 1u, size - 1u);
+          const std::size_t last = end.x + size.x * (end.y + std::size_t{size.y} * end.z);
+          num_wrong += field.changing[block] != expected.changing[block] ||
+                       std::memcmp(field.values + 64 * last, expected.values + 64 * last,
+                                   64 * sizeof(float)) != 0;
+        });
+      });
+    }
+    threads.clear();
+    EXPECT_EQ(num_wrong, 0);
+    // Values of the turn before must not pass for those of the next.
+    std::memset(const_cast<float *>(field.values), 0xFF, 64 * num_blocks * sizeof(float));
+  }
+}
+
 /// The blocks that a ray may come to before its hit: those that its way touches, a little wider or
 /// narrower, and that have cells that change.
 void add_touched(const TestVolume &volume, const std::vector<bool> &active, const glm::dvec3 &o,
