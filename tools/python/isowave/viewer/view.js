@@ -192,6 +192,7 @@ const toRgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 
 const toText = (value) => String(Number(Number(value).toPrecision(6)));
 const toShort = (value) => String(Number(Number(value).toPrecision(3)));
 const toMiB = (bytes) => `${Math.round(bytes / 2 ** 20).toLocaleString("en")} MiB`;
+const isFresher = (a, b) => a.wish > b.wish || (a.wish === b.wish && a.frame > b.frame);
 const toCount = (n) => (n === null || n === undefined ? "–" : n.toLocaleString("en"));
 
 const HTML = `
@@ -372,7 +373,7 @@ class View {
       max_error: null, time_budget: null, ambient: 0 };
     if (home.hash) Object.assign(this.state, readHash(location.hash));
     this.wish = 0;
-    this.shown = { wish: -1, frame: -1 };
+    this.shown = this.arrived = { wish: -1, frame: -1 };
     this.answered = true; // there is a picture of the last wish, or an error
     this.sentAt = -Infinity;
     this.scheduled = this.held = 0;
@@ -386,7 +387,7 @@ class View {
 
   /** A new connection: what was asked for must be asked for again. */
   connected() {
-    this.shown.frame = -1;
+    this.shown = this.arrived = { wish: this.shown.wish, frame: -1 };
     this.volume = null;
     this.note("Starting …", "passing");
     this.home.send({ type: "hello", version: VERSION });
@@ -454,14 +455,16 @@ class View {
 
   async showPicture(head, data) {
     const { connection } = this;
-    try {
-      const bitmap = await createImageBitmap(new Blob([data], { type: `image/${head.format}` }));
-      const { wish, frame } = this.shown;
-      const fresh = head.wish > wish || (head.wish === wish && head.frame > frame);
-      if (fresh) this.draw(head, bitmap, data);
-      bitmap.close();
-    } catch {
-      this.note("A picture could not be read.", "drawing");
+    // Bitmaps may be ready in another order than they came in.
+    if (isFresher(head, this.arrived)) {
+      this.arrived = head;
+      try {
+        const bitmap = await createImageBitmap(new Blob([data], { type: `image/${head.format}` }));
+        if (isFresher(head, this.shown)) this.draw(head, bitmap, data);
+        bitmap.close();
+      } catch {
+        this.note("A picture could not be read.", "drawing");
+      }
     }
     if (connection === this.connection) this.home.send({ type: "ack", frame: head.frame });
   }
