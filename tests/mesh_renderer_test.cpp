@@ -88,6 +88,18 @@ TEST_P(MeshRendererOnDevice, FurtherFramesDrawTheMeshThatIsThere) {
   EXPECT_EQ(cold.decoded_blocks, cold.needed_blocks);
 }
 
+/// Blocks come and go until the cache's table is full of those that went.
+TEST_P(MeshRendererOnDevice, ManyIsovaluesInOneCache) {
+  const TestVolume volume({160, 12, 12}, [](const glm::dvec3 &p) { return p.x; });
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  MeshRenderer renderer(device_, volume.compressed, {.size = kSmall});
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    const float isovalue = 1.5f + static_cast<float>(37 * i % 157);
+    SCOPED_TRACE(isovalue);
+    EXPECT_EQ(renderer.render(camera, isovalue).num_triangles, 2u * 11 * 11);
+  }
+}
+
 TEST_P(MeshRendererOnDevice, AnyBudgetDrawsTheSamePicture) {
   const TestVolume volume({40, 41, 39}, test::gyroid_field(7), 4);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <limits>
+#include <stdexcept>
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
@@ -131,18 +132,12 @@ void MeshRenderer::plan_within_budget() {
   blocks_.open_cache(slots);
 }
 
-/// Has all that the surface needs cached, where there are as many slots.
+/// Has all that the surface needs cached, where there are as many slots. In one pass, since only
+/// blocks that the same pass needs are never evicted.
 void MeshRenderer::bring_all() {
   const auto stage = device_.timer().stage("surface");
-  BatchSize batch(blocks_.num_slots(), num_needed_);
-  for (std::uint32_t begin = 0; begin < num_listed_;) {
-    const std::uint32_t size = std::min(batch.size(), num_listed_ - begin);
-    if (!blocks_.bring(lists_->block_ids, begin, begin + size)) {
-      batch.refused(size);
-      continue;
-    }
-    begin += size;
-  }
+  if (!blocks_.bring(lists_->block_ids, 0, num_listed_))
+    throw std::logic_error("a cache too small for a surface that it was made for");
 }
 
 /// Leaves the prefix sums of all blocks in lists_->offsets.

@@ -169,7 +169,7 @@ bool SurfaceBlocks::bring(const ocl::Buffer<uint> &block_ids, std::uint32_t begi
   request_(block_ids, begin, end, *cache_, rays_);
   const std::uint32_t num_requested = rays_.counts.read().front().requested_count;
   if (num_requested == 0) return true;
-  if (num_requested > num_free_) cache_->evict(rays_.counts, rays_);
+  cache_->evict(rays_.counts, rays_);  // if slots are short; and rebuilds a table that gets full
   cache_->assign(rays_.counts, rays_);
   (*decode_)({stream_, rays_.frame}, {stream_, rays_.frame}, rays_.counts, *cache_);
   counts = rays_.counts.read().front();
