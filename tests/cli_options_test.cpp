@@ -163,7 +163,7 @@ TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   expect_one_line_error("verify " + kHead + " -i 80 --levels 2", "--levels: ");
   expect_one_line_error("generate sphere --dims 8 --seed 3", "--seed: ");
   expect_one_line_error("info generate:sphere_8x8x8_uint8:3",
-                        "a seed is of mixing_layer's noise alone");
+                        "a seed is of noise, and sphere has none");
   expect_one_line_error(kRender + "--no-stage-times", "--no-stage-times: ");
   expect_one_line_error("convert " + kHead + " --exact --no-verify -o " + quoted(folder / "a.zfp"),
                         "--no-verify: ");

@@ -22,9 +22,10 @@ using test::TemporaryFolder;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-constexpr std::array<Field, 7> kFields{Field::kSphere,        Field::kPlane,  Field::kSaddle,
-                                       Field::kMarschnerLobb, Field::kGyroid, Field::kMixingLayer,
-                                       Field::kShell};
+constexpr std::array kFields{Field::kSphere,      Field::kPlane,         Field::kSaddle,
+                             Field::kGyroid,      Field::kMarschnerLobb, Field::kShell,
+                             Field::kMixingLayer, Field::kTurbulence,    Field::kJet,
+                             Field::kScan,        Field::kNoisyScan};
 
 std::vector<float> generate(const GenerateOptions &options) {
   const auto reader = open_generated(options);
@@ -122,6 +123,23 @@ TEST(Generate, MixingLayerIsTheSameEverywhere) {
   EXPECT_EQ(::crc32_z(0, reinterpret_cast<const Bytef *>(bytes.data()), bytes.size()), 1828420260u);
   options.seed = 2;
   EXPECT_NE(bytes, test::read_file(generate_to_file(options, folder / "b.raw")));
+}
+
+TEST(Generate, FieldsOfNoiseAreTheSameEverywhere) {
+  const TemporaryFolder folder;
+  for (const auto &[field, checksum] : {std::pair(Field::kTurbulence, 2648135395u),
+                                        {Field::kJet, 1974121093u},
+                                        {Field::kScan, 3276317315u},
+                                        {Field::kNoisyScan, 2860903464u}}) {
+    SCOPED_TRACE(to_string(field));
+    GenerateOptions options = make_options(field, {48, 64, 40}, VoxelType::kUint16);
+    const std::string bytes = test::read_file(generate_to_file(options, folder / "a.raw"));
+    EXPECT_EQ(::crc32_z(0, reinterpret_cast<const Bytef *>(bytes.data()), bytes.size()), checksum);
+    EXPECT_TRUE(has_seed(field));
+    options.seed = 2;
+    EXPECT_NE(bytes, test::read_file(generate_to_file(options, folder / "b.raw")));
+  }
+  EXPECT_FALSE(has_seed(Field::kSphere));
 }
 
 TEST(Generate, MixingLayerMixesOnlyInTheMiddle) {

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 #include <vector>
+
+#include "core/sources/noise_field.hpp"
 
 namespace isowave::core {
 
@@ -84,12 +87,14 @@ std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims,
       return make_analytic(dims, marschner_lobb);
     case Field::kGyroid:
       return make_analytic(dims, gyroid);
-    case Field::kMixingLayer:
-      return make_mixing_layer(dims, seed);
     case Field::kShell:
       return make_analytic(dims, shell);
+    default:
+      break;
   }
-  throw std::invalid_argument("make_field_rows: unknown field");
+  std::optional<NoiseField> noise = make_noise_field(field, dims, seed);
+  if (!noise) throw std::invalid_argument("make_field_rows: unknown field");
+  return make_noise_rows(std::move(*noise), dims.x);
 }
 
 }  // namespace isowave::core

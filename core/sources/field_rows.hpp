@@ -19,7 +19,5 @@ class FieldRows {
 };
 
 std::unique_ptr<FieldRows> make_field_rows(Field field, const glm::uvec3 &dims, std::uint64_t seed);
-/// mixing_layer, see mixing_layer.cpp.
-std::unique_ptr<FieldRows> make_mixing_layer(const glm::uvec3 &dims, std::uint64_t seed);
 
 }  // namespace isowave::core

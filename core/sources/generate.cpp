@@ -13,14 +13,16 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/sources/field_rows.hpp"
+#include "core/sources/noise_field.hpp"
 
 namespace isowave::core {
 namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 7> kFieldNames{
-    "sphere", "plane", "saddle", "marschner_lobb", "gyroid", "mixing_layer", "shell"};
+constexpr std::array<std::string_view, 11> kFieldNames{
+    "sphere",       "plane",      "saddle", "marschner_lobb", "gyroid",    "shell",
+    "mixing_layer", "turbulence", "jet",    "scan",           "noisy_scan"};
 constexpr std::uint64_t kChunkBytes = 1u << 24;
 
 VolumeInfo info_of(const GenerateOptions &options) {
@@ -53,6 +55,9 @@ class GeneratedReader : public VolumeReader {
   explicit GeneratedReader(const GenerateOptions &options)
       : options_(options), rows_(make_field_rows(options.field, options.dims, options.seed)) {
     info_ = info_of(options);
+    const auto noise = make_noise_field(options.field, options.dims, options.seed);
+    if (noise && options.device && NoiseOnDevice::suits(*options.device))
+      on_device_.emplace(device_.emplace(*options.device), *noise, options.dims, options.type);
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
@@ -70,8 +75,7 @@ class GeneratedReader : public VolumeReader {
   }
 
   /// The voxels in their own type.
-  void read_stored(std::uint32_t z_begin, std::uint32_t num_layers,
-                   std::span<std::byte> out) const {
+  void read_stored(std::uint32_t z_begin, std::uint32_t num_layers, std::span<std::byte> out) {
     check_range(z_begin, num_layers, out.size() / size_of(info_.type));
     for_rows(z_begin, num_layers, [&](std::uint64_t row, std::span<const std::byte> voxels) {
       std::memcpy(out.data() + row * voxels.size(), voxels.data(), voxels.size());
@@ -90,13 +94,21 @@ class GeneratedReader : public VolumeReader {
 
   /// Calls consume(row index from z_begin, stored voxels) for each row, from many threads.
   template <class Consume>
-  void for_rows(std::uint32_t z_begin, std::uint32_t num_layers, const Consume &consume) const {
+  void for_rows(std::uint32_t z_begin, std::uint32_t num_layers, const Consume &consume) {
+    const std::uint64_t num_rows = std::uint64_t(info_.dims.y) * num_layers;
+    if (on_device_) {
+      const std::size_t row_bytes = info_.dims.x * size_of(info_.type);
+      stored_.resize(num_rows * row_bytes);
+      on_device_->evaluate(z_begin, num_layers, stored_);
+      return parallel_for(num_rows, options_.num_threads, [&](std::uint64_t row, std::uint32_t) {
+        consume(row, std::span<const std::byte>(stored_).subspan(row * row_bytes, row_bytes));
+      });
+    }
     struct Scratch {
       std::vector<double> values;
       std::vector<std::byte> voxels;
     };
     std::vector<Scratch> scratch(thread_count(options_.num_threads));
-    const std::uint64_t num_rows = std::uint64_t(info_.dims.y) * num_layers;
     parallel_for(num_rows, options_.num_threads, [&](std::uint64_t row, std::uint32_t thread) {
       auto &[values, voxels] = scratch[thread];
       values.resize(info_.dims.x);
@@ -111,6 +123,9 @@ class GeneratedReader : public VolumeReader {
 
   GenerateOptions options_;
   std::unique_ptr<FieldRows> rows_;
+  std::optional<ocl::Device> device_{};  ///< of its own: layers are read beside other work on it
+  std::optional<NoiseOnDevice> on_device_{};
+  std::vector<std::byte> stored_{};  ///< layers that it made
 };
 
 /// The file to write: a folder gets the Open-SciVis name, and a name in that pattern must tell the
@@ -152,10 +167,11 @@ std::string_view to_string(Field field) {
 Field field_from_string(std::string_view name) {
   const auto found = std::find(kFieldNames.begin(), kFieldNames.end(), name);
   if (found != kFieldNames.end()) return Field(found - kFieldNames.begin());
-  throw Error(
-      "unknown field '{}': use sphere, plane, saddle, marschner_lobb, gyroid, mixing_layer or "
-      "shell",
-      name);
+  throw Error("unknown field '{}': use one of {}", name, fmt::join(kFieldNames, ", "));
+}
+
+bool has_seed(Field field) {
+  return make_noise_field(field, glm::uvec3(2), 0).has_value();
 }
 
 std::vector<std::string> field_names() {
@@ -172,7 +188,7 @@ fs::path generate_to_file(const GenerateOptions &options, const fs::path &path,
   const VolumeInfo info = info_of(options);
   fs::path target = output_path(options, path);
   AtomicFile file(target);
-  const GeneratedReader reader(options);
+  GeneratedReader reader(options);
   const std::uint64_t layer_bytes = std::uint64_t(info.dims.x) * info.dims.y * size_of(info.type);
   const auto chunk =
       std::uint32_t(std::clamp<std::uint64_t>(kChunkBytes / layer_bytes, 1, info.dims.z));

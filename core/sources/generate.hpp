@@ -15,42 +15,66 @@
 //   mixing_layer    a smooth step across the mid-plane of y, displaced and wrinkled by octaves of
 //                   gradient noise; the surface at 0.5 is a turbulent mixing layer. Larger volumes
 //                   get finer octaves.
+//   turbulence      gradient noise of the same octaves' spectrum everywhere
+//   jet             a round jet along x, smooth where it begins, that widens and breaks up
+//   scan            an ellipsoid with bumps, at 0.15 to 0.3, and thin curved walls in it, at 0.4 to
+//                   0.9, about 20 voxels apart at any size
+//   noisy_scan      scan, and for each voxel a random value of -0.06 to 0.06
 //   shell           one closed, smooth surface: (128 + 127 s (3 - s^2) / 2) / 255, with
 //                   s = d / 0.12 clamped to [-1, 1] and
 //                   d = 0.8 - |p| + 0.02 (sin(5 x + 1) + sin(6 y + 2) + sin(7 z + 3)):
 //                   a bent sphere of 0.4 of the volume's longest edge, inside where d > 0. As
 //                   uint8 it is at 128. A function of p alone: the same at any size.
 //
-// The same field, dims, type and seed give the same bytes for any number of threads. mixing_layer,
-// plane, sphere and saddle use correctly rounded operations only and are the same on every machine;
-// the other three use the C library's sin and cos.
+// The same field, dims, type and seed give the same bytes for any number of threads, and on a
+// device. Fields of noise (those with seeds), plane, sphere and saddle use correctly rounded
+// operations only and are the same on every machine; the other three use the C library's sin and
+// cos.
 
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
+#include "core/ocl/device.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
 
-enum class Field { kSphere, kPlane, kSaddle, kMarschnerLobb, kGyroid, kMixingLayer, kShell };
+enum class Field {
+  kSphere,
+  kPlane,
+  kSaddle,
+  kMarschnerLobb,
+  kGyroid,
+  kShell,
+  kMixingLayer,
+  kTurbulence,
+  kJet,
+  kScan,
+  kNoisyScan
+};
 
-/// "sphere", "plane", "saddle", "marschner_lobb", "gyroid", "mixing_layer", "shell".
+/// "sphere", "plane", ... "noisy_scan".
 std::string_view to_string(Field field);
 /// Throws  Error naming the fields
 Field field_from_string(std::string_view name);
 /// All names, for help texts.
 std::vector<std::string> field_names();
+/// Whether a seed makes another volume of it.
+bool has_seed(Field field);
 
 struct GenerateOptions {
   Field field = Field::kMixingLayer;
   glm::uvec3 dims{0};
   VoxelType type = VoxelType::kFloat32;
-  std::uint64_t seed = 1;         ///< mixing_layer only
+  std::uint64_t seed = 1;         ///< of fields of noise
   std::uint32_t num_threads = 0;  ///< 0: one per processor
+  /// Makes the voxels of fields of noise, if it has doubles and is no CPU; unset: the host does.
+  std::optional<ocl::DeviceInfo> device{};
 };
 
 /// The volume as a reader, without a file: the voxels that generate_to_file() would write. Layers

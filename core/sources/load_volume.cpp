@@ -33,8 +33,9 @@ GenerateOptions parse_generator(std::string_view text) {
     const auto seed = parse_all<decltype(options.seed)>(text.substr(colon + 1));
     if (!seed) fail();
     options.seed = *seed;
-    if (options.field != Field::kMixingLayer)
-      throw Error("'{}{}': a seed is of mixing_layer's noise alone: leave it out", kGenerate, text);
+    if (!has_seed(options.field))
+      throw Error("'{}{}': a seed is of noise, and {} has none: leave it out", kGenerate, text,
+                  name->name);
   }
   return options;
 }
@@ -153,12 +154,14 @@ CompressedVolume open_compressed_volume(const std::string &path, const RawOverri
 }
 
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
-                                              const RawOverrides &overrides) {
+                                              const RawOverrides &overrides,
+                                              const ocl::Device *maker) {
   if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
   if (overrides.dims || overrides.type)
     throw Error("{}: it says dims and type itself: leave --dims and --type", path);
-  std::unique_ptr<VolumeReader> reader =
-      open_generated(parse_generator(std::string_view(path).substr(kGenerate.size())));
+  GenerateOptions options = parse_generator(std::string_view(path).substr(kGenerate.size()));
+  if (maker != nullptr) options.device = maker->info();
+  std::unique_ptr<VolumeReader> reader = open_generated(options);
   if (!overrides.spacing) return reader;
   return std::make_unique<RespacedReader>(std::move(reader), *overrides.spacing);
 }

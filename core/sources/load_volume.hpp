@@ -59,7 +59,10 @@ bool is_zfp_name(std::string_view path);
 CompressedVolume open_compressed_volume(const std::string &path, const RawOverrides &overrides);
 
 /// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
+///
+/// maker  makes the generator's voxels, where it can (GenerateOptions::device)
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
-                                              const RawOverrides &overrides);
+                                              const RawOverrides &overrides,
+                                              const ocl::Device *maker = nullptr);
 
 }  // namespace isowave::core

@@ -249,6 +249,7 @@ ordered_json measure_bcmc(const ocl::DeviceInfo &device_info, const PaperRun &ru
                  {"kept_percent", 100.0 * double(num_kept) / double(num_frames)},
                  {"cache_slots", slots.empty() ? 0.0 : *std::ranges::max_element(slots)}});
   } catch (const Error &error) {
+    device.finish();  // throws where the device itself has failed: that is no refusal
     json["refused"] = error.what();
   }
   std::uint64_t cache_bytes = 0;
@@ -271,13 +272,14 @@ ordered_json compare_methods(const ocl::DeviceInfo &device_info, const PaperRun 
     of_rays = renderer.hits();
     if (!pictures.empty()) write_png(renderer.shade(), pictures + "_rays.png");
   }
+  ocl::Device device(device_info);
   try {
-    ocl::Device device(device_info);
     MeshRenderer renderer(device, run.volume, {.size = run.size});
     renderer.render(run.cameras[0], run.isovalues[0]);
     of_mesh = renderer.hits();
     if (!pictures.empty()) write_png(renderer.shade(), pictures + "_bcmc.png");
   } catch (const Error &) {  // too large: measure_bcmc() says so
+    device.finish();
     return nullptr;
   }
   const double diagonal = glm::length(run.volume.info.index_to_world() * glm::dvec3(1));

@@ -43,13 +43,14 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   Outputs outputs;
   outputs.read_volume(options.path);
   outputs.write("--output", options.output);
-  const std::unique_ptr<VolumeReader> reader = open_any_volume(options.path, overrides);
   CompressOptions compress{.rate = options.compression.rate,
                            .measure_error = !options.no_verify,
                            .levels = options.compression.levels,
                            .input = options.input};
   std::optional<ocl::Device> device;
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
+  const std::unique_ptr<VolumeReader> reader =
+      open_any_volume(options.path, overrides, compress.device);
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
   compress.precision = find_precision(options.path, overrides, options.compression, options.input);
@@ -85,11 +86,11 @@ void add_convert(CLI::App &app) {
       ->add_option("--map-nan", options->input.map_nan,
                    "replace NaN and infinite voxels by this value")
       ->check(fits_float32());
-  command->add_option(
-      "--device", options->device,
-      "compress on this device, at a fixed rate: index, cpu, gpu, or a part of its name [the "
-      "host's processors]; the "
-      "file is the same");
+  command->add_option("--device", options->device,
+                      "compress on this device, at a fixed rate, and make generated voxels there: "
+                      "index, cpu, gpu, or a part of its name [the "
+                      "host's processors]; the "
+                      "file is the same");
   command->add_option("--threads", options->input.num_threads, "0: one per processor")
       ->capture_default_str();
   command->add_flag("--no-verify", options->no_verify,

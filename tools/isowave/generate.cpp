@@ -10,6 +10,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <system_error>
 
 #include "core/base/error.hpp"
@@ -25,6 +26,7 @@ namespace {
 struct GenerateArgs {
   std::string field, type = "uint8", output = ".";
   std::vector<std::uint32_t> dims;
+  std::optional<std::string> device;
   GenerateOptions generate;
 };
 
@@ -65,8 +67,9 @@ void run_generate(const CLI::App &command, const GenerateArgs &options) {
   generate.field = field_from_string(options.field);
   generate.type = voxel_type_from_string(options.type);
   generate.dims = to_dims(options.dims);
-  if (generate.field != Field::kMixingLayer)
-    refuse_options(command, {"--seed"}, "is of mixing_layer's noise alone");
+  if (!has_seed(generate.field))
+    refuse_options(command, {"--seed"}, "is of noise, and this field has none");
+  if (options.device) generate.device = ocl::choose_device(*options.device);
   check_space(generate, options.output);
   const std::filesystem::path path =
       generate_to_file(generate, options.output, make_progress_bar("generating"));
@@ -90,8 +93,12 @@ void add_generate(CLI::App &app) {
       ->expected(1, 3)
       ->required();
   command->add_option("--type", options->type, "voxel type")->capture_default_str();
-  command->add_option("--seed", options->generate.seed, "of mixing_layer's noise")
+  command->add_option("--seed", options->generate.seed, "of fields of noise")
       ->capture_default_str();
+  command->add_option(
+      "--device", options->device,
+      "make fields of noise on this device, if it is no CPU and has doubles: index, gpu, or a part "
+      "of its name [the host's processors]; the file is the same");
   command->add_option("--threads", options->generate.num_threads, "0: one per processor")
       ->capture_default_str();
   command

@@ -121,7 +121,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   }
   Storage storage = to_storage(compression);
   storage.device = device;
-  return compress_volume([&] { return open_any_volume(path, overrides); }, path, storage);
+  return compress_volume([&] { return open_any_volume(path, overrides, device); }, path, storage);
 }
 
 std::string volume_stem(const std::string &path) {

@@ -1,0 +1,200 @@
+#include "core/sources/noise_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace isowave::core {
+
+namespace {
+
+constexpr double kFinestCell = 4;  // voxels: the noise of the finest octave is resolved
+/// Of an octave's amplitude to that of the one below where velocities have a k^(-5/3) spectrum:
+/// 2^(-1/3).
+constexpr double kTurbulent = 0.79370;
+constexpr std::uint32_t kAsFineAsResolved = std::numeric_limits<std::uint32_t>::max();
+
+/// Octaves, each of twice the frequency of the one before.
+struct OctaveGroup {
+  double frequency;  ///< noise cells along the edge that the field is measured by
+  double amplitude, ratio;
+  std::uint32_t num_octaves;
+};
+
+/// Appends the group's octaves. edge: in voxels.
+void add_group(const OctaveGroup &group, double edge, std::uint64_t seed, NoiseField &field) {
+  double frequency = group.frequency, amplitude = group.amplitude;
+  for (std::uint32_t i = 0; i < group.num_octaves; ++i) {
+    if (group.num_octaves == kAsFineAsResolved && frequency * kFinestCell > edge) break;
+    const std::uint64_t hash = noise_hash(seed + i);
+    field.octaves.push_back({.cells_per_voxel = frequency / edge,
+                             .amplitude = amplitude,
+                             .shift = double(hash >> 40) * 0x1p-24,
+                             .seed = hash});
+    frequency *= 2;
+    amplitude *= group.ratio;
+  }
+}
+
+/// One octave on the rows of a grid.
+class OctaveRows {
+ public:
+  OctaveRows(std::uint32_t nx, const NoiseOctave &octave) : octave_(octave), columns_(nx) {
+    for (std::uint32_t x = 0; x < nx; ++x) {
+      const double position = x * octave.cells_per_voxel + octave.shift;
+      const double cell = std::floor(position);
+      columns_[x] = {std::uint32_t(cell), position - cell, noise_fade(position - cell)};
+    }
+  }
+
+  /// Adds the row (y, z) to `row` [nx]; `lines` is scratch.
+  void add(std::uint32_t y, std::uint32_t z, std::span<double> row,
+           std::vector<NoiseLine> &lines) const {
+    const double position_y = y * octave_.cells_per_voxel + octave_.shift,
+                 position_z = z * octave_.cells_per_voxel + octave_.shift;
+    const double cell_y = std::floor(position_y), cell_z = std::floor(position_z);
+    lines.resize(columns_.back().cell + 2);
+    for (std::uint32_t plane = 0; plane < lines.size(); ++plane) {
+      lines[plane] = noise_line(octave_.amplitude, octave_.seed, plane, std::uint32_t(cell_y),
+                                std::uint32_t(cell_z), position_y - cell_y, position_z - cell_z);
+    }
+    for (std::size_t x = 0; x < row.size(); ++x) {
+      const Column &column = columns_[x];
+      row[x] +=
+          noise_between(lines[column.cell], lines[column.cell + 1], column.local, column.fade);
+    }
+  }
+
+ private:
+  struct Column {
+    std::uint32_t cell;
+    double local, fade;
+  };
+
+  NoiseOctave octave_;
+  std::vector<Column> columns_;
+};
+
+class NoiseRows : public FieldRows {
+ public:
+  NoiseRows(const NoiseField &field, std::uint32_t nx) : shape_(field.shape) {
+    octaves_.reserve(field.octaves.size());
+    for (const NoiseOctave &octave : field.octaves) octaves_.emplace_back(nx, octave);
+  }
+
+  void evaluate(std::uint32_t y, std::uint32_t z, std::span<double> row) const override {
+    thread_local std::vector<NoiseLine> lines;
+    thread_local std::vector<double> sums;  // of group b; the row has those of a
+    sums.assign(row.size(), 0.0);
+    std::ranges::fill(row, noise_begin(shape_, y));
+    for (std::size_t i = 0; i < octaves_.size(); ++i)
+      octaves_[i].add(y, z, i < shape_.begin_b ? row : std::span(sums), lines);
+    for (std::size_t x = 0; x < row.size(); ++x)
+      row[x] = noise_value(shape_, std::uint32_t(x), y, z, row[x], sums[x]);
+  }
+
+ private:
+  NoiseShape shape_;
+  std::vector<OctaveRows> octaves_;
+};
+
+ocl::Defines defines_for(VoxelType type) {
+  switch (type) {
+    case VoxelType::kUint8:
+      return {{"ISO_VOXEL", "uchar"}, {"ISO_LARGEST_VOXEL", "255.0"}};
+    case VoxelType::kInt8:
+      return {{"ISO_VOXEL", "char"}, {"ISO_LARGEST_VOXEL", "127.0"}};
+    case VoxelType::kUint16:
+      return {{"ISO_VOXEL", "ushort"}, {"ISO_LARGEST_VOXEL", "65535.0"}};
+    case VoxelType::kInt16:
+      return {{"ISO_VOXEL", "short"}, {"ISO_LARGEST_VOXEL", "32767.0"}};
+    case VoxelType::kUint32:
+      return {{"ISO_VOXEL", "uint"}, {"ISO_LARGEST_VOXEL", "4294967295.0"}};
+    case VoxelType::kInt32:
+      return {{"ISO_VOXEL", "int"}, {"ISO_LARGEST_VOXEL", "2147483647.0"}};
+    case VoxelType::kFloat32:
+      return {{"ISO_VOXEL", "float"}, {"ISO_LARGEST_VOXEL", "0"}};
+    case VoxelType::kFloat64:
+      break;
+  }
+  return {{"ISO_VOXEL", "double"}, {"ISO_LARGEST_VOXEL", "0"}};
+}
+
+}  // namespace
+
+std::optional<NoiseField> make_noise_field(Field field, const glm::uvec3 &dims,
+                                           std::uint64_t seed) {
+  NoiseField made;
+  const glm::dvec3 last = glm::dvec3(dims) - 1.0;
+  made.shape.last_x = last.x;
+  made.shape.last_y = last.y;
+  made.shape.last_z = last.z;
+  made.shape.seed = noise_hash(64 * seed + 63);
+  const double edge = field == Field::kMixingLayer ? last.y : std::min({last.x, last.y, last.z});
+  OctaveGroup a{}, b{};
+  switch (field) {
+    case Field::kMixingLayer:
+      made.shape.kind = ISO_NOISE_MIXING_LAYER;
+      a = {2.5, 0.3 / ISO_NOISE_THICKNESS, 0.5, 2};
+      b = {10, 2.6, kTurbulent, kAsFineAsResolved};
+      break;
+    case Field::kTurbulence:
+      made.shape.kind = ISO_NOISE_TURBULENCE;
+      b = {4, 1.2, kTurbulent, kAsFineAsResolved};
+      break;
+    case Field::kJet:
+      made.shape.kind = ISO_NOISE_JET;
+      a = {5, 3, 0.6, 2};
+      b = {12, 4, kTurbulent, kAsFineAsResolved};
+      break;
+    case Field::kScan:
+    case Field::kNoisyScan:
+      made.shape.kind = field == Field::kScan ? ISO_NOISE_SCAN : ISO_NOISE_NOISY_SCAN;
+      a = {3, 6, 0.5, 4};
+      b = {std::max(4.0, edge / 40), 1, 0.4, 2};  // walls are as thin at any size
+      break;
+    default:
+      return {};
+  }
+  add_group(a, edge, 64 * seed, made);
+  made.shape.begin_b = std::uint32_t(made.octaves.size());
+  add_group(b, edge, 64 * seed + 32, made);
+  made.shape.end = std::uint32_t(made.octaves.size());
+  return made;
+}
+
+std::unique_ptr<FieldRows> make_noise_rows(NoiseField field, std::uint32_t nx) {
+  return std::make_unique<NoiseRows>(field, nx);
+}
+
+bool NoiseOnDevice::suits(const ocl::DeviceInfo &device) {
+  return device.capabilities.fp64 && device.type != ocl::DeviceType::kCpu;
+}
+
+NoiseOnDevice::NoiseOnDevice(ocl::Device &device, const NoiseField &field, const glm::uvec3 &dims,
+                             VoxelType type)
+    : device_(device),
+      shape_(field.shape),
+      dims_(dims),
+      type_(type),
+      octaves_(device_, "octaves", std::span<const NoiseOctave>(field.octaves)),
+      kernel_(device_, "noise_field", "noise_field", defines_for(type)) {}
+
+void NoiseOnDevice::evaluate(std::uint32_t z_begin, std::uint32_t num_layers,
+                             std::span<std::byte> voxels) {
+  const std::uint64_t num_rows = std::uint64_t{dims_.y} * num_layers;
+  if (voxels.size() != num_rows * dims_.x * size_of(type_))
+    throw std::invalid_argument("NoiseOnDevice: not the size of so many layers");
+  if (!voxels_ || voxels_->size() < voxels.size()) {
+    voxels_.reset();
+    voxels_.emplace(device_, "voxels", voxels.size());
+  }
+  const std::uint64_t num_runs = num_rows * ((dims_.x + 3u) / 4u);
+  kernel_(ocl::Range::strided(num_runs, ocl::kGroupSize, device_, 4), octaves_, shape_, dims_.x,
+          dims_.y, z_begin, num_layers, *voxels_);
+  voxels_->read(voxels);
+}
+
+}  // namespace isowave::core
