@@ -170,7 +170,7 @@ TEST_F(HostileZfp, LevelsOfLevelsAreRefusedAtOnce) {
   const std::string grid =
       R"("spacing":[1,1,1],"origin":[0,0,0],"type":"uint8","direction":[[1,0,0],[0,1,0],[0,0,1]])";
   std::string file = with_trailer(head + std::string(12, 0), "{" + grid + "}", 4);
-  while (file.size() < 3'000'000) {
+  while (file.size() < 1'500'000) {
     const std::string level_bytes = fmt::format(R"(,"level_bytes":[{}])", file.size());
     file = with_trailer(head + std::string(12, 0) + file, "{" + grid + level_bytes + "}", 4);
   }
@@ -328,7 +328,7 @@ TEST_F(HostileZfp, AdviceCanBeFollowed) {
   std::size_t num_advised = 0;
   for (const auto &[voxels, isovalue] : {std::pair(constant, "3"), std::pair(constant, "2.5"),
                                          std::pair(ramp, "7.3"), std::pair(high, "10000007")}) {
-    for (const std::string compression : {"--rate 2", "--rate 8", "--rate 32", "--tolerance 0.7"}) {
+    for (const std::string compression : {"--rate 2", "--rate 32", "--tolerance 0.7"}) {
       for (const std::string error : {"1e-9", "0.001", "1"}) {
         const auto run = test::run_isowave(
             fmt::format("render {} {} -i {} --device cpu --size 32x24 --max-surface-error {} -o {}",

@@ -40,11 +40,16 @@ inline bool is_llvmpipe(const ocl::DeviceInfo &device) {
   return device.platform == "rusticl";
 }
 
+/// Whether tests may take long: in tools/test --long.
+inline bool long_tests() {
+  return std::getenv("ISOWAVE_LONG_TESTS") != nullptr;
+}
+
 /// Oclgrind, which takes about a second for what others do in a millisecond. What it looks for,
 /// races and uninitialised memory, shows in small pictures of one view. The long tests
 /// (ISOWAVE_LONG_TESTS) draw there what other devices draw.
 inline bool is_simulator(const ocl::DeviceInfo &device) {
-  return device.platform == "Oclgrind" && std::getenv("ISOWAVE_LONG_TESTS") == nullptr;
+  return device.platform == "Oclgrind" && !long_tests();
 }
 
 /// "0_rusticl": a device as the suffix of a test's name.
