@@ -49,7 +49,7 @@ assert coarse < one < four, detail
 EOF
 if grep -qF "$top/tests/data" "$results"; then fail 'the folder of the volumes is named'; fi
 "$top/tools/charts" "$results" -o "$work" > "$work/out"
-for chart in a_cells a_frames a_pareto a_budgets; do
+for chart in a_{cells,frames,pareto,budgets,time,memory,speculation}; do
   [ -s "$work/$chart.png" ] || fail "$chart.png is missing"
 done
 
