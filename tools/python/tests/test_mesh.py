@@ -67,7 +67,8 @@ def real_volumes():
     """Of the folder that the environment variable names, such as one of Open SciVis sets."""
     folder = os.environ.get("ISOWAVE_TEST_VOLUMES")
     found = sorted(pathlib.Path(folder).iterdir()) if folder else []
-    return [path for path in found if re.search(r"(\.raw(\.gz)?|\.mha|\.nrrd)$", path.name)]
+    says_dims = r"(_\d+x\d+x\d+_\w+\.raw(\.gz)?|\.mha|\.nrrd)$"
+    return [path for path in found if re.search(says_dims, path.name)]
 
 
 @pytest.mark.skipif(not real_volumes(), reason="ISOWAVE_TEST_VOLUMES names no folder of volumes")
