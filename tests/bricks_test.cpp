@@ -70,7 +70,7 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
           frame.hits[ray] = hits[ray];
           frame.hits[ray].block_id = whole_id(whole.info(), volume.info, hits[ray].block_id);
         }
-        color_words(hits, renderer.shade(), 0, place, frame.words);
+        color_words(renderer.shade_packed({}), place, frame.words);
         keep_first(frame.colors, frame.words);
         field_words(hits, HitField::kT, place, frame.words);
         keep_first(frame.depths, frame.words);

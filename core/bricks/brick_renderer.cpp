@@ -46,7 +46,7 @@ std::span<const HitRecord> BrickRenderer::own_hits() {
 
 void BrickRenderer::compose(const MakeWords &make_words) {
   const auto begin = std::chrono::steady_clock::now();
-  words_.resize(own_hits().size());
+  words_.resize(renderer_.size().num_rays());
   for (std::size_t first = 0; first < words_.size(); first += kSlabRays) {
     const auto slab = std::span(words_).subspan(first, std::min(kSlabRays, words_.size() - first));
     make_words(first, slab);
@@ -70,10 +70,9 @@ void BrickRenderer::compose_field(HitField field, std::span<HitRecord> hits) {
 
 Image8 BrickRenderer::shade(const Appearance &appearance) {
   const ImageSize size = renderer_.size();
-  const std::span own = own_hits();
   if (size.samples > 1) {
     // The mean of a pixel's colours is made of more than 8 bits of each.
-    std::vector<HitRecord> hits(team_.rank() == 0 ? own.size() : 0, nothing());
+    std::vector<HitRecord> hits(team_.rank() == 0 ? size.num_rays() : 0, nothing());
     for (const HitField field :
          {HitField::kT, HitField::kGradX, HitField::kGradY, HitField::kGradZ})
       compose_field(field, hits);
@@ -81,9 +80,9 @@ Image8 BrickRenderer::shade(const Appearance &appearance) {
     renderer_.set_hits(hits);
     return renderer_.shade(appearance);
   }
-  const Image8 image = renderer_.shade(appearance);
+  const std::vector<std::uint32_t> colors = renderer_.shade_packed(appearance);
   compose([&](std::size_t begin, std::span<std::uint64_t> words) {
-    color_words(own.subspan(begin, words.size()), image, begin, place_, words);
+    color_words(std::span(colors).subspan(begin, words.size()), place_, words);
   });
   return team_.rank() == 0 ? image_of(words_, size.width, size.height) : Image8{};
 }

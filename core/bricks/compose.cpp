@@ -31,16 +31,11 @@ void set_field(std::span<const std::uint64_t> words, HitField field, std::span<H
   }
 }
 
-void color_words(std::span<const HitRecord> hits, const Image8 &image, std::size_t first,
-                 std::uint32_t place, std::span<std::uint64_t> words) {
-  for (std::size_t ray = 0; ray < hits.size(); ++ray) {
-    std::uint32_t color = 0;
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      color |= std::uint32_t{image.pixels[image.channels * (first + ray) + channel]}
-               << (8 * channel);
-    }
-    words[ray] = make_word(hits[ray], place, color);
-  }
+void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
+                 std::span<std::uint64_t> words) {
+  std::ranges::transform(colors, words.begin(), [place](std::uint32_t color) {
+    return std::uint64_t{color >> 24 == 0 ? kNoPlace : place} << 32 | (color & 0xFFFFFFu);
+  });
 }
 
 Image8 image_of(std::span<const std::uint64_t> words, std::uint32_t width, std::uint32_t height) {

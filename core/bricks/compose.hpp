@@ -6,7 +6,6 @@
 // order, below, 32 bits of what its ray has hit. So the smallest word wins, which is what
 // MPI_MIN finds.
 
-#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -31,10 +30,9 @@ void field_words(std::span<const HitRecord> hits, HitField field, std::uint32_t 
 /// Gives hits [ray] the field that won.
 void set_field(std::span<const std::uint64_t> words, HitField field, std::span<HitRecord> hits);
 
-/// words [ray]: a brick's picture from pixel `first` on, of one ray a pixel, beside its hits from
-/// there on.
-void color_words(std::span<const HitRecord> hits, const Image8 &image, std::size_t first,
-                 std::uint32_t place, std::span<std::uint64_t> words);
+/// words [ray]: a brick's picture, of one ray a pixel, as Renderer::shade_packed() has it.
+void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
+                 std::span<std::uint64_t> words);
 /// The picture that won, RGB.
 Image8 image_of(std::span<const std::uint64_t> words, std::uint32_t width, std::uint32_t height);
 

@@ -10,10 +10,11 @@ namespace isowave::core {
 
 namespace {
 
+/// Of sides of the same length the last: rows and layers of a file, or of a generator, stay whole.
 int longest_side(const BlockBox &box) {
   const glm::ivec3 size = box.end - box.begin;
-  const int yz = size.z > size.y ? 2 : 1;
-  return size[yz] > size.x ? yz : 0;
+  const int xy = size.x > size.y ? 0 : 1;
+  return size[xy] > size.z ? xy : 2;
 }
 
 BlockBox part_below(BlockBox box, int axis, int plane) {

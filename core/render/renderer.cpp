@@ -523,6 +523,12 @@ Image8 Renderer::shade(const Appearance &appearance) {
   return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, size_.samples);
 }
 
+std::vector<std::uint32_t> Renderer::shade_packed(const Appearance &appearance) {
+  check_has_picture();
+  return shade_.packed(make_shade_params(state_.levels[0].info, appearance), state_.rays,
+                       size_.samples);
+}
+
 OpenCounts Renderer::open() const {
   check_has_picture();
   OpenCounts open{{}, state_.rays.num_ambient};

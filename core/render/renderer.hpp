@@ -89,6 +89,8 @@ class Renderer {
   /// Throws   Error: no frame was drawn
   /// Waits    yes
   Image8 shade(const Appearance &appearance = {});
+  /// The same, RGBA in words, red in bits 0..7: A is 0 where no ray of a pixel hits.
+  std::vector<std::uint32_t> shade_packed(const Appearance &appearance);
   /// How open the hits of the last frame are, as far as its ambient rays are through.
   ///
   /// Throws  Error: no frame was drawn
