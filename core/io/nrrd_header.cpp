@@ -128,7 +128,8 @@ std::vector<std::optional<glm::dvec3>> parse_vectors(const HeaderFields &fields,
   std::string_view text = fields[name];
   while (!(text = trim(text)).empty()) {
     if (text.starts_with(kNoVector) &&
-        (text.size() == kNoVector.size() || text[kNoVector.size()] == ' ' || text[kNoVector.size()] == '\t')) {
+        (text.size() == kNoVector.size() || text[kNoVector.size()] == ' ' ||
+         text[kNoVector.size()] == '\t')) {
       vectors.emplace_back();
       text.remove_prefix(kNoVector.size());
       continue;
