@@ -34,7 +34,7 @@ FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const Fr
   params.schedule.table_groups = cache.table_groups;
   macrocells.select(params);
   params.surface = macrocells.surface(params);
-  params.screen = make_screen_box(params.grid, params.view, params.surface);
+  params.screen = make_screen_box(params);
   rays.frame = params;
 }
 

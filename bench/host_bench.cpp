@@ -117,7 +117,7 @@ void measure(const Options &options) {
     for (const Camera &camera : orbit_cameras(volume.info, options.views)) {
       FrameParams frame = make_frame_params(volume.info, camera, size, isovalue);
       frame.surface = blocks->surface();
-      frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+      frame.screen = make_screen_box(frame);
       std::vector<HitRecord> expected;
       std::vector<HitRecord> first(size.num_rays(), no_hit());
       draw(frame, blocks->field(), host_loops().trace, true, options.threads, first);

@@ -308,7 +308,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       progress.met = progress.moved = ints(0);
       p.waits = p.found.lanes = ints(0);
       if (is_active_somewhere && any(source.lanes)) {
-        make_packet_axes(&frame->view, source.column, source.row, p.rays.axis);
+        make_packet_axes(frame, source.column, source.row, p.rays.axis);
         open_packet(&p, &scene);
         if (begins != 0) {
           const Mask on = on_screen(frame->screen, source);

@@ -77,7 +77,7 @@ TEST(Frame, ScreenBoxHasEveryPixelThatMeetsTheActiveBox) {
         expect_encloses(frame, seen_range(frame));
         for (int i = 0; i < 20; ++i) {
           choose_active_box(frame, random);
-          frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+          frame.screen = make_screen_box(frame);
           EXPECT_EQ(frame.screen.begin_x % 8, 0u);
           EXPECT_EQ(frame.screen.begin_y % 4, 0u);
           EXPECT_LE(frame.screen.end_x, size.width);
@@ -100,7 +100,7 @@ TEST(Frame, ScreenBoxAllowsForRoundedDirections) {
     FrameParams frame = make_frame_params(info, camera, {360, 360}, 0);
     frame.surface.active_begin_x = frame.surface.active_begin_y = frame.surface.active_begin_z = 8;
     frame.surface.active_end_x = frame.surface.active_end_y = frame.surface.active_end_z = 9;
-    frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+    frame.screen = make_screen_box(frame);
     expect_encloses(frame, seen_range(frame));
   }
 }
@@ -118,7 +118,7 @@ TEST(Frame, ScreenBoxIsTight) {
                      up = glm::cross(right, fwd);
     for (int i = 0; i < 20; ++i) {
       choose_active_box(frame, random);
-      frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+      frame.screen = make_screen_box(frame);
       glm::dvec2 least(1e9), most(-1e9);
       for (int corner = 0; corner < 8; ++corner) {
         const glm::dvec3 at(
@@ -146,7 +146,7 @@ TEST(Frame, ScreenBoxIsEmptyWhereNothingIsSeen) {
   EXPECT_LT(frame.screen.begin_x, frame.screen.end_x);
   frame.surface.active_end_x = frame.surface.active_end_y = frame.surface.active_end_z =
       0;  // no active block
-  frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+  frame.screen = make_screen_box(frame);
   EXPECT_EQ(frame.screen.begin_x, frame.screen.end_x);
   EXPECT_EQ(frame.screen.begin_y, frame.screen.end_y);
   frame = case_frame(dims, {"beside", {{-200, 32, -10}, {-200, 32, 400}, {0, 1, 0}, 20}});

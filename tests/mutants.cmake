@@ -55,7 +55,8 @@ add_mutant(float_plane_t grid_dda.h
   "fma(s, a.inv_d.hi, -h) + fma(s, a.inv_d.lo, e * a.inv_d.hi);" "0.0f;")
 add_mutant(float_position grid_dda.h "const float x = r + (re + (pe + se));" "const float x = r;")
 add_mutant(domain_end grid_dda.h
-  "return (float)(plane > last_plane ? last_plane : plane);" "return (float)plane;")
+  "return whole_plane(a, plane > last_plane ? last_plane : plane);"
+  "return whole_plane(a, plane);")
 
 # Intersection.
 add_mutant(open_interval solve_bernstein.h

@@ -43,7 +43,7 @@ struct RaysWorld {
         request_ahead(device, size.num_rays(), group_size) {
     macrocells.select(frame);
     frame.surface = macrocells.surface(frame);
-    frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+    frame.screen = make_screen_box(frame);
     frame.schedule.max_spec_count = spec_count;
     frame.schedule.table_groups = cache.table_groups;
     rays.frame = frame;

@@ -76,7 +76,7 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   FrameParams frame = make_frame_params(info_, request.camera, size, request.isovalue);
   blocks_.select(request.isovalue);
   frame.surface = blocks_.surface();
-  frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+  frame.screen = make_screen_box(frame);
   frame_ = frame;
   samples_ = size.samples;
   normals_ = request.normals;

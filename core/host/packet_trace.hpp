@@ -70,7 +70,7 @@ namespace isowave::core::packets {
 inline uint trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
                          HitRecord *hits) {
   Packet p;
-  make_packet_axes(&scene.frame->view, column, row, p.rays.axis);
+  make_packet_axes(scene.frame, column, row, p.rays.axis);
   const Mask enters = enter_box(&p.rays, &scene) & lanes;
   if (!any(enters)) return 0;
   open_packet(&p, &scene);

@@ -123,14 +123,15 @@ VoxelType nrrd_voxel_type(const HeaderFields &fields) {
 /// Vectors of three numbers like (1,0,0.5), or `none`.
 std::vector<std::optional<glm::dvec3>> parse_vectors(const HeaderFields &fields,
                                                      std::string_view name) {
-  constexpr std::string_view kNone = "none";
+  constexpr std::string_view kNoVector = "none";
   std::vector<std::optional<glm::dvec3>> vectors;
   std::string_view text = fields[name];
   while (!(text = trim(text)).empty()) {
-    if (text.starts_with(kNone) &&
-        (text.size() == kNone.size() || text[kNone.size()] == ' ' || text[kNone.size()] == '\t')) {
+    if (text.starts_with(kNoVector) &&
+        (text.size() == kNoVector.size() || text[kNoVector.size()] == ' ' ||
+         text[kNoVector.size()] == '\t')) {
       vectors.emplace_back();
-      text.remove_prefix(kNone.size());
+      text.remove_prefix(kNoVector.size());
       continue;
     }
     const std::size_t end = text.find(')');

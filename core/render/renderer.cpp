@@ -36,7 +36,8 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
         plan.stream == StreamPlace::kHost
             ? DeviceStream(device, *volumes[i], OnHost{plan.window_blocks}, options.with_bounds)
             : DeviceStream(device, *volumes[i], options.largest_stream_part, options.with_bounds));
-    macrocells.emplace_back(device, grids[i], streams.back(), buffers);
+    macrocells.emplace_back(device, grids[i], streams.back(), buffers,
+                            i == 0 ? options.range_thresholds : std::vector<float>());
   }
   std::vector<Level> levels;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
@@ -352,8 +353,7 @@ void Renderer::open_frame(std::vector<FrameParams> frames, const std::vector<Dec
       level.macrocells.select(frame, level.range_error, &level.stream);
       frame.surface = level.macrocells.surface(frame);
       // Where there are several bands, a ray stands at a border wherever it crosses that.
-      if (!has_bands && source == RaySource::kCamera)
-        frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+      if (!has_bands && source == RaySource::kCamera) frame.screen = make_screen_box(frame);
     }
     level.frame = frame;
   }
@@ -437,10 +437,14 @@ void Renderer::decode_as(const std::vector<DecodedValues> &values, FieldBound bo
   if (changes) clear_cache();
 }
 
+std::optional<BlockBox> Renderer::surface_box(std::span<const float> isovalues) {
+  Level &finest = state_.levels[0];
+  finest.macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
+  return isowave::core::surface_box(finest.macrocells, finest.info, isovalues);
+}
+
 Camera Renderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
-  const Level &finest = state_.levels[0];
-  state_.levels[0].macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
-  return surface_camera(state_.levels[0].macrocells, finest.info, isovalues,
+  return surface_camera(state_.levels[0].info, surface_box(isovalues),
                         size.value_or(options_.size));
 }
 
@@ -509,9 +513,20 @@ std::vector<HitRecord> Renderer::hits() const {
   return hits;
 }
 
+void Renderer::set_hits(std::span<const HitRecord> hits) {
+  check_has_picture();
+  state_.rays.hits.write(hits);
+}
+
 Image8 Renderer::shade(const Appearance &appearance) {
   check_has_picture();
   return shade_(make_shade_params(state_.levels[0].info, appearance), state_.rays, size_.samples);
+}
+
+std::vector<std::uint32_t> Renderer::shade_packed(const Appearance &appearance) {
+  check_has_picture();
+  return shade_.packed(make_shade_params(state_.levels[0].info, appearance), state_.rays,
+                       size_.samples);
 }
 
 OpenCounts Renderer::open() const {

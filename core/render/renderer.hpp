@@ -52,6 +52,12 @@ class Renderer {
   /// Throws  Error: the renderer was not made for the request's size, levels of detail or bound
   void check(const FrameRequest &request) const;
 
+  /// The box around the blocks that isosurfaces may be in; none: in no block.
+  ///
+  /// Throws  Error: an isovalue is NaN
+  /// Waits   yes
+  std::optional<BlockBox> surface_box(std::span<const float> isovalues);
+
   /// A view in which isosurfaces fill a picture of that size, see surface_camera(); none: of the
   /// largest.
   ///
@@ -73,10 +79,18 @@ class Renderer {
   /// Throws   Error: no frame was drawn
   /// Waits    yes
   std::vector<HitRecord> hits() const;
+  /// Puts other hits in the place of the last frame's: what shade() shows.
+  ///
+  /// hits    [size.ray_rows()][size.ray_columns()]
+  /// Throws  Error: no frame was drawn
+  /// Waits   yes
+  void set_hits(std::span<const HitRecord> hits);
   /// Returns  the picture of the hit buffer, RGB [size.height][size.width], row 0 at the top
   /// Throws   Error: no frame was drawn
   /// Waits    yes
   Image8 shade(const Appearance &appearance = {});
+  /// The same, RGBA in words, red in bits 0..7: A is 0 where no ray of a pixel hits.
+  std::vector<std::uint32_t> shade_packed(const Appearance &appearance);
   /// How open the hits of the last frame are, as far as its ambient rays are through.
   ///
   /// Throws  Error: no frame was drawn

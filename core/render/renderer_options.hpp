@@ -2,6 +2,7 @@
 // What a renderer is made for.
 
 #include <cstdint>
+#include <vector>
 
 #include "core/render/memory_plan.hpp"
 
@@ -38,6 +39,8 @@ struct RendererOptions {
   /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built
   /// when they are needed.
   bool with_shading = true;
+  /// Macrocells::thresholds() of the finest level; none: of a sample of its blocks.
+  std::vector<float> range_thresholds{};
 };
 
 /// Slots (325 MiB with their share of the tables) that no budget was asked for are enough: a cold

@@ -7,8 +7,8 @@
 
 namespace isowave::core {
 
-Camera surface_camera(Macrocells &macrocells, const VolumeInfo &info,
-                      std::span<const float> isovalues, ImageSize size) {
+std::optional<BlockBox> surface_box(Macrocells &macrocells, const VolumeInfo &info,
+                                    std::span<const float> isovalues) {
   FrameParams frame = make_grid_params(info);
   std::optional<BlockBox> box;
   for (const float isovalue : isovalues) {
@@ -21,7 +21,7 @@ Camera surface_camera(Macrocells &macrocells, const VolumeInfo &info,
     box->begin = glm::min(box->begin, blocks->begin);
     box->end = glm::max(box->end, blocks->end);
   }
-  return surface_camera(info, box, size);
+  return box;
 }
 
 Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size) {
@@ -36,7 +36,7 @@ Camera surface_camera(ocl::Device &device, const CompressedVolume &volume,
   constexpr std::uint32_t kWindowBlocks = 4096;
   const DeviceStream stream(device, volume, OnHost{kWindowBlocks});
   Macrocells macrocells(device, make_grid_params(volume.info), stream);
-  return surface_camera(macrocells, volume.info, isovalues, size);
+  return surface_camera(volume.info, surface_box(macrocells, volume.info, isovalues), size);
 }
 
 }  // namespace isowave::core

@@ -36,7 +36,7 @@ ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num
 }
 
 Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
-                       std::shared_ptr<MacrocellBuffers> buffers)
+                       std::shared_ptr<MacrocellBuffers> buffers, std::vector<float> thresholds)
     : num_coarse_(static_cast<std::uint32_t>(num_macrocells(frame.grid))),
       coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
       buffers_(buffers
@@ -45,6 +45,7 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
                          device, MacrocellBuffers::Limits{block_count(frame.grid), num_coarse_})),
       coarse_ranges_(device, own_sizes()["macrocell ranges"]),
       limits_(device, own_sizes()["active limits"]),
+      thresholds_(std::move(thresholds)),
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
   for (const ocl::BufferSize &size : own_sizes().named("active box"))
     selections_.push_back({.box = ocl::Buffer<int>(device, size)});
@@ -74,8 +75,10 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
                        {device, "macrocells", "macrocell_coarse_ranges", stream.defines()}};
   compile(device, stream, kernels);
   Partials decode{device, frame, stream, kernels.partials};
-  thresholds_ =
-      sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame.grid)), decode);
+  if (thresholds_.empty()) {
+    thresholds_ =
+        sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame.grid)), decode);
+  }
 
   const std::uint32_t layer_blocks = frame.grid.blocks_x * frame.grid.blocks_y;
   const ocl::BufferSizes scratch = layer_sizes(layer_blocks);
@@ -186,8 +189,13 @@ Surface Macrocells::surface(const FrameParams &frame) {
   const auto begin = [](int first, uint dim) {
     return std::min(first, static_cast<int>(num_owning_blocks(dim))) * ISO_MACROCELL_BLOCKS;
   };
-  const auto end = [](int behind, uint dim) {
-    return std::min(behind * ISO_MACROCELL_BLOCKS, static_cast<int>(num_owning_blocks(dim)));
+  // A ray that runs in the plane where a brick ends is in the block behind: in the box, too, or it
+  // would be taken to be in the last of the brick's own.
+  const auto end = [](int behind, uint dim, uint blocks, uint others) {
+    const int last = static_cast<int>(num_owning_blocks(dim)),
+              own = static_cast<int>(blocks - others);
+    const int whole = std::min(behind * ISO_MACROCELL_BLOCKS, last);
+    return whole == own && own < last ? own + 1 : whole;
   };
   const BlockGrid &grid = frame.grid;
   return {.isovalue = frame.surface.isovalue,
@@ -195,9 +203,9 @@ Surface Macrocells::surface(const FrameParams &frame) {
           .active_begin_x = begin(macrocells[0], grid.dims_x),
           .active_begin_y = begin(macrocells[1], grid.dims_y),
           .active_begin_z = begin(macrocells[2], grid.dims_z),
-          .active_end_x = end(macrocells[3], grid.dims_x),
-          .active_end_y = end(macrocells[4], grid.dims_y),
-          .active_end_z = end(macrocells[5], grid.dims_z)};
+          .active_end_x = end(macrocells[3], grid.dims_x, grid.blocks_x, frame.brick.behind_x),
+          .active_end_y = end(macrocells[4], grid.dims_y, grid.blocks_y, frame.brick.behind_y),
+          .active_end_z = end(macrocells[5], grid.dims_z, grid.blocks_z, frame.brick.behind_z)};
 }
 
 std::optional<BlockBox> Macrocells::active_blocks(const FrameParams &frame) const {

@@ -48,11 +48,12 @@ class Macrocells {
   /// Decodes every block once, beside a sample for the quantile table. Needs 128 bytes of scratch
   /// for each block of one z layer.
   ///
-  /// frame    its grid and place are used
-  /// buffers  shared with other levels; none: its own
-  /// Waits    yes
+  /// frame       its grid and place are used
+  /// buffers     shared with other levels; none: its own
+  /// thresholds  see thresholds(); none: of a sample of the blocks
+  /// Waits       yes
   Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
-             std::shared_ptr<MacrocellBuffers> buffers = {});
+             std::shared_ptr<MacrocellBuffers> buffers = {}, std::vector<float> thresholds = {});
 
   /// Makes masks() for an isovalue; nothing to do where they are those in use. Ranges were made of
   /// voxels of all bit planes, and blocks may since be decoded to other values: by voxel_error and

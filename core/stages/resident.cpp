@@ -93,7 +93,7 @@ double Resident::render(const Camera &camera, float isovalue) {
     changing_kernel_(blocks, frame, num_blocks_, inside_, changing_);
   }
   frame.surface = macrocells_.surface(frame);
-  frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+  frame.screen = make_screen_box(frame);
   selected_isovalue_ = isovalue;
   const std::size_t tiles = std::size_t{(frame.view.width + 7) / 8} * ((frame.view.height + 3) / 4);
   // One work-item per pixel: rays differ too much in length for strides over them to keep a device

@@ -79,14 +79,19 @@ void Shade::compile(Wavefront &rays) {
 }
 
 Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
+  return rgb_image(rays.frame.view.width / samples, rays.frame.view.height / samples,
+                   packed(params, rays, samples));
+}
+
+std::vector<uint> Shade::packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
   const std::uint32_t columns = rays.frame.view.width / samples,
                       rows = rays.frame.view.height / samples;
-  std::vector<uint> packed(std::size_t{columns} * rows);
+  std::vector<uint> colors(std::size_t{columns} * rows);
   params_.write({&params, 1});
-  kernel_(ocl::Range::strided(packed.size(), ocl::kGroupSize, device_), rays.frame, params_,
+  kernel_(ocl::Range::strided(colors.size(), ocl::kGroupSize, device_), rays.frame, params_,
           samples, rays.hits, rays.open_counts, rays.num_ambient, image_);
-  image_.read(packed);
-  return rgb_image(columns, rows, packed);
+  image_.read(colors);
+  return colors;
 }
 
 }  // namespace isowave::core

@@ -57,6 +57,8 @@ class Shade {
   /// Returns  RGB
   /// Waits    yes
   Image8 operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples = 1);
+  /// The same as the kernel has it: RGBA, red in bits 0..7, A 0 where no ray of a pixel hits.
+  std::vector<uint> packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples);
 
  private:
   ocl::Device &device_;

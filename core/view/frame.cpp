@@ -58,6 +58,10 @@ FrameParams make_grid_params(const VolumeInfo &info) {
   frame.grid = make_grid(info);
   frame.place.blocks_x = frame.grid.blocks_x;
   frame.place.blocks_y = frame.grid.blocks_y;
+  const glm::vec3 origin(info.brick.first_voxel);
+  const glm::uvec3 &before = info.brick.before, &behind = info.brick.behind;
+  frame.brick = {origin.x, origin.y, origin.z, before.x, before.y,
+                 before.z, behind.x, behind.y, behind.z};
   frame.band = {.begin_t = 0, .end_t = std::numeric_limits<float>::infinity()};
   return frame;
 }
@@ -160,12 +164,15 @@ FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, Imag
   frame.surface.active_end_x = static_cast<int>(num_owning_blocks(info.dims.x));
   frame.surface.active_end_y = static_cast<int>(num_owning_blocks(info.dims.y));
   frame.surface.active_end_z = static_cast<int>(num_owning_blocks(info.dims.z));
-  frame.screen = make_screen_box(frame.grid, frame.view, frame.surface);
+  frame.screen = make_screen_box(frame);
   frame.schedule.max_spec_count = 1;
   return frame;
 }
 
-ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface) {
+ScreenBox make_screen_box(const FrameParams &frame) {
+  const BlockGrid &grid = frame.grid;
+  const View &view = frame.view;
+  const Surface &surface = frame.surface;
   if (surface.active_end_x == 0) return {};
   const glm::dvec2 size(view.width, view.height);
   const glm::dmat3 basis(glm::dvec3(view.fwd_x, view.fwd_y, view.fwd_z),
@@ -190,9 +197,11 @@ ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface
     const auto plane = [corner](int axis, int first, int behind, uint dim) {
       return (corner >> axis & 1) == 0 ? 4.0 * first : std::min(4.0 * behind, dim - 1.0);
     };
-    const glm::dvec3 at(plane(0, surface.active_begin_x, surface.active_end_x, grid.dims_x),
-                        plane(1, surface.active_begin_y, surface.active_end_y, grid.dims_y),
-                        plane(2, surface.active_begin_z, surface.active_end_z, grid.dims_z));
+    const glm::dvec3 within(plane(0, surface.active_begin_x, surface.active_end_x, grid.dims_x),
+                            plane(1, surface.active_begin_y, surface.active_end_y, grid.dims_y),
+                            plane(2, surface.active_begin_z, surface.active_end_z, grid.dims_z));
+    const glm::dvec3 at =
+        within + glm::dvec3(frame.brick.origin_x, frame.brick.origin_y, frame.brick.origin_z);
     const glm::dvec3 in_view = to_view * (at - eye);
     if (!(in_view.x > 1e-3 && margin.x < size.x &&
           margin.y < size.y)) {  // beside or behind the eye, or all rounded

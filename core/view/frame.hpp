@@ -63,8 +63,9 @@ FrameParams make_grid_params(const VolumeInfo &info);
 ///         check_image_size() refuses
 View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size);
 
-/// The rays, as make_ray() rounds them, that may meet the surface's active box.
-ScreenBox make_screen_box(const BlockGrid &grid, const View &view, const Surface &surface);
+/// The rays, as make_ray() rounds them, that may meet the surface's active box, by a frame's grid,
+/// brick, view and surface.
+ScreenBox make_screen_box(const FrameParams &frame);
 
 /// A frame in which the whole volume is active, without speculation and without a cache: what the
 /// scalar reference needs.

@@ -49,13 +49,21 @@ auto with_voxel_type(VoxelType type, const Use &use) {
   return use(double{});
 }
 
+/// Where a brick lies in the volume that it is a part of; the defaults: it is the whole.
+struct BrickOf {
+  glm::uvec3 first_voxel{0};  ///< of the brick, in the whole volume; multiples of 4
+  /// Layers of 4^3 blocks before and behind, along each axis, that belong to other bricks.
+  glm::uvec3 before{0}, behind{0};
+};
+
 /// The grid of a volume. Plain data; the defaults are a unit grid at the origin.
 struct VolumeInfo {
-  glm::uvec3 dims{0};                    ///< voxels along x, y, z
-  glm::dvec3 spacing{1.0};               ///< world units between voxels along each index axis, > 0
-  glm::dvec3 origin{0.0};                ///< world position of voxel (0,0,0)
-  glm::dmat3 direction{1.0};             ///< column a: unit world direction of index axis a
+  glm::uvec3 dims{0};         ///< voxels along x, y, z
+  glm::dvec3 spacing{1.0};    ///< world units between voxels along each index axis, > 0
+  glm::dvec3 origin{0.0};     ///< world position of voxel (0,0,0), of a brick the whole's
+  glm::dmat3 direction{1.0};  ///< column a: unit world direction of index axis a
   VoxelType type = VoxelType::kFloat32;  ///< as stored in the source file
+  BrickOf brick{};
 
   std::uint64_t num_voxels() const { return std::uint64_t(dims.x) * dims.y * dims.z; }
   /// World vector of one index step along each axis, as columns: direction * diag(spacing).

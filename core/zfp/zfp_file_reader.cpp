@@ -10,6 +10,7 @@
 #include "core/base/error.hpp"
 #include "core/io/byte_source.hpp"
 #include "core/volume/pyramid.hpp"
+#include "core/zfp/cut_blocks.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/libzfp.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
@@ -66,6 +67,16 @@ class ZfpFileReader {
   CompressedVolume take_info() {
     for (ZfpFileReader &level : levels_) volume_.coarser_levels.push_back(level.take_info());
     return std::move(volume_);
+  }
+
+  /// The blocks of a box.
+  CompressedVolume take_blocks(const BlockBox &box) {
+    volume_.file = file_;
+    volume_.file_first_bit = 8 * begin_ + header_bits_;
+    if (!volume_.is_indexed()) return cut_blocks(volume_, box);
+    if (!has_trailer_)
+      fail("a file of zfp's own tool does not say where its blocks begin: convert it first");
+    return cut_indexed(box);
   }
 
   /// keep: the index and bounds, and the file.
@@ -168,6 +179,33 @@ class ZfpFileReader {
     }
     volume_.indexed_bits = end;
     if (keep) volume_.index = index.finish();
+  }
+
+  /// Keeps the lengths of a row at a time.
+  CompressedVolume cut_indexed(const BlockBox &box) {
+    const glm::u64vec3 blocks(volume_.num_blocks()), from(box.begin), to(box.end);
+    BlockCutter cutter(volume_, box);
+    std::vector<std::uint32_t> lengths;
+    std::uint64_t block = 0, end = 0, first_bit = 0;
+    const bool is_whole =
+        inflate_lengths({file_, begin_ + stream_bytes_, layout_.index_bytes}, volume_.block_count(),
+                        [&](std::uint32_t bits) {
+                          const std::uint64_t x = block % blocks.x, y = block / blocks.x % blocks.y,
+                                              z = block / blocks.x / blocks.y;
+                          ++block;
+                          end += bits;
+                          if (end > volume_.indexed_bits || x < from.x || x >= to.x || y < from.y ||
+                              y >= to.y || z < from.z || z >= to.z)
+                            return;
+                          if (x == from.x) first_bit = end - bits;
+                          lengths.push_back(bits);
+                          if (x + 1 < to.x) return;
+                          cutter.add_row(first_bit, lengths);
+                          lengths.clear();
+                        });
+    if (!is_whole || end != volume_.indexed_bits)
+      fail("damaged: the lengths of its blocks are not those of its stream");
+    return cutter.finish();
   }
 
   void read_bounds(bool keep) {
@@ -341,6 +379,9 @@ CompressedVolume check_zfp_file(const fs::path &path) {
 }
 CompressedVolume read_zfp_file_info(const fs::path &path) {
   return ZfpFileReader(path).take_info();
+}
+CompressedVolume read_zfp_blocks(const fs::path &path, const BlockBox &box) {
+  return ZfpFileReader(path).take_blocks(box);
 }
 
 }  // namespace isowave::core

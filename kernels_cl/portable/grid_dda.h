@@ -19,6 +19,11 @@
 /// smaller moment has the larger magnitude, it is negative. The other one is then either not, and
 /// signs are exact, or so near that the same rest covers the difference of their magnitudes.
 /// Closer moments are in doubt, and two-float decides.
+///
+/// A brick counts its cells, blocks and macrocells from its own first voxel on, `origin`. Rays and
+/// planes stay where they are in the whole volume: moments, and so decisions, have the same bits in
+/// a brick as in the whole. Regions, and the planes at the ends of boxes (LastPlanes), are the
+/// brick's; planes as floats are the whole's. All are whole numbers below 2^24: sums are exact.
 #ifndef ISOWAVE_GRID_DDA_H
 #define ISOWAVE_GRID_DDA_H
 
@@ -43,6 +48,7 @@ typedef struct RayAxis {
   float o;         ///< eye, index space [voxels]
   float d;         ///< direction [voxels per t]; exactly 0 or at least ISO_SMALLEST_DIRECTION
   TwoFloat inv_d;  ///< 1 / d; unused where d = 0
+  float origin;    ///< where regions count from, see BrickPlace
 } RayAxis;
 
 typedef struct Ray {
@@ -81,6 +87,7 @@ ISO_INLINE RayAxis make_ray_axis(float o, float d) {
   a.d = fabs(d) < ISO_SMALLEST_DIRECTION ? 0.0f : d;
   a.inv_d.hi = a.d == 0.0f ? 0.0f : 1.0f / a.d;
   a.inv_d.lo = a.d == 0.0f ? 0.0f : fma(-a.inv_d.hi, a.d, 1.0f) / a.d;
+  a.origin = 0.0f;
   return a;
 }
 
@@ -103,10 +110,13 @@ ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   r.z = make_ray_axis(
       frame->view.eye_z,
       fma(v, frame->view.up_z, fma(u, frame->view.right_z, frame->view.fwd_z)) / length);
+  r.x.origin = frame->brick.origin_x;
+  r.y.origin = frame->brick.origin_y;
+  r.z.origin = frame->brick.origin_z;
   return r;
 }
 
-/// A ray of a list.
+/// A ray of a list, of a whole volume.
 ISO_INLINE Ray make_given_ray(GivenRay given) {
   Ray r;
   r.x = make_ray_axis(given.o_x, given.d_x);
@@ -143,11 +153,16 @@ ISO_INLINE TwoFloat plane_t(RayAxis a, float plane) {
   return t;
 }
 
+/// A plane of the brick as one of the whole volume.
+ISO_INLINE float whole_plane(RayAxis a, int plane) {
+  return (float)plane + a.origin;
+}
+
 /// Regions are slabs [size c, size (c+1)] of planes along one axis, cut at the domain's last plane.
 /// The plane by which the ray leaves region c. Exact: dims are far below 2^24.
 ISO_INLINE float far_plane(RayAxis a, int c, int size, int last_plane) {
   const int plane = a.d > 0.0f ? size * (c + 1) : size * c;
-  return (float)(plane > last_plane ? last_plane : plane);
+  return whole_plane(a, plane > last_plane ? last_plane : plane);
 }
 
 /// When it does: never, if it runs within the slab.
@@ -172,7 +187,7 @@ ISO_INLINE RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int size
   int plane = a.d > 0.0f ? size * c : size * (c + 1);
   RayEvent near;
   if (a.d == 0.0f) return e;
-  near = make_event(plane_t(a, (float)(plane > last_plane ? last_plane : plane)), axis);
+  near = make_event(plane_t(a, whole_plane(a, plane > last_plane ? last_plane : plane)), axis);
   return event_before(e, near) ? near : e;
 }
 
@@ -180,21 +195,23 @@ ISO_INLINE RayEvent later_entry(RayEvent e, RayAxis a, int axis, int c, int size
 /// != 0.
 ISO_INLINE int is_above(RayAxis a, int axis, int plane, RayEvent e) {
   const int crossed =
-      !event_before(e, make_event(plane_t(a, (float)plane), axis)); /* the event itself counts */
+      !event_before(e, make_event(plane_t(a, whole_plane(a, plane)), axis)); /* itself counts */
   return crossed == (a.d > 0.0f);
 }
 
 /// The region along one axis, within [first, last], that the ray is in just after event `e`. Where
 /// the position o + t d is further from a plane than its error, 2^-24 (|t d| + |o + t d|), it
-/// decides; else crossings are compared.
+/// decides; else crossings are compared. Near a brick, taking its origin off the position is exact:
+/// the difference is the smaller of the two, or at most as large as the origin and far from it.
 ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
   const float p = a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o);
   const float error = 0x1p-22f * (fabs(p) + fabs(a.o));
-  const int on_plane = axis == e.axis;                    /* on a whole number, then */
-  const float x = (on_plane ? rint(p) : p) / (float)size; /* size is a power of two: exact */
+  const int on_plane = axis == e.axis; /* on a whole number, then */
+  const float at = (on_plane ? rint(p) : p) - a.origin;
+  const float x = at / (float)size; /* size is a power of two: exact */
   const float region = on_plane && a.d < 0.0f ? ceil(x) - 1.0f : floor(x);
   int c = region <= (float)first ? first : (region >= (float)last ? last : (int)region);
-  int step = a.d != 0.0f && (on_plane ? error > 0.25f : fabs(p - (float)size * rint(x)) <= error);
+  int step = a.d != 0.0f && (on_plane ? error > 0.25f : fabs(at - (float)size * rint(x)) <= error);
   while (step != 0) {
     const int up = c < last && is_above(a, axis, size * (c + 1), e);
     step = up ? 1 : (c > first && !is_above(a, axis, size * c, e) ? -1 : 0);
@@ -206,7 +223,7 @@ ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int 
 /// Position along one axis at t, relative to the integer plane c: (o - c) + t d with the
 /// cancellation done exactly, clamped to the cell [0,1].
 ISO_INLINE float local_position(RayAxis a, TwoFloat t, int c) {
-  const float cf = (float)c;
+  const float cf = whole_plane(a, c);
   const float s = a.o - cf;
   const float sb = a.o - s;
   const float se = (a.o - (s + sb)) + (sb - cf);
@@ -314,7 +331,7 @@ ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
 
 /// One axis of walk_step().
 ISO_INLINE float next_far_plane(RayAxis a, float plane, int size, int last_plane) {
-  const float next = plane + (float)(a.d > 0.0f ? size : -size), end = (float)last_plane;
+  const float next = plane + (float)(a.d > 0.0f ? size : -size), end = whole_plane(a, last_plane);
   return next > end ? end : next;
 }
 
@@ -359,9 +376,9 @@ ISO_INLINE int leaves(const GridWalk *w, const GridWalk *larger, RayEvent exit) 
 ISO_INLINE int clip_to_slab(RayAxis a, int axis, int begin, int end, RayEvent *enter,
                             RayEvent *exit) {
   RayEvent near, far;
-  if (a.d == 0.0f) return a.o >= (float)begin && a.o <= (float)end;
-  near = make_event(plane_t(a, (float)(a.d > 0.0f ? begin : end)), axis);
-  far = make_event(plane_t(a, (float)(a.d > 0.0f ? end : begin)), axis);
+  if (a.d == 0.0f) return a.o >= whole_plane(a, begin) && a.o <= whole_plane(a, end);
+  near = make_event(plane_t(a, whole_plane(a, a.d > 0.0f ? begin : end)), axis);
+  far = make_event(plane_t(a, whole_plane(a, a.d > 0.0f ? end : begin)), axis);
   if (event_before(*enter, near)) *enter = near;
   if (event_before(far, *exit)) *exit = far;
   return 1;

@@ -16,6 +16,7 @@ ISO_PACKET_NAMESPACE_BEGIN
 /// where d = 0.
 typedef struct PacketAxis {
   Floats o, d, inv_hi, inv_lo, from, rate;
+  float origin;
   Mask up;      ///< d > 0
   Floats sign;  ///< 1 or -1, by up
 } PacketAxis;
@@ -123,9 +124,10 @@ ISO_INLINE Floats packet_refine(Cubics c, Floats lo, Floats hi, Mask lanes, int 
 
 // ---- Rays
 
-ISO_INLINE void make_packet_axis(Floats o, Floats d, PacketAxis *a) {
+ISO_INLINE void make_packet_axis(Floats o, Floats d, float origin, PacketAxis *a) {
   const Mask still = fabs(d) < ISO_SMALLEST_DIRECTION;
   a->o = o;
+  a->origin = origin;
   a->d = pick(still, floats(0.0f), d);
   a->inv_hi = pick(still, floats(0.0f), 1.0f / a->d);
   a->inv_lo = pick(still, floats(0.0f), fma(-a->inv_hi, a->d, floats(1.0f)) / a->d);
@@ -136,22 +138,24 @@ ISO_INLINE void make_packet_axis(Floats o, Floats d, PacketAxis *a) {
 }
 
 /// make_ray() of pixels (column, row), into axes [3].
-ISO_INLINE void make_packet_axes(const View *view, Ints column, Ints row, PacketAxis *axes) {
+ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row,
+                                 PacketAxis *axes) {
+  const View *view = &frame->view;
   const Floats u = to_floats(2 * column + 1 - (int)view->width) * view->pixel_scale;
   const Floats v = to_floats((int)view->height - 1 - 2 * row) * view->pixel_scale;
   const Floats length = sqrt(fma(u, u, fma(v, v, floats(1.0f))));
   make_packet_axis(
       floats(view->eye_x),
       fma(v, floats(view->up_x), fma(u, floats(view->right_x), floats(view->fwd_x))) / length,
-      &axes[0]);
+      frame->brick.origin_x, &axes[0]);
   make_packet_axis(
       floats(view->eye_y),
       fma(v, floats(view->up_y), fma(u, floats(view->right_y), floats(view->fwd_y))) / length,
-      &axes[1]);
+      frame->brick.origin_y, &axes[1]);
   make_packet_axis(
       floats(view->eye_z),
       fma(v, floats(view->up_z), fma(u, floats(view->right_z), floats(view->fwd_z))) / length,
-      &axes[2]);
+      frame->brick.origin_z, &axes[2]);
 }
 
 ISO_INLINE RayAxis axis_of_lane(const PacketAxis *a, int lane) {
@@ -160,6 +164,7 @@ ISO_INLINE RayAxis axis_of_lane(const PacketAxis *a, int lane) {
   axis.d = a->d[lane];
   axis.inv_d.hi = a->inv_hi[lane];
   axis.inv_d.lo = a->inv_lo[lane];
+  axis.origin = a->origin;
   return axis;
 }
 ISO_INLINE Ray ray_of_lane(const PacketRays *rays, int lane) {
@@ -262,11 +267,12 @@ ISO_INLINE Ints packet_locate(const PacketRays *r, int axis, int size, Floats t,
   const PacketAxis *a = &r->axis[axis];
   const Floats position = fma(t, a->d, a->o);
   const Mask on_plane = r->entered.axis == axis;
-  const Floats x = pick(on_plane, r->entered.plane, position) * (1.0f / (float)size);
+  const Floats at = pick(on_plane, r->entered.plane, position) - a->origin,
+               x = at * (1.0f / (float)size);
   const Floats region = pick(on_plane & ~a->up, -floor(-x) - 1.0f, floor(x));
   const Ints at_least = larger(to_ints(region), range.first),
              places = smaller(at_least, range.last);
-  const Floats distance = fabs(position - (float)size * rint(x)),
+  const Floats distance = fabs(at - (float)size * rint(x)),
                error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o));
   const Mask doubt = lanes & ~on_plane & (a->d != 0.0f) & (distance <= error);
   if (ISO_UNLIKELY(any(doubt))) return settle_places(r, axis, size, range, doubt, places);

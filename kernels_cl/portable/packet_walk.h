@@ -58,7 +58,7 @@ typedef struct FoundCells {
 
 typedef struct Packet {
   PacketRays rays;
-  Floats last[3];        ///< planes at the domain's end
+  Floats last[3];        ///< planes at the domain's end; as all planes here, the whole volume's
   Floats end[3];         ///< planes by which rays leave the macrocells of the active box
   PacketLevel level[3];  ///< ISO_CELLS to ISO_MACROCELLS
   Mask at[3];            ///< lanes that walk among the regions of this size
@@ -71,7 +71,7 @@ typedef struct PacketScene {
   const FrameParams *frame;
   const PacketField *field;
   int last[3];             ///< last_planes()
-  int begin[3], end[3];    ///< planes of the box of active blocks
+  int begin[3], end[3];    ///< planes of the box of active blocks, of the brick
   int first[3], final[3];  ///< its macrocells
   int columns, rows;       ///< macrocells of the volume along x and y
 } PacketScene;
@@ -107,12 +107,13 @@ ISO_INLINE Ints regions(const Packet *p, int level, int axis) {
   const Floats far = p->level[level].far[axis];
   /* Where the domain's end cuts the last region, the plane before its far one is still within it.
    */
-  const Floats within = pick(p->rays.axis[axis].up, far - 1.0f, far);
+  const Floats within = pick(p->rays.axis[axis].up, far - 1.0f, far) - p->rays.axis[axis].origin;
   return to_ints(floor(within * (1.0f / (float)ISO_REGION_SIZE(level))));
 }
 
 ISO_INLINE Floats far_planes(const Packet *p, int axis, int size, Ints region) {
-  const Floats near = to_floats(region * size), end = near + (float)size;
+  const Floats near = to_floats(region * size) + p->rays.axis[axis].origin,
+               end = near + (float)size;
   return pick(p->rays.axis[axis].up, smaller(end, p->last[axis]), near);
 }
 
@@ -135,7 +136,7 @@ ISO_INLINE void open_packet(Packet *p, const PacketScene *scene) {
     const Mask up = p->rays.axis[axis].up;
     const Ints stride = ints(axis == 0 ? 1 : (axis == 1 ? 4 : 16)),
                coarse = ints(axis == 0 ? 1 : scene->columns * (axis == 1 ? 1 : scene->rows));
-    p->last[axis] = floats((float)scene->last[axis]);
+    p->last[axis] = floats((float)scene->last[axis]) + p->rays.axis[axis].origin;
     p->end[axis] = far_planes(p, axis, ISO_REGION_SIZE(ISO_MACROCELLS),
                               pick(up, ints(scene->final[axis]), ints(scene->first[axis])));
     ISO_EACH_OF_3(level) {
@@ -177,8 +178,9 @@ ISO_RARE Entered settle_box_entries(const PacketRays *r, const PacketScene *scen
     settled.lanes[lane] = box_entry(&ray, begin, end, &enter) != 0 ? -1 : 0;
     settled.at.axis[lane] = enter.axis;
     if (enter.axis != ISO_AXIS_START) {
-      settled.at.plane[lane] = (float)(r->axis[enter.axis].up[lane] != 0 ? scene->begin[enter.axis]
-                                                                         : scene->end[enter.axis]);
+      settled.at.plane[lane] = whole_plane(
+          axis_of_lane(&r->axis[enter.axis], lane),
+          r->axis[enter.axis].up[lane] != 0 ? scene->begin[enter.axis] : scene->end[enter.axis]);
     }
   }
   return settled;
@@ -190,7 +192,8 @@ ISO_INLINE Mask enter_box(PacketRays *r, const PacketScene *scene) {
   Mask beside = ints(0);
   ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &r->axis[axis];
-    const Floats begin = floats((float)scene->begin[axis]), end = floats((float)scene->end[axis]),
+    const Floats begin = floats((float)scene->begin[axis] + a->origin),
+                 end = floats((float)scene->end[axis] + a->origin),
                  far_t = packet_float_t(a, pick(a->up, end, begin));
     near[axis] = pick(a->up, begin, end);
     exit = smaller(exit, far_t);
@@ -236,7 +239,8 @@ ISO_RARE Crossings settle_block_entries(const PacketRays *r, const PacketScene *
     settled.axis[lane] = axis;
     if (axis != ISO_AXIS_START) {
       const int near = 4 * (r->axis[axis].up[lane] != 0 ? at[axis] : at[axis] + 1);
-      settled.plane[lane] = (float)(near < scene->last[axis] ? near : scene->last[axis]);
+      settled.plane[lane] = whole_plane(axis_of_lane(&r->axis[axis], lane),
+                                        near < scene->last[axis] ? near : scene->last[axis]);
     }
   }
   return settled;
@@ -248,7 +252,7 @@ ISO_INLINE void begin_at_blocks(Packet *p, const PacketScene *scene, const Ints 
   Floats near[3];
   Ints place = ints(0), coarse = ints(0);
   ISO_EACH_OF_3(axis) {
-    const Floats begin = to_floats(4 * at[axis]), whole = begin + 4.0f,
+    const Floats begin = to_floats(4 * at[axis]) + p->rays.axis[axis].origin, whole = begin + 4.0f,
                  end = smaller(whole, p->last[axis]);
     const Mask up = p->rays.axis[axis].up;
     near[axis] = pick(up, begin, end);
@@ -385,7 +389,7 @@ typedef struct Segments {
   Floats w[8];        ///< corners minus the isovalue
 } Segments;
 
-/// Finds where rays are in their cells (cell [3]: its least corner).
+/// Finds where rays are in their cells (cell [3]: its least corner, in the whole volume).
 ISO_INLINE void find_segments(const PacketRays *r, Crossings enter, Crossings exit,
                               const Floats *cell, Segments *s) {
   s->enter = crossing_t(r, enter);
@@ -463,9 +467,15 @@ ISO_INLINE void keep_found(FoundCells *found, Brackets brackets, Crossings enter
   found->hi = pick(hit, brackets.hi, found->hi);
 }
 
-ISO_INLINE Mask load_cells(const PacketScene *scene, const Floats *cell, Mask lanes, Floats *w) {
+/// Cells, from their least corners in the whole volume.
+ISO_INLINE void cells_at(const Packet *p, const Floats *cell, Ints *at) {
+  ISO_EACH_OF_3(axis) at[axis] = to_ints(cell[axis] - p->rays.axis[axis].origin);
+}
+
+ISO_INLINE Mask load_cells(const Packet *p, const PacketScene *scene, const Floats *cell,
+                           Mask lanes, Floats *w) {
   Ints at[3];
-  ISO_EACH_OF_3(axis) at[axis] = to_ints(cell[axis]);
+  cells_at(p, cell, at);
   return load_corners(scene->field, scene->frame, at, lanes, w);
 }
 
@@ -475,7 +485,7 @@ ISO_INLINE void test_cells(Packet *p, const PacketScene *scene, Mask standing) {
   Floats cell[3];
   Segments s;
   ISO_EACH_OF_3(axis) cell[axis] = pick(p->rays.axis[axis].up, far[axis] - 1.0f, far[axis]);
-  const Mask waits = load_cells(scene, cell, standing, s.w), lanes = standing & ~waits;
+  const Mask waits = load_cells(p, scene, cell, standing, s.w), lanes = standing & ~waits;
   p->waits |= waits;
   const Exits exits = find_exits(&p->rays, far, lanes);
   Crossings exit;
@@ -513,7 +523,7 @@ ISO_INLINE void write_hits(const Packet *p, const PacketScene *scene, Ints ray_i
                            ISO_GLOBAL HitRecord *hits) {
   const FoundCells *found = &p->found;
   Segments at;
-  load_cells(scene, found->cell, found->lanes, at.w);
+  load_cells(p, scene, found->cell, found->lanes, at.w);
   find_segments(&p->rays, found->enter, found->exit, found->cell, &at);
   const Floats *w = at.w;
   const Floats s = packet_refine(packet_segment_cubic(w, at.a, at.b), found->lo, found->hi,
@@ -528,8 +538,9 @@ ISO_INLINE void write_hits(const Packet *p, const PacketScene *scene, Ints ray_i
                                     packet_lerp(x, w[6] - w[4], w[7] - w[5]));
   const Floats grad_z = packet_lerp(y, packet_lerp(x, w[4] - w[0], w[5] - w[1]),
                                     packet_lerp(x, w[6] - w[2], w[7] - w[3]));
-  const Ints cx = to_ints(found->cell[0]), cy = to_ints(found->cell[1]),
-             cz = to_ints(found->cell[2]);
+  Ints c[3];
+  cells_at(p, found->cell, c);
+  const Ints cx = c[0], cy = c[1], cz = c[2];
   ISO_EACH_LANE(lane, found->lanes) {
     ISO_GLOBAL HitRecord *hit = &hits[(uint)ray_ids[lane]];
     hit->t = t[lane];

@@ -97,7 +97,7 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
 }
 
 /// RGBA, 8 bits each, red in bits 0..7: of the pixel at a column and row of the picture, which has
-/// samples times samples rays of the frame.
+/// samples times samples rays of the frame. A is 255 where any of them hits, else 0.
 ///
 /// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h), of num_ambient; 0:
 /// there
@@ -107,7 +107,7 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadePa
                             ISO_GLOBAL const uchar *open_counts, uint num_ambient) {
   const float share = 1.0f / (float)(samples * samples);
   float r = 0.0f, g = 0.0f, b = 0.0f;
-  uint i;
+  uint i, a = 0;
   for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
     const uint ray_id =
         (row * samples + i / samples) * frame->view.width + column * samples + i % samples;
@@ -118,8 +118,9 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadePa
     r += color.r;
     g += color.g;
     b += color.b;
+    if (hits[ray_id].t != INFINITY) a = 255;
   }
-  return to_byte(r * share) | to_byte(g * share) << 8 | to_byte(b * share) << 16 | 0xFF000000u;
+  return to_byte(r * share) | to_byte(g * share) << 8 | to_byte(b * share) << 16 | a << 24;
 }
 
 ISO_NAMESPACE_END

@@ -93,6 +93,18 @@ typedef struct LevelPlace {
 } LevelPlace;
 ISO_CHECK_SIZE(LevelPlace, 20);
 
+/// A brick of a volume: a box of its blocks, drawn by itself, with the blocks around that its cells
+/// and normals have voxels of. All that a frame counts is the brick's own, blocks and cells from
+/// its first on; rays, eye and planes stay in the index space of the whole volume. All zero: a
+/// volume that is not cut.
+typedef struct BrickPlace {
+  float origin_x, origin_y, origin_z;  ///< the brick's first voxel, multiples of 4 [voxels]
+  /// Layers of its blocks, before and behind along each axis, that are other bricks': no surface is
+  /// looked for in them.
+  uint before_x, before_y, before_z, behind_x, behind_y, behind_z;
+} BrickPlace;
+ISO_CHECK_SIZE(BrickPlace, 36);
+
 /// The camera and the rays of its picture.
 typedef struct View {
   uint width, height;         ///< rays: those of the image, or several for each of its pixels along
@@ -141,13 +153,14 @@ ISO_CHECK_SIZE(Schedule, 12);
 typedef struct FrameParams {
   BlockGrid grid;
   LevelPlace place;  ///< only read where ISO_LEVELS is 1
+  BrickPlace brick;
   View view;
   Band band;  ///< only read where ISO_LEVELS is 1
   Surface surface;
   ScreenBox screen;
   Schedule schedule;
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 176);
+ISO_CHECK_SIZE(FrameParams, 212);
 
 #define ISO_NO_HIT 64u  ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED \

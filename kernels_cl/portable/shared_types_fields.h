@@ -11,6 +11,9 @@
   X(grid.blocks_x) X(grid.blocks_y) X(grid.blocks_z)                                           \
   X(place.blocks_x) X(place.blocks_y) X(place.begin_z)                                         \
   X(place.ranges_begin) X(place.masks_begin)                                                   \
+  X(brick.origin_x) X(brick.origin_y) X(brick.origin_z)                                        \
+  X(brick.before_x) X(brick.before_y) X(brick.before_z)                                        \
+  X(brick.behind_x) X(brick.behind_y) X(brick.behind_z)                                        \
   X(view.width) X(view.height)                                                                 \
   X(view.eye_x) X(view.eye_y) X(view.eye_z) X(view.fwd_x) X(view.fwd_y) X(view.fwd_z)          \
   X(view.right_x) X(view.right_y) X(view.right_z) X(view.up_x) X(view.up_y) X(view.up_z)       \

@@ -21,10 +21,10 @@ typedef struct LastLayer {
 ISO_INLINE LastLayer last_layer(RayAxis a, int axis, int plane, int last_plane, RayEvent enter,
                                 RayEvent exit) {
   LastLayer layer;
-  layer.plane = make_event(plane_t(a, (float)plane), axis);
+  layer.plane = make_event(plane_t(a, whole_plane(a, plane)), axis);
   layer.after = a.d > 0.0f;
   layer.always = a.d == 0.0f;
-  layer.crossed = layer.always  ? plane < last_plane && a.o >= (float)plane
+  layer.crossed = layer.always  ? plane < last_plane && a.o >= whole_plane(a, plane)
                   : layer.after ? event_before(layer.plane, exit)
                                 : event_before(enter, layer.plane);
   return layer;

@@ -43,13 +43,9 @@ Views read_views(const FrameOptions &options) {
   return views;
 }
 
-Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
-                 const Views &views, ocl::Device *device) {
-  Scene scene;
+std::vector<Camera> make_cameras(const std::string &path, const VolumeInfo &info,
+                                 const FrameOptions &options, const Views &views) {
   const std::optional<CameraFile> &file = views.file;
-  scene.size = views.size;
-  scene.volume = load_volume(path, to_overrides(volume), options.compression, device);
-  const VolumeInfo &info = scene.volume.info;
   if (file && file->dims && *file->dims != info.dims) {
     throw Error("{} is for a volume of {}, but {} has {}", options.cameras, dims_text(*file->dims),
                 path, dims_text(info.dims));
@@ -60,7 +56,15 @@ Scene load_scene(const std::string &path, const VolumeOptions &volume, const Fra
                 options.cameras, file->spacing->x, file->spacing->y, file->spacing->z, path,
                 info.spacing.x, info.spacing.y, info.spacing.z);
   }
-  scene.cameras = file ? file->cameras : orbit_cameras(info, views.count);
+  return file ? file->cameras : orbit_cameras(info, views.count);
+}
+
+Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
+                 const Views &views, ocl::Device *device) {
+  Scene scene;
+  scene.size = views.size;
+  scene.volume = load_volume(path, to_overrides(volume), options.compression, device);
+  scene.cameras = make_cameras(path, scene.volume.info, options, views);
   return scene;
 }
 

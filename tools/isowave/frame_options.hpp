@@ -50,6 +50,11 @@ struct Scene {
   ImageSize size;
 };
 
+/// The views of a volume of that grid, of which `path` is the name. Throws Error when a camera file
+/// is for another volume.
+std::vector<Camera> make_cameras(const std::string &path, const VolumeInfo &info,
+                                 const FrameOptions &options, const Views &views);
+
 /// Reads or compresses the volume and makes its cameras. Throws Error in one line, also when a
 /// camera file is for another volume. Where a device is given, it compresses the volume.
 Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,

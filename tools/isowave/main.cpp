@@ -4,11 +4,25 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/base/error.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/program.hpp"
+
+namespace {
+
+/// All processes would do the same, and write the same files.
+[[noreturn]] void refuse_team(const CLI::App &command) {
+  throw isowave::core::Error(
+      "mpirun has started {} processes, and {} is for one: only render is shared",
+      isowave::core::tools::MpiJob::team()->size(), command.get_name());
+}
+
+}  // namespace
 
 int main(int argc, char **argv) {
   using namespace isowave::core::tools;
+  MpiJob job(&argc, &argv);
   CLI::App app{
       "Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on "
       "OpenCL devices."};
@@ -32,5 +46,11 @@ int main(int argc, char **argv) {
   for (const auto &[status, meaning] : kExitStatuses)
     statuses += fmt::format("  {:<3} {}\n", status, meaning);
   app.footer(statuses);
-  return run_program(app, argc, argv);
+  if (MpiJob::team() != nullptr) {
+    for (CLI::App *command : app.get_subcommands({})) {
+      if (command->get_name() == "render") continue;
+      command->preparse_callback([command](std::size_t) { refuse_team(*command); });
+    }
+  }
+  return job.finish(run_program(app, argc, argv));
 }

@@ -13,18 +13,23 @@
 
 #include "core/accuracy/choose_detail.hpp"
 #include "core/base/error.hpp"
+#include "core/bricks/brick_renderer.hpp"
+#include "core/bricks/brick_volume.hpp"
 #include "core/io/npy.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/render/time_budget.hpp"
 #include "core/view/detail.hpp"
+#include "core/volume/range_thresholds.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/help_groups.hpp"
+#include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
+#include "tools/isowave/ranks.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -52,6 +57,7 @@ struct RenderArgs {
   double voxel_pixels = 0;                  ///< of whole frames
   std::string normals = "smooth";
   std::uint32_t ambient_rays = 0;
+  std::string bricks;  ///< XxYxZ
 };
 
 /// "#RRGGBB" -> [0,1]^3.
@@ -351,8 +357,7 @@ Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
   return outputs;
 }
 
-std::unique_ptr<ocl::Device> open_device(const RenderArgs &options) {
-  const ocl::DeviceInfo info = ocl::choose_device(options.device);
+std::unique_ptr<ocl::Device> open_device(const RenderArgs &options, const ocl::DeviceInfo &info) {
   fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
              info.name, info.platform);
   if (!info.capabilities.correctly_rounded_divide) {
@@ -441,7 +446,159 @@ std::string default_image(const RenderArgs &options, std::size_t num_views) {
   return fmt::format("{}_iso{}.png", stem, options.frame.isovalues.front());
 }
 
+void print_picture_name(const RenderArgs &options, std::size_t num_views) {
+  fmt::print("wrote {}; --output names another file\n",
+             num_views * options.frame.isovalues.size() == 1
+                 ? options.image
+                 : fmt::format("{}_isoV_viewK.png", volume_stem(options.input)));
+}
+
+/// What bricks cannot do, since it goes on in other bricks, or is not put together.
+void check_brick_options(const CLI::App &command, const Team &team) {
+  refuse_options(command,
+                 {"--reference", "--voxel-pixels", "--levels", "--max-surface-error", "--error-map",
+                  "--time-budget", "--refined", "--ambient", "--progress-dir", "--verbose"},
+                 fmt::format("not of a volume that {} processes draw together", team.size()));
+}
+
+/// All ranks: writes what rank 0 has got.
+void write_brick_outputs(const RenderArgs &options, const Scene &scene,
+                         const Appearance &appearance, BrickRenderer &renderer, Team &team,
+                         float isovalue, std::size_t view) {
+  const std::size_t num_views = scene.cameras.size();
+  Image8 image;
+  std::vector<float> depth;
+  if (!options.depth.empty() || options.image.empty()) depth = renderer.depth();
+  if (!options.image.empty()) image = renderer.shade(appearance);
+  together(team, [&] {
+    if (team.rank() != 0) return;
+    if (!options.image.empty())
+      write_png(image, frame_path(options.image, num_views, options, isovalue, view));
+    if (!options.depth.empty()) {
+      write_npy({scene.size.ray_columns(), scene.size.ray_rows(), std::move(depth)},
+                frame_path(options.depth, num_views, options, isovalue, view));
+    }
+  });
+}
+
+/// Draws a volume's bricks, one at each rank. frames: of the whole, at rank 0; own: this rank's.
+void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appearance &appearance,
+                       BrickRenderer &renderer, Team &team, nlohmann::ordered_json &frames,
+                       nlohmann::ordered_json &own) {
+  FrameRequest base;
+  base.voxel_error = options.frame.voxel_error;
+  base.normals = normals_from_string(options.normals);
+  for (const float isovalue : options.frame.isovalues) {
+    for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
+      const Camera &camera = scene.cameras[view];
+      const auto begin = Clock::now();
+      const double composed_before = renderer.composition().ms;
+      FrameStats stats;
+      together(team, [&] {
+        FrameRequest request = seen_from(camera, base);
+        request.isovalue = isovalue;
+        stats = renderer.render(request);
+      });
+      write_brick_outputs(options, scene, appearance, renderer, team, isovalue, view);
+      own.push_back(frame_json(isovalue, view, camera, stats));
+      const double ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+      fmt::print("isovalue {}, view {}: {} rays hit, {} bricks, {:.1f} ms\n", isovalue, view,
+                 with_commas(renderer.num_hits()), team.size(), ms);
+      frames.push_back({{"isovalue", isovalue},
+                        {"view", view},
+                        {"rays_hit", renderer.num_hits()},
+                        {"written_ms", ms},
+                        {"composition_ms", renderer.composition().ms - composed_before}});
+    }
+  }
+}
+
+void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
+  agree_on(team, "version", program_name());
+  agree_on(team, "command line", MpiJob::command_line());
+  check_brick_options(command, team);
+  const bool names_picture = !asks_for_output(options);
+  const Views views = read_views(options.frame);
+  if (names_picture) options.image = default_image(options, views.count);
+  check_options(command, options);
+  Appearance appearance;
+  appearance.surface = parse_color("--color", options.color);
+  appearance.background = parse_color("--background", options.background);
+  const RawOverrides overrides = to_overrides(options.volume);
+  std::unique_ptr<ocl::Device> device;
+  VolumeInfo whole;
+  together(team, [&] {
+    if (team.rank() == 0) check_outputs(options, views.count);
+    device = open_device(options, choose_local_device(options.device, MpiJob::local_rank()));
+    whole = read_volume_info(options.input, overrides);
+  });
+  agree_on(team, "volume", fingerprint(options.input, whole));
+  const Cuts cuts = cut_for(team, whole, options.bricks);
+  const BlockBox &own = cuts.bricks()[team.rank()];
+  Scene scene;
+  scene.size = views.size;
+  RendererOptions &wanted = options.renderer_flags.values;
+  wanted.with_shading = !options.image.empty();
+  if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
+  std::vector<float> samples;
+  together(team, [&] {
+    scene.cameras = make_cameras(options.input, whole, options.frame, views);
+    scene.volume =
+        load_brick(options.input, overrides, options.frame.compression, whole, own, device.get());
+    samples = range_samples(scene.volume, whole);
+    options.renderer = to_renderer_options(options.renderer_flags, scene.size);
+  });
+  options.renderer.range_thresholds = range_thresholds(gather_values(team, samples));
+  std::optional<BrickRenderer> renderer;
+  together(team,
+           [&] { renderer.emplace(*device, scene.volume, options.renderer, cuts, whole, team); });
+  if (options.frame.orbit == 0 && options.frame.cameras.empty()) {
+    scene.cameras = {surface_camera(
+        whole, gather_box(team, scene.volume.info, renderer->surface_box(options.frame.isovalues)),
+        scene.size)};
+  }
+  nlohmann::ordered_json frames = nlohmann::ordered_json::array(), own_frames = frames;
+  draw_brick_frames(options, scene, appearance, *renderer, team, frames, own_frames);
+  const CompositionStats &composition = renderer->composition();
+  const nlohmann::ordered_json of_rank = {{"rank", team.rank()},
+                                          {"device", device_json(device->info())},
+                                          {"brick",
+                                           {{"begin", {own.begin.x, own.begin.y, own.begin.z}},
+                                            {"end", {own.end.x, own.end.y, own.end.z}}}},
+                                          {"volume", volume_json(options, scene.volume)},
+                                          {"setup_ms", renderer->renderer().setup_ms()},
+                                          {"compile_ms", device->compile_ms()},
+                                          {"composition",
+                                           {{"reductions", composition.reductions},
+                                            {"bytes", composition.bytes},
+                                            {"ms", composition.ms}}},
+                                          {"frames", own_frames},
+                                          {"memory", memory_json(device->ledger())}};
+  const std::vector<std::string> of_ranks = team.all_gather(json_text(of_rank));
+  together(team, [&] {
+    if (team.rank() != 0 || options.stats.empty()) return;
+    RenderArgs shown = options;
+    shown.renderer = renderer->renderer().options();
+    nlohmann::ordered_json ranks = nlohmann::ordered_json::array();
+    for (const std::string &text : of_ranks) ranks.push_back(nlohmann::ordered_json::parse(text));
+    write_json({{"program", program_name()},
+                {"volume",
+                 {{"file", options.input},
+                  {"dims", {whole.dims.x, whole.dims.y, whole.dims.z}},
+                  {"spacing", {whole.spacing.x, whole.spacing.y, whole.spacing.z}},
+                  {"type", to_string(whole.type)},
+                  {"blocks", num_blocks({glm::ivec3(0), blocks_along(whole)})}}},
+                {"options", options_json(shown, scene)},
+                {"frames", frames},
+                {"ranks", ranks}},
+               options.stats);
+  });
+  if (names_picture) print_picture_name(options, views.count);
+}
+
 void run_render(const CLI::App &command, RenderArgs options) {
+  if (Team *team = MpiJob::team()) return render_bricks(command, std::move(options), *team);
+  refuse_options(command, {"--bricks"}, "one process draws the whole: start more by mpirun");
   options.voxel_pixels = options.renderer_flags.voxel_pixels;
   const bool names_picture = !asks_for_output(options);
   const Views views = read_views(options.frame);
@@ -451,7 +608,8 @@ void run_render(const CLI::App &command, RenderArgs options) {
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
   const Outputs outputs = check_outputs(options, views.count);
-  const std::unique_ptr<ocl::Device> device = options.reference ? nullptr : open_device(options);
+  const std::unique_ptr<ocl::Device> device =
+      options.reference ? nullptr : open_device(options, ocl::choose_device(options.device));
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
   RendererOptions &wanted = options.renderer_flags.values;
@@ -494,12 +652,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
                double(device->ledger().peak()) / (1 << 20));
   }
   if (!options.stats.empty()) write_json(document, options.stats);
-  if (names_picture) {
-    fmt::print("wrote {}; --output names another file\n",
-               views.count * options.frame.isovalues.size() == 1
-                   ? options.image
-                   : fmt::format("{}_isoV_viewK.png", volume_stem(options.input)));
-  }
+  if (names_picture) print_picture_name(options, views.count);
 }
 
 }  // namespace
@@ -515,6 +668,7 @@ void group_render_options(CLI::App &command) {
                 {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--error-map",
                  "--time-budget", "--refined"});
   group_options(command, "Memory", {"--memory-budget", "--cache-slots", "--stream", "--verbose"});
+  group_options(command, "Several processes, by mpirun", {"--bricks"});
   group_options(command, "Further outputs",
                 {"--depth", "--stats", "--no-stage-times", "--progress-dir"});
   group_options(command, "For researchers",
@@ -537,7 +691,10 @@ void add_render(CLI::App &app) {
       ->check(CLI::Range(1u, ImageSize::kMaxSamples))
       ->capture_default_str();
   command->add_option("--device", options->device,
-                      "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
+                      "device: index, cpu, gpu, or a part of its name (see `isowave devices`); "
+                      "several, with commas: of the first process of a host, the second, ...");
+  command->add_option("--bricks", options->bricks,
+                      "XxYxZ: how many along each axis, one for each process [all alike large]");
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();

@@ -9,7 +9,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
-#include "core/io/open_volume.hpp"
+#include "core/bricks/brick_volume.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
@@ -122,6 +122,30 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   Storage storage = to_storage(compression);
   storage.device = device;
   return compress_volume([&] { return open_any_volume(path, overrides, device); }, path, storage);
+}
+
+VolumeInfo read_volume_info(const std::string &path, const RawOverrides &overrides) {
+  if (!is_zfp_name(path)) return open_any_volume(path, overrides)->info();
+  if (overrides.dims || overrides.type) throw Error("{}: dims and type are for raw files", path);
+  VolumeInfo info = read_zfp_file_info(path).info;
+  if (overrides.spacing) info.spacing = *overrides.spacing;
+  check_volume_info(info, path);
+  return info;
+}
+
+CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
+                            const CompressionOptions &compression, const VolumeInfo &info,
+                            const BlockBox &own, ocl::Device *device) {
+  check_drawable(brick_info(info, own), path);
+  if (is_zfp_name(path)) {
+    refuse_compression(compression, path);
+    CompressedVolume volume = read_brick(path, own);
+    set_spacing(volume, info.spacing);
+    return volume;
+  }
+  Storage storage = to_storage(compression);
+  storage.device = device;
+  return compress_brick([&] { return open_any_volume(path, overrides); }, path, storage, own);
 }
 
 std::string volume_stem(const std::string &path) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/sources/load_volume.hpp"
+#include "core/volume/block_box.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
@@ -70,6 +71,14 @@ inline constexpr const char *kVolumeHelp =
 /// stage times. Throws Error also on what cannot be drawn.
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device = nullptr);
+
+/// The grid of what load_volume() would load. Throws Error as that does.
+VolumeInfo read_volume_info(const std::string &path, const RawOverrides &overrides);
+
+/// A brick of what load_volume() would load. info: what read_volume_info() says of it.
+CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
+                            const CompressionOptions &compression, const VolumeInfo &info,
+                            const BlockBox &own, ocl::Device *device);
 
 /// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with
 /// the last.

@@ -1,0 +1,74 @@
+#pragma once
+// Draws one brick of a volume, and with the team that draws the others the picture of the whole:
+// at rank 0, with the bits that one renderer of all would draw.
+
+#include <vector>
+
+#include "core/bricks/compose.hpp"
+#include "core/bricks/cuts.hpp"
+#include "core/bricks/team.hpp"
+#include "core/render/renderer.hpp"
+
+namespace isowave::core {
+
+/// What put pictures together so far, at this rank.
+struct CompositionStats {
+  std::uint64_t reductions = 0, bytes = 0;  ///< words that this rank gave
+  double ms = 0;                            ///< wall clock, with the wait for slower ranks
+};
+
+/// All ranks make the same calls in the same order. Not thread-safe.
+class BrickRenderer {
+ public:
+  /// cuts    as many bricks as ranks; each rank draws that of its number
+  /// volume  it: see brick_volume.hpp
+  /// whole   the grid of the whole volume
+  /// Throws  Error: as Renderer, at the rank that it is about
+  BrickRenderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
+                const Cuts &cuts, const VolumeInfo &whole, Team &team);
+
+  /// Draws this rank's brick.
+  ///
+  /// Returns  what that took
+  /// Throws   Error: as Renderer::render(); levels of detail, bounds and ambient rays, which go on
+  ///          in other bricks
+  FrameStats render(const FrameRequest &request);
+
+  // Of the last frame, all bricks together. Rank 0 has the picture, the others nothing.
+
+  /// Of one ray a pixel, colours are put together; of more, hits, which rank 0 shades.
+  Image8 shade(const Appearance &appearance);
+  /// Depths of the rays.
+  std::vector<float> depth();
+  /// Hits without the ids of their blocks.
+  std::vector<HitRecord> hits();
+  /// Rays that hit, of what was put together last.
+  std::uint64_t num_hits() const { return num_hits_; }
+
+  /// Of this rank's brick: see Renderer::surface_box().
+  std::optional<BlockBox> surface_box(std::span<const float> isovalues) {
+    return renderer_.surface_box(isovalues);
+  }
+  const Renderer &renderer() const { return renderer_; }
+  const CompositionStats &composition() const { return composition_; }
+
+ private:
+  using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
+
+  /// In slabs: while one is on its way, the next is made.
+  void compose(const MakeWords &make_words);
+  void compose_field(HitField field, std::span<HitRecord> hits);
+  std::span<const HitRecord> own_hits();
+
+  Renderer renderer_;
+  const Cuts &cuts_;
+  VolumeInfo whole_;
+  Team &team_;
+  std::uint32_t place_ = 0;           ///< of the brick, seen from the frame's eye
+  std::vector<HitRecord> own_hits_;   ///< empty: not read yet
+  std::vector<std::uint64_t> words_;  ///< [ray]; at rank 0 the smallest ones
+  std::uint64_t num_hits_ = 0;
+  CompositionStats composition_;
+};
+
+}  // namespace isowave::core

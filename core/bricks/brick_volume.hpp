@@ -1,0 +1,51 @@
+#pragma once
+// Bricks as volumes that a renderer draws: their own blocks, and around them one layer of others'.
+//
+// Dual cells have voxels of the blocks behind, and smooth normals of those before, too. Where the
+// whole volume ends, so does a brick. So its hits, and their normals, have the bits of the whole.
+
+#include <memory>
+#include <vector>
+
+#include "core/sources/load_volume.hpp"
+#include "core/volume/block_box.hpp"
+#include "core/volume/volume.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+/// Along each axis.
+inline glm::ivec3 blocks_along(const VolumeInfo &info) {
+  return glm::ivec3((info.dims + 3u) / 4u);
+}
+
+/// What a brick keeps of a volume of so many blocks: its own, and one layer around.
+BlockBox kept_blocks(const glm::ivec3 &blocks, const BlockBox &own);
+
+/// The grid of a brick. Rays of its frames are those of the whole volume.
+///
+/// whole  not a brick itself
+/// own    not empty, within the whole
+VolumeInfo brick_info(const VolumeInfo &whole, const BlockBox &own);
+
+/// A brick of a volume, without levels of detail.
+///
+/// Throws  Error: the file that the volume is in is shorter than it was
+CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own);
+
+/// A brick of a `.zfp` file, of which only its blocks are read: see read_zfp_blocks().
+CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own);
+
+/// A brick of any other volume, compressed as the whole would be. Reads the layers of voxels that
+/// the brick has part of; where an error is bounded, before that the whole volume.
+///
+/// Throws  Error as compress_volume()
+CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
+                                const Storage &storage, const BlockBox &own);
+
+/// What the whole volume's thresholds of value ranges are made of (range_thresholds()), as far as
+/// it is in the brick's own blocks: together, the bricks give what the whole would. Of volumes of
+/// more blocks than have ids, a sample of each brick's own.
+std::vector<float> range_samples(const CompressedVolume &brick, const VolumeInfo &whole);
+
+}  // namespace isowave::core

@@ -1,0 +1,56 @@
+#include "core/bricks/compose.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace isowave::core {
+
+namespace {
+
+using HitWords = std::array<std::uint32_t, sizeof(HitRecord) / sizeof(std::uint32_t)>;
+
+std::uint64_t make_word(const HitRecord &hit, std::uint32_t place, std::uint32_t what) {
+  return std::uint64_t{hit.block_id == ISO_INVALID_ID ? kNoPlace : place} << 32 | what;
+}
+
+}  // namespace
+
+void field_words(std::span<const HitRecord> hits, HitField field, std::uint32_t place,
+                 std::span<std::uint64_t> words) {
+  std::ranges::transform(hits, words.begin(), [&](const HitRecord &hit) {
+    return make_word(hit, place, std::bit_cast<HitWords>(hit)[static_cast<std::size_t>(field)]);
+  });
+}
+
+void set_field(std::span<const std::uint64_t> words, HitField field, std::span<HitRecord> hits) {
+  for (std::size_t ray = 0; ray < hits.size(); ++ray) {
+    auto fields = std::bit_cast<HitWords>(hits[ray]);
+    fields[static_cast<std::size_t>(field)] = static_cast<std::uint32_t>(words[ray]);
+    hits[ray] = std::bit_cast<HitRecord>(fields);
+  }
+}
+
+void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
+                 std::span<std::uint64_t> words) {
+  std::ranges::transform(colors, words.begin(), [place](std::uint32_t color) {
+    return std::uint64_t{color >> 24 == 0 ? kNoPlace : place} << 32 | (color & 0xFFFFFFu);
+  });
+}
+
+Image8 image_of(std::span<const std::uint64_t> words, std::uint32_t width, std::uint32_t height) {
+  Image8 image{width, height, 3, {}};
+  image.pixels.reserve(3 * words.size());
+  for (const std::uint64_t word : words) {
+    for (int channel = 0; channel < 3; ++channel)
+      image.pixels.push_back(static_cast<std::uint8_t>(word >> (8 * channel)));
+  }
+  return image;
+}
+
+void keep_first(std::span<std::uint64_t> words, std::span<const std::uint64_t> others) {
+  std::ranges::transform(words, others, words.begin(),
+                         [](std::uint64_t a, std::uint64_t b) { return std::min(a, b); });
+}
+
+}  // namespace isowave::core

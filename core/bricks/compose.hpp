@@ -1,0 +1,42 @@
+#pragma once
+// Pictures of bricks put together: of each ray, the hit of the first brick that has one, in the
+// order of Cuts::order_from(). No distance is compared.
+//
+// What is put together is a word of 64 bits for each ray: above, the place of the brick in that
+// order, below, 32 bits of what its ray has hit. So the smallest word wins, which is what
+// MPI_MIN finds.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/io/png.hpp"
+#include "kernels_cl/portable/shared_types.h"
+
+namespace isowave::core {
+
+/// Instead of a brick's place: no brick has a hit of this ray.
+inline constexpr std::uint32_t kNoPlace = 0xFFFFFFFF;
+
+/// Fields of HitRecord, each of 32 bits. block_id is not among them: ids are a brick's own.
+enum class HitField { kT = 0, kCell = 2, kX, kY, kZ, kGradX, kGradY, kGradZ };
+inline constexpr HitField kHitFields[] = {HitField::kT,     HitField::kCell, HitField::kX,
+                                          HitField::kY,     HitField::kZ,    HitField::kGradX,
+                                          HitField::kGradY, HitField::kGradZ};
+
+/// words [ray]: one field of a brick's hits.
+void field_words(std::span<const HitRecord> hits, HitField field, std::uint32_t place,
+                 std::span<std::uint64_t> words);
+/// Gives hits [ray] the field that won.
+void set_field(std::span<const std::uint64_t> words, HitField field, std::span<HitRecord> hits);
+
+/// words [ray]: a brick's picture, of one ray a pixel, as Renderer::shade_packed() has it.
+void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
+                 std::span<std::uint64_t> words);
+/// The picture that won, RGB.
+Image8 image_of(std::span<const std::uint64_t> words, std::uint32_t width, std::uint32_t height);
+
+/// What MPI_MIN does: keeps the smaller of both words of each ray, in `words`.
+void keep_first(std::span<std::uint64_t> words, std::span<const std::uint64_t> others);
+
+}  // namespace isowave::core

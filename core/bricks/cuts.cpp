@@ -1,0 +1,155 @@
+#include "core/bricks/cuts.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "core/base/error.hpp"
+#include "core/base/text.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+/// Of sides of the same length the last: rows and layers of a file, or of a generator, stay whole.
+int longest_side(const BlockBox &box) {
+  const glm::ivec3 size = box.end - box.begin;
+  const int xy = size.x > size.y ? 0 : 1;
+  return size[xy] > size.z ? xy : 2;
+}
+
+BlockBox part_below(BlockBox box, int axis, int plane) {
+  box.end[axis] = plane;
+  return box;
+}
+
+BlockBox part_above(BlockBox box, int axis, int plane) {
+  box.begin[axis] = plane;
+  return box;
+}
+
+}  // namespace
+
+std::uint64_t num_blocks(const BlockBox &box) {
+  const glm::u64vec3 size(box.end - box.begin);
+  return size.x * size.y * size.z;
+}
+
+Cuts::Cuts(const glm::ivec3 &blocks, std::uint32_t count, const BoxWork &work) {
+  const BlockBox all{glm::ivec3(0), blocks};
+  if (count == 0 || count > num_blocks(all))
+    throw Error("{} blocks cannot be cut into {} bricks", num_blocks(all), count);
+  root_ = cut(all, count, work);
+}
+
+Cuts::Cuts(const glm::ivec3 &blocks, const glm::uvec3 &bricks) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (bricks[axis] == 0 || bricks[axis] > static_cast<std::uint32_t>(blocks[axis])) {
+      throw Error("{}x{}x{} bricks cannot be cut from {}x{}x{} blocks", bricks.x, bricks.y,
+                  bricks.z, blocks.x, blocks.y, blocks.z);
+    }
+  }
+  bricks_.resize(std::size_t{bricks.x} * bricks.y * bricks.z);
+  root_ = cut_grid({glm::ivec3(0), blocks}, glm::uvec3(0), bricks, bricks);
+}
+
+std::uint32_t Cuts::add_brick(const BlockBox &box) {
+  nodes_.push_back({.brick = static_cast<std::uint32_t>(bricks_.size())});
+  bricks_.push_back(box);
+  return static_cast<std::uint32_t>(nodes_.size() - 1);
+}
+
+std::uint32_t Cuts::cut(const BlockBox &box, std::uint32_t count, const BoxWork &work) {
+  if (count == 1) return add_brick(box);
+  const int axis = longest_side(box);
+  const int begin = box.begin[axis], end = box.end[axis];
+  const std::uint64_t layer = num_blocks(box) / static_cast<std::uint64_t>(end - begin);
+  std::uint64_t num_below = count / 2;
+  // The first plane with at least its share of work below, or the one before if that is nearer.
+  const auto share = [&](int plane) {
+    return static_cast<double>(work(part_below(box, axis, plane))) * count;
+  };
+  const double wanted = static_cast<double>(work(box)) * static_cast<double>(num_below);
+  int low = begin, high = end;
+  while (high - low > 1) {
+    const int middle = low + (high - low) / 2;
+    (share(middle) < wanted ? low : high) = middle;
+  }
+  int plane = share(high) - wanted < wanted - share(low) ? high : low;
+  // Each brick needs a block.
+  const auto layers = [layer](std::uint64_t blocks) {
+    return static_cast<int>((blocks + layer - 1) / layer);
+  };
+  plane = std::min(std::max(plane, begin + layers(num_below)), end - layers(count - num_below));
+  plane = std::clamp(plane, begin + 1, end - 1);
+  const std::uint64_t room_below = layer * static_cast<std::uint64_t>(plane - begin),
+                      room_above = layer * static_cast<std::uint64_t>(end - plane);
+  num_below = std::min(num_below, room_below);
+  if (count - num_below > room_above) num_below = count - room_above;
+  const std::uint32_t first = cut(part_below(box, axis, plane), std::uint32_t(num_below), work),
+                      second =
+                          cut(part_above(box, axis, plane), std::uint32_t(count - num_below), work);
+  nodes_.push_back({.axis = axis, .plane = plane, .below = first, .above = second});
+  return static_cast<std::uint32_t>(nodes_.size() - 1);
+}
+
+std::uint32_t Cuts::cut_grid(const BlockBox &box, const glm::uvec3 &first, const glm::uvec3 &bricks,
+                             const glm::uvec3 &all) {
+  const int axis = longest_side({glm::ivec3(0), glm::ivec3(bricks)});
+  const std::uint32_t half = bricks[axis] / 2;
+  if (half == 0) {
+    const std::size_t brick =
+        first.x + std::size_t{all.x} * (first.y + std::size_t{all.y} * first.z);
+    bricks_[brick] = box;
+    nodes_.push_back({.brick = static_cast<std::uint32_t>(brick)});
+    return static_cast<std::uint32_t>(nodes_.size() - 1);
+  }
+  const int side = box.end[axis] - box.begin[axis];
+  const int plane = box.begin[axis] + static_cast<int>(std::int64_t{side} * half / bricks[axis]);
+  glm::uvec3 num_below = bricks, num_above = bricks, behind = first;
+  num_below[axis] = half;
+  num_above[axis] -= half;
+  behind[axis] += half;
+  const std::uint32_t low = cut_grid(part_below(box, axis, plane), first, num_below, all),
+                      high = cut_grid(part_above(box, axis, plane), behind, num_above, all);
+  nodes_.push_back({.axis = axis, .plane = plane, .below = low, .above = high});
+  return static_cast<std::uint32_t>(nodes_.size() - 1);
+}
+
+std::vector<std::uint32_t> Cuts::order_from(const glm::vec3 &eye) const {
+  std::vector<std::uint32_t> places(bricks_.size());
+  std::uint32_t place = 0;
+  visit(root_, eye, place, places);
+  return places;
+}
+
+/// A ray crosses a plane at most once, towards the side where the eye is not. From an eye in the
+/// plane it never does: it begins on one side and stays there.
+void Cuts::visit(std::uint32_t node, const glm::vec3 &eye, std::uint32_t &place,
+                 std::vector<std::uint32_t> &places) const {
+  const Node &at = nodes_[node];
+  if (at.axis < 0) {
+    places[at.brick] = place++;
+    return;
+  }
+  const bool is_above = eye[at.axis] >= 4.0f * static_cast<float>(at.plane);
+  visit(is_above ? at.above : at.below, eye, place, places);
+  visit(is_above ? at.below : at.above, eye, place, places);
+}
+
+glm::uvec3 parse_bricks(std::string_view text) {
+  std::array<std::uint32_t, 3> bricks{};
+  std::string_view rest = text;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t end = axis < 2 ? rest.find('x') : rest.size();
+    const auto number = end == std::string_view::npos
+                            ? std::nullopt
+                            : parse_all<std::uint32_t>(rest.substr(0, end));
+    if (!number || *number == 0 || *number > 1u << 16)
+      throw Error("--bricks {}: write XxYxZ, how many along each axis", text);
+    bricks[axis] = *number;
+    rest.remove_prefix(axis < 2 ? end + 1 : end);
+  }
+  return {bricks[0], bricks[1], bricks[2]};
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,39 @@
+#pragma once
+// The processes that draw a volume together, and what they say to each other. tools/isowave has
+// those of MPI; the library itself needs none.
+
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace isowave::core {
+
+/// All of them make the same calls in the same order.
+class Team {
+ public:
+  virtual ~Team() = default;
+  virtual std::uint32_t rank() const = 0;  ///< of this process, 0 to size() - 1
+  virtual std::uint32_t size() const = 0;
+  /// Everybody's text, by rank.
+  virtual std::vector<std::string> all_gather(const std::string &text) = 0;
+  /// Begins to find the smallest word of all processes at each place, which rank 0 will have in
+  /// `words`. Until finish_reductions() these must not be touched.
+  virtual void begin_reduce_min(std::span<std::uint64_t> words) = 0;
+  virtual void finish_reductions() = 0;
+};
+
+/// Throws Error at every rank if one gives a text: that of the first, with its rank, unless all
+/// give the same.
+void agree_on_error(Team &team, const std::string &error);
+
+/// Does what each rank has to do by itself. Where one fails, all throw what it throws, so that none
+/// waits for it.
+void together(Team &team, const std::function<void()> &work);
+
+/// Throws Error at every rank, which says which, unless all have the same. what: that they have.
+void agree_on(Team &team, const std::string &what, const std::string &text);
+
+}  // namespace isowave::core

@@ -1,0 +1,51 @@
+#pragma once
+// Some blocks of a compressed volume as a volume of their own, bit for bit: nothing is decoded.
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "core/volume/block_box.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+/// Lays rows of blocks along x end to end, those of a box in their order: y, then z.
+class BlockCutter {
+ public:
+  /// whole  where the payload is read from; its index may be missing
+  /// box    not empty, within the whole
+  BlockCutter(const CompressedVolume &whole, const BlockBox &box);
+  /// first_bit  of the row in the whole's payload
+  /// lengths    of its blocks [bits]
+  void add_row(std::uint64_t first_bit, std::span<const std::uint32_t> lengths);
+  /// After the last row: the volume, in words. Its dims and brick.first_voxel are the box's; all
+  /// else that is said of voxels is the whole's.
+  CompressedVolume finish();
+
+ private:
+  void take_words();
+
+  const CompressedVolume &whole_;
+  CompressedVolume cut_;
+  BitAppender bits_;
+  BlockIndexBuilder index_;
+  std::vector<std::uint32_t> row_;   ///< of the payload, as it is read ...
+  std::vector<std::uint64_t> wide_;  ///< ... and in words of 64 bits
+};
+
+/// The blocks of a box, of a volume wherever it is, without levels of detail.
+///
+/// Throws  Error: a file is shorter than it was
+CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box);
+
+/// The same of a `.zfp` file, of which little else is read: header, trailer and the lengths of its
+/// blocks. So the checksum of the payload is not looked at.
+///
+/// Throws  Error as read_zfp_file_info(); a damaged index; a file of zfp's own tool whose blocks
+///         have lengths of their own, since nobody knows where they begin
+CompressedVolume read_zfp_blocks(const std::filesystem::path &path, const BlockBox &box);
+
+}  // namespace isowave::core

@@ -1,0 +1,203 @@
+// `mpirun isowave render`: what several processes draw together has the bytes that one writes, and
+// what goes wrong at one rank is said in one line, and ends all.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/run_program.hpp"
+
+namespace isowave::core {
+namespace {
+
+using test::ProgramResult;
+using test::quoted;
+using test::read_file;
+using test::run_command;
+using test::run_isowave;
+using test::TemporaryFolder;
+
+/// Several processes on one CPU, whoever runs the tests. Oversubscribed and not bound to cores.
+/// -q: mpirun itself says nothing.
+const std::string kMpirun =
+    ISOWAVE_MPIRUN " -q --oversubscribe --bind-to none --allow-run-as-root ";
+
+const std::string kFuel = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
+
+std::string on_ranks(int count, const std::string &arguments) {
+  return kMpirun + "-n " + std::to_string(count) + " " + test::isowave_program() + " " + arguments;
+}
+
+class CliRanks : public testing::Test {
+ protected:
+  /// Draws with one process, and with so many, of which `bricks` is the option.
+  void expect_same(const std::string &volume, const std::string &options, int count,
+                   const std::string &bricks = "") {
+    const std::string outputs =
+        " -o " + quoted(folder_ / "x.png") + " --depth " + quoted(folder_ / "x.npy");
+    const std::string arguments = "render " + volume + " " + options + outputs;
+    std::vector<std::string> names = {"x.png", "x.npy"};
+    if (options.find("--orbit 2 -i") != std::string::npos) {
+      names.clear();
+      for (const char *frame : {"40_view0", "40_view1", "90_view0", "90_view1"}) {
+        for (const char *extension : {".png", ".npy"})
+          names.push_back(std::string("x_iso") + frame + extension);
+      }
+    }
+    const auto files = [&] {
+      std::vector<std::string> texts;
+      for (const std::string &name : names) {
+        texts.push_back(read_file(folder_ / name));
+        EXPECT_FALSE(texts.back().empty()) << name;
+        std::filesystem::remove(folder_ / name);
+      }
+      return texts;
+    };
+    const ProgramResult one = run_isowave(arguments);
+    ASSERT_EQ(one.status, 0) << one.err;
+    const std::vector<std::string> expected = files();
+    const ProgramResult several = run_command(on_ranks(count, arguments + bricks));
+    ASSERT_EQ(several.status, 0) << several.err;
+    EXPECT_TRUE(files() == expected) << arguments << " with " << count << " ranks";
+  }
+
+  /// A command line must fail with status 1 and one line.
+  static void expect_error(const std::string &command, const std::string &text) {
+    const ProgramResult result = run_command(command);
+    EXPECT_EQ(result.status, 1) << command << "\n" << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+  }
+
+  std::string convert(const std::string &options) {
+    std::string path = quoted(folder_ / "volume.zfp");
+    const ProgramResult result = run_isowave("convert " + kFuel + " " + options + " -o " + path);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return path;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(CliRanks, DrawWhatOneProcessDraws) {
+  expect_same(convert(""), "-i 40 --size 96x64", 2);  // the view that the surface fills
+  expect_same(kFuel, "--tolerance 0.3 --orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", 3);
+}
+
+TEST_F(CliRanks, SamplesAndBricksAsAskedFor) {
+  expect_same(convert("--exact"), "-i 40 --size 48x32 --samples 2", 3, " --bricks 1x1x3");
+  expect_same("generate:mixing_layer_30x40x24_uint8", "-i 128 --size 64x48 --cache-slots 64", 2);
+}
+
+TEST_F(CliRanks, ManyRanks) {
+  if (std::getenv("ISOWAVE_LONG_TESTS") == nullptr) GTEST_SKIP() << "among the long tests";
+  const std::string volume = convert("--rate 6");
+  for (const int count : {5, 8, 27}) {
+    expect_same(volume, "--orbit 2 -i 40 -i 90 --size 320x200", count);
+    expect_same(volume, "--orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", count);
+  }
+}
+
+TEST_F(CliRanks, StatisticsOfEachRank) {
+  const ProgramResult result = run_command(
+      on_ranks(2, "render " + kFuel + " -i 40 --size 64x48 --stats " + quoted(folder_ / "s.json")));
+  ASSERT_EQ(result.status, 0) << result.err;
+  const auto stats = nlohmann::json::parse(read_file(folder_ / "s.json"));
+  EXPECT_EQ(stats["volume"]["dims"], nlohmann::json({64, 33, 32}));
+  ASSERT_EQ(stats["ranks"].size(), 2u);
+  for (int rank = 0; rank < 2; ++rank) {
+    const auto &of_rank = stats["ranks"][std::size_t(rank)];
+    EXPECT_EQ(of_rank["rank"], rank);
+    EXPECT_EQ(of_rank["frames"].size(), 1u);
+    EXPECT_EQ(of_rank["volume"]["dims"], nlohmann::json({36, 33, 32}));  // a layer of the other's
+    // No picture is asked for, and one word a ray says who hits.
+    EXPECT_EQ(of_rank["composition"]["reductions"], 1);
+    EXPECT_EQ(of_rank["composition"]["bytes"], 64 * 48 * 8);
+  }
+  EXPECT_GT(stats["frames"][0]["rays_hit"], 200);
+}
+
+TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
+  const std::string render = "render " + kFuel + " -i 40 --size 16x16 ";
+  expect_error(on_ranks(2, render + "--ambient 4"), "--ambient");
+  expect_error(on_ranks(2, render + "--bricks 2x2x1"), "2 processes draw a brick each");
+  expect_error(on_ranks(2, "info " + kFuel), "only render");
+  test::expect_one_line_error(render + "--bricks 1x1x1", "--bricks");
+}
+
+TEST_F(CliRanks, DifferentRanksAreFound) {
+  const std::string program = test::isowave_program(), render = " render v.zfp -i 40 --size 16x16 ";
+  for (const char *rate : {"4", "8"}) {
+    std::filesystem::create_directory(folder_ / rate);
+    ASSERT_EQ(run_isowave("convert " + kFuel + " --rate " + rate + " -o " +
+                          quoted(folder_ / rate / "v.zfp"))
+                  .status,
+              0);
+  }
+  const auto in = [&](const char *name) { return " --wdir " + quoted(folder_ / name) + " "; };
+  expect_error(kMpirun + "-n 1" + in("4") + program + render + "-o x.png : -n 1" + in("8") +
+                   program + render + "-o x.png",
+               "rank 1 has another volume");
+  expect_error(kMpirun + "-n 1" + in("4") + program + render + "-o x.png : -n 1" + in("4") +
+                   program + render + "-o y.png",
+               "rank 1 has another command line");
+  expect_error(kMpirun + "-n 1" + in("4") + program + render + "-o x.png : -n 1" + in("4") +
+                   "env OCL_ICD_VENDORS=/nowhere " + program + render + "-o x.png",
+               "rank 1: no OpenCL 1.2 device");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "4" / "x.png"));
+}
+
+TEST_F(CliRanks, FullDisk) {
+  // A limit on the length of files stands in for it: with kernels that are compiled already, and
+  // without MPI's own files, as over TCP.
+  const std::string arguments = "render " + kFuel + " -i 40 --size 1600x1200 --depth ";
+  ASSERT_EQ(run_command(on_ranks(2, arguments + quoted(folder_ / "y.npy"))).status, 0);
+  std::filesystem::remove(folder_ / "y.npy");
+  const std::string command = kMpirun + "--mca btl tcp,self -n 2 sh -c " +
+                              "'ulimit -f 8192; exec \"$0\" \"$@\"' " + test::isowave_program() +
+                              " " + arguments + quoted(folder_ / "x.npy");
+  expect_error(command, "x.npy");
+  EXPECT_EQ(folder_.num_files(), 0u);
+}
+
+/// Without rank 1, rank 0 must not wait for ever, and leaves nothing half-written.
+TEST_F(CliRanks, ARankThatDiesEndsTheJob) {
+  const std::string ids = (folder_ / "ids").string();
+  const std::string command = kMpirun + "-n 2 sh -c 'echo $OMPI_COMM_WORLD_RANK $$ >> " + ids +
+                              "; exec \"$0\" \"$@\"' " + test::isowave_program() + " render " +
+                              kFuel + " -i 40 --size 64x48 --orbit 3000 --depth " +
+                              quoted(folder_ / "x.npy");
+  ProgramResult result;
+  std::thread job([&] { result = run_command(command); });
+  const auto first = folder_ / "x_iso40_view3.npy";
+  for (int tries = 0; tries < 600 && !std::filesystem::exists(first); ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  pid_t dying = 0;
+  std::ifstream stream(ids);
+  for (long rank = 0, id = 0; stream >> rank >> id;) {
+    if (rank == 1) dying = static_cast<pid_t>(id);
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_GT(dying, 0);
+  if (dying > 0) {
+    EXPECT_EQ(::kill(dying, SIGKILL), 0);
+  }
+  job.join();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
+  EXPECT_NE(result.status, 0);
+  for (const auto &entry : std::filesystem::directory_iterator(folder_.path())) {
+    const std::string name = entry.path().filename().string();
+    if (name == "ids") continue;
+    EXPECT_TRUE(name.starts_with("x_iso40_view") && name.ends_with(".npy")) << name;
+    EXPECT_EQ(std::filesystem::file_size(entry), std::filesystem::file_size(first)) << name;
+  }
+}
+
+}  // namespace
+}  // namespace isowave::core

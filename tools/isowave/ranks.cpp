@@ -1,0 +1,99 @@
+#include "tools/isowave/ranks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <filesystem>
+
+#include "core/base/error.hpp"
+#include "core/bricks/brick_volume.hpp"
+#include "core/io/input_file.hpp"
+#include "core/zfp/zfp_trailer.hpp"
+
+namespace isowave::core::tools {
+
+namespace {
+
+std::vector<std::string> split(const std::string &list) {
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin <= list.size();) {
+    const std::size_t end = std::min(list.find(',', begin), list.size());
+    parts.push_back(list.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+}  // namespace
+
+ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t local_rank) {
+  const std::vector<std::string> parts = split(selector);
+  if (parts.size() > 1) return ocl::choose_device(parts[local_rank % parts.size()]);
+  const ocl::DeviceInfo first = ocl::choose_device(selector);
+  std::vector<ocl::DeviceInfo> alike = ocl::list_devices();
+  std::erase_if(alike, [&](const ocl::DeviceInfo &info) {
+    return info.name != first.name || info.platform != first.platform;
+  });
+  return alike[local_rank % alike.size()];
+}
+
+std::string fingerprint(const std::string &path, const VolumeInfo &info) {
+  const std::string grid =
+      fmt::format("{}x{}x{} {} {} {} {} {} {} {}", info.dims.x, info.dims.y, info.dims.z,
+                  info.spacing.x, info.spacing.y, info.spacing.z, info.origin.x, info.origin.y,
+                  info.origin.z, to_string(info.type));
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) return grid;  // it is made
+  const InputFile file(path);
+  std::vector<std::byte> end(std::min<std::uint64_t>(file.size(), 1u << 16));
+  file.read(0, end);
+  std::uint32_t crc = update_crc(0, end);
+  file.read(file.size() - end.size(), end);
+  crc = update_crc(crc, end);
+  return fmt::format("{} {} {:x}", grid, file.size(), crc);
+}
+
+Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks) {
+  if (bricks.empty()) return {blocks_along(whole), team.size()};
+  const glm::uvec3 along = parse_bricks(bricks);
+  if (std::uint64_t{along.x} * along.y * along.z != team.size())
+    throw Error("--bricks {}: {} processes draw a brick each", bricks, team.size());
+  return {blocks_along(whole), along};
+}
+
+std::vector<float> gather_values(Team &team, std::span<const float> values) {
+  std::string own(values.size_bytes(), '\0');
+  std::memcpy(own.data(), values.data(), own.size());
+  std::vector<float> all;
+  for (const std::string &each : team.all_gather(own)) {
+    const std::size_t before = all.size();
+    all.resize(before + each.size() / sizeof(float));
+    std::memcpy(all.data() + before, each.data(), each.size());
+  }
+  return all;
+}
+
+std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
+                                   const std::optional<BlockBox> &own) {
+  std::string text;
+  if (own) {
+    const glm::ivec3 first(brick.brick.first_voxel / 4u);
+    const BlockBox box{own->begin + first, own->end + first};
+    text.resize(sizeof(box));
+    std::memcpy(text.data(), &box, sizeof(box));
+  }
+  std::optional<BlockBox> all;
+  for (const std::string &each : team.all_gather(text)) {
+    if (each.empty()) continue;
+    BlockBox box{};
+    std::memcpy(&box, each.data(), sizeof(box));
+    if (!all) all = box;
+    all->begin = glm::min(all->begin, box.begin);
+    all->end = glm::max(all->end, box.end);
+  }
+  return all;
+}
+
+}  // namespace isowave::core::tools

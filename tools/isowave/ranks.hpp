@@ -1,0 +1,42 @@
+#pragma once
+// What the processes of a team have to know of each other before they draw bricks.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/bricks/cuts.hpp"
+#include "core/bricks/team.hpp"
+#include "core/ocl/device.hpp"
+#include "core/volume/volume.hpp"
+
+namespace isowave::core::tools {
+
+/// The device of a host's process of that number. selector: for ocl::choose_device(), or several
+/// with commas, of which processes take one each, again and again. Without commas, the devices of
+/// the same kind as the one that it means are shared out.
+///
+/// Throws  Error: no such device
+ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t local_rank);
+
+/// What tells a volume from another of the same name: its grid, its file's length, and a checksum
+/// of both ends, where a `.zfp` file has the checksum of the rest.
+///
+/// Throws  Error: the file cannot be read
+std::string fingerprint(const std::string &path, const VolumeInfo &info);
+
+/// A brick for each rank. bricks: XxYxZ, or empty. Throws Error.
+Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks);
+
+/// All ranks' values.
+std::vector<float> gather_values(Team &team, std::span<const float> values);
+
+/// The box, in the whole volume, around all ranks' boxes.
+///
+/// brick  the grid of this rank's
+/// own    its box there; none: nothing is in it
+std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
+                                   const std::optional<BlockBox> &own);
+
+}  // namespace isowave::core::tools
