@@ -14,7 +14,7 @@ struct MarchPacketsInput : RaysRig {
       : RaysRig(device, width), march_packets(device, rays.num_rays, kDefaultSolver) {
     if (!cached) cache.clear();
     begin();
-    march_packets(macrocells, cache, rays);
+    march_packets(macrocells, stream, cache, rays);
     const PassCounts counts = read_counts();
     check(counts.active_count == num_started, "rays of the frame begun again");
     check(counts.hit_count == (cached ? num_hits : 0), "hits of the frame drawn again");
@@ -23,7 +23,7 @@ struct MarchPacketsInput : RaysRig {
 
   void begin() {
     rays.forget_rays();
-    march_packets.begin_frame(rays);
+    march_packets.begin_frame();
     rays.open_pass();
   }
 
@@ -36,7 +36,7 @@ void march_packets(benchmark::State &state) {
   const double waiting = state.range(1) != 0 ? 0.0 : in.num_started;
   measure(
       state, {pixels, pixels * sizeof(HitRecord) + 2.0 * sizeof(uint) * waiting},
-      [&] { in.begin(); }, [&] { in.march_packets(in.macrocells, in.cache, in.rays); });
+      [&] { in.begin(); }, [&] { in.march_packets(in.macrocells, in.stream, in.cache, in.rays); });
   state.counters["hits"] = state.range(1) != 0 ? double(in.num_hits) : 0;
 }
 

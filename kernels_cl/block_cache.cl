@@ -20,22 +20,10 @@ ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
 }
 
-/// Are so many keys too many, those of evicted blocks included? Three eighths of the entries stay
-/// without.
-ISO_INLINE int table_is_full(const FrameParams *frame, uint num_keys) {
-  return num_keys > 5 * frame->schedule.table_groups;
-}
-
 /// Adds a key to the table, or finds the one it has.
 ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id,
                              uint slot, ulong changing) {
-  const BlockCoords b = block_coords(frame, block_id);
-  uint i = table_home(frame, b.x, b.y, b.z);
-  for (;;) {
-    const uint key = atomic_cmpxchg(&table[i].block_id, ISO_INVALID_ID, block_id);
-    if (key == ISO_INVALID_ID || key == block_id) break;
-    i = table_next(frame, i);
-  }
+  const uint i = table_key(frame, table, block_coords(frame, block_id), block_id);
   table[i].slot = slot;
   table[i].changing_low = (uint)changing;
   table[i].changing_high = (uint)(changing >> 32);

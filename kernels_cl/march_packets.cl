@@ -1,14 +1,21 @@
 /// march_packets.cl -- pipeline `rays` on CPUs: what start_rays and march do, eight rays at a time
 /// (Sec. 3.2, 3.3, 3.7).
 ///
-/// begin_packets -> march_packets -> request_ahead -> [ cache -> decode -> march_packets ->
-/// request_ahead ]*. The first march makes the rays of the picture, in packets of 4 x 2; later ones
-/// take those that wait, eight neighbours of the list. One level of detail, rays of the camera, and
-/// solver `bernstein` alone: march has the others.
+/// open_packets -> march_packets -> request_ahead -> [ cache -> decode -> open_packets ->
+/// march_packets -> request_ahead ]*. The first march makes the rays of the picture, in packets of
+/// 4 x 2; later ones take those that wait, eight neighbours of the list. One level of detail, rays
+/// of the camera, and solver `bernstein` alone: march has the others.
+///
+/// ISO_ON_DEMAND, by -D: 1: rays decode the blocks that they come to (on_demand.h). So they wait
+/// only where there is no free slot, and a frame with enough of them takes one pass.
+#ifndef ISO_ON_DEMAND
+#define ISO_ON_DEMAND 0
+#endif
 #define ISO_FOUND local
 #include "device/float8.h"
 #include "device/march_block.h"
 #include "device/march_pass.h"
+#include "device/on_demand.h"
 
 #define ISO_LANES 8u
 // A work-item takes a chunk of packets at a time: a tile of the picture, wide enough that the hits
@@ -25,7 +32,7 @@ typedef struct PacketProgress {
   uint num_blocks;  ///< blocks that they were intersected in
 } PacketProgress;
 
-/// A block that a work-item's rays have come to in this pass, in which the cache does not change.
+/// A block that a work-item's rays have come to in this pass, in which no block leaves the cache.
 typedef struct OpenedBlock {
   uint block_id; /* ISO_INVALID_ID: none so far */
   uint have;     /* corners of the dual grid; see open_block() */
@@ -49,6 +56,7 @@ typedef struct PacketField {
   local uint *slots;         /* [lane][8]: of the block that it has opened last */
   local uint *have;          /* [lane] */
   PacketProgress *progress;
+  BlockMaker *maker;
 } PacketField;
 
 ISO_INLINE void macrocell_bits(const PacketField *field, Ints macrocells, Mask lanes, Ints *low,
@@ -64,23 +72,30 @@ ISO_INLINE void macrocell_bits(const PacketField *field, Ints macrocells, Mask l
   *high = pick(lanes, highs, *high);
 }
 
-/// Looks block b up, unless a ray has been there before. Cached blocks are stamped.
+/// Looks block b up. Cached blocks are stamped.
+ISO_INLINE void look_up(const PacketField *field, const FrameParams *frame, BlockCoords b,
+                        local OpenedBlock *opened) {
+  uint have;
+  const ulong cells = open_block(frame, field->table, field->inside, b, field->scratch, &have);
+  for (uint corner = 0; corner < 8; ++corner)
+    opened->slots[corner] = field->scratch[corner * ISO_GROUP_SIZE];
+  if ((have & 1u) != 0)
+    field->slot_stamps[opened->slots[0]] = field->stamp; /* for all of the dual grid: last_use() */
+  opened->block_id = block_id_at(frame, b.x, b.y, b.z);
+  opened->have = have;
+  opened->cells_low = (uint)cells;
+  opened->cells_high = (uint)(cells >> 32);
+}
+
+/// Looks block b up, unless a ray has been there before. corners: of its dual grid, those that rays
+/// need, to be decoded on demand.
 ISO_INLINE local const OpenedBlock *find_opened(const PacketField *field, const FrameParams *frame,
-                                                BlockCoords b) {
-  const uint block_id = block_id_at(frame, b.x, b.y, b.z);
+                                                BlockCoords b, uint corners) {
   local OpenedBlock *opened = &field->opened[(b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3)];
-  if (opened->block_id != block_id) {
-    uint have;
-    const ulong cells = open_block(frame, field->table, field->inside, b, field->scratch, &have);
-    for (uint corner = 0; corner < 8; ++corner)
-      opened->slots[corner] = field->scratch[corner * ISO_GROUP_SIZE];
-    if ((have & 1u) != 0)
-      field->slot_stamps[opened->slots[0]] =
-          field->stamp; /* for all of the dual grid: last_use() */
-    opened->block_id = block_id;
-    opened->have = have;
-    opened->cells_low = (uint)cells;
-    opened->cells_high = (uint)(cells >> 32);
+  if (opened->block_id != block_id_at(frame, b.x, b.y, b.z)) look_up(field, frame, b, opened);
+  if (ISO_ON_DEMAND && (corners & ~opened->have) != 0 && !field->maker->is_full) {
+    bring_corners(field->maker, frame, b, corners & ~opened->have);
+    look_up(field, frame, b, opened);
   }
   return opened;
 }
@@ -100,16 +115,16 @@ ISO_INLINE Mask open_blocks(const PacketField *field, const FrameParams *frame, 
     b.x = (uint)at[0][first];
     b.y = (uint)at[1][first];
     b.z = (uint)at[2][first];
-    local const OpenedBlock *opened = find_opened(field, frame, b);
+    local const OpenedBlock *opened = find_opened(field, frame, b, 1);
     left &= ~here;
     if ((opened->have & 1u) == 0) {
       waits |= here;
     } else {
-      const uint8 slots = vload8(0, opened->slots);
-      const uint have = opened->have;
       *low = pick(here, ints((int)opened->cells_low), *low);
       *high = pick(here, ints((int)opened->cells_high), *high);
       progress->num_blocks += popcount(bits_of(here));
+      const uint8 slots = vload8(0, opened->slots);
+      const uint have = opened->have;
       ISO_EACH_LANE(lane, here) {
         vstore8(slots, lane, field->slots);
         field->have[lane] = have;
@@ -119,6 +134,15 @@ ISO_INLINE Mask open_blocks(const PacketField *field, const FrameParams *frame, 
   return waits;
 }
 
+/// Has the blocks decoded that a lane at cell (x, y, z) misses.
+ISO_RARE void bring_missing(const PacketField *field, const FrameParams *frame, int x, int y, int z,
+                            uint lane) {
+  const BlockCoords b = {(uint)x >> 2, (uint)y >> 2, (uint)z >> 2};
+  local const OpenedBlock *opened = find_opened(field, frame, b, cell_blocks(x & 3, y & 3, z & 3));
+  vstore8(vload8(0, opened->slots), lane, field->slots);
+  field->have[lane] = opened->have;
+}
+
 ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame, const Ints *at,
                              Mask lanes, Floats *w) {
   float values[8 * ISO_LANES]; /* [corner][lane] */
@@ -126,7 +150,10 @@ ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame,
   for (uint i = 0; i < 8 * ISO_LANES; ++i) values[i] = 0.0f;
   ISO_EACH_LANE(lane, lanes) {
     const int x = at[0][lane] & 3, y = at[1][lane] & 3, z = at[2][lane] & 3;
-    if ((cell_blocks(x, y, z) & ~field->have[lane]) != 0) {
+    const uint corners = cell_blocks(x, y, z);
+    if (ISO_ON_DEMAND && (corners & ~field->have[lane]) != 0)
+      bring_missing(field, frame, at[0][lane], at[1][lane], at[2][lane], lane);
+    if ((corners & ~field->have[lane]) != 0) {
       waits[lane] = -1;
       --field->progress->num_blocks;
     } else {
@@ -147,13 +174,22 @@ ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame,
 
 #include "portable/packet_walk.h"
 
-/// Says that a frame begins. One work-item.
+/// Opens a pass. One work-item.
 ///
-/// counts  of the last pass of the frame before
-/// next    of this frame's first pass
-kernel void begin_packets(global const PassCounts *counts, global PassCounts *next) {
-  next->last_frame_pass = counts->frame_pass;
-  next->frame_pass = next->pass;
+/// begins  1: the first of a frame
+/// prev    counts of the pass before
+/// counts  of this pass
+/// Out     counts: frame_pass, window_count, free_count, active_count; begins: 0 of the last
+kernel void open_packets(const FrameParams frame_params, uint begins, global const PassCounts *prev,
+                         global PassCounts *counts, global PassCounts *next_counts,
+                         global CacheState *cache) {
+  if (begins != 0) {
+    counts->last_frame_pass = prev->frame_pass;
+    counts->frame_pass = counts->pass;
+  } else {
+    counts->active_count = prev->next_active_count;
+  }
+  open_march(&frame_params, prev, counts, next_counts, cache);
 }
 
 /// The rays of a packet, and which of them there are.
@@ -254,27 +290,49 @@ ISO_INLINE void list_waiting(const Packet *p, const FrameParams *frame, PacketSo
 /// or those that wait.
 ///
 /// begins           1: the first pass of a frame
+/// part_0 .. layout the zfp stream (block_stream.h), as free_slots for decoding on demand alone
 /// macrocell_masks  as traverse
 /// In      active_ray_ids [prev->next_active_count] and ray_block_ids [pixel] of the rays that
 ///         wait; begins: none
 /// Out     as march; begins: hits of all pixels, and counts->active_count, the rays that have met
-/// an
-///         active block
+///         an active block. With what has been decoded on demand, counts->decoded_count grows and
+///         counts->free_count shrinks
 /// Launch  groups of one work-item, which stride over chunks of packets
 kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
-    const FrameParams frame_params, uint begins, global const uint *macrocell_masks,
-    global BlockEntry *table, global const ulong *inside, global const float *cache_values,
-    global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
-    global const uint *active_ray_ids, global uint *next_active_ray_ids, global uint *ray_block_ids,
-    global HitRecord *hits, global uint *slot_stamps, global CacheState *cache) {
+    const FrameParams frame_params, uint begins, global const uint *part_0,
+    global const uint *part_1, global const uint *part_2, global const uint *part_3,
+    global const uint *index, const StreamLayout layout, global const uint *macrocell_masks,
+    global BlockEntry *table, global ulong *inside, global float *cache_values,
+    global const PassCounts *prev, global PassCounts *counts, global const uint *active_ray_ids,
+    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
+    global uint *slot_block_ids, global uint *slot_stamps, global uint *requested_bits,
+    global const uint *free_slots, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local OpenedBlock opened[ISO_OPENED_BLOCKS];
   local uint slots[8 * ISO_LANES], have[ISO_LANES], scratch[8 * ISO_GROUP_SIZE];
-  const uint num_rays = prev->next_active_count,
+  const uint num_rays = prev->next_active_count, stamp = read_stamp(counts->pass),
              chunk_packets = begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS;
   const uint num_chunks = begins != 0 ? tiles_along(frame->view.width, ISO_TILE_COLUMNS) *
                                             tiles_along(frame->view.height, ISO_TILE_ROWS)
                                       : tiles_along(num_rays, ISO_LANES * ISO_LIST_PACKETS);
+  BlockMaker maker = {part_0,
+                      part_1,
+                      part_2,
+                      part_3,
+                      index,
+                      layout,
+                      frame_params.surface.isovalue,
+                      table,
+                      cache_values,
+                      inside,
+                      slot_block_ids,
+                      slot_stamps,
+                      requested_bits,
+                      free_slots,
+                      cache,
+                      stamp,
+                      0,
+                      0};
   uint num_met = 0, num_hits = 0;
   PacketProgress progress;
   PacketField field;
@@ -285,18 +343,15 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
   field.inside = inside;
   field.values = cache_values;
   field.slot_stamps = slot_stamps;
-  field.stamp = read_stamp(counts->pass);
+  field.stamp = stamp;
   field.opened = opened;
   field.scratch = scratch;
   field.slots = slots;
   field.have = have;
   field.progress = &progress;
+  field.maker = &maker;
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
   const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
-  if (get_global_id(0) == 0) {
-    open_march(frame, prev, counts, next_counts, cache);
-    if (begins == 0) counts->active_count = num_rays;
-  }
   for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0)) {
     if (begins != 0) clear_hits(&frame->view, chunk, hits);
     for (uint packet = 0; packet < chunk_packets; ++packet) {
@@ -328,6 +383,10 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     }
   }
   if (num_hits != 0) atomic_add(&counts->hit_count, num_hits);
+  if (maker.num_made != 0) {
+    atomic_add(&counts->decoded_count, maker.num_made);
+    atomic_sub(&counts->free_count, maker.num_made);
+  }
   if (progress.num_blocks != 0) atomic_add(&counts->granted_count, progress.num_blocks);
   if (begins != 0 && num_met != 0) atomic_add(&counts->active_count, num_met);
 }

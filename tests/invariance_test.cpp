@@ -141,7 +141,8 @@ TEST_P(InvarianceOnDevice, SpeculationNeverNeedsMorePasses) {
   std::vector<std::size_t> num_passes;
   for (const std::uint32_t limit : {1u, 2u, 3u, 7u, 16u, 33u, 64u}) {
     SCOPED_TRACE(limit);
-    const FrameStats stats = check(volume, {.size = kMedium, .max_speculation = limit});
+    const FrameStats stats = check(
+        volume, {.size = kMedium, .max_speculation = limit, .on_demand = DecodeOnDemand::kOff});
     EXPECT_EQ(total(stats, &PassCounts::decoded_count), total(stats, &PassCounts::requested_count));
     for (const PassStats &pass : stats.passes) {  // an ample cache: nobody waits for slots
       if (is_blocks()) {
@@ -332,7 +333,10 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
     Renderer renderer(
         device_, volume.compressed,
-        GetParam().with({.size = kFrame, .cache_slots = slots, .max_speculation = 4}));
+        GetParam().with({.size = kFrame,
+                         .cache_slots = slots,
+                         .max_speculation = 4,
+                         .on_demand = slots == 0 ? DecodeOnDemand::kOff : DecodeOnDemand::kAuto}));
     std::uint64_t found = 0;
     std::size_t calls = 0;
     const FrameStats stats = renderer.render(

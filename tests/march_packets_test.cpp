@@ -1,11 +1,14 @@
 // core/march_packets against start_rays and march: pass by pass, the same rays hit, wait and leave,
 // with the same bits, counts and stamps. And whole frames against the twin, where the walk of eight
-// rays is hard, or the cache is small.
+// rays is hard, or the cache is small. Blocks decoded on demand: what is in the cache then, and
+// frames again, many threads at the same blocks.
 
 #include "core/stages/march_packets.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <map>
 
 #include "core/render/renderer.hpp"
@@ -42,7 +45,7 @@ class MarchPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       alone.rays.forget_rays();
       packets.rays.forget_rays();
       alone.start_rays(alone.macrocells, alone.rays);
-      march_packets.begin_frame(packets.rays);
+      march_packets.begin_frame();
       for (int pass = 0; pass == 0 || alone.counts().next_active_count != 0; ++pass) {
         SCOPED_TRACE(fmt::format("pass {}", pass));
         for (RaysWorld *world : {&alone, &packets}) {
@@ -50,7 +53,7 @@ class MarchPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
           if (pass != 0 || frame != 0) world->provide();
         }
         alone.march(alone.macrocells, alone.cache, alone.rays);
-        march_packets(packets.macrocells, packets.cache, packets.rays);
+        march_packets(packets.macrocells, packets.stream, packets.cache, packets.rays);
         expect_same_rays(packets, alone);
         for (RaysWorld *world : {&alone, &packets})
           world->request_ahead(world->macrocells, world->cache, world->rays);
@@ -104,6 +107,91 @@ class MarchPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         ASSERT_EQ(of_packets.at(block), stamp) << "block " << block;
       }
     }
+  }
+
+  /// Draws two frames with blocks decoded on demand, of the twin's bits, and looks at the cache
+  /// after each pass.
+  ///
+  /// num_slots  0: one for each block
+  void expect_on_demand(const test::TestVolume &volume, const Camera &camera, ImageSize size,
+                        uint num_slots) {
+    RaysWorld world(device_, volume, camera, size, kIsovalue, 4, num_slots);
+    MarchPackets march_packets(device_, size.num_rays(), kDefaultSolver, &world.stream);
+    const std::vector<HitRecord> twin =
+        test::twin_hits(volume, camera, size, kIsovalue, Normals::kCell);
+    const std::vector<float> values = decode_blocks_with_libzfp(volume.compressed);
+    uint num_on_demand = 0;
+    for (int frame = 0; frame < 2; ++frame) {
+      SCOPED_TRACE(fmt::format("frame {}", frame));
+      world.rays.forget_rays();
+      march_packets.begin_frame();
+      for (int pass = 0; pass == 0 || world.counts().next_active_count != 0; ++pass) {
+        SCOPED_TRACE(fmt::format("pass {}", pass));
+        ASSERT_LT(pass, 10000);
+        world.rays.open_pass();
+        if (pass != 0 || frame != 0) world.provide();
+        const uint num_provided = pass != 0 || frame != 0 ? world.counts().decoded_count : 0,
+                   num_free = count_free(world);
+        march_packets(world.macrocells, world.stream, world.cache, world.rays);
+        expect_whole_cache(world, values);
+        num_on_demand = world.counts().decoded_count - num_provided;
+        EXPECT_EQ(count_free(world), num_free - num_on_demand);
+        EXPECT_EQ(world.counts().free_count, num_free - num_on_demand);
+        if (pass == 0 && frame == 0) {
+          EXPECT_GT(num_on_demand, 5u);
+        }
+        world.request_ahead(world.macrocells, world.cache, world.rays);
+        if (HasFailure()) return;
+      }
+      test::expect_same_hits(world.rays.hits.read(), twin, size.width);
+    }
+    if (num_slots == 0) {
+      EXPECT_EQ(num_on_demand, 0u) << "all was cached";
+    }
+  }
+
+  static uint count_free(const RaysWorld &world) {
+    const std::vector<uint> blocks = world.cache.slot_block_ids.read();
+    return static_cast<uint>(std::ranges::count(blocks, ISO_INVALID_ID));
+  }
+
+  /// Each cached block is in one slot, with its values and bits; free slots are listed once; no
+  /// block is marked.
+  ///
+  /// expected  [block][64]
+  static void expect_whole_cache(const RaysWorld &world, const std::vector<float> &expected) {
+    const std::vector<uint> blocks = world.cache.slot_block_ids.read(),
+                            free_slots = world.cache.free_slots.read(),
+                            marks = world.cache.requested_bits.read(),
+                            slots = world.slots_by_block();
+    const std::vector<float> values = world.cache.values.read();
+    const std::vector<ulong> inside = world.cache.inside.read();
+    const CacheState state = world.cache.state.read().front();
+    ASSERT_EQ(std::ranges::count(marks, 0u), std::ssize(marks));
+    ASSERT_EQ(state.free_count, std::ranges::count(blocks, ISO_INVALID_ID));
+    std::vector<uint> is_free(blocks.size());
+    for (uint i = 0; i < state.free_count; ++i) ++is_free.at(free_slots[i]);
+    for (uint slot = 0; slot < blocks.size(); ++slot) {
+      ASSERT_EQ(is_free[slot], blocks[slot] == ISO_INVALID_ID ? 1u : 0u) << "slot " << slot;
+      if (blocks[slot] == ISO_INVALID_ID) continue;
+      ASSERT_EQ(slots.at(blocks[slot]), slot) << "block " << blocks[slot];
+      for (uint v = 0; v < 64; ++v) {
+        const float value = values[64 * std::size_t{slot} + v];
+        ASSERT_EQ(std::bit_cast<uint>(value),
+                  std::bit_cast<uint>(expected[64 * std::size_t{blocks[slot]} + v]))
+            << "block " << blocks[slot] << ", voxel " << v;
+        ASSERT_EQ(inside[slot] >> v & 1, value - kIsovalue >= 0 ? 1u : 0u);
+      }
+    }
+    uint num_keys = 0;
+    for (const BlockEntry &entry : world.cache.table.read()) {
+      if (entry.block_id == ISO_INVALID_ID) continue;
+      ++num_keys;
+      if (entry.slot == ISO_BLOCK_ABSENT) continue;
+      ASSERT_EQ(blocks.at(entry.slot), entry.block_id);
+    }
+    ASSERT_LE(num_keys, state.table_count);
+    ASSERT_LE(state.table_count, 5 * world.cache.table_groups);
   }
 
   /// Draws frames of the twin's bits, one after the other. Returns how many rays hit.
@@ -196,12 +284,93 @@ TEST_P(MarchPacketsOnDevice, NoiseFromAwkwardCameras) {
 TEST_P(MarchPacketsOnDevice, TinyCaches) {
   const test::TestVolume volume({30, 27, 33}, test::gyroid_field(10), 8);
   for (const std::uint32_t num_slots : {40u, kMinCacheSlots}) {
-    for (const StreamPlace stream : {StreamPlace::kDevice, StreamPlace::kHost}) {
-      SCOPED_TRACE(fmt::format("{} slots", num_slots));
-      EXPECT_GT(expect_pictures(volume, orbit(volume, 2), {13, 9}, 0.3f,
-                                {.cache_slots = num_slots, .stream = stream}),
-                50u);
+    for (const DecodeOnDemand on_demand : {DecodeOnDemand::kOff, DecodeOnDemand::kOn}) {
+      for (const StreamPlace stream : {StreamPlace::kDevice, StreamPlace::kHost}) {
+        SCOPED_TRACE(fmt::format("{} slots, {}", num_slots, static_cast<int>(on_demand)));
+        EXPECT_GT(
+            expect_pictures(volume, orbit(volume, 2), {13, 9}, 0.3f,
+                            {.cache_slots = num_slots, .on_demand = on_demand, .stream = stream}),
+            50u);
+      }
     }
+  }
+}
+
+/// What march_packets leaves where rays decode blocks themselves: a cache in which all is as cache
+/// and decode would have left it.
+TEST_P(MarchPacketsOnDevice, SmallCacheFilledOnDemand) {
+  const test::TestVolume volume({10, 9, 11}, test::gyroid_field(11), 8);
+  for (const uint num_slots : {0u, 9u})
+    expect_on_demand(volume, orbit_cameras(volume.info(), 1).front(), {6, 5}, num_slots);
+}
+
+TEST_P(MarchPacketsOnDevice, CacheFilledOnDemand) {
+  const glm::uvec3 dims(30, 27, 33);
+  // Blocks of one length, and of lengths of their own.
+  for (const test::TestVolume &volume :
+       {test::TestVolume(dims, test::gyroid_field(11), 8),
+        test::TestVolume(test::grid_info(dims), test::sample(dims, test::gyroid_field(11)),
+                         {.tolerance = 0.01})}) {
+    for (const uint num_slots : {0u, 200u, 50u, 9u, 8u}) {
+      SCOPED_TRACE(fmt::format("{} slots", num_slots));
+      expect_on_demand(volume, orbit_cameras(volume.info(), 1).front(), {61, 47}, num_slots);
+    }
+  }
+}
+
+/// Blocks that rays only look ahead at are left out.
+
+TEST_P(MarchPacketsOnDevice, FewerBlocksOnDemand) {
+  const test::TestVolume volume({30, 27, 33}, test::gyroid_field(11), 8);
+  const Camera camera = orbit_cameras(volume.info(), 1).front();
+  std::vector<FrameStats> stats;
+  for (const DecodeOnDemand on_demand : {DecodeOnDemand::kOff, DecodeOnDemand::kOn}) {
+    Renderer renderer(device_, volume.compressed,
+                      {.size = {61, 47}, .packets = RayPackets::kOn, .on_demand = on_demand});
+    stats.push_back(
+        renderer.render({.camera = camera, .isovalue = kIsovalue, .normals = Normals::kCell}));
+  }
+  EXPECT_GT(stats[0].passes.size(), 1u);
+  std::uint64_t decoded_in_turns = 0, decoded = 0;
+  for (const PassStats &pass : stats[0].passes) decoded_in_turns += pass.counts.decoded_count;
+  for (const PassStats &pass : stats[1].passes) decoded += pass.counts.decoded_count;
+  EXPECT_LT(decoded, decoded_in_turns);
+  EXPECT_GT(decoded, 50u);
+  EXPECT_EQ(stats[1].rays_hit, stats[0].rays_hit);
+}
+
+/// All rays go through the same blocks, past a surface in each, to a wall behind. So threads go
+/// side by side, and one often comes to the block that another is at. Slots have values that show:
+/// who reads them too early hits something before the wall.
+TEST_P(MarchPacketsOnDevice, ThreadsMeetAtBlocks) {
+  const test::TestVolume volume(
+      {160, 13, 14},
+      [](const glm::dvec3 &p) { return kIsovalue + std::max(p.y - 7.3, p.x - 150.4); }, 32);
+  const Camera camera =
+      test::camera_along({-20.0, 6.2, 6.3}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, 0.1);
+  const ImageSize size{1, 64};
+  RaysWorld world(device_, volume, camera, size, kIsovalue, 4);
+  // Groups for all 8 tiles.
+  MarchPackets march_packets(device_, 1 << 20, kDefaultSolver, &world.stream);
+  const std::vector<HitRecord> twin =
+      test::twin_hits(volume, camera, size, kIsovalue, Normals::kCell);
+  for (int frame = 0; frame < 500 && !HasFailure(); ++frame) {
+    SCOPED_TRACE(fmt::format("frame {}", frame));
+    world.cache.clear();
+    world.cache.values.fill(frame % 2 == 0 ? 1000.0f : -1000.0f);
+    world.cache.inside.fill(frame % 2 == 0 ? ~ulong{0} : 0);
+    world.rays.forget_rays();
+    march_packets.begin_frame();
+    uint num_hits = 0;
+    for (int pass = 0; pass == 0 || world.counts().next_active_count != 0; ++pass) {
+      world.rays.open_pass();
+      if (pass != 0 || frame != 0) world.provide();
+      march_packets(world.macrocells, world.stream, world.cache, world.rays);
+      num_hits += world.counts().hit_count;
+      world.request_ahead(world.macrocells, world.cache, world.rays);
+    }
+    EXPECT_EQ(num_hits, size.num_rays());
+    test::expect_same_hits(world.rays.hits.read(), twin, size.width);
   }
 }
 

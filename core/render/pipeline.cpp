@@ -77,22 +77,28 @@ class BlocksPipeline : public Pipeline {
 class RaysPipeline : public Pipeline {
  public:
   RaysPipeline(FrameState &state, std::uint32_t group_size, Solver solver, RaySource source,
-               RayPackets packets)
+               RayPackets packets, DecodeOnDemand on_demand)
       : state_(state),
         start_rays_(state.device, state.rays.num_rays, group_size, has_levels(state), source),
         march_(state.device, state.rays.num_rays, group_size, solver, has_levels(state), source),
         request_ahead_(state.device, state.rays.num_rays, group_size, has_levels(state), source) {
-    const bool wanted = packets == RayPackets::kAuto ? MarchPackets::suits(state.device.info())
-                                                     : packets == RayPackets::kOn;
-    if (wanted && MarchPackets::has(solver) && source == RaySource::kCamera)
-      march_packets_.emplace(state.device, state.rays.num_rays, solver);
+    const ocl::DeviceInfo &device = state.device.info();
+    const bool in_packets =
+        packets == RayPackets::kAuto ? MarchPackets::suits(device) : packets == RayPackets::kOn;
+    const bool decodes = on_demand == DecodeOnDemand::kAuto ? MarchPackets::may_decode(device)
+                                                            : on_demand == DecodeOnDemand::kOn;
+    const DeviceStream &stream = state.levels[0].stream;
+    if (in_packets && MarchPackets::has(solver) && source == RaySource::kCamera) {
+      march_packets_.emplace(state.device, state.rays.num_rays, solver,
+                             decodes && !stream.window ? &stream : nullptr);
+    }
   }
 
   void begin_frame() override {
     const auto stage = state_.device.timer().stage("start_rays");
     if (unanswered_) state_.rays.forget_rays();
     if (in_packets()) {
-      march_packets_->begin_frame(state_.rays);
+      march_packets_->begin_frame();
     } else {
       start_rays_(macrocells(), state_.rays);
     }
@@ -105,7 +111,7 @@ class RaysPipeline : public Pipeline {
     {
       const auto stage = state_.device.timer().stage("march");
       if (in_packets()) {
-        (*march_packets_)(macrocells(), state_.cache, rays);
+        (*march_packets_)(macrocells(), state_.levels[0].stream, state_.cache, rays);
       } else {
         march_(macrocells(), state_.cache, rays);
       }
@@ -167,17 +173,18 @@ void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
                                         const Group::Limits &limits, Solver solver,
-                                        ClosestHit closest, RayPackets packets) {
+                                        ClosestHit closest, RayPackets packets,
+                                        DecodeOnDemand on_demand) {
   if (kind == PipelineKind::kBlocks)
     return std::make_unique<BlocksPipeline>(state, limits, solver, closest);
   return std::make_unique<RaysPipeline>(state, limits.group_size, solver, RaySource::kCamera,
-                                        packets);
+                                        packets, on_demand);
 }
 
 std::unique_ptr<Pipeline> make_given_pipeline(FrameState &state, std::uint32_t group_size,
                                               Solver solver) {
   return std::make_unique<RaysPipeline>(state, group_size, solver, RaySource::kGiven,
-                                        RayPackets::kOff);
+                                        RayPackets::kOff, DecodeOnDemand::kOff);
 }
 
 }  // namespace isowave::core

@@ -6,7 +6,7 @@
 //           the paper's (Sec. 3.3 to 4.4)
 //   rays    start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
 //           each ray intersects what it meets, as far as it is cached; on CPUs march_packets does
-//           the work of start_rays and march
+//           the work of start_rays and march, and of cache and decode where there are free slots
 
 #include <cstdint>
 #include <memory>
@@ -33,6 +33,10 @@ std::string_view to_string(PipelineKind kind);
 
 /// Packets of eight rays; where they cannot be had (MarchPackets), there are none.
 enum class RayPackets { kAuto, kOn, kOff };
+
+/// Blocks that packets decode when they come to them, instead of waiting for the next pass; never
+/// where the stream stays on the host.
+enum class DecodeOnDemand { kAuto, kOn, kOff };
 
 /// The volume on the device, or one of its levels of detail.
 struct Level {
@@ -88,7 +92,8 @@ ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits);
 /// `state` must outlive the pipeline.
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,
                                         const Group::Limits &limits, Solver solver,
-                                        ClosestHit closest, RayPackets packets = RayPackets::kAuto);
+                                        ClosestHit closest, RayPackets packets = RayPackets::kAuto,
+                                        DecodeOnDemand on_demand = DecodeOnDemand::kAuto);
 
 /// Pipeline `rays` for the rays state.rays.given: what they hit is in given_hits. state.rays.frame
 /// has as many as a picture has pixels.

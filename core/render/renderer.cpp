@@ -245,7 +245,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       value_range_(volume.value_range),
       size_(options_.size),
       pipeline_(make_pipeline(options_.pipeline, state_, plan_.limits.pairs, options_.solver,
-                              options_.closest, options_.packets)),
+                              options_.closest, options_.packets, options_.on_demand)),
       smooth_normals_(device, state_.rays.num_rays, options_.group_size, state_.levels.size() > 1),
       shade_(device, options_.size.num_rays()),
       readback_(device) {

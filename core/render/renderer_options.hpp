@@ -21,6 +21,8 @@ struct RendererOptions {
   Solver solver = kDefaultSolver;   ///< root finder in a cell
   /// Whether rays march in packets of eight (pipeline `rays`); kAuto: where MarchPackets suits.
   RayPackets packets = RayPackets::kAuto;
+  /// Whether packets decode the blocks that they come to; kAuto: where MarchPackets may.
+  DecodeOnDemand on_demand = DecodeOnDemand::kAuto;
   std::uint32_t group_size = 64;  ///< work-items per work-group, a power of two in 8..256
   /// How a pass's pairs are gathered by block.
   Grouping grouping = kDefaultGrouping;

@@ -68,6 +68,7 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
       inside(device, sizes["voxels inside"]),
       slot_block_ids(device, sizes["cache slot blocks"]),
       slot_stamps(device, sizes["cache slot stamps"]),
+      free_slots(device, sizes["free slots"]),
       requested_bits(device, sizes["requested blocks"]),
       request_block_ids(device, sizes["block requests"]),
       decode_slots(device, sizes["decode slots"]),
@@ -76,7 +77,6 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
       pairs_range_(ocl::Range::strided(limits.num_rays, group_size, device)),
       slots_range_(ocl::Range::strided(num_slots, group_size, device)),
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
-      free_slots_(device, sizes["free slots"]),
       slot_ranks_(device, sizes["slot ranks"]),
       slot_changing_(device, sizes["cells of cached blocks"]),
       rank_histogram_(device, sizes["eviction ranks"]),
@@ -92,7 +92,7 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
 }
 
 void BlockCache::clear() {
-  clear_(slots_range_, num_slots, 8 * table_groups, table, slot_block_ids, slot_stamps, free_slots_,
+  clear_(slots_range_, num_slots, 8 * table_groups, table, slot_block_ids, slot_stamps, free_slots,
          state);
 }
 
@@ -111,13 +111,13 @@ void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
   select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
           request_block_ids, capacity, rank_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, slot_ranks_,
-         table, state, free_slots_);
+         table, state, free_slots);
   rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_changing_, state,
            table);
 }
 
 void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {
-  assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots_,
+  assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots,
           table, slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
 }
 

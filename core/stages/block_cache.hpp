@@ -70,6 +70,7 @@ struct BlockCache {
   ocl::Buffer<uint> slot_block_ids;  ///< [num_slots] block in each slot or ISO_INVALID_ID
   ocl::Buffer<uint>
       slot_stamps;  ///< [num_slots] when it was used last: kernels_cl/device/slot_stamps.h
+  ocl::Buffer<uint> free_slots;  ///< [num_slots] the first state.free_count hold no block
   ocl::Buffer<uint>
       requested_bits;  ///< [2 * coarse macrocells] one bit per block; 0 between passes
   ocl::Buffer<uint> request_block_ids;  ///< [capacity]
@@ -82,7 +83,6 @@ struct BlockCache {
 
   std::uint32_t group_size_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
-  ocl::Buffer<uint> free_slots_;
   ocl::Buffer<uchar> slot_ranks_;  ///< [num_slots] orders of eviction
   ocl::Buffer<ulong>
       slot_changing_;  ///< [num_slots] BlockEntry::changing while the table is rebuilt

@@ -7,14 +7,24 @@ namespace isowave::core {
 namespace {
 
 /// A work-item of its own for each packet: its lanes are what a work-group is elsewhere.
-ocl::Defines packet_defines(Solver solver) {
+ocl::Defines packet_defines(Solver solver, const DeviceStream *on_demand) {
   ocl::Defines defines = group_defines(1);
   defines.merge(solver_defines(solver));
+  if (on_demand != nullptr) {
+    defines.merge(on_demand->defines());
+    defines.emplace("ISO_ON_DEMAND", "1");
+  }
   return defines;
 }
 
 /// Rays of a chunk, which a work-item takes at a time: march_packets.cl.
 constexpr std::uint64_t kChunkRays = 256;
+
+/// Oclgrind would report what work-items do for each other.
+ocl::Range range_of(const ocl::Device &device, std::uint64_t num_pixels, bool on_demand) {
+  if (on_demand && device.info().platform == "Oclgrind") return {1, 1};
+  return ocl::Range::strided((num_pixels + kChunkRays - 1) / kChunkRays, 1, device);
+}
 
 }  // namespace
 
@@ -22,21 +32,31 @@ bool MarchPackets::suits(const ocl::DeviceInfo &device) {
   return device.type == ocl::DeviceType::kCpu && device.capabilities.native_float_width >= 8;
 }
 
-MarchPackets::MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver solver)
-    : range_(ocl::Range::strided((num_pixels + kChunkRays - 1) / kChunkRays, 1, device)),
-      begin_(device, "march_packets", "begin_packets", packet_defines(solver)),
-      march_(device, "march_packets", "march_packets", packet_defines(solver)) {}
-
-void MarchPackets::begin_frame(Wavefront &rays) {
-  begin_({1, 1}, rays.counts, rays.next_counts);
-  begins_ = true;
+bool MarchPackets::may_decode(const ocl::DeviceInfo &device) {
+  return device.type == ocl::DeviceType::kCpu && device.platform == "Portable Computing Language";
 }
 
-void MarchPackets::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  march_(range_, rays.frame, std::exchange(begins_, false) ? 1u : 0u, macrocells.masks(),
-         cache.table, cache.inside, cache.values, rays.previous_counts, rays.counts,
-         rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids, rays.ray_block_ids,
-         rays.hits, cache.slot_stamps, cache.state);
+MarchPackets::MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver solver,
+                           const DeviceStream *on_demand)
+    : on_demand_(on_demand != nullptr),
+      range_(range_of(device, num_pixels, on_demand_)),
+      open_(device, "march_packets", "open_packets", packet_defines(solver, on_demand)),
+      march_(device, "march_packets", "march_packets", packet_defines(solver, on_demand)) {}
+
+void MarchPackets::operator()(const Macrocells &macrocells, const DeviceStream &stream,
+                              BlockCache &cache, Wavefront &rays) {
+  const uint begins = std::exchange(begins_, false) ? 1 : 0;
+  const ocl::Buffer<uint> &none = macrocells.masks();  // stands in for what is not read
+  const auto part = [&](std::size_t i) -> const ocl::Buffer<uint> & {
+    return on_demand_ ? stream.part(i) : none;
+  };
+  open_({1, 1}, rays.frame, begins, rays.previous_counts, rays.counts, rays.next_counts,
+        cache.state);
+  march_(range_, rays.frame, begins, part(0), part(1), part(2), part(3),
+         on_demand_ ? stream.index() : none, stream.layout, macrocells.masks(), cache.table,
+         cache.inside, cache.values, rays.previous_counts, rays.counts, rays.active_ray_ids,
+         rays.next_active_ray_ids, rays.ray_block_ids, rays.hits, cache.slot_block_ids,
+         cache.slot_stamps, cache.requested_bits, cache.free_slots, cache.state);
 }
 
 }  // namespace isowave::core

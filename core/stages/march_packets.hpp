@@ -6,6 +6,7 @@
 #include "core/stages/macrocells.hpp"
 #include "core/stages/solvers.hpp"
 #include "core/stages/wavefront.hpp"
+#include "core/stream/device_stream.hpp"
 
 namespace isowave::core {
 
@@ -17,32 +18,45 @@ class MarchPackets {
   /// Whether it has that solver.
   static bool has(Solver solver) { return solver.kind == ISO_SOLVER_BERNSTEIN; }
 
-  /// solver: one that it has.
-  MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver solver);
+  /// Whether threads of that device may decode blocks on demand: where memory is ordered as
+  /// kernels_cl/device/on_demand.h says.
+  static bool may_decode(const ocl::DeviceInfo &device);
+
+  /// solver      one that it has
+  /// on_demand   the stream that rays decode blocks from when they come to them; null: they wait
+  ///             for blocks until the next pass. Whole on the device
+  MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver solver,
+               const DeviceStream *on_demand = nullptr);
 
   /// Begins a frame, of the finest level of detail and rays of the camera.
   ///
   /// In     rays.counts: next_active_count is 0
-  /// Waits  no
-  void begin_frame(Wavefront &rays);
+  void begin_frame() { begins_ = true; }
 
-  /// Takes rays further, as far as what was requested in the pass before has been provided. In the
-  /// first pass of a frame, these are the rays of the picture.
+  /// Takes rays further, as far as what was requested in the pass before has been provided, or can
+  /// be decoded on demand. In the first pass of a frame, these are the rays of the picture.
   ///
-  /// Out    rays.hits, in the first pass all of them; next_active_ray_ids and ray_block_ids of the
-  ///        rays that wait; counts.active_count: rays that had met an active block before;
-  ///        hit_count, granted_count (blocks intersected), next_active_count
-  /// Waits  no
-  void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
+  /// stream  the volume; it may have got another layout, but must be of the same defines
+  /// Out     rays.hits, in the first pass all of them; next_active_ray_ids and ray_block_ids of the
+  ///         rays that wait; counts.active_count: rays that had met an active block before;
+  ///         hit_count, granted_count (blocks intersected), next_active_count, free_count;
+  ///         counts.decoded_count grows by the blocks decoded on demand
+  /// Waits   no
+  void operator()(const Macrocells &macrocells, const DeviceStream &stream, BlockCache &cache,
+                  Wavefront &rays);
 
  private:
+  bool on_demand_;
   ocl::Range range_;
   bool begins_ = false;  ///< the next pass is the first of its frame
-  ocl::Kernel<ocl::In<PassCounts>, ocl::Out<PassCounts>> begin_;
-  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::In<ulong>,
-              ocl::In<float>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>,
-              ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>,
+  ocl::Kernel<FrameParams, uint, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>,
               ocl::Out<CacheState>>
+      open_;
+  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              ocl::In<uint>, StreamLayout, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<ulong>,
+              ocl::Out<float>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
+              ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::In<uint>, ocl::Out<CacheState>>
       march_;
 };
 

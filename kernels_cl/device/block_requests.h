@@ -12,6 +12,23 @@ ISO_INLINE void open_requests(global CacheState *cache) {
   cache->granted = cache->recycled = 0;
 }
 
+/// Are so many keys too many, those of evicted blocks included? Three eighths of the entries stay
+/// without.
+ISO_INLINE int table_is_full(const FrameParams *frame, uint num_keys) {
+  return num_keys > 5 * frame->schedule.table_groups;
+}
+
+/// Adds the key of block b to the table, or finds the one it has. Returns its entry.
+ISO_INLINE uint table_key(const FrameParams *frame, global BlockEntry *table, BlockCoords b,
+                          uint block_id) {
+  uint i = table_home(frame, b.x, b.y, b.z);
+  for (;;) {
+    const uint key = atomic_cmpxchg(&table[i].block_id, ISO_INVALID_ID, block_id);
+    if (key == ISO_INVALID_ID || key == block_id) return i;
+    i = table_next(frame, i);
+  }
+}
+
 /// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks,
 /// with several levels of detail as those of one whose blocks have their ids.
 ISO_INLINE uint request_word(const FrameParams *frame, uint x, uint y, uint z) {
@@ -28,6 +45,11 @@ ISO_INLINE int mark_request(const FrameParams *frame, volatile global uint *requ
                             uint y, uint z) {
   const uint bit = request_bit(frame, x, y, z);
   return (atomic_or(&requested_bits[request_word(frame, x, y, z)], bit) & bit) == 0;
+}
+
+ISO_INLINE void unmark_request(const FrameParams *frame, volatile global uint *requested_bits,
+                               uint x, uint y, uint z) {
+  atomic_and(&requested_bits[request_word(frame, x, y, z)], ~request_bit(frame, x, y, z));
 }
 
 /// Stamps block (x,y,z) as needed if it is cached. Returns 1 if it is not, and this is the first to
@@ -50,8 +72,7 @@ ISO_INLINE void list_request(const FrameParams *frame, global uint *request_bloc
     request_block_ids[place] = block_id;
   } else {
     const BlockCoords b = block_coords(frame, block_id);
-    atomic_and(&requested_bits[request_word(frame, b.x, b.y, b.z)],
-               ~request_bit(frame, b.x, b.y, b.z));
+    unmark_request(frame, requested_bits, b.x, b.y, b.z);
   }
 }
 

@@ -51,6 +51,16 @@ ISO_INLINE ulong cells_of_corners(uint corners) {
   return cells;
 }
 
+#if ISO_ON_DEMAND
+/// What the table knows of the cells of block b. To be asked when its slot has been seen: what was
+/// read of the entry before that may be older (on_demand.h).
+ISO_INLINE ulong known_cells(const FrameParams *frame, global const BlockEntry *table,
+                             BlockCoords b) {
+  volatile global const BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
+  return (ulong)entry->changing_high << 32 | entry->changing_low;
+}
+#endif
+
 /// Which cells of block b a ray must look into: those in which inside changes, and those that need
 /// a block that is not cached. What is found out stays in the block's table entry for the next who
 /// asks. Out: slots [8] of the dual grid, ISO_GROUP_SIZE apart; *have: which of its corners are
@@ -70,6 +80,9 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
     *have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
   }
   cells = (ulong)entries[0].changing_high << 32 | entries[0].changing_low;
+#if ISO_ON_DEMAND
+  if ((*have & 1u) != 0) cells = known_cells(frame, table, b);
+#endif
   if ((*have & 1u) != 0 && cells == ISO_CHANGING_UNKNOWN) {
     ulong voxels[8];
     ISO_UNROLL

@@ -237,7 +237,7 @@ typedef struct PassCounts {
   uint granted_count;    ///< of those, pairs whose dual grid was in the cache and were intersected
   uint visible_count;    ///< distinct blocks those belong to
   uint requested_count;  ///< blocks asked for that were not cached
-  uint decoded_count;    ///< of those, blocks that got a slot
+  uint decoded_count;    ///< of those, blocks that got a slot; and blocks decoded on demand
   uint recycled_count;  ///< blocks freed for them that this frame had asked for, too: it needs more
                         ///< than there are slots
   uint hit_count;       ///< rays that hit in this pass
