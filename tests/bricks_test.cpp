@@ -111,8 +111,8 @@ std::vector<Camera> views_of(const VolumeInfo &info, const glm::dvec3 &cut) {
 TEST_P(BricksOnDevice, SmallTwoBricks) {
   const TestVolume volume({9, 10, 11}, test::noise_field(3), 8);
   EXPECT_GT(check(volume, Cuts(blocks_along(volume.info()), 2),
-                  {camera_along({4, 4.5, 4}, {1, 0.25, -0.5})}, 0.1f, {.size = {9, 7}}),
-            20u);
+                  {camera_along({4, 4.5, 4}, {1, 0.25, -0.5})}, 0.1f, {.size = {6, 5}}),
+            10u);
 }
 
 TEST_P(BricksOnDevice, EyesOutsideInsideAndOnCuts) {
@@ -146,7 +146,7 @@ TEST_P(BricksOnDevice, BricksOfOneBlockWithSmallCaches) {
 
 /// Ranges of values are stored through the whole's thresholds, so that bricks find the blocks that
 /// the whole finds, and with them the view that it takes where nobody asks for one.
-TEST_P(BricksOnDevice, SmallSameActiveBlocks) {
+TEST_P(BricksOnDevice, SameActiveBlocks) {
   const TestVolume volume({21, 18, 17}, test::sphere_field({21, 18, 17}));
   const RendererOptions options = GetParam().with({.size = {9, 7}});
   Renderer whole(device_, volume.compressed, options);
