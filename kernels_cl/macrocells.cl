@@ -150,14 +150,6 @@ kernel void macrocell_coarse_ranges(const FrameParams frame_params, uint num_coa
   }
 }
 
-/// Is the block the brick's own? All of a volume's are that is not cut.
-ISO_INLINE int is_own(const FrameParams *frame, uint block_id) {
-  const BlockCoords b = block_coords(frame, block_id);
-  return b.x >= frame->brick.before_x && b.x + frame->brick.behind_x < frame->grid.blocks_x &&
-         b.y >= frame->brick.before_y && b.y + frame->brick.behind_y < frame->grid.blocks_y &&
-         b.z >= frame->brick.before_z && b.z + frame->brick.behind_z < frame->grid.blocks_z;
-}
-
 /// limits: `below` in bits 0..15, `above` in bits 16..31.
 ISO_INLINE int holds_isovalue(uint range, uint limits) {
   return (range & 255u) < (limits & 0xFFFFu) && range >> 8 >= limits >> 16;
@@ -194,7 +186,7 @@ kernel void macrocell_masks(const FrameParams frame_params, uint num_coarse,
     if (holds_isovalue(coarse_ranges[coarse], widest)) {
       for (uint bit = 0; bit < 64; ++bit) {
         const uint block_id = macrocell_block(frame, coarse, bit);
-        if (block_id == ISO_INVALID_ID || !is_own(frame, block_id)) continue;
+        if (block_id == ISO_INVALID_ID || !is_own(frame, block_coords(frame, block_id))) continue;
         const uint range = ranges[frame->place.ranges_begin + block_id];
         if (holds_isovalue(range, widest) &&
             (has_bounds == 0 ||

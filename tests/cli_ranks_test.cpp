@@ -90,8 +90,9 @@ TEST_F(CliRanks, DrawWhatOneProcessDraws) {
   expect_same(kFuel, "--tolerance 0.3 --orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", 3);
 }
 
-TEST_F(CliRanks, SamplesAndBricksAsAskedFor) {
+TEST_F(CliRanks, SamplesLevelsAndBricksAsAskedFor) {
   expect_same(convert("--exact"), "-i 40 --size 48x32 --samples 2", 3, " --bricks 1x1x3");
+  expect_same(convert("--exact --levels 3"), "-i 40 --size 96x64 --voxel-pixels 1.5", 3);
   expect_same("generate:mixing_layer_30x40x24_uint8", "-i 128 --size 64x48 --cache-slots 64", 2);
 }
 
@@ -127,6 +128,7 @@ TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   const std::string render = "render " + kFuel + " -i 40 --size 16x16 ";
   expect_error(on_ranks(2, render + "--ambient 4"), "--ambient");
   expect_error(on_ranks(2, render + "--bricks 2x2x1"), "2 processes draw a brick each");
+  expect_error(on_ranks(2, render + "--voxel-pixels 1"), "convert --levels all");
   expect_error(on_ranks(2, "info " + kFuel), "only render");
   test::expect_one_line_error(render + "--bricks 1x1x1", "--bricks");
 }

@@ -166,6 +166,21 @@ TEST(Cuts, GridsCountAlongX) {
   EXPECT_EQ(cuts.bricks()[5].end, glm::ivec3(5, 4, 3));
 }
 
+TEST(Cuts, CubesAreNotParted) {
+  const glm::ivec3 blocks(21, 17, 9);
+  for (const Cuts &cuts : {Cuts(blocks, 7, num_blocks, 4), Cuts(blocks, glm::uvec3(3, 2, 1), 4)}) {
+    expect_partition(blocks, cuts.bricks());
+    for (const BlockBox &brick : cuts.bricks()) {
+      EXPECT_EQ(brick.begin % 4, glm::ivec3(0));
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_TRUE(brick.end[axis] % 4 == 0 || brick.end[axis] == blocks[axis]);
+    }
+  }
+  EXPECT_EQ(Cuts(blocks, glm::uvec3(2, 1, 1), 4).order_from({47, 0, 0})[0], 0u);
+  EXPECT_EQ(Cuts(blocks, glm::uvec3(2, 1, 1), 4).order_from({48, 0, 0})[0], 1u);
+  EXPECT_THROW(Cuts(blocks, glm::uvec3(7, 1, 1), 4), Error);
+}
+
 TEST(Cuts, RefusesWhatCannotBeCut) {
   EXPECT_THROW(Cuts(glm::ivec3(2), 0u), Error);
   EXPECT_THROW(Cuts(glm::ivec3(2), 9u), Error);

@@ -144,3 +144,5 @@ add_device_mutant(half_of_blocks packets portable/packet_walk.h
   "pick(level->place < 32, level->low, ints(0))")
 add_device_mutant(one_crossing_of_packets packets portable/packet_walk.h
   "lanes & ((in0 ^ in1) | (in0 ^ in2) | (in0 ^ in3))" "lanes & (in0 ^ in3)")
+add_device_mutant(narrow_way packets portable/packet_walk.h
+  "pick(a->up, to, place[axis]) & 3" "place[axis] & 3")

@@ -30,8 +30,8 @@ BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume
     : renderer_(device, volume, options), cuts_(cuts), whole_(whole), team_(team) {}
 
 FrameStats BrickRenderer::render(const FrameRequest &request) {
-  if (request.voxel_pixels > 0 || request.bound != FieldBound::kNone || request.ambient_rays != 0)
-    throw Error("bricks have no levels of detail, no bounds and no ambient rays");
+  if (request.bound != FieldBound::kNone || request.ambient_rays != 0)
+    throw Error("bricks have no bounds and no ambient rays");
   own_hits_.clear();
   const FrameStats stats = renderer_.render(request);
   const View view = make_view(whole_, request.camera, renderer_.size());

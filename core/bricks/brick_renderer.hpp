@@ -30,8 +30,7 @@ class BrickRenderer {
   /// Draws this rank's brick.
   ///
   /// Returns  what that took
-  /// Throws   Error: as Renderer::render(); levels of detail, bounds and ambient rays, which go on
-  ///          in other bricks
+  /// Throws   Error: as Renderer::render(); bounds and ambient rays, which go on in other bricks
   FrameStats render(const FrameRequest &request);
 
   // Of the last frame, all bricks together. Rank 0 has the picture, the others nothing.

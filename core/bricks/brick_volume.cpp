@@ -57,9 +57,15 @@ class CroppedReader : public VolumeReader {
   std::vector<double> doubles_;
 };
 
-CompressedVolume as_brick(CompressedVolume kept, const VolumeInfo &whole, const BlockBox &own) {
-  kept.info = brick_info(whole, own);
-  return kept;
+/// The same box at a coarser level, which ends where that does.
+BlockBox own_of_level(const VolumeInfo &whole, const BlockBox &own, const VolumeInfo &info,
+                      std::size_t level) {
+  const glm::ivec3 all = blocks_along(whole);
+  BlockBox box{own.begin >> int(level), own.end >> int(level)};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (own.end[axis] == all[axis]) box.end[axis] = blocks_along(info)[axis];
+  }
+  return box;
 }
 
 }  // namespace
@@ -77,13 +83,37 @@ VolumeInfo brick_info(const VolumeInfo &whole, const BlockBox &own) {
   return info;
 }
 
-CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own) {
-  return as_brick(cut_blocks(whole, kept_blocks(blocks_along(whole.info), own)), whole.info, own);
+CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own,
+                           std::size_t num_levels) {
+  CompressedVolume brick;
+  for (std::size_t i = 0; i < num_levels; ++i) {
+    const CompressedVolume &level = i == 0 ? whole : whole.coarser_levels.at(i - 1);
+    const BlockBox of_level = own_of_level(whole.info, own, level.info, i);
+    CompressedVolume cut = cut_blocks(level, kept_blocks(blocks_along(level.info), of_level));
+    cut.info = brick_info(level.info, of_level);
+    if (i == 0) {
+      brick = std::move(cut);
+    } else {
+      brick.coarser_levels.push_back(std::move(cut));
+    }
+  }
+  return brick;
 }
 
-CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own) {
-  const VolumeInfo whole = read_zfp_file_info(path).info;
-  return as_brick(read_zfp_blocks(path, kept_blocks(blocks_along(whole), own)), whole, own);
+CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own,
+                            std::size_t num_levels) {
+  const CompressedVolume whole = read_zfp_file_info(path);
+  std::vector<BlockBox> own_of, kept;
+  std::vector<VolumeInfo> infos;
+  for (std::size_t i = 0; i < num_levels; ++i) {
+    infos.push_back(i == 0 ? whole.info : whole.coarser_levels.at(i - 1).info);
+    own_of.push_back(own_of_level(whole.info, own, infos.back(), i));
+    kept.push_back(kept_blocks(blocks_along(infos.back()), own_of.back()));
+  }
+  CompressedVolume brick = read_zfp_blocks(path, kept);
+  for (std::size_t i = 0; i < num_levels; ++i)
+    (i == 0 ? brick : brick.coarser_levels[i - 1]).info = brick_info(infos[i], own_of[i]);
+  return brick;
 }
 
 CompressedVolume compress_brick(const OpenReader &open, std::string_view what,

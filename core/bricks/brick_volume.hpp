@@ -28,16 +28,27 @@ BlockBox kept_blocks(const glm::ivec3 &blocks, const BlockBox &own);
 /// own    not empty, within the whole
 VolumeInfo brick_info(const VolumeInfo &whole, const BlockBox &own);
 
-/// A brick of a volume, without levels of detail.
+/// Blocks along an edge of the cubes that cuts may not part (Cuts), where so many levels of detail
+/// are drawn: then a brick is the same box at all of them, and rays change from one level to
+/// another within it.
+inline int cut_unit(std::size_t num_levels) {
+  return 1 << (num_levels - 1);
+}
+
+/// A brick of a volume.
 ///
-/// Throws  Error: the file that the volume is in is shorter than it was
-CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own);
+/// num_levels  of detail, the volume itself among them; own's planes are multiples of cut_unit()
+/// Throws      Error: the file that the volume is in is shorter than it was
+CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own,
+                           std::size_t num_levels = 1);
 
 /// A brick of a `.zfp` file, of which only its blocks are read: see read_zfp_blocks().
-CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own);
+CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own,
+                            std::size_t num_levels = 1);
 
-/// A brick of any other volume, compressed as the whole would be. Reads the layers of voxels that
-/// the brick has part of; where an error is bounded, before that the whole volume.
+/// A brick of any other volume, of one level of detail, compressed as the whole would be. Reads the
+/// layers of voxels that the brick has part of; where an error is bounded, before that the whole
+/// volume.
 ///
 /// Throws  Error as compress_volume()
 CompressedVolume compress_brick(const OpenReader &open, std::string_view what,

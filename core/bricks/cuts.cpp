@@ -27,6 +27,18 @@ BlockBox part_above(BlockBox box, int axis, int plane) {
   return box;
 }
 
+glm::ivec3 units_along(const glm::ivec3 &blocks, int unit) {
+  return (blocks + (unit - 1)) / unit;
+}
+
+BlockBox scaled(const BlockBox &box, int unit, const glm::ivec3 &blocks) {
+  return {box.begin * unit, glm::min(box.end * unit, blocks)};
+}
+
+std::string name_of_units(int unit) {
+  return unit == 1 ? "blocks" : fmt::format("cubes of {}^3 blocks, for levels of detail,", unit);
+}
+
 }  // namespace
 
 std::uint64_t num_blocks(const BlockBox &box) {
@@ -34,22 +46,32 @@ std::uint64_t num_blocks(const BlockBox &box) {
   return size.x * size.y * size.z;
 }
 
-Cuts::Cuts(const glm::ivec3 &blocks, std::uint32_t count, const BoxWork &work) {
-  const BlockBox all{glm::ivec3(0), blocks};
-  if (count == 0 || count > num_blocks(all))
-    throw Error("{} blocks cannot be cut into {} bricks", num_blocks(all), count);
-  root_ = cut(all, count, work);
+Cuts::Cuts(const glm::ivec3 &blocks, std::uint32_t count, const BoxWork &work, int unit) {
+  const BlockBox all{glm::ivec3(0), units_along(blocks, unit)};
+  if (count == 0 || count > num_blocks(all)) {
+    throw Error("a volume of {} {} cannot be cut into {} bricks", num_blocks(all),
+                name_of_units(unit), count);
+  }
+  root_ = cut(all, count, [&](const BlockBox &box) { return work(scaled(box, unit, blocks)); });
+  scale(unit, blocks);
 }
 
-Cuts::Cuts(const glm::ivec3 &blocks, const glm::uvec3 &bricks) {
+Cuts::Cuts(const glm::ivec3 &blocks, const glm::uvec3 &bricks, int unit) {
+  const glm::ivec3 units = units_along(blocks, unit);
   for (int axis = 0; axis < 3; ++axis) {
-    if (bricks[axis] == 0 || bricks[axis] > static_cast<std::uint32_t>(blocks[axis])) {
-      throw Error("{}x{}x{} bricks cannot be cut from {}x{}x{} blocks", bricks.x, bricks.y,
-                  bricks.z, blocks.x, blocks.y, blocks.z);
+    if (bricks[axis] == 0 || bricks[axis] > static_cast<std::uint32_t>(units[axis])) {
+      throw Error("{}x{}x{} bricks cannot be cut from {}x{}x{} {}", bricks.x, bricks.y, bricks.z,
+                  units.x, units.y, units.z, name_of_units(unit));
     }
   }
   bricks_.resize(std::size_t{bricks.x} * bricks.y * bricks.z);
-  root_ = cut_grid({glm::ivec3(0), blocks}, glm::uvec3(0), bricks, bricks);
+  root_ = cut_grid({glm::ivec3(0), units}, glm::uvec3(0), bricks, bricks);
+  scale(unit, blocks);
+}
+
+void Cuts::scale(int unit, const glm::ivec3 &blocks) {
+  for (BlockBox &brick : bricks_) brick = scaled(brick, unit, blocks);
+  for (Node &node : nodes_) node.plane *= unit;
 }
 
 std::uint32_t Cuts::add_brick(const BlockBox &box) {

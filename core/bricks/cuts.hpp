@@ -25,13 +25,16 @@ class Cuts {
   /// work for each of their bricks, as near as planes between blocks allow.
   ///
   /// blocks  of the volume, along each axis
-  /// count   of bricks, each of at least one block
-  /// Throws  Error: no brick, or more than blocks
-  Cuts(const glm::ivec3 &blocks, std::uint32_t count, const BoxWork &work = num_blocks);
+  /// count   of bricks, each of at least one unit
+  /// unit    blocks along an edge of the cubes that are not cut: where levels of detail are to be
+  ///         cut at the same planes, 2^(levels - 1)
+  /// Throws  Error: no brick, or more than units
+  Cuts(const glm::ivec3 &blocks, std::uint32_t count, const BoxWork &work = num_blocks,
+       int unit = 1);
   /// So many bricks along each axis, as equal as can be; x counts fastest.
   ///
-  /// Throws  Error: none along an axis, or more than blocks
-  Cuts(const glm::ivec3 &blocks, const glm::uvec3 &bricks);
+  /// Throws  Error: none along an axis, or more than units
+  Cuts(const glm::ivec3 &blocks, const glm::uvec3 &bricks, int unit = 1);
 
   /// Each block is in one.
   const std::vector<BlockBox> &bricks() const { return bricks_; }
@@ -56,6 +59,7 @@ class Cuts {
   std::uint32_t cut_grid(const BlockBox &box, const glm::uvec3 &first, const glm::uvec3 &bricks,
                          const glm::uvec3 &all);
   std::uint32_t add_brick(const BlockBox &box);
+  void scale(int unit, const glm::ivec3 &blocks);
   void visit(std::uint32_t node, const glm::vec3 &eye, std::uint32_t &place,
              std::vector<std::uint32_t> &places) const;
 

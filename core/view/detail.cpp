@@ -17,7 +17,8 @@ namespace {
 /// than the second, a little apart so that no rounding matters [world units].
 std::array<double, 2> reach(const VolumeInfo &info, const glm::dvec3 &eye) {
   const glm::dmat3 to_world = info.index_to_world(), to_index = glm::inverse(to_world);
-  const glm::dvec3 last = glm::dvec3(info.dims) - 1.0, at = to_index * (eye - info.origin);
+  const glm::dvec3 last = glm::dvec3(info.dims) - 1.0,
+                   at = to_index * (eye - info.origin) - glm::dvec3(info.brick.first_voxel);
   double farthest = 0, radius = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 side(corner & 1, corner >> 1 & 1, corner >> 2);

@@ -41,11 +41,12 @@ class BlockCutter {
 /// Throws  Error: a file is shorter than it was
 CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box);
 
-/// The same of a `.zfp` file, of which little else is read: header, trailer and the lengths of its
-/// blocks. So the checksum of the payload is not looked at.
+/// The same of a `.zfp` file, a box of each of its first levels of detail. Little else is read:
+/// headers, trailers and the lengths of blocks. So the checksum of the payload is not looked at.
 ///
 /// Throws  Error as read_zfp_file_info(); a damaged index; a file of zfp's own tool whose blocks
 ///         have lengths of their own, since nobody knows where they begin
-CompressedVolume read_zfp_blocks(const std::filesystem::path &path, const BlockBox &box);
+CompressedVolume read_zfp_blocks(const std::filesystem::path &path,
+                                 std::span<const BlockBox> boxes);
 
 }  // namespace isowave::core

@@ -69,14 +69,12 @@ class ZfpFileReader {
     return std::move(volume_);
   }
 
-  /// The blocks of a box.
-  CompressedVolume take_blocks(const BlockBox &box) {
-    volume_.file = file_;
-    volume_.file_first_bit = 8 * begin_ + header_bits_;
-    if (!volume_.is_indexed()) return cut_blocks(volume_, box);
-    if (!has_trailer_)
-      fail("a file of zfp's own tool does not say where its blocks begin: convert it first");
-    return cut_indexed(box);
+  /// A box of each of the first levels.
+  CompressedVolume take_blocks(std::span<const BlockBox> boxes) {
+    CompressedVolume cut = cut_box(boxes.front());
+    for (std::size_t i = 1; i < boxes.size(); ++i)
+      cut.coarser_levels.push_back(levels_.at(i - 1).cut_box(boxes[i]));
+    return cut;
   }
 
   /// keep: the index and bounds, and the file.
@@ -179,6 +177,15 @@ class ZfpFileReader {
     }
     volume_.indexed_bits = end;
     if (keep) volume_.index = index.finish();
+  }
+
+  CompressedVolume cut_box(const BlockBox &box) {
+    volume_.file = file_;
+    volume_.file_first_bit = 8 * begin_ + header_bits_;
+    if (!volume_.is_indexed()) return cut_blocks(volume_, box);
+    if (!has_trailer_)
+      fail("a file of zfp's own tool does not say where its blocks begin: convert it first");
+    return cut_indexed(box);
   }
 
   /// Keeps the lengths of a row at a time.
@@ -380,8 +387,8 @@ CompressedVolume check_zfp_file(const fs::path &path) {
 CompressedVolume read_zfp_file_info(const fs::path &path) {
   return ZfpFileReader(path).take_info();
 }
-CompressedVolume read_zfp_blocks(const fs::path &path, const BlockBox &box) {
-  return ZfpFileReader(path).take_blocks(box);
+CompressedVolume read_zfp_blocks(const fs::path &path, std::span<const BlockBox> boxes) {
+  return ZfpFileReader(path).take_blocks(boxes);
 }
 
 }  // namespace isowave::core

@@ -27,8 +27,8 @@ ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macro
              : ISO_SIDE_OUTSIDE;
 }
 
-/// Does the ray reach the border at t within the domain? If so, *b is the block it is in just
-/// behind it.
+/// Does the ray reach the border at t within the brick's own blocks? If so, *b is the one that it
+/// is in just behind it.
 ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
   const LastPlanes last = last_planes(frame);
   LastPlanes zero;
@@ -38,7 +38,7 @@ ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t
   b->x = (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4);
   b->y = (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4);
   b->z = (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4);
-  return 1;
+  return is_own(frame, *b);
 }
 
 /// Where a ray stands that leaves the band of frames[level], or ISO_INVALID_ID: there is nothing

@@ -61,6 +61,13 @@ ISO_INLINE uint block_id_at(const FrameParams *frame, uint x, uint y, uint z) {
   return x + id_blocks_x(frame) * (y + id_blocks_y(frame) * id_layer(frame, z));
 }
 
+/// Is the block the brick's own? All of a volume's are that is not cut.
+ISO_INLINE int is_own(const FrameParams *frame, BlockCoords b) {
+  return b.x >= frame->brick.before_x && b.x + frame->brick.behind_x < frame->grid.blocks_x &&
+         b.y >= frame->brick.before_y && b.y + frame->brick.behind_y < frame->grid.blocks_y &&
+         b.z >= frame->brick.before_z && b.z + frame->brick.behind_z < frame->grid.blocks_z;
+}
+
 /// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. Always the
 /// first would be blind where the stride is a multiple of the blocks along x: all on one face of
 /// the volume.

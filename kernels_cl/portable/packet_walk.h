@@ -2,9 +2,9 @@
 /// hits of the scalar walk, bit for bit.
 ///
 /// All rays of a packet first look for a macrocell with active blocks, then those that have found
-/// one for such a block, then for a cell to look into; only when no ray walks any more are cells
-/// tested, those of all rays together. A ray that leaves a block or a macrocell on its way is
-/// looked after before that.
+/// one for such a block, then for a cell to look into; only when half of the rays stand at one, or
+/// none walks any more, are cells tested, those of all rays together. A ray that leaves a block or
+/// a macrocell on its way is looked after before that.
 ///
 /// A ray keeps the crossing by which it entered the region that it is in, as axis and plane: the
 /// moment follows from these when a cell is tested.
@@ -36,6 +36,8 @@ ISO_PACKET_NAMESPACE_BEGIN
 #define ISO_CELLS 0
 #define ISO_BLOCKS 1
 #define ISO_MACROCELLS 2
+/// When so many lanes stand at cells, these are tested, though others still walk.
+#define ISO_ENOUGH_STANDING 4
 /// Voxels along the edge of a region of that level.
 #define ISO_REGION_SIZE(level) (1 << (2 * (level)))
 
@@ -275,24 +277,55 @@ ISO_INLINE void begin_at_blocks(Packet *p, const PacketScene *scene, const Ints 
 
 // ---- The walk
 
-/// Lets lanes enter the regions of a level within those of the next larger one, where they are.
+/// Bits first to last, each of 0 to 3.
+ISO_INLINE Ints bits_between(Ints first, Ints last) {
+  return (ints(2) << last) - (ints(1) << first);
+}
+
+/// Lets lanes enter the regions of a level within those of the next larger one, where they are, but
+/// for lanes on whose way there none is to be entered.
+///
+/// A ray's way is within the box of the regions where it enters and leaves the larger one. The
+/// latter need not be known exactly: positions are off by less than `error` (packet_locate()),
+/// which makes the box larger.
 ISO_INLINE void enter_regions(Packet *p, const PacketScene *scene, int level, Mask lanes) {
   const int size = ISO_REGION_SIZE(level);
   PacketLevel *l = &p->level[level];
-  const Floats t = entry_t(&p->rays);
-  Ints places = ints(0);
+  const PacketAxis *axes = p->rays.axis;
+  const Floats *far = p->level[level + 1].far;
+  const Floats t = entry_t(&p->rays), x_t = packet_float_t(&axes[0], far[0]),
+               y_t = packet_float_t(&axes[1], far[1]), z_t = packet_float_t(&axes[2], far[2]),
+               xy_t = smaller(x_t, y_t), exit_t = smaller(xy_t, z_t);
+  Ints place[3], bits[3], places = ints(0);
   ISO_EACH_OF_3(axis) {
+    const PacketAxis *a = &axes[axis];
     Range range;
     range.first = regions(p, level + 1, axis) * 4;
     const Ints end = range.first + 3, last = ints((scene->last[axis] - 1) / size);
     range.last = smaller(end, last);
-    const Ints place = packet_locate(&p->rays, axis, size, t, range, lanes);
-    l->far[axis] = pick(lanes, far_planes(p, axis, size, place), l->far[axis]);
-    places += (place & 3) << (2 * axis);
+    place[axis] = packet_locate(&p->rays, axis, size, t, range, lanes);
+    const Floats exit = fma(exit_t, a->d, a->o),
+                 error = ISO_FLOAT_DOUBT * (fabs(exit) + fabs(a->o));
+    const Ints farthest = to_ints(floor((exit + error * a->sign) * (1.0f / (float)size))),
+               at_least = larger(farthest, range.first), to = smaller(at_least, range.last);
+    bits[axis] = bits_between(pick(a->up, place[axis], to) & 3, pick(a->up, to, place[axis]) & 3);
+    places += (place[axis] & 3) << (2 * axis);
   }
-  l->place = pick(lanes, places, l->place);
-  p->at[level] |= lanes;
-  p->at[level + 1] &= ~lanes;
+  const Ints x = bits[0] | bits[0] << 4, row = x | x << 8, y = bits[1], z = bits[2];
+  const Ints rows = row & (((y & 1) | (y & 2) << 3 | (y & 4) << 6 | (y & 8) << 9) * 15),
+             layers = rows | rows << 16;
+  const Ints low = l->low & layers & ((-(z & 1) & 0xFFFF) | -(z >> 1 & 1) << 16),
+             high = l->high & layers & ((-(z >> 2 & 1) & 0xFFFF) | -(z >> 3) << 16);
+  const Mask enters = lanes & ((low | high) != 0);
+  if (!any(enters)) return;
+  ISO_EACH_OF_3(axis) {
+    l->far[axis] = pick(enters, far_planes(p, axis, size, place[axis]), l->far[axis]);
+  }
+  l->low = pick(enters, low, l->low);
+  l->high = pick(enters, high, l->high);
+  l->place = pick(enters, places, l->place);
+  p->at[level] |= enters;
+  p->at[level + 1] &= ~enters;
 }
 
 /// Lets lanes leave their regions of a level. Returns those that leave the larger one, too, and
@@ -511,7 +544,9 @@ ISO_INLINE void walk_packet(Packet *p, const PacketScene *scene) {
     walk_blocks(p, scene);
     if (any(p->at[ISO_MACROCELLS])) continue;
     standing |= walk_cells(p);
-    if (any(p->at[ISO_MACROCELLS] | p->at[ISO_BLOCKS])) continue;
+    if (any(p->at[ISO_MACROCELLS] | p->at[ISO_BLOCKS]) &&
+        popcount(bits_of(standing)) < ISO_ENOUGH_STANDING)
+      continue;
     if (!any(standing)) break;
     test_cells(p, scene, standing);
     standing = ints(0);

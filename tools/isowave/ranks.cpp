@@ -55,12 +55,12 @@ std::string fingerprint(const std::string &path, const VolumeInfo &info) {
   return fmt::format("{} {} {:x}", grid, file.size(), crc);
 }
 
-Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks) {
-  if (bricks.empty()) return {blocks_along(whole), team.size()};
+Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit) {
+  if (bricks.empty()) return {blocks_along(whole), team.size(), num_blocks, unit};
   const glm::uvec3 along = parse_bricks(bricks);
   if (std::uint64_t{along.x} * along.y * along.z != team.size())
     throw Error("--bricks {}: {} processes draw a brick each", bricks, team.size());
-  return {blocks_along(whole), along};
+  return {blocks_along(whole), along, unit};
 }
 
 std::vector<float> gather_values(Team &team, std::span<const float> values) {

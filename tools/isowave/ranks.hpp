@@ -26,8 +26,8 @@ ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t l
 /// Throws  Error: the file cannot be read
 std::string fingerprint(const std::string &path, const VolumeInfo &info);
 
-/// A brick for each rank. bricks: XxYxZ, or empty. Throws Error.
-Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks);
+/// A brick for each rank. bricks: XxYxZ, or empty; unit: see Cuts. Throws Error.
+Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit);
 
 /// All ranks' values.
 std::vector<float> gather_values(Team &team, std::span<const float> values);

@@ -20,6 +20,7 @@
 #include "core/render/surface_camera.hpp"
 #include "core/render/time_budget.hpp"
 #include "core/view/detail.hpp"
+#include "core/volume/pyramid.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
@@ -456,8 +457,8 @@ void print_picture_name(const RenderArgs &options, std::size_t num_views) {
 /// What bricks cannot do, since it goes on in other bricks, or is not put together.
 void check_brick_options(const CLI::App &command, const Team &team) {
   refuse_options(command,
-                 {"--reference", "--voxel-pixels", "--levels", "--max-surface-error", "--error-map",
-                  "--time-budget", "--refined", "--ambient", "--progress-dir", "--verbose"},
+                 {"--reference", "--levels", "--max-surface-error", "--error-map", "--time-budget",
+                  "--refined", "--ambient", "--progress-dir", "--verbose"},
                  fmt::format("not of a volume that {} processes draw together", team.size()));
 }
 
@@ -486,6 +487,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
                        BrickRenderer &renderer, Team &team, nlohmann::ordered_json &frames,
                        nlohmann::ordered_json &own) {
   FrameRequest base;
+  base.voxel_pixels = options.voxel_pixels;
   base.voxel_error = options.frame.voxel_error;
   base.normals = normals_from_string(options.normals);
   for (const float isovalue : options.frame.isovalues) {
@@ -514,6 +516,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
 }
 
 void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
+  options.voxel_pixels = options.renderer_flags.voxel_pixels;
   agree_on(team, "version", program_name());
   agree_on(team, "command line", MpiJob::command_line());
   check_brick_options(command, team);
@@ -526,14 +529,21 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   appearance.background = parse_color("--background", options.background);
   const RawOverrides overrides = to_overrides(options.volume);
   std::unique_ptr<ocl::Device> device;
-  VolumeInfo whole;
+  std::vector<VolumeInfo> levels;
   together(team, [&] {
     if (team.rank() == 0) check_outputs(options, views.count);
     device = open_device(options, choose_local_device(options.device, MpiJob::local_rank()));
-    whole = read_volume_info(options.input, overrides);
+    levels = read_volume_levels(options.input, overrides);
   });
+  const VolumeInfo &whole = levels.front();
   agree_on(team, "volume", fingerprint(options.input, whole));
-  const Cuts cuts = cut_for(team, whole, options.bricks);
+  if (options.voxel_pixels == 0) levels.resize(1);
+  if (options.voxel_pixels > 0 && levels.size() == 1 && max_levels(whole.dims) > 1) {
+    throw Error(
+        "{} has no levels of detail, which bricks cannot make: isowave convert --levels all",
+        options.input);
+  }
+  const Cuts cuts = cut_for(team, whole, options.bricks, cut_unit(levels.size()));
   const BlockBox &own = cuts.bricks()[team.rank()];
   Scene scene;
   scene.size = views.size;
@@ -543,8 +553,8 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   std::vector<float> samples;
   together(team, [&] {
     scene.cameras = make_cameras(options.input, whole, options.frame, views);
-    scene.volume =
-        load_brick(options.input, overrides, options.frame.compression, whole, own, device.get());
+    scene.volume = load_brick(options.input, overrides, options.frame.compression, whole,
+                              levels.size(), own, device.get());
     samples = range_samples(scene.volume, whole);
     options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   });

@@ -13,6 +13,7 @@
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
+#include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -124,22 +125,22 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   return compress_volume([&] { return open_any_volume(path, overrides, device); }, path, storage);
 }
 
-VolumeInfo read_volume_info(const std::string &path, const RawOverrides &overrides) {
-  if (!is_zfp_name(path)) return open_any_volume(path, overrides)->info();
+std::vector<VolumeInfo> read_volume_levels(const std::string &path, const RawOverrides &overrides) {
+  if (!is_zfp_name(path)) return {open_any_volume(path, overrides)->info()};
   if (overrides.dims || overrides.type) throw Error("{}: dims and type are for raw files", path);
-  VolumeInfo info = read_zfp_file_info(path).info;
-  if (overrides.spacing) info.spacing = *overrides.spacing;
-  check_volume_info(info, path);
-  return info;
+  CompressedVolume volume = read_zfp_file_info(path);
+  if (overrides.spacing) set_spacing(volume, *overrides.spacing);
+  check_volume_info(volume.info, path);
+  return level_infos(volume, true);
 }
 
 CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
                             const CompressionOptions &compression, const VolumeInfo &info,
-                            const BlockBox &own, ocl::Device *device) {
+                            std::size_t num_levels, const BlockBox &own, ocl::Device *device) {
   check_drawable(brick_info(info, own), path);
   if (is_zfp_name(path)) {
     refuse_compression(compression, path);
-    CompressedVolume volume = read_brick(path, own);
+    CompressedVolume volume = read_brick(path, own, num_levels);
     set_spacing(volume, info.spacing);
     return volume;
   }

@@ -72,13 +72,15 @@ inline constexpr const char *kVolumeHelp =
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device = nullptr);
 
-/// The grid of what load_volume() would load. Throws Error as that does.
-VolumeInfo read_volume_info(const std::string &path, const RawOverrides &overrides);
+/// What load_volume() would load, of which only grids are there, the finest first. Throws Error as
+/// that does.
+std::vector<VolumeInfo> read_volume_levels(const std::string &path, const RawOverrides &overrides);
 
-/// A brick of what load_volume() would load. info: what read_volume_info() says of it.
+/// A brick of what load_volume() would load, with so many levels of detail. info: of the finest, as
+/// read_volume_levels() has it. Throws Error.
 CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
                             const CompressionOptions &compression, const VolumeInfo &info,
-                            const BlockBox &own, ocl::Device *device);
+                            std::size_t num_levels, const BlockBox &own, ocl::Device *device);
 
 /// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with
 /// the last.
