@@ -217,13 +217,13 @@ TEST(MemoryPlan, FirstSlotsAreForWhatAFrameNeeds) {
   constexpr std::uint64_t kRays = 1280 * 720;
   EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays), 12u * 128 * 128) << "of the volume";
   EXPECT_EQ(first_cache_slots(256 * 256 * 256, kRays), kRays / 8 * 5) << "of the picture";
-  EXPECT_EQ(first_cache_slots(64 * 64 * 64, 800), 4096u) << "not worth saving";
-  EXPECT_EQ(first_cache_slots(4096, kRays), 4096u) << "all";
+  EXPECT_EQ(first_cache_slots(64 * 64 * 64, 800), 16'384u) << "not worth saving";
+  EXPECT_EQ(first_cache_slots(16'384, kRays), 16'384u) << "all";
   EXPECT_EQ(first_cache_slots(27, kRays), 27u) << "all";
   EXPECT_EQ(first_cache_slots(1, 1), kMinCacheSlots);
 }
 
-TEST(MemoryPlan, ACacheGrowsByWhatItLackedAtMostToTwice) {
+TEST(MemoryPlan, ACacheGrowsByWhatItLackedAtMostToFourTimes) {
   MemoryPlan plan;
   plan.cache_slots = 1600;
   plan.most_slots = 3000;
@@ -232,8 +232,8 @@ TEST(MemoryPlan, ACacheGrowsByWhatItLackedAtMostToTwice) {
   EXPECT_EQ(grown_cache_slots(plan, 51), 2060u);
   EXPECT_EQ(grown_cache_slots(plan, 400), 2500u) << "a quarter more than was needed";
   EXPECT_EQ(grown_cache_slots(plan, 100'000), 3000u) << "no more than it may";
-  plan.most_slots = 5000;
-  EXPECT_EQ(grown_cache_slots(plan, 100'000), 3200u);
+  plan.most_slots = 10'000;
+  EXPECT_EQ(grown_cache_slots(plan, 100'000), 6400u);
   plan.most_slots = plan.cache_slots;
   EXPECT_FALSE(plan.can_grow());
   EXPECT_EQ(grown_cache_slots(plan, 100'000), 1600u);
@@ -266,8 +266,8 @@ TEST_P(MemoryPlanOfLevelsOnDevice, DefaultIsBelowThePaperAndTheDecodedVolume) {
   EXPECT_TRUE(plan.can_grow());
   EXPECT_LT(plan_of({256, 256, 256}).peak(), 256u * 256 * 256 * 4) << "with fewer slots";
   EXPECT_GE(plan_of({256, 256, 256}).cache_slots, 30'720u) << "but not with too few";
-  request.num_rays = 1920 * 1080;  // the picture alone has more bytes
-  EXPECT_EQ(plan_of({256, 256, 256}).cache_slots, 30'720u);
+  request.num_rays = 1920 * 1080;
+  EXPECT_EQ(plan_of({256, 256, 256}).cache_slots, 49'152u) << "the picture alone has more bytes";
 }
 
 /// What growing makes of a plan is what would have been planned.
@@ -343,7 +343,7 @@ TEST_P(GrowingCacheOnDevice, SmallUntilAFrameFits) {
   for (int frame = 0; frame < 8 && last_decoded != 0; ++frame) {
     last_decoded = decoded(draw(renderer));
     slots.push_back(renderer.memory_plan().cache_slots);
-    if (frame != 0) EXPECT_LE(slots[frame], 2 * slots[frame - 1]);
+    if (frame != 0) EXPECT_LE(slots[frame], 4 * slots[frame - 1]);
   }
   EXPECT_EQ(slots.front(), 16u) << "not before the frame that finds them missing";
   EXPECT_TRUE(std::ranges::is_sorted(slots));

@@ -31,12 +31,15 @@ constexpr std::uint64_t kRaysPerUsefulSlot = 8;
 constexpr double kSlotsPerFace = 12;
 /// Few rays need fewer: never more than five slots for eight of them.
 constexpr std::uint64_t kRaysPerSlot = 8, kSlotsOfThose = 5;
-/// A cache that would make the plan larger than the decoded volume begins with 5/8.
+/// Where that keeps the plan below the decoded volume, a cache begins with as little as 5/8.
 constexpr std::uint64_t kLeastOfFirst = 8, kLeastOfThose = 5;
-/// Slots (1.3 MB) that no cache begins with fewer of, unless there are not so many blocks.
-constexpr std::uint64_t kFewSlots = 4096;
+/// Slots (5.3 MB) that no cache begins with fewer of, unless there are not so many blocks: those of
+/// a small noisy volume, where a frame needs most of the blocks.
+constexpr std::uint64_t kFewSlots = 1 << 14;
 /// A frame that frees a smaller part of its slots for itself finds enough of them.
 constexpr std::uint32_t kSparePart = 32;
+/// A cache grows to so many times as many slots at most.
+constexpr std::uint64_t kMostGrowth = 4;
 
 std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequest &request,
                                 std::uint32_t cache_slots) {
@@ -131,8 +134,8 @@ std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays
 std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled) {
   const std::uint64_t slots = plan.cache_slots;
   if (!plan.can_grow() || recycled <= slots / kSparePart) return plan.cache_slots;
-  // What was freed may have been asked for again and again: at most twice as many.
-  const std::uint64_t wanted = std::min((slots + recycled) / 4 * 5, 2 * slots);
+  // What was freed may have been asked for again and again, and counts as often.
+  const std::uint64_t wanted = std::min((slots + recycled) / 4 * 5, kMostGrowth * slots);
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, plan.most_slots));
 }
 
@@ -255,13 +258,13 @@ MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volum
       first_slots != 0 ? first_slots : first_cache_slots(num_blocks, request.num_rays);
   MemoryPlan plan = plan_of(first);
   const std::uint64_t decoded = ISO_BLOCK_VOXELS * sizeof(float) * volume.block_count();
-  if (first_slots == 0 && plan.cache_slots > kFewSlots && plan.total() > decoded) {
-    const std::uint64_t few = plan_of(kFewSlots).total(),
-                        excess =
-                            (plan.total() - decoded) * (first - kFewSlots) / (plan.total() - few) +
-                            1,
-                        least = std::max(first / kLeastOfFirst * kLeastOfThose, kFewSlots);
-    plan = plan_of(std::max(first - std::min(first, excess), least));
+  if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots
+    const std::uint64_t slots = plan.cache_slots,
+                        least = std::max(slots / kLeastOfFirst * kLeastOfThose, kFewSlots);
+    const MemoryPlan smaller = plan_of(least);
+    if (least < slots && smaller.total() < decoded)
+      plan = plan_of(least + (slots - least) * (decoded - smaller.total()) /
+                                 (plan.total() - smaller.total()));
   }
   plan.most_slots = most.cache_slots;
   plan.reason = std::move(most.reason);
