@@ -93,7 +93,8 @@ std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
   // In equal ratios of what lies above the least: the same at every budget, that would hide the
   // rest.
   constexpr double kSmallest = 0.01;
-  const auto above = static_cast<double>(ample.memory_plan().peak() - least);
+  const MemoryPlan &plan = ample.memory_plan();
+  const auto above = static_cast<double>(resized(plan, plan.most_slots).peak() - least);
   std::vector<std::uint64_t> budgets;
   for (std::uint32_t i = 0; i < count; ++i) {
     budgets.push_back(

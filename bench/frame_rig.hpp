@@ -22,6 +22,7 @@ struct FrameSetup {
   ImageSize size;
   float isovalue = 0;
   std::uint32_t max_speculation = 1;
+  bool scanned_pairs = false;
   std::uint32_t cache_slots = 0;  ///< 0: all blocks
 };
 

@@ -1,5 +1,5 @@
 // Rays -> their next N_Spec blocks: traverse.cl. The first pass of a frame, with as many rays as
-// give each N_Spec.
+// give each N_Spec; each with as many places, or with as many as it fills.
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
@@ -7,11 +7,18 @@
 namespace isowave::core::bench {
 namespace {
 
+FrameSetup setup_of(std::int64_t width, std::int64_t edge, std::int64_t spec_count,
+                    std::int64_t scanned_pairs) {
+  FrameSetup setup =
+      mixing_layer_setup(edge, image_of_width(width), static_cast<std::uint32_t>(spec_count));
+  setup.scanned_pairs = scanned_pairs != 0;
+  return setup;
+}
+
 struct TraverseInput : FrameRig {
-  TraverseInput(ocl::Device &device, std::int64_t width, std::int64_t edge, std::int64_t spec_count)
-      : FrameRig(device, mixing_layer(edge),
-                 mixing_layer_setup(edge, image_of_width(width),
-                                    static_cast<std::uint32_t>(spec_count))) {
+  TraverseInput(ocl::Device &device, std::int64_t width, std::int64_t edge, std::int64_t spec_count,
+                std::int64_t scanned_pairs)
+      : FrameRig(device, mixing_layer(edge), setup_of(width, edge, spec_count, scanned_pairs)) {
     start();
     thin_wavefront(params.schedule.max_spec_count);
     begin_pass();
@@ -33,7 +40,8 @@ struct TraverseInput : FrameRig {
     for (std::size_t pair = 0; pair < blocks.size(); ++pair) {
       if (blocks[pair] == ISO_INVALID_ID) continue;
       ++num_pairs;
-      check(pair % counts.spec_count == 0 || blocks[pair - 1] != ISO_INVALID_ID,
+      check(params.schedule.scanned_pairs || pair % counts.spec_count == 0 ||
+                blocks[pair - 1] != ISO_INVALID_ID,
             "order of a ray's blocks");
       const uint x = blocks[pair] % params.grid.blocks_x,
                  y = blocks[pair] / params.grid.blocks_x % params.grid.blocks_y,
@@ -50,7 +58,7 @@ struct TraverseInput : FrameRig {
 };
 
 void find_blocks(benchmark::State &state) {
-  auto &in = input<TraverseInput>(state.range(0), state.range(1), state.range(2));
+  auto &in = input<TraverseInput>(state.range(0), state.range(1), state.range(2), state.range(3));
   const double bytes = 12.0 * in.counts.active_count + 4.0 * in.counts.pair_slot_count;
   measure(
       state, {double(in.counts.active_count), bytes}, [&] { in.before->restore(); },
@@ -60,8 +68,8 @@ void find_blocks(benchmark::State &state) {
 
 const bool kRegistered = [] {
   stage_benchmark("traverse", find_blocks)
-      ->ArgNames({"width", "edge", "n_spec"})
-      ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {128, 256}, {1, 8, 64}});
+      ->ArgNames({"width", "edge", "n_spec", "scanned"})
+      ->ArgsProduct({{kWidths.begin(), kWidths.end()}, {128, 256}, {1, 8, 64}, {0, 1}});
   return true;
 }();
 

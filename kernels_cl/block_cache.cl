@@ -13,6 +13,7 @@
 /// slots are too few even for it, slots that other rays use in this very pass are taken; those rays
 /// wait for the next. (Not in the paper, whose cache grows instead.)
 #include "device/block_requests.h"
+#include "device/ray_pairs.h"
 
 #define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
 
@@ -37,12 +38,28 @@ ISO_INLINE void table_evict(const FrameParams *frame, global BlockEntry *table, 
   table[i].slot = ISO_BLOCK_ABSENT;
 }
 
+/// Whether the pair as far along the ray before has the same block.
+ISO_INLINE int asked_beside(const FrameParams *frame, global const uint *pair_block_ids,
+                            global const uint *pair_begins, global const uint *pair_rays, uint pair,
+                            uint block_id, uint spec_count) {
+  uint own = pair, beside = pair - spec_count;
+  if (frame->schedule.scanned_pairs) {
+    const uint a = pair_rays[pair];
+    own = pair_begins[a];
+    beside = a == 0 ? own : pair_begins[a - 1] + pair - own;
+  } else if (pair < spec_count) {
+    beside = own;
+  }
+  return beside < own && pair_block_ids[beside] == block_id;
+}
+
 /// For each pair, stamps the cached blocks of its dual grid and lists the missing ones, once each.
 ///
 /// Out     request_block_ids [counts->requested_count, at most capacity]; slot_stamps
 /// Launch  grid-stride over pair slots
 kernel void cache_request(const FrameParams frame_params, global PassCounts *counts,
-                          global const uint *pair_block_ids, global const BlockEntry *table,
+                          global const uint *pair_block_ids, global const uint *pair_begins,
+                          global const uint *pair_rays, global const BlockEntry *table,
                           global uint *slot_stamps, global uint *requested_bits,
                           global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
@@ -59,7 +76,7 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
     uint num_missing = 0;
     /* The neighbouring ray's pair asks for the same blocks: let it. Saves most of the work. */
     if (block_id != ISO_INVALID_ID &&
-        (pair < spec_count || pair_block_ids[pair - spec_count] != block_id)) {
+        !asked_beside(frame, pair_block_ids, pair_begins, pair_rays, pair, block_id, spec_count)) {
       const BlockCoords b = block_coords(frame, block_id);
       for (uint corner = 0; corner < 8; ++corner) {
         const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
@@ -333,6 +350,33 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
       decode_slots[i] = slot;
     }
   }
+}
+
+/// Adds up the cached blocks that rays of the pass have used: for statistics.
+///
+/// in_dual_grids  those too that are in the dual grid of a block that was read: march stamps just
+///                that block, cache_request all eight
+/// touched        [1]
+/// Launch         grid-stride over slots
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_touched(
+    const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
+    uint in_dual_grids, global const BlockEntry *table, global const uint *slot_block_ids,
+    global const uint *slot_stamps, global uint *touched) {
+  const FrameParams *frame = &frame_params;
+  local uint group_touched;
+  const uint now = read_stamp(counts->pass);
+  if (get_local_id(0) == 0) group_touched = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
+    const uint block_id = slot_block_ids[slot];
+    if (block_id != ISO_INVALID_ID) {
+      uint stamp = slot_stamps[slot];
+      if (in_dual_grids) stamp = last_use(frame, table, slot_stamps, block_id, stamp);
+      if ((int)(stamp - now) >= 0) atomic_inc(&group_touched);
+    }
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (get_local_id(0) == 0 && group_touched != 0) atomic_add(touched, group_touched);
 }
 
 /// The cache as it was made: every slot free. Grid-stride over slots and table.

@@ -2,6 +2,7 @@
 /// (Sec. 4.4).
 #include "device/cached_cell.h"
 #include "device/closest_pair.h"
+#include "device/ray_pairs.h"
 #include "portable/cell_intersect.h"
 #include "portable/ray_state.h"
 
@@ -13,10 +14,10 @@
 /// Launch  grid-stride over the active rays
 kernel void composite(const FrameParams frame_params, global PassCounts *counts,
                       global uint *active_ray_ids, global const uint *pair_block_ids,
-                      global const PairHit *pair_hits, global const uint *closest_pairs,
-                      global const BlockEntry *table, global const float *cache_values,
-                      global uint *ray_block_ids, global HitRecord *hits,
-                      global uint *ray_active_mask) {
+                      global const uint *pair_begins, global const PairHit *pair_hits,
+                      global const uint *closest_pairs, global const BlockEntry *table,
+                      global const float *cache_values, global uint *ray_block_ids,
+                      global HitRecord *hits, global uint *ray_active_mask) {
   const FrameParams *frame = &frame_params;
   const LastPlanes last = last_planes(frame);
   const uint active_count = counts->active_count, spec_count = counts->spec_count,
@@ -27,9 +28,10 @@ kernel void composite(const FrameParams frame_params, global PassCounts *counts,
     uint goes_on =
         ray_block_ids[ray_id] != ISO_INVALID_ID; /* also for rays outside the window: untouched */
     if (a < window) {
-      const uint pair = closest_pair(closest_pairs, pair_block_ids, pair_hits, a, spec_count);
-      if (pair == ISO_INVALID_ID ||
-          (pair_hits[pair].cell == ISO_NOT_TESTED && pair != a * spec_count)) {
+      const uint begin = first_pair(frame, pair_begins, a, spec_count),
+                 end = first_pair(frame, pair_begins, a + 1, spec_count);
+      const uint pair = closest_pair(closest_pairs, pair_block_ids, pair_hits, a, begin, end);
+      if (pair == ISO_INVALID_ID || (pair_hits[pair].cell == ISO_NOT_TESTED && pair != begin)) {
         if (frame->schedule.per_ray_speculation)
           active_ray_ids[a] = pack_entry(ray_id, further_ahead(entry.log_ahead), 0);
       }

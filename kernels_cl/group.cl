@@ -13,6 +13,7 @@
 /// in whatever order they come. Nothing here costs more than O(pairs), whatever the number of slots
 /// or blocks.
 #include "device/closest_pair.h"
+#include "device/ray_pairs.h"
 #include "device/work_group.h"
 #include "portable/block_table.h"
 
@@ -42,8 +43,8 @@ ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b,
 /// Launch  groups stride over tiles of pairs; each appends with one global atomic a tile
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_select(
     const FrameParams frame_params, global PassCounts *counts, global const uint *pair_block_ids,
-    global const BlockEntry *table, global PairHit *pair_hits, global uint *closest_pairs,
-    global uint *pair_ids, global uint *keys) {
+    global const BlockEntry *table, global const uint *pair_rays, global PairHit *pair_hits,
+    global uint *closest_pairs, global uint *pair_ids, global uint *keys) {
   const FrameParams *frame = &frame_params;
   local uint num_granted, first_place;
   const uint pair_slots = counts->pair_slot_count, spec_count = counts->spec_count,
@@ -61,7 +62,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_se
             dual_grid_is_cached(frame, block_coords(frame, block_id), table, &slots[i])) {
           places[i] = atomic_inc(&num_granted);
         } else {
-          mark_not_tested(pair_hits, closest_pairs, pair, block_id, spec_count);
+          mark_not_tested(pair_hits, closest_pairs, ray_of_pair(frame, pair_rays, pair, spec_count),
+                          pair, block_id);
         }
       }
     }
@@ -255,11 +257,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_bl
 ///
 /// Out     pair_ids [granted_count]; candidate_count: 0, for the next pass
 /// Launch  grid-stride over pair slots
-kernel void group_scatter(global const PassCounts *counts, global const uint *pair_block_ids,
-                          global const uint *pair_slots, global const uint *pair_ranks,
-                          global const uint *slot_offsets, global PairHit *pair_hits,
+kernel void group_scatter(const FrameParams frame_params, global const PassCounts *counts,
+                          global const uint *pair_block_ids, global const uint *pair_slots,
+                          global const uint *pair_ranks, global const uint *slot_offsets,
+                          global const uint *pair_rays, global PairHit *pair_hits,
                           global uint *closest_pairs, global uint *pair_ids,
                           global uint *candidate_count) {
+  const FrameParams *frame = &frame_params;
   const uint count = counts->pair_slot_count, spec_count = counts->spec_count;
   if (get_global_id(0) == 0) *candidate_count = 0;
   for (uint pair = get_global_id(0); pair < count; pair += get_global_size(0)) {
@@ -268,7 +272,8 @@ kernel void group_scatter(global const PassCounts *counts, global const uint *pa
     if (offset != ISO_INVALID_ID) {
       pair_ids[offset + rank] = pair;
     } else {
-      mark_not_tested(pair_hits, closest_pairs, pair, pair_block_ids[pair], spec_count);
+      mark_not_tested(pair_hits, closest_pairs, ray_of_pair(frame, pair_rays, pair, spec_count),
+                      pair, pair_block_ids[pair]);
     }
   }
 }

@@ -1,6 +1,7 @@
 /// intersect.cl -- a block's rays against its dual grid (Sec. 3.7, 4.3).
 #include "device/cached_cell.h"
 #include "device/closest_pair.h"
+#include "device/ray_pairs.h"
 #include "portable/block_cells.h"
 #include "portable/cell_intersect.h"
 #include "portable/ray_state.h"
@@ -41,7 +42,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
     const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_ids,
     global const BlockRays *block_rays, global const uint *pair_block_ids,
     global const BlockEntry *table, global const float *cache_values,
-    global const uint *active_ray_ids, global PairHit *pair_hits, global uint *closest_pairs) {
+    global const uint *active_ray_ids, global const uint *pair_rays, global PairHit *pair_hits,
+    global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
   local uint corner_slots[8];
@@ -69,11 +71,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     for (uint i = begin + get_local_id(0); i < end; i += ISO_GROUP_SIZE) {
-      const uint pair = pair_ids[i];
-      const Ray ray = make_ray(frame, unpack_entry(active_ray_ids[pair / spec_count]).pixel);
+      const uint pair = pair_ids[i], a = ray_of_pair(frame, pair_rays, pair, spec_count);
+      const Ray ray = make_ray(frame, unpack_entry(active_ray_ids[a]).pixel);
       const PairHit hit = intersect_block(&ray, b, last, dual_grid);
       pair_hits[pair] = hit;
-      if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, pair, spec_count);
+      if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, a, pair);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
   }
@@ -88,16 +90,16 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
 kernel void settle_doubts(const FrameParams frame_params, global const PassCounts *counts,
                           global const uint *pair_ids, global const uint *pair_block_ids,
                           global const BlockEntry *table, global const float *cache_values,
-                          global const uint *active_ray_ids, global PairHit *pair_hits,
-                          global uint *closest_pairs) {
+                          global const uint *active_ray_ids, global const uint *pair_rays,
+                          global PairHit *pair_hits, global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   const LastPlanes last = last_planes(frame);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   for (uint i = get_global_id(0); i < counts->granted_count; i += get_global_size(0)) {
     const uint pair = pair_ids[i], start = pair_hits[pair].cell;
     if (start >= ISO_IN_DOUBT) {
-      const Ray ray =
-          make_ray(frame, unpack_entry(active_ray_ids[pair / counts->spec_count]).pixel);
+      const uint a = ray_of_pair(frame, pair_rays, pair, counts->spec_count);
+      const Ray ray = make_ray(frame, unpack_entry(active_ray_ids[a]).pixel);
       const BlockCoords b = block_coords(frame, pair_block_ids[pair]);
       const int x = (int)(4 * b.x + (start & 3)), y = (int)(4 * b.y + (start >> 2 & 3)),
                 z = (int)(4 * b.z + (start >> 4 & 3));
@@ -114,7 +116,7 @@ kernel void settle_doubts(const FrameParams frame_params, global const PassCount
       hit.cell = found ? cell_in_block(&at.cell) : ISO_NO_HIT;
       hit.s = found ? refine(solver, change.cubic, change.bracket) : 0.0f;
       pair_hits[pair] = hit;
-      if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, pair, counts->spec_count);
+      if (hit.cell < ISO_NO_HIT) offer_closest(closest_pairs, a, pair);
     }
   }
 }

@@ -41,6 +41,7 @@ class CacheModel {
     if (testing::Test::HasFatalFailure()) return;
     world.assign_slots();
     check_assignment(world, pairs);
+    if (!testing::Test::HasFatalFailure()) check_touched(world);
   }
 
   /// Rays read in some of the cached blocks in the last pass, as march says it.
@@ -163,6 +164,21 @@ class CacheModel {
     num_granted += decoded;
     num_refused += wanted_.size() - decoded;
     num_stolen += stole;
+  }
+
+  /// What the pass has stamped, and with it, its dual grids.
+  void check_touched(StageWorld &world) {
+    std::set<uint> stamped, with_grids;
+    for (uint slot = 0; slot < slots_.size(); ++slot) {
+      if (slots_[slot] == ISO_INVALID_ID || used_[slot] < now_ - 1) continue;
+      stamped.insert(slots_[slot]);
+      for (const uint block : dual_grid_blocks(frame_, slots_[slot]))
+        if (cached(block)) with_grids.insert(block);
+    }
+    world.cache.count_touched(world.rays, false);
+    ASSERT_EQ(world.cache.touched_blocks(), stamped.size());
+    world.cache.count_touched(world.rays, true);
+    ASSERT_EQ(world.cache.touched_blocks(), with_grids.size());
   }
 
   /// Who reads in a block reads its dual grid. Not of blocks that are of this frame by their own
@@ -296,6 +312,39 @@ TEST_P(BlockCacheOnDevice, OneDualGridOfSlotsServesEveryBlock) {
                1);
     if (HasFatalFailure()) return;
   }
+}
+
+/// Another number of slots: as a new cache, whatever was asked for before.
+TEST_P(BlockCacheOnDevice, SmallCachesAreResized) {
+  const FrameParams frame = plain_frame(kDims, 8);
+  StageWorld world(device_, frame, 30, 8);
+  const std::vector<uint> pairs{3, 70, 110, 200};
+  uint last_slots = 0;
+  for (const uint num_slots : {30u, 100u, 9u, 64u}) {
+    SCOPED_TRACE(fmt::format("{} slots after {}", num_slots, last_slots));
+    const BlockCache::Limits limits = BlockCache::limits_for(frame.grid, num_slots, 8);
+    if (last_slots != 0) {
+      world.cache.request(world.rays);  // of the last pass, and never answered
+      world.cache.resize(limits);
+      world.rays.reset_counts();
+      world.set_frame(frame);
+    }
+    EXPECT_EQ(world.cache.num_slots, num_slots);
+    EXPECT_EQ(world.cache.capacity, limits.max_requests());
+    std::uint64_t bytes = 0;
+    for (const ocl::BufferSize &size : BlockCache::sizes(limits))
+      bytes += device_.ledger().by_name().at(size.name).current;
+    EXPECT_EQ(bytes, BlockCache::sizes(limits).bytes());
+    CacheModel model(frame, num_slots);
+    world.begin_frame();
+    for (int pass = 0; pass < 2; ++pass) {
+      model.pass(world, pairs, 1);
+      if (HasFatalFailure()) return;
+    }
+    last_slots = num_slots;
+  }
+  EXPECT_THAT([&] { world.cache.resize(BlockCache::limits_for(frame.grid, 7, 8)); },
+              testing::ThrowsMessage<Error>(testing::HasSubstr("7 slots")));
 }
 
 /// Ages of more passes than there are ranks.

@@ -23,6 +23,7 @@
 #include "core/stages/rasterise.hpp"
 #include "core/stages/resident.hpp"
 #include "core/stages/shade.hpp"
+#include "core/stages/traverse.hpp"
 #include "core/zfp/zfp_encode.hpp"
 #include "tests/stage_world.hpp"
 #include "tests/test_devices.hpp"
@@ -44,6 +45,16 @@ TEST(BufferSizes, AreFoundByNameAndAddedUp) {
   EXPECT_EQ(sizes.bytes(), 47u);
   EXPECT_EQ(ocl::BufferSizes().bytes(), 0u);
   EXPECT_THAT([&] { sizes["c"]; }, ThrowsMessage<std::invalid_argument>(HasSubstr("'c'")));
+}
+
+TEST(BufferSizes, ThoseOfTheSameNameAreResized) {
+  ocl::BufferSizes sizes{ocl::buffer_size<std::uint32_t>("a", 3),
+                         ocl::buffer_size<std::uint32_t>("b", 4),
+                         ocl::buffer_size<std::uint32_t>("a", 3)};
+  sizes.resize({ocl::buffer_size<std::uint32_t>("a", 7), ocl::buffer_size<std::uint32_t>("c", 1)});
+  EXPECT_EQ(sizes.named("a").bytes(), 2 * 28u);
+  EXPECT_EQ(sizes["b"].bytes(), 16u);
+  EXPECT_EQ(sizes.size(), 3u);
 }
 
 TEST(BufferSizes, BytesDoNotOverflow) {
@@ -99,6 +110,7 @@ void check_wavefront(ocl::Device &device) {
         {.num_rays = 1000, .with_pairs = false},
         {333, true, 4},
         {.num_rays = 50, .with_given = true},
+        {.num_rays = 70, .scanned_pairs = true},
         {.num_rays = 60, .with_pairs = false, .with_walks = false}})
     expect_books(device, Wavefront::sizes(limits), [&] { return Wavefront(device, limits); });
 }
@@ -188,6 +200,14 @@ void check_active_blocks(ocl::Device &device) {
                  [&] { return ActiveBlocks(device, macrocells); });
 }
 
+void check_traverse(ocl::Device &device) {
+  for (const bool scanned : {false, true}) {
+    for (const uint rays : {1u, 1000u})
+      expect_books(device, Traverse::sizes(rays, 8, scanned),
+                   [&] { return Traverse(device, rays, 8, scanned); });
+  }
+}
+
 void check_marching_cubes(ocl::Device &device) {
   for (const Gradients gradients : {Gradients::kNone, Gradients::kSmooth}) {
     expect_books(device, MarchingCubes::sizes(), [&] { return MarchingCubes(device, gradients); });
@@ -257,6 +277,11 @@ void check_pipelines(ocl::Device &device) {
         return make_pipeline(kind, state, limits, kDefaultSolver, kDefaultClosestHit);
       });
     expect_books(device, {}, [&] { return make_given_pipeline(state, 8, kDefaultSolver); });
+    state.rays = Wavefront(device, {.num_rays = limits.num_rays, .scanned_pairs = true});
+    expect_books(device, pipeline_sizes(PipelineKind::kBlocks, limits, true), [&] {
+      return make_pipeline(PipelineKind::kBlocks, state, limits, kDefaultSolver,
+                           kDefaultClosestHit);
+    });
     levels = std::move(state.levels);
   }
 }
@@ -289,6 +314,7 @@ constexpr std::array kMakers = {Maker{"Wavefront", check_wavefront},
                                 Maker{"Compaction", check_compaction},
                                 Maker{"PrefixSum", check_prefix_sum},
                                 Maker{"ActiveBlocks", check_active_blocks},
+                                Maker{"Traverse", check_traverse},
                                 Maker{"MarchingCubes", check_marching_cubes},
                                 Maker{"BlockTriangles", check_block_triangles},
                                 Maker{"Rasterise", check_rasterise},

@@ -28,8 +28,8 @@ class CliPaper : public testing::Test {
   json measure(const std::string &arguments) {
     const auto file = folder_ / "paper.json";
     const ProgramResult result =
-        run_isowave("bench paper --isovalues 3 --views 2 --size 64x48 --seed 7 " + arguments +
-                    " --json " + quoted(file));
+        run_isowave("bench paper --isovalues 3 --views 2 --size 64x48 --seed 7 --limits 1,64 " +
+                    arguments + " --json " + quoted(file));
     EXPECT_EQ(result.status, 0) << result.err;
     EXPECT_EQ(result.err, "");
     out_ = result.out;
@@ -49,7 +49,8 @@ TEST_F(CliPaper, MeasuresAllMethods) {
     EXPECT_GE(isovalue, 20);
     EXPECT_LE(isovalue, 120);
   }
-  ASSERT_EQ(methods.size(), 10u) << "five with rays, two of triangles, three of another size";
+  ASSERT_EQ(methods.size(), 11u)
+      << "five with rays, two of triangles, three of another size, scanned speculation";
   const json &blocks = methods[0], &without = methods[1], &rays = methods[2], &tight = methods[4],
              &bcmc = methods[5];
   EXPECT_EQ(blocks["method"], "blocks");
@@ -64,7 +65,21 @@ TEST_F(CliPaper, MeasuresAllMethods) {
   EXPECT_EQ(without["n_spec"]["max"], 1);
   EXPECT_GE(blocks["visible_blocks"]["mean"], 1);
   EXPECT_TRUE(rays["visible_blocks"].is_null());
-  for (const json *method : {&blocks, &without, &rays, &tight}) {
+  const json &scanned = methods[10];
+  EXPECT_EQ(scanned["look_ahead"], "scanned");
+  EXPECT_EQ(blocks["look_ahead"], "global");
+  EXPECT_EQ(rays["look_ahead"], "per-ray");
+  EXPECT_GE(scanned["n_spec"]["mean"], blocks["n_spec"]["mean"]);
+  ASSERT_EQ(volume["limits"].size(), 3u);
+  for (const json &method : volume["limits"]) {
+    const json &least = method["by_limit"][0], &most = method["by_limit"][1];
+    EXPECT_EQ(least["limit"], 1);
+    EXPECT_GT(least["passes"]["mean"], most["passes"]["mean"]);
+    EXPECT_LE(least["active_blocks"]["mean"], most["active_blocks"]["mean"]);
+  }
+  for (const json *method : {&blocks, &without, &rays, &tight, &scanned}) {
+    EXPECT_GT((*method)["touched_blocks"]["max"], 0);
+    EXPECT_LE((*method)["touched_blocks"]["max"], (*method)["active_blocks"]["max"]);
     const json &completed = (*method)["completed_percent"];
     EXPECT_TRUE(std::ranges::is_sorted(completed));
     EXPECT_DOUBLE_EQ(completed.back().get<double>(), 100);
@@ -133,6 +148,7 @@ TEST_F(CliPaper, RefusesWhatItCannotDo) {
   expect_one_line_error(paper + kFuel + " --isovalues 0", "--isovalues");
   expect_one_line_error(paper + kFuel + " --size 0x9", "image of 0 x 9");
   expect_one_line_error(paper + kFuel + " --scaling 12", "12");
+  expect_one_line_error(paper + kFuel + " --limits 4,65", "65");
   expect_one_line_error(paper + kFuel + " --json " + quoted(folder_ / "no" / "j.json"),
                         "is no folder");
 }

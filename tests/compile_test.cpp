@@ -107,6 +107,7 @@ TEST_P(CompileOnDevice, EverySolverAndGroupingIsCompiled) {
                        .group_size = 32,
                        .grouping = Grouping::kRadix,
                        .closest = ClosestHit::kScan});
+  expect_all_compiled({.size = kSize, .pipeline = PipelineKind::kBlocks, .scanned_pairs = true});
 }
 
 TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {

@@ -26,7 +26,8 @@ measured --only frames,normals,error,time,stability,sweep,paper
 measured --only storage,sizes,detail,solvers,pareto --volumes "$top/tests/data"
 tables=(front frames normals error time stability leaks storage sizes detail solvers solver_frames
   pareto pareto_times paper_claims paper_stand_ins paper_passes paper_times paper_progress
-  paper_utilisation paper_memory paper_blocks paper_scaling)
+  paper_utilisation paper_scanned paper_limits paper_working_set paper_memory paper_blocks
+  paper_scaling)
 if [ -x "$programs/bench/peer_bench" ]; then
   measured --only peer
   tables+=(peer)

@@ -212,5 +212,239 @@ TEST_P(MemoryPlanOfLevelsOnDevice, PeakOfSetupIsPlanned) {
   EXPECT_EQ(device.ledger().current(), plan.total());
 }
 
+// ---- caches that grow
+
+TEST(MemoryPlan, FirstSlotsAreForWhatAFrameNeeds) {
+  constexpr std::uint64_t kRays = 1280 * 720;
+  EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays), 12u * 128 * 128) << "of the volume";
+  EXPECT_EQ(first_cache_slots(256 * 256 * 256, kRays), kRays / 8 * 5) << "of the picture";
+  EXPECT_EQ(first_cache_slots(64 * 64 * 64, 800), 16'384u) << "not worth saving";
+  EXPECT_EQ(first_cache_slots(16'384, kRays), 16'384u) << "all";
+  EXPECT_EQ(first_cache_slots(27, kRays), 27u) << "all";
+  EXPECT_EQ(first_cache_slots(1, 1), kMinCacheSlots);
+}
+
+TEST(MemoryPlan, ACacheGrowsByWhatItLackedAtMostToFourTimes) {
+  MemoryPlan plan;
+  plan.cache_slots = 1600;
+  plan.most_slots = 3000;
+  EXPECT_EQ(grown_cache_slots(plan, 0), 1600u);
+  EXPECT_EQ(grown_cache_slots(plan, 50), 1600u) << "one of 32: the next frame finds enough";
+  EXPECT_EQ(grown_cache_slots(plan, 51), 2060u);
+  EXPECT_EQ(grown_cache_slots(plan, 400), 2500u) << "a quarter more than was needed";
+  EXPECT_EQ(grown_cache_slots(plan, 100'000), 3000u) << "no more than it may";
+  plan.most_slots = 10'000;
+  EXPECT_EQ(grown_cache_slots(plan, 100'000), 6400u);
+  plan.most_slots = plan.cache_slots;
+  EXPECT_FALSE(plan.can_grow());
+  EXPECT_EQ(grown_cache_slots(plan, 100'000), 1600u);
+}
+
+/// A volume of that size with 4 bits a voxel, without data: enough for a plan.
+CompressedVolume volume_of_size(const glm::uvec3 &dims) {
+  CompressedVolume volume;
+  volume.info = test::grid_info(dims);
+  volume.bits_per_block = 4 * ISO_BLOCK_VOXELS;
+  return volume;
+}
+
+/// Usher, Dyken and Kumar give 191 MB for 512^3 at 1280 x 720; the decoded volume has 537 MB.
+TEST_P(MemoryPlanOfLevelsOnDevice, DefaultIsBelowThePaperAndTheDecodedVolume) {
+  const ocl::Device device(GetParam());
+  MemoryRequest request{.num_rays = 1280 * 720};
+  const auto plan_of = [&](const glm::uvec3 &dims) {
+    const CompressedVolume volume = volume_of_size(dims);
+    return plan_to_grow(device, volume, request, 4'000'000'000,
+                        static_cast<std::uint32_t>(
+                            std::min<std::uint64_t>(volume.block_count(), kAmpleCacheSlots)));
+  };
+  if (device.capabilities().largest_allocation < 512u << 20)
+    GTEST_SKIP() << "a device that cannot have the largest cache";
+  const MemoryPlan plan = plan_of({512, 512, 512});
+  EXPECT_LE(plan.peak(), 191'000'000u);
+  EXPECT_EQ(plan.cache_slots, 196'608u);
+  EXPECT_EQ(plan.most_slots, kAmpleCacheSlots);
+  EXPECT_TRUE(plan.can_grow());
+  EXPECT_LT(plan_of({256, 256, 256}).peak(), 256u * 256 * 256 * 4) << "with fewer slots";
+  EXPECT_GE(plan_of({256, 256, 256}).cache_slots, 30'720u) << "but not with too few";
+  request.num_rays = 1920 * 1080;
+  EXPECT_EQ(plan_of({256, 256, 256}).cache_slots, 49'152u) << "the picture alone has more bytes";
+}
+
+/// What growing makes of a plan is what would have been planned.
+TEST_P(MemoryPlanOfLevelsOnDevice, GrownPlansArePlans) {
+  ArrayReader reader(test::grid_info({40, 41, 42}),
+                     test::sample({40, 41, 42}, test::noise_field(3)));
+  const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 2});
+  for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
+    for (const auto &[pipeline, grouping, levels] :
+         {std::tuple(PipelineKind::kRays, Grouping::kCounting, true),
+          {PipelineKind::kBlocks, Grouping::kCounting, false},
+          {PipelineKind::kBlocks, Grouping::kRadix, false}}) {
+      const MemoryRequest request{.num_rays = 500,
+                                  .pipeline = pipeline,
+                                  .grouping = grouping,
+                                  .stream = place,
+                                  .window_blocks = 8,
+                                  .with_levels = levels};
+      const MemoryPlan grown = resized(plan_memory(volume, request, 20), 300),
+                       planned = plan_memory(volume, request, 300);
+      EXPECT_EQ(grown.cache_slots, planned.cache_slots);
+      ASSERT_EQ(grown.buffers.size(), planned.buffers.size());
+      for (std::size_t i = 0; i < grown.buffers.size(); ++i) {
+        const ocl::BufferSize &a = *(grown.buffers.begin() + std::ptrdiff_t(i)),
+                              &b = *(planned.buffers.begin() + std::ptrdiff_t(i));
+        EXPECT_EQ(a.name, b.name);
+        EXPECT_EQ(a.bytes(), b.bytes()) << a.name;
+      }
+    }
+  }
+}
+
+class GrowingCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
+ protected:
+  const ImageSize size_ = is_simulator(GetParam().device) || is_llvmpipe(GetParam().device)
+                              ? ImageSize{9, 7}
+                              : ImageSize{37, 23};
+  const TestVolume volume_{{22, 21, 20}, test::gyroid_field(10), 8};
+  const Camera camera_ = orbit_cameras(volume_.info(), 1)[0];
+  const std::vector<HitRecord> expected_ = test::twin_hits(volume_, camera_, size_, kIsovalue);
+  ocl::Device device_{GetParam().device};
+
+  Renderer renderer_of(RendererOptions options) {
+    options.size = size_;
+    return {device_, volume_.compressed, GetParam().with(options)};
+  }
+  FrameStats draw(Renderer &renderer, const FrameRequest &request) {
+    const FrameStats stats = renderer.render(request);
+    if (!stats.cancelled) test::expect_same_hits(renderer.hits(), expected_, size_.width);
+    EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());
+    EXPECT_EQ(renderer.options().cache_slots, renderer.memory_plan().cache_slots);
+    return stats;
+  }
+  FrameStats draw(Renderer &renderer) {
+    return draw(renderer, {.camera = camera_, .isovalue = kIsovalue});
+  }
+  static std::uint64_t decoded(const FrameStats &stats) {
+    std::uint64_t sum = stats.normals.decoded_blocks;
+    for (const PassStats &pass : stats.passes) sum += pass.counts.decoded_count;
+    return sum;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Devices, GrowingCacheOnDevice, testing::ValuesIn(pipelines_under_test()),
+                         pipeline_test_name);
+
+TEST_P(GrowingCacheOnDevice, SmallUntilAFrameFits) {
+  Renderer renderer = renderer_of({.first_slots = 16});
+  const std::uint64_t planned =
+      resized(renderer.memory_plan(), renderer.memory_plan().most_slots).peak();
+  EXPECT_EQ(renderer.memory_plan().most_slots, volume_.compressed.block_count());
+  std::vector<std::uint32_t> slots;
+  std::uint64_t last_decoded = 1;
+  for (int frame = 0; frame < 8 && last_decoded != 0; ++frame) {
+    last_decoded = decoded(draw(renderer));
+    slots.push_back(renderer.memory_plan().cache_slots);
+    if (frame != 0) EXPECT_LE(slots[frame], 4 * slots[frame - 1]);
+  }
+  EXPECT_EQ(slots.front(), 16u) << "not before the frame that finds them missing";
+  EXPECT_TRUE(std::ranges::is_sorted(slots));
+  EXPECT_GT(slots.back(), 32u);
+  EXPECT_EQ(last_decoded, 0u) << "now all that the frame needs has slots";
+  EXPECT_LE(device_.ledger().peak(), planned) << "the old cache goes before the new one comes";
+  draw(renderer);
+  EXPECT_EQ(renderer.memory_plan().cache_slots, slots.back()) << "it is enough";
+}
+
+TEST_P(GrowingCacheOnDevice, SmallNotWhereSlotsOrABudgetAreGiven) {
+  for (const RendererOptions &options :
+       {RendererOptions{.cache_slots = 16, .first_slots = 16},
+        RendererOptions{.memory_budget = renderer_of({.cache_slots = 16}).memory_plan().peak(),
+        .first_slots = 9}}) {
+    Renderer renderer = renderer_of(options);
+    const std::uint32_t slots = renderer.memory_plan().cache_slots;
+    EXPECT_FALSE(renderer.memory_plan().can_grow());
+    for (int frame = 0; frame < 2; ++frame) draw(renderer);
+    EXPECT_EQ(renderer.memory_plan().cache_slots, slots);
+  }
+  EXPECT_THAT([&] { renderer_of({.first_slots = 7}); },
+              testing::ThrowsMessage<Error>(HasSubstr("begin with 7 slots")));
+}
+
+/// A device that gives no more, then less: the cache stays, or shrinks; the pictures stay.
+TEST_P(GrowingCacheOnDevice, SmallWhereMemoryIsShort) {
+  for (const bool less : {false, true}) {
+    SCOPED_TRACE(less);
+    Renderer renderer = renderer_of({.first_slots = 24});
+    draw(renderer);
+    device_.ledger().set_limit(device_.ledger().current() - (less ? 1 : 0));
+    draw(renderer);
+    EXPECT_EQ(renderer.memory_plan().cache_slots, less ? 12u : 24u);
+    EXPECT_FALSE(renderer.memory_plan().can_grow()) << "it does not try again";
+    device_.ledger().set_limit(UINT64_MAX);
+    const std::uint32_t slots = renderer.memory_plan().cache_slots;
+    draw(renderer);
+    EXPECT_EQ(renderer.memory_plan().cache_slots, slots);
+  }
+}
+
+/// Frames that were stopped have asked for blocks that nobody brought.
+TEST_P(GrowingCacheOnDevice, SmallAfterFramesThatWereStopped) {
+  for (const std::size_t last : {1u, 2u, 5u}) {
+    SCOPED_TRACE(last);
+    Renderer renderer = renderer_of({.first_slots = 16});
+    FrameRequest stopped{.camera = camera_, .isovalue = kIsovalue};
+    std::size_t num_passes = 0;
+    stopped.on_pass = [&](const PassStats &) { return ++num_passes < last; };
+    draw(renderer, stopped);
+    draw(renderer);
+    draw(renderer);
+    EXPECT_GT(renderer.memory_plan().cache_slots, 16u);
+    if (is_simulator(GetParam().device)) break;
+  }
+}
+
+/// Ambient rays are the next frame's of those that a cache grows between, and lists of rays.
+TEST_P(GrowingCacheOnDevice, WithRaysOfAnyOrigin) {
+  if (is_simulator(GetParam().device)) GTEST_SKIP() << "takes a simulator too long";
+  Renderer ample = renderer_of({.with_given_rays = true}),
+           renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
+  const FrameRequest request{.camera = camera_, .isovalue = kIsovalue, .ambient_rays = 2};
+  const std::vector<WorldRay> rays(3, {camera_.eye, camera_.at - camera_.eye});
+  ample.render(request);
+  const auto expected_rays = ample.cast_rays(rays, kIsovalue, Normals::kSmooth);
+  for (int frame = 0; frame < 3; ++frame) {
+    renderer.render(request);
+    EXPECT_EQ(renderer.open().counts, ample.open().counts);
+    test::expect_same_hits(renderer.cast_rays(rays, kIsovalue, Normals::kSmooth), expected_rays, 3);
+    test::expect_same_hits(renderer.hits(), expected_, size_.width);
+  }
+  EXPECT_GT(renderer.memory_plan().cache_slots, 32u);
+}
+
+/// Of a stream on the host, of several levels, there is more that depends on the slots.
+TEST_P(MemoryPlanOfLevelsOnDevice, CachesOfLevelsGrow) {
+  const glm::uvec3 dims(40, 41, 42);
+  ArrayReader reader(test::grid_info(dims), test::sample(dims, test::gyroid_field(10)));
+  const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 2});
+  const ImageSize size = is_llvmpipe(GetParam()) ? ImageSize{9, 7} : ImageSize{37, 23};
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  const FrameRequest request{.camera = camera, .isovalue = kIsovalue, .voxel_pixels = 1};
+  for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
+    ocl::Device device(GetParam());
+    Renderer ample(device, volume, {.size = size, .stream = place, .with_levels = true});
+    ample.render(request);
+    const std::vector<HitRecord> expected = ample.hits();
+    const std::uint64_t others = device.ledger().current();
+    Renderer renderer(device, volume,
+                      {.size = size, .first_slots = 16, .stream = place, .with_levels = true});
+    for (int frame = 0; frame < 3; ++frame) {
+      renderer.render(request);
+      test::expect_same_hits(renderer.hits(), expected, size.width);
+      EXPECT_EQ(device.ledger().current() - others, renderer.memory_plan().total());
+    }
+    EXPECT_GT(renderer.memory_plan().cache_slots, 32u);
+  }
+}
+
 }  // namespace
 }  // namespace isowave::core

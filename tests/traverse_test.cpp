@@ -14,6 +14,7 @@
 #include "core/stages/zfp_decode.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 #include "kernels_cl/portable/ray_state.h"
+#include "kernels_cl/portable/window.h"
 #include "tests/ray_cases.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
@@ -42,6 +43,21 @@ Selection random_selection(const FrameParams &frame, uint one_in, uint seed) {
   Random random(seed);
   Selection selected(std::size_t{frame.grid.blocks_x} * frame.grid.blocks_y * frame.grid.blocks_z);
   for (std::size_t b = 0; b < selected.size(); ++b) selected[b] = random() % one_in == 0;
+  return selected;
+}
+
+/// Of an isovalue.
+Selection selection_of(const Macrocells &macrocells, const FrameParams &frame) {
+  const std::vector<uint> masks = macrocells.masks().read();
+  const BlockGrid &grid = frame.grid;
+  const uint coarse_x = (grid.blocks_x + 3) / 4, coarse_y = (grid.blocks_y + 3) / 4;
+  Selection selected(block_count(grid));
+  for (uint b = 0; b < selected.size(); ++b) {
+    const uint x = b % grid.blocks_x, y = b / grid.blocks_x % grid.blocks_y,
+               z = b / grid.blocks_x / grid.blocks_y, bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+    selected[b] =
+        masks[2 * (x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4))) + bit / 32] >> bit % 32 & 1;
+  }
   return selected;
 }
 
@@ -279,13 +295,7 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   macrocells.select(frame);
   frame.surface = macrocells.surface(frame);
   rays.frame = frame;
-  const std::vector<uint> masks = macrocells.masks().read();
-  Selection selected(9 * 9 * 9);
-  for (uint b = 0; b < selected.size(); ++b) {
-    const uint x = b % 9, y = b / 9 % 9, z = b / 81, bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
-    selected[b] = masks[2 * (x / 4 + 3 * (y / 4 + 3 * (z / 4))) + bit / 32] >> bit % 32 & 1;
-  }
-  const BlockLists expected = walk_cells(frame, selected);
+  const BlockLists expected = walk_cells(frame, selection_of(macrocells, frame));
   Compaction compaction(device_, 40 * 30, 64);
   InitialRays(device_, 40 * 30)(rays, compaction);
   std::vector<uint> active = rays.next_active_ray_ids.read();
@@ -306,6 +316,99 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   }
   EXPECT_EQ(rays.counts.read().front().pair_count, num_pairs);
   EXPECT_GT(num_pairs, 100u);
+}
+
+/// All passes of a frame with scanned places, against the lists of the walk: N_Spec is the most for
+/// which there are places enough, each ray gets that many or what is before it, and the places of
+/// the next ray begin where its own end. The first pass takes a third of the rays alone.
+TEST_P(TraverseOnDevice, SmallScannedPlaces) {
+  const ImageSize size = is_simulator(device_.info()) ? ImageSize{9, 7} : ImageSize{71, 53};
+  const glm::uvec3 dims(33, 34, 35);
+  std::vector<float> voxels(33 * 34 * 35);
+  for (std::size_t i = 0; i < voxels.size(); ++i)
+    voxels[i] = std::sin(0.2f * float(i % 33)) * float(i / 33 % 34);
+  const CompressedVolume volume = compress_with_libzfp(voxels, dims, 1024);
+  const DeviceStream stream(device_, volume);
+  FrameParams frame = case_frame(dims, camera_cases(dims)[0], size, 3.0f);
+  Macrocells macrocells(device_, frame, stream);
+  macrocells.select(frame);
+  frame.surface = macrocells.surface(frame);
+  const BlockLists expected = walk_cells(frame, selection_of(macrocells, frame));
+  const uint num_pixels = static_cast<uint>(size.num_pixels());
+  for (const uint most : {64u, 3u}) {
+    SCOPED_TRACE(most);
+    frame.schedule.max_spec_count = most;
+    frame.schedule.scanned_pairs = 1;
+    Wavefront rays(device_, {.num_rays = num_pixels, .scanned_pairs = true});
+    rays.frame = frame;
+    Compaction compaction(device_, num_pixels, 8);
+    InitialRays(device_, num_pixels)(rays, compaction);
+    Traverse traverse(device_, num_pixels, 8, true);
+    std::vector<uint> active = rays.next_active_ray_ids.read();
+    active.resize(rays.counts.read().front().next_active_count);
+    std::vector<std::size_t> done(num_pixels);
+    bool gave_more = false;
+    for (uint passes = 0; !active.empty(); ++passes) {
+      ASSERT_LT(passes, 200u) << "the rays never leave";
+      SCOPED_TRACE(passes);
+      std::vector<uint> entries = active;
+      entries.resize(num_pixels);  // whole: see kernels_cl/README.md, Oclgrind
+      rays.active_ray_ids.write(entries);
+      PassCounts counts{};
+      counts.ray_count = num_pixels;
+      counts.active_count = static_cast<uint>(active.size());
+      counts.window_count = passes == 0 ? counts.active_count / 3 : counts.active_count;
+      const uint before = speculation_count(&frame, counts.active_count),
+                 counted = std::min(most, 4 * before);
+      counts.spec_count = before;
+      counts.pair_slot_count = 12345;
+      rays.counts.write({&counts, 1});
+      traverse(macrocells, rays);
+
+      const auto left = [&](uint a) { return expected[active[a]].size() - done[active[a]]; };
+      const auto places = [&](uint spec_count) {
+        std::size_t sum = 0;
+        for (uint a = 0; a < counts.window_count; ++a)
+          sum += std::min<std::size_t>(left(a), spec_count);
+        return sum;
+      };
+      uint spec_count = before;
+      const std::size_t there_are =
+          passes == 0 ? std::size_t{counts.window_count} * before : num_pixels;
+      while (spec_count < counted && places(spec_count + 1) <= there_are) ++spec_count;
+      gave_more |= spec_count > before;
+      counts.spec_count = spec_count;
+      counts.pair_count = counts.pair_slot_count = static_cast<uint>(places(spec_count));
+      counts.ahead_count = counts.window_count * spec_count;
+      expect_counts(rays.counts, counts);
+      const std::vector<uint> begins = rays.pair_begins.read(), of = rays.pair_rays.read(),
+                              blocks = rays.pair_block_ids.read(),
+                              stands = rays.ray_block_ids.read(),
+                              closest = rays.closest_pairs.read();
+      uint place = 0;
+      std::vector<uint> still;
+      for (uint a = 0; a < active.size(); ++a) {
+        const uint ray = active[a];
+        if (a < counts.window_count) {
+          ASSERT_EQ(begins[a], place) << a;
+          const std::size_t there = std::min<std::size_t>(left(a), counted),
+                            own = std::min<std::size_t>(there, spec_count);
+          for (std::size_t k = 0; k < own; ++k, ++place) {
+            ASSERT_EQ(blocks[place], expected[ray][done[ray]++]) << "ray " << ray;
+            ASSERT_EQ(of[place], a);
+          }
+          ASSERT_EQ(closest[a], ISO_INVALID_ID);
+          ASSERT_EQ(stands[ray] == ISO_INVALID_ID, own == there && there < counted)
+              << "a ray is through as soon as it has looked at its last block";
+        }
+        if (stands[ray] != ISO_INVALID_ID) still.push_back(ray);
+      }
+      ASSERT_EQ(begins[counts.window_count], place);
+      active = still;
+    }
+    for (uint ray = 0; ray < num_pixels; ++ray) ASSERT_EQ(done[ray], expected[ray].size());
+    EXPECT_TRUE(gave_more) << "else this scene tests nothing";
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, TraverseOnDevice, testing::ValuesIn(devices_under_test()),

@@ -1,6 +1,7 @@
 #include "isowave/renderer.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <optional>
@@ -45,7 +46,11 @@ struct Renderer::Implementation {
         renderer(device->implementation().device, volume->implementation().volume,
                  core_options(options, *volume)) {
     if (options.with_time_budget) timed.emplace(renderer);
+    note_memory();
   }
+
+  /// For other threads, that may ask while a frame is drawn.
+  void note_memory() { memory_bytes = renderer.memory_plan().total(); }
 
   Frame draw(const FrameRequest &request);
   void draw_hits(const FrameRequest &request, core::FrameRequest &wanted, Frame &frame);
@@ -56,6 +61,7 @@ struct Renderer::Implementation {
   RendererOptions options;
   core::Renderer renderer;
   std::optional<core::TimedFrames> timed;
+  std::atomic<std::uint64_t> memory_bytes = 0;
 };
 
 namespace {
@@ -173,6 +179,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   core::FrameRequest wanted = core_request(request);
   Frame frame;
   draw_hits(request, wanted, frame);
+  note_memory();
   fetch(request, wanted, frame);
   return frame;
 }
@@ -222,9 +229,10 @@ Frame Renderer::cast_rays(std::span<const Ray> rays, float isovalue, Normals nor
       throw core::Error("rays of any origin need a renderer that was made with_rays");
     const std::lock_guard lock(implementation_->device->implementation().mutex);
     core::Renderer &renderer = implementation_->renderer;
-    return frame_of_rays(
-        renderer.cast_rays(world_rays(rays), isovalue, static_cast<core::Normals>(normals)),
-        volume()->implementation().volume, renderer.options().with_levels);
+    const std::vector<core::HitRecord> hits =
+        renderer.cast_rays(world_rays(rays), isovalue, static_cast<core::Normals>(normals));
+    implementation_->note_memory();
+    return frame_of_rays(hits, volume()->implementation().volume, renderer.options().with_levels);
   });
 }
 
@@ -243,7 +251,7 @@ const std::shared_ptr<const Volume> &Renderer::volume() const {
   return implementation_->volume;
 }
 std::uint64_t Renderer::memory_bytes() const {
-  return implementation_->renderer.memory_plan().total();
+  return implementation_->memory_bytes;
 }
 double Renderer::setup_ms() const {
   return implementation_->renderer.setup_ms();

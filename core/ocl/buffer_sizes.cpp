@@ -20,6 +20,13 @@ BufferSizes &BufferSizes::add(const BufferSizes &others) {
   return *this;
 }
 
+void BufferSizes::resize(const BufferSizes &others) {
+  for (BufferSize &size : sizes_) {
+    const auto found = std::ranges::find(others, size.name, &BufferSize::name);
+    if (found != others.end()) size.count = found->count;
+  }
+}
+
 const BufferSize &BufferSizes::operator[](std::string_view name) const {
   const auto found = std::ranges::find(sizes_, name, &BufferSize::name);
   if (found == sizes_.end())

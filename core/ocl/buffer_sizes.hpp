@@ -35,6 +35,8 @@ class BufferSizes {
 
   /// Appends others. Returns *this.
   BufferSizes &add(const BufferSizes &others);
+  /// All buffers whose name one of the others has become as long as the first such.
+  void resize(const BufferSizes &others);
 
   /// The first buffer of that name.
   ///

@@ -2,10 +2,16 @@
 
 #include <algorithm>
 
+#include "core/base/error.hpp"
+
 namespace isowave::core::ocl {
 
 void MemoryLedger::add(const std::string &name, std::uint64_t bytes) {
-  Entry &entry = by_name_[name];  // first, since only this can throw
+  if (bytes > limit_ - std::min(total_.current, limit_)) {
+    throw Error("cannot allocate {} bytes for buffer '{}': {} of {} are in use", bytes, name,
+                total_.current, limit_);
+  }
+  Entry &entry = by_name_[name];  // first, since only these two can throw
   const auto book = [bytes](Entry &target) {
     target.current += bytes;
     target.peak = std::max(target.peak, target.current);

@@ -13,8 +13,12 @@ class MemoryLedger {
     std::uint64_t current = 0, peak = 0;  ///< bytes
   };
 
+  /// Throws  Error: more would be booked than the limit allows
   void add(const std::string &name, std::uint64_t bytes);
   void remove(const std::string &name, std::uint64_t bytes) noexcept;
+
+  /// From now on, no more is booked than so many bytes: for tests, as if the device had no more.
+  void set_limit(std::uint64_t bytes) { limit_ = bytes; }
 
   std::uint64_t current() const { return total_.current; }  ///< bytes
   std::uint64_t peak() const { return total_.peak; }  ///< bytes: the largest current() ever was
@@ -22,6 +26,7 @@ class MemoryLedger {
 
  private:
   Entry total_;
+  std::uint64_t limit_ = UINT64_MAX;
   std::map<std::string, Entry> by_name_;
 };
 

@@ -24,6 +24,9 @@ struct PassStats {
   /// Distinct blocks that rays were intersected in; not counted in pipeline `rays`, which does not
   /// gather rays by block.
   std::optional<std::uint32_t> visible_blocks{};
+  /// Distinct blocks whose voxels the pass's rays looked at, or, where a whole dual grid is asked
+  /// for, may have; only where the host waits after each pass.
+  std::optional<std::uint32_t> touched_blocks{};
   double utilization_percent = 0;  ///< ray-block pairs that were intersected, of all rays
   double completed_percent = 0;    ///< rays that have ended, of all
   std::map<std::string, double>

@@ -1,6 +1,7 @@
 #include "core/render/memory_plan.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -23,6 +24,22 @@ constexpr std::uint64_t kWindowBytes = 2u << 20;
 /// device: one for so many rays. A judgement, not a measurement: a cold 720p frame touches a block
 /// for every two rays, and most again in the next frame.
 constexpr std::uint64_t kRaysPerUsefulSlot = 8;
+
+/// A surface of a volume of n^3 blocks is in about n^2. Of turbulence, a cold frame of pipeline
+/// `rays` decodes 6 n^2, of 256^3 voxels as of 1024^3; pipeline `blocks`, which asks for whole dual
+/// grids, 9.6 n^2 (bench/README.md).
+constexpr double kSlotsPerFace = 12;
+/// Few rays need fewer: never more than five slots for eight of them.
+constexpr std::uint64_t kRaysPerSlot = 8, kSlotsOfThose = 5;
+/// Where that keeps the plan below the decoded volume, a cache begins with as little as 5/8.
+constexpr std::uint64_t kLeastOfFirst = 8, kLeastOfThose = 5;
+/// Slots (5.3 MB) that no cache begins with fewer of, unless there are not so many blocks: those of
+/// a small noisy volume, where a frame needs most of the blocks.
+constexpr std::uint64_t kFewSlots = 1 << 14;
+/// A frame that frees a smaller part of its slots for itself finds enough of them.
+constexpr std::uint32_t kSparePart = 32;
+/// A cache grows to so many times as many slots at most.
+constexpr std::uint64_t kMostGrowth = 4;
 
 std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequest &request,
                                 std::uint32_t cache_slots) {
@@ -71,7 +88,8 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
           .rays = {.num_rays = rays,
                    .with_pairs = request.pipeline == PipelineKind::kBlocks,
                    .num_levels = grids.size(),
-                   .with_given = request.with_given_rays},
+                   .with_given = request.with_given_rays,
+                   .scanned_pairs = request.scanned_pairs},
           .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays),
           .pairs = {.num_rays = rays,
                     .num_slots = cache_slots,
@@ -103,11 +121,39 @@ StreamPlace stream_place_from_string(std::string_view name) {
   throw Error("the compressed volume cannot be on '{}': auto, device, host", name);
 }
 
+std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays) {
+  const double edge = std::cbrt(double(num_blocks));
+  const std::uint64_t wanted =
+      std::min(static_cast<std::uint64_t>(std::llround(kSlotsPerFace * edge * edge)),
+               num_rays * kSlotsOfThose / kRaysPerSlot);
+  const std::uint64_t slots = std::min(std::max(wanted, kFewSlots), num_blocks);
+  return static_cast<std::uint32_t>(
+      std::clamp<std::uint64_t>(slots, kMinCacheSlots, ISO_MAX_CACHE_SLOTS));
+}
+
+std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled) {
+  const std::uint64_t slots = plan.cache_slots;
+  if (!plan.can_grow() || recycled <= slots / kSparePart) return plan.cache_slots;
+  // What was freed may have been asked for again and again, and counts as often.
+  const std::uint64_t wanted = std::min((slots + recycled) / 4 * 5, kMostGrowth * slots);
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, plan.most_slots));
+}
+
+MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots) {
+  plan.cache_slots = plan.limits.cache.num_slots = plan.limits.pairs.num_slots = cache_slots;
+  const PipelineKind pipeline =
+      plan.limits.rays.with_pairs ? PipelineKind::kBlocks : PipelineKind::kRays;
+  plan.buffers.resize(BlockCache::sizes(plan.limits.cache));
+  plan.buffers.resize(pipeline_sizes(pipeline, plan.limits.pairs));
+  plan.buffers.resize(ZfpDecode::sizes(plan.limits.cache.max_requests(), true, true));
+  return plan;
+}
+
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots) {
   MemoryPlan plan;
   plan.limits = limits_of(volume, request, cache_slots);
-  plan.cache_slots = cache_slots;
+  plan.cache_slots = plan.most_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
   if (plan.stream == StreamPlace::kHost)
     plan.window_blocks = window_blocks_for(volume, request, cache_slots);
@@ -120,7 +166,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                                       plan.stream == StreamPlace::kHost, levels.size() > 1));
   plan.buffers.add(Wavefront::sizes(limits.rays))
       .add(BlockCache::sizes(limits.cache))
-      .add(pipeline_sizes(request.pipeline, limits.pairs))
+      .add(pipeline_sizes(request.pipeline, limits.pairs, request.scanned_pairs))
       .add(Shade::sizes(request.num_rays))
       .add(PassReadback::sizes());
   if (request.with_given_rays) plan.buffers.add(Ambient::sizes());
@@ -194,6 +240,35 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
   throw Error(
       "a memory budget of {} bytes is too small: {} would do, {} of them for the compressed volume",
       budget, least->peak(), least->stream_bytes);
+}
+
+MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volume,
+                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots,
+                        std::uint32_t first_slots) {
+  MemoryPlan most = plan_within(device, volume, request, budget, max_slots);
+  const auto plan_of = [&](std::uint64_t slots) {
+    return plan_memory(
+        volume, with_stream(request, most.stream),
+        static_cast<std::uint32_t>(std::min<std::uint64_t>(slots, most.cache_slots)));
+  };
+  std::uint64_t num_blocks = 0;
+  for (const CompressedVolume *level : levels_of(volume, request.with_levels))
+    num_blocks += level->block_count();
+  const std::uint64_t first =
+      first_slots != 0 ? first_slots : first_cache_slots(num_blocks, request.num_rays);
+  MemoryPlan plan = plan_of(first);
+  const std::uint64_t decoded = ISO_BLOCK_VOXELS * sizeof(float) * volume.block_count();
+  if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots
+    const std::uint64_t slots = plan.cache_slots,
+                        least = std::max(slots / kLeastOfFirst * kLeastOfThose, kFewSlots);
+    const MemoryPlan smaller = plan_of(least);
+    if (least < slots && smaller.total() < decoded)
+      plan = plan_of(least + (slots - least) * (decoded - smaller.total()) /
+                                 (plan.total() - smaller.total()));
+  }
+  plan.most_slots = most.cache_slots;
+  plan.reason = std::move(most.reason);
+  return plan;
 }
 
 }  // namespace isowave::core

@@ -38,6 +38,7 @@ struct MemoryRequest {
   bool with_bounds = false;         ///< and the bounds of their blocks' errors
   std::uint64_t kept_rays = 0;      ///< of KeptPicture
   bool with_given_rays = false;     ///< rays of any origin, and ambient rays
+  bool scanned_pairs = false;       ///< of pipeline kBlocks
 };
 
 /// What the lengths of a renderer's buffers depend on, beside its compressed volume: the plan adds
@@ -56,15 +57,30 @@ struct MemoryPlan {
   std::uint64_t setup_bytes =
       0;  ///< all that exists while the value ranges are built, scratch included
   std::uint32_t cache_slots = 0;
+  /// The cache may grow to so many, between frames; where it cannot grow: cache_slots.
+  std::uint32_t most_slots = 0;
   StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
   std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
   std::uint64_t stream_bytes = 0;             ///< of the buffers for the compressed volume
   std::string reason;  ///< for the place: "the compressed volume of 10 bytes ..."
 
   std::uint64_t total() const { return buffers.bytes(); }
-  /// Bytes: the most that ever exists.
+  /// Bytes: the most that exists as long as the cache does not grow. What a cache takes is given
+  /// back before a larger one is made; so that is also the most that ever existed once it has.
   std::uint64_t peak() const { return std::max(total(), setup_bytes); }
+  bool can_grow() const { return cache_slots < most_slots; }
 };
+
+/// The plan of the same renderer once its cache has so many slots.
+MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
+
+/// Slots with which a cache begins that may grow: for the blocks that a frame needs in most volumes
+/// and as many again, so that the next frame finds free ones.
+std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays);
+
+/// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had asked
+/// for itself; plan.cache_slots where these do.
+std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled);
 
 /// The plan with so many cache slots and the stream where request.stream says; kAuto: on the
 /// device.
@@ -89,5 +105,14 @@ MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &
 /// Throws     Error: not even kMinCacheSlots fit; names the smallest budget that would do
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
+
+/// A plan that can grow to as many slots as plan_within() gives. It begins with
+/// first_cache_slots(), or, where that would take more memory than the decoded volume, with as
+/// little as 5/8 of them; with first_slots, where these are not 0.
+///
+/// budget, max_slots, Throws  as plan_within()
+MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volume,
+                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots,
+                        std::uint32_t first_slots = 0);
 
 }  // namespace isowave::core

@@ -22,13 +22,16 @@ class BlocksPipeline : public Pipeline {
         compaction_(state.device, limits.num_rays, limits.group_size),
         initial_rays_(state.device, limits.num_rays),
         speculation_(state.device),
-        traverse_(state.device, limits.num_rays, limits.group_size),
+        traverse_(state.device, limits.num_rays, limits.group_size,
+                  state.rays.pair_rays.size() != 0),
         group_(state.device, limits, closest),
         intersect_(state.device, limits.num_rays, limits.group_size, solver, closest),
         composite_(state.device, limits.num_rays, closest) {}
 
-  static ocl::BufferSizes sizes(const Group::Limits &limits) {
-    return Compaction::sizes(limits.num_rays, limits.group_size).add(Group::sizes(limits));
+  static ocl::BufferSizes sizes(const Group::Limits &limits, bool scanned_pairs) {
+    return Compaction::sizes(limits.num_rays, limits.group_size)
+        .add(Traverse::sizes(limits.num_rays, limits.group_size, scanned_pairs))
+        .add(Group::sizes(limits));
   }
 
   void begin_frame() override {
@@ -49,6 +52,10 @@ class BlocksPipeline : public Pipeline {
       state_.cache.request(state_.rays);
     }
     state_.provide_blocks(state_.rays.counts, state_.drawing);
+    if (state_.counts_touched) {
+      const auto stage = timer.stage("touched");
+      state_.cache.count_touched(state_.rays, false);
+    }
     {
       const auto stage = timer.stage("group");
       group_(state_.cache, state_.rays);
@@ -62,6 +69,8 @@ class BlocksPipeline : public Pipeline {
       composite_(state_.cache, state_.rays, compaction_);
     }
   }
+
+  void resize_cache(std::uint32_t num_slots) override { group_.resize(num_slots); }
 
  private:
   FrameState &state_;
@@ -116,6 +125,10 @@ class RaysPipeline : public Pipeline {
         march_(macrocells(), state_.cache, rays);
       }
     }
+    if (state_.counts_touched) {  // before more blocks are stamped, as needed
+      const auto stage = state_.device.timer().stage("touched");
+      state_.cache.count_touched(rays, true);
+    }
     const auto stage = state_.device.timer().stage("request");
     request_ahead_(macrocells(), state_.cache, rays);
     unanswered_ = true;
@@ -145,8 +158,10 @@ std::string_view to_string(PipelineKind kind) {
   return kind == PipelineKind::kBlocks ? "blocks" : "rays";
 }
 
-ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits) {
-  return kind == PipelineKind::kBlocks ? BlocksPipeline::sizes(limits) : ocl::BufferSizes();
+ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits,
+                                bool scanned_pairs) {
+  return kind == PipelineKind::kBlocks ? BlocksPipeline::sizes(limits, scanned_pairs)
+                                       : ocl::BufferSizes();
 }
 
 void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
@@ -169,6 +184,13 @@ void FrameState::provide_blocks(const CountsBuffer &asked, LevelRange of) {
     rays.reset_counts();
     throw;
   }
+}
+
+void FrameState::resize_cache(const BlockCache::Limits &limits) {
+  cache.resize(limits);
+  for (Level &level : levels) level.decode.resize(limits.max_requests());
+  rays.reset_counts();
+  slots_are_scarce = true;
 }
 
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,

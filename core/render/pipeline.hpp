@@ -63,11 +63,16 @@ struct FrameState {
   BlockCache cache;
   LevelRange drawing{};          ///< the frame at work
   bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
+  bool counts_touched = false;   ///< passes count the blocks that they touch, see BlockCache
 
   /// Cache and decode: the blocks asked for, asked.requested_count, of those levels, get slots and
   /// values. Asynchronous but where the stream stays on the host: see ZfpDecode. Where that throws,
   /// cache and counts are as they were made.
   void provide_blocks(const CountsBuffer &asked, LevelRange of);
+
+  /// As BlockCache::resize(), with what depends on it. No ray and no request of the frame before is
+  /// left.
+  void resize_cache(const BlockCache::Limits &limits);
 };
 
 class Pipeline {
@@ -84,10 +89,14 @@ class Pipeline {
   /// Says that no ray is left in the frame. Without it, the next frame knows that passes of this
   /// one were not followed up.
   virtual void end_frame() {}
+  /// For a cache of so many slots from now on: as BlockCache::resize(). Between frames.
+  virtual void resize_cache(std::uint32_t num_slots) { (void)num_slots; }
 };
 
-/// The buffers of a pipeline beside those of FrameState. limits: of its Group, if it has one.
-ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits);
+/// The buffers of a pipeline beside those of FrameState. limits: of its Group, if it has one;
+/// scanned_pairs: as Wavefront::Limits has it.
+ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits,
+                                bool scanned_pairs = false);
 
 /// `state` must outlive the pipeline.
 std::unique_ptr<Pipeline> make_pipeline(PipelineKind kind, FrameState &state,

@@ -19,8 +19,11 @@ namespace isowave::core {
 
 namespace {
 
-/// Slots; below, slots may run out within one pass.
+/// Caches of fewer slots may run out of them within one pass, unless they are made for what a frame
+/// needs (MemoryPlan::can_grow()), or for all blocks.
 constexpr std::uint32_t kSmallCache = 1u << 16;
+/// Slots are scarce where fewer than one of so many are free.
+constexpr std::uint32_t kScarcePart = 8;
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
                       const RendererOptions &options, const MemoryPlan &plan) {
@@ -61,10 +64,11 @@ std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, Strea
   return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
 }
 
-bool turned_over(const FrameStats &stats, std::uint32_t most) {
-  std::uint64_t num_recycled = stats.normals.recycled_blocks + stats.ambient.recycled_blocks;
-  for (const PassStats &pass : stats.passes) num_recycled += pass.counts.recycled_count;
-  return num_recycled > most;
+/// Slots that the frame has freed of blocks that it had asked for itself.
+std::uint64_t recycled_blocks(const FrameStats &stats) {
+  std::uint64_t sum = stats.normals.recycled_blocks + stats.ambient.recycled_blocks;
+  for (const PassStats &pass : stats.passes) sum += pass.counts.recycled_count;
+  return sum;
 }
 
 /// Columns of the picture that a list of rays is seen as.
@@ -103,6 +107,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
   const bool more_follows = is_smooth || request.ambient_rays != 0;
   FrameStats stats;
   begin_frame(request);
+  state_.counts_touched = in_step(on_pass);
   stats.first_level = state_.drawing.first;
   stats.last_level = state_.drawing.end - 1;
   StallGuard guard(state_.levels[0].info.dims);
@@ -120,7 +125,8 @@ FrameStats Renderer::render(const FrameRequest &request) {
     } else if (!in_step(on_pass) && readback_.in_flight() < PassReadback::kMaxInFlight) {
       continue;  // read one pass behind: the device never waits for us
     }
-    const PassStats pass = stats_of(readback_.pop());
+    PassStats pass = stats_of(readback_.pop());
+    if (state_.counts_touched) pass.touched_blocks = state_.cache.touched_blocks();
     stats.rays_hit += pass.counts.hit_count;
     stats.passes.push_back(pass);
     finished = pass.counts.next_active_count == 0;
@@ -132,6 +138,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
       has_begun_normals = false;
     }
   }
+  state_.counts_touched = false;
   is_one_pass_ = stats.passes.size() == 1;
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
   // for it.
@@ -139,9 +146,11 @@ FrameStats Renderer::render(const FrameRequest &request) {
   if (is_smooth && !stats.cancelled)
     finish_normals(on_pass, has_begun_normals, request.ambient_rays != 0, stats);
   if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
-  if (!stats.cancelled && turned_over(stats, most_recycled(state_.cache.num_slots,
-                                                           device_.info().type, options_.stream)))
+  const std::uint64_t recycled = recycled_blocks(stats);
+  if (!stats.cancelled &&
+      recycled > most_recycled(state_.cache.num_slots, device_.info().type, options_.stream))
     state_.cache.clear();
+  plan_growth(recycled);
   state_.rays.frame = state_.levels[0].frame;  // for shading
   const Uploads uploaded = uploads();
   stats.uploaded_blocks = uploaded.blocks - uploaded_before.blocks;
@@ -254,7 +263,9 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
     given_pipeline_ = make_given_pipeline(state_, options_.group_size, options_.solver);
     ambient_.emplace(device, state_.rays.num_rays, state_.levels.size() > 1);
   }
-  options_.cache_slots = plan_.cache_slots;
+  options_.cache_slots = wanted_slots_ = plan_.cache_slots;
+  is_small_cache_ = plan_.cache_slots < kSmallCache && !plan_.can_grow() &&
+                    plan_.cache_slots < plan_.limits.cache.num_blocks;
   options_.stream = plan_.stream;
   options_.window_blocks = plan_.window_blocks;
   compile_kernels();
@@ -274,6 +285,7 @@ void Renderer::compile_kernels() {
   rays.frame = FrameParams{};
   rays.frame.view.width = rays.frame.view.height = rays.frame.schedule.max_spec_count = 1;
   rays.frame.schedule.table_groups = state_.cache.table_groups;
+  rays.frame.schedule.scanned_pairs = options_.scanned_pairs;
   // Frames of one level of detail and of several have kernels of their own.
   for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, state_.levels.size());
        ++num_levels) {
@@ -292,10 +304,45 @@ void Renderer::compile_kernels() {
     readback_.drain();
   }
   state_.cache.classify(rays);
+  state_.cache.count_touched(rays, true);
   for (Level &level : state_.levels) level.decode.compile(level.stream, rays.counts, state_.cache);
   if (options_.with_shading) shade_.compile(rays);
   if (kept_) kept_->compile(rays);
   rays.reset_counts();
+}
+
+/// After a frame that has freed so many slots of its own blocks.
+void Renderer::plan_growth(std::uint64_t recycled) {
+  wanted_slots_ = grown_cache_slots(plan_, recycled);
+}
+
+/// Between frames: a cache of wanted_slots_, without a block. What there was is freed first, so
+/// that the plan is kept. Where the device has not so much memory after all, the cache stays as
+/// large as it was, or becomes smaller, and never grows again; pictures do not depend on it.
+void Renderer::grow_cache() {
+  if (wanted_slots_ == plan_.cache_slots) return;
+  const std::uint32_t before = plan_.cache_slots;
+  for (std::uint32_t slots = wanted_slots_;;) {
+    try {
+      MemoryPlan plan = resized(plan_, slots);
+      state_.resize_cache(plan.limits.cache);
+      pipeline_->resize_cache(slots);
+      plan_ = std::move(plan);
+      break;
+    } catch (const Error &) {
+      if (slots == kMinCacheSlots) throw;
+      slots = slots > before ? before : std::max(slots / 2, kMinCacheSlots);
+    }
+  }
+  if (plan_.cache_slots != wanted_slots_) {
+    plan_.most_slots = plan_.cache_slots;
+    is_small_cache_ |= plan_.cache_slots < std::min(before, kSmallCache);
+  }
+  options_.cache_slots = wanted_slots_ = plan_.cache_slots;
+  cached_isovalue_.reset();
+  open_requests_.reset();
+  pipeline_->end_frame();
+  if (given_pipeline_) given_pipeline_->end_frame();
 }
 
 /// Throws Error before anything has changed.
@@ -335,6 +382,7 @@ void Renderer::open_frame(std::vector<FrameParams> frames, const std::vector<Dec
                           FieldBound bound, RaySource source) {
   const float isovalue = frames.front().surface.isovalue;
   readback_.drain();  // of what the frame before had enqueued beyond its last pass
+  grow_cache();
   decode_as(values, bound);
   const auto first = std::ranges::find_if(frames, draws);
   const auto end = std::find_if_not(first, frames.end(), draws);
@@ -343,7 +391,8 @@ void Renderer::open_frame(std::vector<FrameParams> frames, const std::vector<Dec
   const bool has_bands = end - first > 1;
   const Schedule schedule{.max_spec_count = options_.max_speculation,
                           .per_ray_speculation = options_.per_ray_speculation,
-                          .table_groups = state_.cache.table_groups};
+                          .table_groups = state_.cache.table_groups,
+                          .scanned_pairs = options_.scanned_pairs};
   for (std::size_t i = 0; i < frames.size(); ++i) {
     Level &level = state_.levels[i];
     FrameParams &frame = frames[i];
@@ -396,8 +445,9 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
   // asked for as many.
   const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
   const std::uint32_t num_slots = state_.cache.num_slots;
-  state_.slots_are_scarce = num_slots < kSmallCache ||
-                            counts.free_count < std::max<std::uint64_t>(num_slots / 4, spoken_for);
+  state_.slots_are_scarce =
+      is_small_cache_ ||
+      counts.free_count < std::max<std::uint64_t>(num_slots / kScarcePart, spoken_for);
   stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
   stats.utilization_percent = 100.0 * counts.granted_count / rays;
   stats.stage_ms = device_.timer().collect();
@@ -473,6 +523,7 @@ std::vector<HitRecord> Renderer::cast_rays(std::span<const WorldRay> world_rays,
     FrameStats stats;
     trace_given({}, stats.ambient);
     if (normals == Normals::kSmooth) finish_normals({}, false, false, stats, RaySource::kGiven);
+    plan_growth(recycled_blocks(stats));
     part.resize(given.size());
     wavefront.given_hits.read(part);
     for (std::size_t i = 0; i < of_part.size(); ++i) part[i].t *= of_part[i].t_scale;

@@ -126,7 +126,7 @@ class Renderer {
     return request.size.value_or(options_.size);
   }
   const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
-  const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that was made
+  const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that there is
   const Macrocells &macrocells() const {
     return state_.levels[0].macrocells;
   }  ///< of the finest level
@@ -163,6 +163,8 @@ class Renderer {
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   bool trace_given(const OnPass &on_pass, LaterPasses &stats);
   void answer_requests();
+  void plan_growth(std::uint64_t recycled);
+  void grow_cache();
   bool in_step(const OnPass &on_pass) const {
     return on_pass || device_.timer().source() != ocl::TimerSource::kOff;
   }
@@ -172,6 +174,8 @@ class Renderer {
   double compile_ms_before_;
   RendererOptions options_;
   MemoryPlan plan_;
+  std::uint32_t wanted_slots_ = 0;  ///< of the cache from the next frame on
+  bool is_small_cache_ = false;     ///< slots may run out within one pass
   FrameState state_;
   std::vector<FrameParams> level_frames_;  ///< of the levels of detail that draw the frame at work
   std::array<float, 2> value_range_;       ///< of the volume before compression

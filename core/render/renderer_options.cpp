@@ -33,11 +33,18 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
                 ISO_MAX_SPECULATION);
   }
   if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
+  if (options.scanned_pairs && options.pipeline != PipelineKind::kBlocks)
+    throw Error("scanned speculation is pipeline blocks's: leave it out, or give that pipeline");
+  if (options.scanned_pairs) options.per_ray_speculation = false;
   const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
   if (!std::has_single_bit(options.group_size) || options.group_size < 8 ||
       options.group_size > largest) {
     throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
                 options.group_size, device.info().name, largest);
+  }
+  if (options.first_slots != 0 && options.first_slots < kMinCacheSlots) {
+    throw Error("a cache cannot begin with {} slots: {} (one dual grid) and more can",
+                options.first_slots, kMinCacheSlots);
   }
   if (options.window_blocks != 0 && options.window_blocks < kMinCacheSlots) {
     throw Error("a window of {} blocks cannot be used: {} (one dual grid) and more can",
@@ -57,7 +64,7 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
       options.stream,          options.largest_stream_part,
       options.window_blocks,   options.with_levels,
       options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0,
-      options.with_given_rays};
+      options.with_given_rays, options.scanned_pairs};
   const std::uint64_t budget = options.memory_budget != 0
                                    ? options.memory_budget
                                    : device.capabilities().global_memory / 4 * 3;
@@ -74,11 +81,12 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
     }
     return plan;
   }
-  const std::uint64_t most =
-      options.memory_budget != 0 ? std::uint64_t{ISO_MAX_CACHE_SLOTS} : kAmpleCacheSlots;
-  return plan_within(
-      device, volume, request, budget,
-      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most)));
+  const bool grows = options.memory_budget == 0;
+  const std::uint64_t most = grows ? kAmpleCacheSlots : std::uint64_t{ISO_MAX_CACHE_SLOTS};
+  const auto max_slots =
+      static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most));
+  return grows ? plan_to_grow(device, volume, request, budget, max_slots, options.first_slots)
+               : plan_within(device, volume, request, budget, max_slots);
 }
 
 }  // namespace isowave::core

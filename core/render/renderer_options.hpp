@@ -13,12 +13,18 @@ struct RendererOptions {
   ImageSize size{};  ///< the largest picture: frames may have as many rays, in any shape
   PipelineKind pipeline = PipelineKind::kAuto;
   std::uint64_t memory_budget = 0;  ///< bound on all device memory [bytes]; 0: 3/4 of the device's
-  std::uint32_t cache_slots = 0;    ///< decoded blocks kept, at least 8; 0: as many as the budget
-                                    ///< allows, or kAmpleCacheSlots where there is none
+  /// Decoded blocks kept, at least 8. 0: as many as the budget allows; without one, as many as
+  /// frames need: the cache grows, up to kAmpleCacheSlots (MemoryPlan::most_slots).
+  std::uint32_t cache_slots = 0;
+  /// Of these, as many as it begins with where it may grow; 0: first_cache_slots().
+  std::uint32_t first_slots = 0;
   std::uint32_t max_speculation =
       64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
   bool per_ray_speculation = true;  ///< each ray by what it has missed, not all alike
-  Solver solver = kDefaultSolver;   ///< root finder in a cell
+  /// Pipeline `blocks`: all rays alike, but what rays with few blocks before them leave goes to the
+  /// others (kernels_cl/traverse.cl).
+  bool scanned_pairs = false;
+  Solver solver = kDefaultSolver;  ///< root finder in a cell
   /// Whether rays march in packets of eight (pipeline `rays`); kAuto: where MarchPackets suits.
   RayPackets packets = RayPackets::kAuto;
   /// Whether packets decode the blocks that they come to; kAuto: where MarchPackets may.
@@ -45,8 +51,8 @@ struct RendererOptions {
   std::vector<float> range_thresholds{};
 };
 
-/// Slots (325 MiB with their share of the tables) that no budget was asked for are enough: a cold
-/// 720p frame of a 1024^3 volume touches about 400,000 blocks.
+/// A cache that no budget was asked for grows to so many slots at most (325 MiB with their share of
+/// the tables): a cold 720p frame of a 1024^3 volume touches about 400,000 blocks.
 inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 
 /// The options with their defaults filled in, but for those that the memory plan decides. Throws

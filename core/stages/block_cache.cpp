@@ -50,6 +50,7 @@ ocl::BufferSizes BlockCache::sizes(const Limits &limits) {
           ocl::buffer_size<uchar>("slot ranks", slots),
           ocl::buffer_size<ulong>("cells of cached blocks", slots),
           ocl::buffer_size<uint>("eviction ranks", ISO_EVICTION_RANKS),
+          ocl::buffer_size<uint>("touched blocks", 1),
           ocl::buffer_size<CacheState>("cache state", 1)};
 }
 
@@ -80,6 +81,7 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
       slot_ranks_(device, sizes["slot ranks"]),
       slot_changing_(device, sizes["cells of cached blocks"]),
       rank_histogram_(device, sizes["eviction ranks"]),
+      touched_(device, sizes["touched blocks"]),
       request_(device, "block_cache", "cache_request", defines),
       rank_(device, "block_cache", "cache_rank", defines),
       select_(device, "block_cache", "cache_select", defines),
@@ -87,6 +89,7 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
       rebuild_(device, "block_cache", "cache_rebuild", defines),
       classify_(device, "block_cache", "cache_classify", defines),
       assign_(device, "block_cache", "cache_assign", defines),
+      count_touched_(device, "block_cache", "cache_touched", defines),
       clear_(device, "block_cache", "cache_clear", defines) {
   clear();
 }
@@ -96,13 +99,41 @@ void BlockCache::clear() {
          state);
 }
 
+void BlockCache::resize(const Limits &limits) {
+  checked_slots(limits.num_slots);
+  const ocl::BufferSizes made = sizes(limits);
+  const auto of_slots = [&](auto &&visit) {
+    visit(table), visit(values), visit(inside), visit(slot_block_ids), visit(slot_stamps),
+        visit(free_slots_), visit(request_block_ids), visit(decode_slots), visit(slot_ranks_),
+        visit(slot_changing_);
+  };
+  ocl::Device &device = state.device();
+  device.finish();  // kernels may still use what goes
+  of_slots([](auto &buffer) { const auto gone = std::move(buffer); });
+  of_slots([&](auto &buffer) { buffer = {device, made[buffer.name()]}; });
+  num_slots = limits.num_slots;
+  table_groups = table_groups_for(num_slots);
+  capacity = limits.max_requests();
+  slots_range_ = ocl::Range::strided(num_slots, group_size_, device);
+  requests_range_ = ocl::Range::strided(capacity, group_size_, device);
+  requested_bits.fill(0);
+  clear();
+  device.finish();
+}
+
 void BlockCache::classify(Wavefront &rays) {
   classify_(slots_range_, rays.frame, num_slots, slot_block_ids, values, inside, table);
 }
 
+void BlockCache::count_touched(Wavefront &rays, bool in_dual_grids) {
+  touched_.fill(0);
+  count_touched_(slots_range_, rays.frame, rays.counts, num_slots, in_dual_grids ? 1u : 0u, table,
+                 slot_block_ids, slot_stamps, touched_);
+}
+
 void BlockCache::request(Wavefront &rays) {
-  request_(pairs_range_, rays.frame, rays.counts, rays.pair_block_ids, table, slot_stamps,
-           requested_bits, request_block_ids, capacity, state);
+  request_(pairs_range_, rays.frame, rays.counts, rays.pair_block_ids, rays.pair_begins,
+           rays.pair_rays, table, slot_stamps, requested_bits, request_block_ids, capacity, state);
 }
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {

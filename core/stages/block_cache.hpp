@@ -55,11 +55,31 @@ struct BlockCache {
   /// Waits  no
   void assign(const CountsBuffer &asked, Wavefront &rays);
 
+  /// Counts the cached blocks whose voxels the rays of the pass at work have looked at, for
+  /// touched_blocks().
+  ///
+  /// in_dual_grids  only what rays read is stamped, as march does, not all that it stands for
+  /// Waits          no
+  void count_touched(Wavefront &rays, bool in_dual_grids);
+  /// What was counted last.
+  ///
+  /// Waits  yes
+  std::uint32_t touched_blocks() const { return touched_.read().front(); }
+
   /// Brings `inside` and the table up to date with another isovalue of rays.frame. Does not wait.
   void classify(Wavefront &rays);
 
   /// Forgets every block: the next pass finds the cache as it was made. Does not wait.
   void clear();
+
+  /// Becomes a cache of other limits, without a block or a request. Its buffers are given back
+  /// before others are made, so that never more memory is taken than the larger of both needs.
+  ///
+  /// limits  differ in num_slots alone
+  /// Throws  Error: the device has not so much memory; until another call succeeds, there is no
+  ///         cache
+  /// Waits   yes
+  void resize(const Limits &limits);
 
   std::uint32_t num_slots;
   std::uint32_t table_groups;     ///< Schedule::table_groups
@@ -87,8 +107,10 @@ struct BlockCache {
   ocl::Buffer<ulong>
       slot_changing_;  ///< [num_slots] BlockEntry::changing while the table is rebuilt
   ocl::Buffer<uint> rank_histogram_;
-  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
+  ocl::Buffer<uint> touched_;  ///< [1]
+  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+              ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint,
+              ocl::Out<CacheState>>
       request_;
   ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>,
               ocl::In<BlockEntry>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uchar>, ocl::Out<ulong>,
@@ -110,6 +132,9 @@ struct BlockCache {
               ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<CacheState>>
       assign_;
+  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<BlockEntry>, ocl::In<uint>,
+              ocl::In<uint>, ocl::Out<uint>>
+      count_touched_;
   ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
               ocl::Out<CacheState>>
       clear_;

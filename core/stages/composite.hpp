@@ -21,8 +21,8 @@ class Composite {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::In<uint>, ocl::In<PairHit>,
-              ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::Out<uint>,
+  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::In<uint>, ocl::In<uint>,
+              ocl::In<PairHit>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::Out<uint>,
               ocl::Out<HitRecord>, ocl::Out<uint>>
       kernel_;
 };

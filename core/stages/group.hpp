@@ -54,19 +54,23 @@ class Group {
 
   const BlockGroups &groups() const { return groups_; }
 
+  /// For a cache of so many slots from now on: as BlockCache::resize().
+  void resize(std::uint32_t num_slots);
+
  private:
   struct ByRadix {
     ByRadix(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
             const ocl::Defines &defines);
     void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &keys,
                     BlockGroups &groups);
+    void resize(const Limits &limits, const ocl::BufferSizes &sizes, ocl::Device &device);
 
     ocl::Range pair_tiles_range, key_tiles_range;
     std::uint32_t key_bits;
     RadixSort sort;
     ocl::Buffer<uint> tile_sums;
     ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+                ocl::In<uint>, ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
         select;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> head_sums;
     ocl::Kernel<ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<BlockRays>> heads;
@@ -77,6 +81,7 @@ class Group {
                const ocl::Defines &defines);
     void operator()(const BlockCache &cache, Wavefront &rays, ocl::Buffer<uint> &pair_slots,
                     BlockGroups &groups);
+    void resize(const Limits &limits, const ocl::BufferSizes &sizes, ocl::Device &device);
 
     ocl::Range pair_tiles_range, candidates_range, pairs_range;
     ocl::Buffer<uint> slot_counts;      ///< [slots] 0 between passes
@@ -88,8 +93,9 @@ class Group {
     ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
                 ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<BlockRays>>
         blocks;
-    ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-                ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
+                ocl::In<uint>, ocl::In<uint>, ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>,
+                ocl::Out<uint>>
         scatter;
   };
 
@@ -100,6 +106,8 @@ class Group {
   static Gather make_gather(ocl::Device &device, const Limits &limits,
                             const ocl::BufferSizes &sizes, const ocl::Defines &defines);
 
+  ocl::Device &device_;
+  Limits limits_;
   BlockGroups groups_;
   ocl::Buffer<uint>
       pair_slots_;  ///< [R] by radix the keys of the sort, else slots of pairs' blocks, by pair

@@ -25,11 +25,12 @@ Intersect::Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t 
 
 void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays) {
   kernel_(range_, rays.frame, rays.counts, groups.pair_ids, groups.block_rays, rays.pair_block_ids,
-          cache.table, cache.values, rays.active_ray_ids, rays.pair_hits, rays.closest_pairs);
+          cache.table, cache.values, rays.active_ray_ids, rays.pair_rays, rays.pair_hits,
+          rays.closest_pairs);
   if (settle_doubts_) {
     (*settle_doubts_)(range_, rays.frame, rays.counts, groups.pair_ids, rays.pair_block_ids,
-                      cache.table, cache.values, rays.active_ray_ids, rays.pair_hits,
-                      rays.closest_pairs);
+                      cache.table, cache.values, rays.active_ray_ids, rays.pair_rays,
+                      rays.pair_hits, rays.closest_pairs);
   }
 }
 

@@ -4,7 +4,9 @@ namespace isowave::core {
 
 ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
   const std::uint64_t rays = limits.num_rays, pairs = limits.with_pairs ? rays : 0,
-                      given = limits.with_given ? rays : 0, walks = limits.with_walks ? rays : 0;
+                      given = limits.with_given ? rays : 0,
+                      scanned = limits.scanned_pairs ? rays : 0,
+                      walks = limits.with_walks ? rays : 0;
   return {ocl::buffer_size<PassCounts>("pass counts", 1),
           ocl::buffer_size<PassCounts>("pass counts, previous", 1),
           ocl::buffer_size<PassCounts>("pass counts, next", 1),
@@ -19,6 +21,8 @@ ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
           ocl::buffer_size<uint>("mask", pairs),
           ocl::buffer_size<uint>("pair block ids", pairs),
           ocl::buffer_size<PairHit>("pair hits", pairs),
+          ocl::buffer_size<uint>("pair begins", scanned == 0 ? 0 : scanned + 1),
+          ocl::buffer_size<uint>("rays of pairs", scanned),
           ocl::buffer_size<uint>("closest pairs", pairs)};
 }
 
@@ -41,6 +45,8 @@ Wavefront::Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferS
       mask(device, sizes["mask"]),
       pair_block_ids(device, sizes["pair block ids"]),
       pair_hits(device, sizes["pair hits"]),
+      pair_begins(device, sizes["pair begins"]),
+      pair_rays(device, sizes["rays of pairs"]),
       closest_pairs(device, sizes["closest pairs"]) {
   reset_counts();
 }

@@ -48,6 +48,7 @@ struct Wavefront {
     std::size_t num_levels = 1;  ///< of detail
     bool with_given = false;     ///< there may be rays of RaySource::kGiven
     bool with_walks = true;      ///< rays walk from block to block: not where triangles are drawn
+    bool scanned_pairs = false;  ///< there may be frames with Schedule::scanned_pairs
   };
   static ocl::BufferSizes sizes(const Limits &limits);
 
@@ -112,8 +113,10 @@ struct Wavefront {
       active_ray_ids;  ///< [active_count] rays at work: RayEntry of ray_state.h (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
   ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
-  ocl::Buffer<uint> pair_block_ids;  ///< [window_count * spec_count] blocks asked for, in ray order
-  ocl::Buffer<PairHit> pair_hits;    ///< [window_count * spec_count] what intersection found
+  ocl::Buffer<uint> pair_block_ids;       ///< [pair_slot_count] blocks asked for, in ray order
+  ocl::Buffer<PairHit> pair_hits;         ///< [pair_slot_count] what intersection found
+  ocl::Buffer<uint> pair_begins;  ///< [window_count + 1], with scanned pairs: see ray_pairs.h
+  ocl::Buffer<uint> pair_rays;    ///< [pair_slot_count], with scanned pairs
   ocl::Buffer<uint>
       closest_pairs;  ///< [window_count] by active ray: its pair that decides (closest_pair.h)
 

@@ -32,6 +32,13 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks,
     places_.emplace(device, sizes(max_blocks, stream_on_host, levels)["decode places"]);
 }
 
+void ZfpDecode::resize(std::uint64_t max_blocks) {
+  range_ = ocl::Range::strided(max_blocks, ocl::kGroupSize, device_);
+  if (!places_) return;
+  { const ocl::Buffer<uint> gone = std::move(*places_); }
+  *places_ = {device_, sizes(max_blocks, true, true)["decode places"]};
+}
+
 void ZfpDecode::compile(const DeviceStream &stream, const CountsBuffer &counts, BlockCache &cache) {
   const ocl::Buffer<uint> &words = cache.request_block_ids;  // stands in for what is not read
   const FrameParams frame{};

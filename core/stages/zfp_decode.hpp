@@ -22,6 +22,9 @@ class ZfpDecode {
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
             bool levels = false);
 
+  /// Up to so many blocks from now on: as BlockCache::resize().
+  void resize(std::uint64_t max_blocks);
+
   /// Launches the kernel without a block to decode, see Device::Compiling.
   void compile(const DeviceStream &stream, const CountsBuffer &counts, BlockCache &cache);
 

@@ -15,28 +15,26 @@
 #define ISO_CLOSEST_BY_ATOMICS 1
 #endif
 
-/// Says that a pair hits, or was not tested.
-ISO_INLINE void offer_closest(volatile global uint *closest_pairs, uint pair, uint spec_count) {
-  if (ISO_CLOSEST_BY_ATOMICS) atomic_min(&closest_pairs[pair / spec_count], pair);
+/// Says that a pair of active ray `a` hits, or was not tested.
+ISO_INLINE void offer_closest(volatile global uint *closest_pairs, uint a, uint pair) {
+  if (ISO_CLOSEST_BY_ATOMICS) atomic_min(&closest_pairs[a], pair);
 }
 
-/// Marks a pair that cannot be intersected in this pass, or lies behind the last of its ray.
+/// Marks a pair of active ray `a` that cannot be intersected in this pass, or lies behind its last.
 ISO_INLINE void mark_not_tested(global PairHit *pair_hits, volatile global uint *closest_pairs,
-                                uint pair, uint block_id, uint spec_count) {
+                                uint a, uint pair, uint block_id) {
   if (!ISO_CLOSEST_BY_ATOMICS || block_id != ISO_INVALID_ID) pair_hits[pair].cell = ISO_NOT_TESTED;
-  if (block_id != ISO_INVALID_ID) offer_closest(closest_pairs, pair, spec_count);
+  if (block_id != ISO_INVALID_ID) offer_closest(closest_pairs, a, pair);
 }
 
-/// The pair of active ray `a` that decides, or ISO_INVALID_ID.
+/// The pair of active ray `a` that decides, or ISO_INVALID_ID. begin, end: of its pairs.
 ISO_INLINE uint closest_pair(global const uint *closest_pairs, global const uint *pair_block_ids,
-                             global const PairHit *pair_hits, uint a, uint spec_count) {
-  uint pair = a * spec_count;
+                             global const PairHit *pair_hits, uint a, uint begin, uint end) {
+  uint pair = begin;
   if (ISO_CLOSEST_BY_ATOMICS) return closest_pairs[a];
-  while (pair < (a + 1) * spec_count && pair_block_ids[pair] != ISO_INVALID_ID &&
-         pair_hits[pair].cell == ISO_NO_HIT)
+  while (pair < end && pair_block_ids[pair] != ISO_INVALID_ID && pair_hits[pair].cell == ISO_NO_HIT)
     ++pair;
-  return pair < (a + 1) * spec_count && pair_block_ids[pair] != ISO_INVALID_ID ? pair
-                                                                               : ISO_INVALID_ID;
+  return pair < end && pair_block_ids[pair] != ISO_INVALID_ID ? pair : ISO_INVALID_ID;
 }
 
 #endif

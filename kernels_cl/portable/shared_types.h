@@ -145,8 +145,10 @@ typedef struct Schedule {
   uint max_spec_count;       ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
   uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
+  uint scanned_pairs;        ///< pipeline `blocks`: rays have as many places for pairs as they fill
+                             ///< (ray_pairs.h)
 } Schedule;
-ISO_CHECK_SIZE(Schedule, 12);
+ISO_CHECK_SIZE(Schedule, 16);
 
 /// All that a frame's kernels need besides buffers. Kernels get it by value: NVIDIA's compiler
 /// reads a pointer to constant memory through the cache, again in every turn of a loop.
@@ -160,7 +162,7 @@ typedef struct FrameParams {
   ScreenBox screen;
   Schedule schedule;
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 212);
+ISO_CHECK_SIZE(FrameParams, 216);
 
 #define ISO_NO_HIT 64u  ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED \
@@ -231,7 +233,8 @@ typedef struct PassCounts {
   uint active_count;     ///< N_Act: rays at work at the start of the pass
   uint spec_count;       ///< N_Spec of the pass; 0 when no ray is active
   uint window_count;     ///< of the active rays, the first so many take part in the pass
-  uint pair_slot_count;  ///< window_count * spec_count: entries of the pair arrays in use
+  uint pair_slot_count;  ///< entries of the pair arrays in use: window_count * spec_count, or the
+                         ///< pairs themselves (ray_pairs.h)
   uint pair_count;   ///< ray-block pairs: blocks that rays looked ahead at, summed over the rays
   uint ahead_count;  ///< blocks that rays were to look ahead at, summed over the rays of the window
   uint granted_count;    ///< of those, pairs whose dual grid was in the cache and were intersected

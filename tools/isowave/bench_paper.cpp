@@ -8,11 +8,18 @@
 //   visible_blocks of a pass: distinct blocks in which rays are intersected (pipeline blocks)
 //   active_blocks  distinct blocks that are decoded for a picture: for a cold frame of rays, or a
 //                  mesh
+//   touched_blocks of a pass: distinct blocks whose voxels its rays look at; of what progress is of
 //   n_spec         of a pass: blocks that a ray is to look ahead at, mean of its rays
 //   utilization    of a pass: ray-block pairs that are intersected, per pixel
 //   completed      after each pass: rays that have ended, of all pixels, or of those that met an
 //                  active block; a frame that is through counts as 100
 //   progress       of cold first views, waited for after each pass: ms since the frame's beginning
+//   look_ahead     "global", the paper's; "per-ray"; "off"; "scanned": global, but what rays with
+//   few
+//                  blocks before them leave goes to others
+//   limits         cold frames of a tenth of the isovalues, from two cameras, by the most blocks
+//   that
+//                  rays look ahead at
 //   cache          of rays: "default" slots, or as many as the cold frames needed at most, "one
 //                  frame"
 //   device_bytes   the peak of all buffers; cache_bytes: those of the block cache among them
@@ -54,6 +61,7 @@ struct BenchPaperArgs {
   std::uint32_t isovalues = 100, views = 10, seed = 1;
   std::string size = "1280x720", device, json, pictures;
   std::vector<std::string> scaling = {"640x360", "1920x1080"};
+  std::vector<std::uint32_t> limits = {1, 2, 4, 8, 16, 32, 64};
   std::vector<float> range;  ///< [low, high]; none: the middle 80 % of the values
   std::uint64_t bcmc_budget = 0;
   bool quick = false;
@@ -149,6 +157,7 @@ void print_method(const ordered_json &row) {
                                ? row.at("memory_budget") == 0 ? "bcmc growing" : "bcmc bounded"
                                : fmt::format("{} {}", row.at("method").get<std::string>(),
                                              row.at("cache") != "default"        ? "one frame"
+                                             : row.at("look_ahead") == "scanned" ? "scanned"
                                              : row.at("speculation").get<bool>() ? ""
                                                                                  : "without spec.");
   if (is_bcmc && !row.at("refused").is_null()) {
@@ -187,9 +196,9 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
   };
   double most_active = 0;  // blocks of a cold frame
   for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
-    for (const bool speculation : {true, false}) {
-      add(measure_rays(device, run, {pipeline, speculation}, parts));
-      if (pipeline != PipelineKind::kRays || !speculation) continue;
+    for (const LookAhead look_ahead : {LookAhead::kDefault, LookAhead::kOff}) {
+      add(measure_rays(device, run, {pipeline, look_ahead}, parts));
+      if (pipeline != PipelineKind::kRays || look_ahead == LookAhead::kOff) continue;
       most_active = methods.back().at("active_blocks").at("max").get<double>();
     }
   }
@@ -203,9 +212,14 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
   for (const std::string &size : options.scaling) {
     part.size = parse_size(size);
     for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays})
-      add(measure_rays(device, part, {pipeline, true}, parts));
+      add(measure_rays(device, part, {pipeline}, parts));
     add(measure_bcmc(device, part, 0, parts));
   }
+  const RayMethod scanned{PipelineKind::kBlocks, LookAhead::kScanned};
+  add(measure_rays(device, run, scanned, parts));
+  ordered_json limits = ordered_json::array();
+  for (const RayMethod &method : {RayMethod{PipelineKind::kBlocks}, scanned, RayMethod{}})
+    limits.push_back(measure_limits(device, few, method, options.limits));
   std::string pictures;
   if (!options.pictures.empty())
     pictures = (fs::path(options.pictures) / ("paper_" + volume_stem(path))).string();
@@ -222,7 +236,8 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
           {"range", {range[0], range[1]}},
           {"isovalues", run.isovalues},
           {"agreement", agreement},
-          {"methods", methods}};
+          {"methods", methods},
+          {"limits", limits}};
 }
 
 /// Throws Error on what no volume is needed to refuse.
@@ -292,6 +307,13 @@ void add_bench_paper(CLI::App &bench) {
                        "further sizes, for a tenth of the isovalues, at least four; a list")
           ->delimiter(',')
           ->capture_default_str();
+  command
+      ->add_option("--limits", options->limits,
+                   "most blocks to look ahead at, 1 to 64, by which passes and decoded blocks are "
+                   "compared; a list")
+      ->check(CLI::Range(1u, 64u))
+      ->delimiter(',')
+      ->capture_default_str();
   command
       ->add_option("--range", options->range,
                    "isovalues of interest, LOW HIGH [the middle 80 % of the values]")

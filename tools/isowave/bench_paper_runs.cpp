@@ -114,15 +114,25 @@ void each_frame(const PaperRun &run, const auto &visit) {
 
 RendererOptions options_of(const PaperRun &run, const RayMethod &method) {
   RendererOptions options{.size = run.size, .pipeline = method.pipeline};
-  if (!method.speculation) options.max_speculation = 1;
-  options.per_ray_speculation = method.pipeline == PipelineKind::kRays && method.speculation;
+  if (method.look_ahead == LookAhead::kOff) options.max_speculation = 1;
+  options.per_ray_speculation =
+      method.pipeline == PipelineKind::kRays && method.look_ahead != LookAhead::kOff;
+  options.scanned_pairs = method.look_ahead == LookAhead::kScanned;
   options.cache_slots = method.cache_slots;
   options.with_shading = false;
   return options;
 }
 
-/// Milliseconds and completed rays after each pass, of first views from an empty cache.
-ordered_json measure_progress(Renderer &renderer, const PaperRun &run, std::size_t count) {
+const char *name_of(const RayMethod &method) {
+  if (method.look_ahead == LookAhead::kOff) return "off";
+  if (method.look_ahead == LookAhead::kScanned) return "scanned";
+  return method.pipeline == PipelineKind::kRays ? "per-ray" : "global";
+}
+
+/// Milliseconds and completed rays after each pass, of first views from an empty cache. touched:
+/// gets the blocks that each of these passes looked at.
+ordered_json measure_progress(Renderer &renderer, const PaperRun &run, std::size_t count,
+                              std::vector<double> &touched) {
   ByPass ms(0), completed(100);
   std::vector<std::vector<double>> times;
   for (std::size_t i = 0; i < count; ++i) {
@@ -135,7 +145,8 @@ ordered_json measure_progress(Renderer &renderer, const PaperRun &run, std::size
       part.push_back(pass.completed_percent);
       return true;
     };
-    renderer.render(request);
+    for (const PassStats &pass : renderer.render(request).passes)
+      touched.push_back(pass.touched_blocks.value_or(0));
     times.push_back(std::move(of_frame));
     completed.add(std::move(part));
   }
@@ -170,9 +181,13 @@ ordered_json measure_rays(const ocl::DeviceInfo &device_info, const PaperRun &ru
     }
   }
   const std::uint32_t slots = renderer.memory_plan().cache_slots;
+  std::vector<double> touched;
+  const ordered_json progress = measure_progress(
+      renderer, run, std::min<std::size_t>(parts.progress, run.isovalues.size()), touched);
   ordered_json json = {
       {"method", to_string(method.pipeline)},
-      {"speculation", method.speculation},
+      {"speculation", method.look_ahead != LookAhead::kOff},
+      {"look_ahead", name_of(method)},
       {"cache", method.cache_slots == 0 ? "default" : "one frame"},
       {"size", {run.size.width, run.size.height}},
       {"isovalues", run.isovalues.size()},
@@ -192,12 +207,40 @@ ordered_json measure_rays(const ocl::DeviceInfo &device_info, const PaperRun &ru
       {"completed_percent", tally.completed.means()},
       {"completed_of_active_percent", tally.completed_active.means()},
       {"utilization_by_pass", tally.utilization_by_pass.means()},
-      {"progress", measure_progress(renderer, run,
-                                    std::min<std::size_t>(parts.progress, run.isovalues.size()))},
+      {"touched_blocks", summary(touched)},
+      {"progress", progress},
       {"cache_slots", slots},
       {"cache_bytes", BlockCache::sizes(renderer.memory_plan().limits.cache).bytes()},
       {"device_bytes", device.ledger().peak()}};
   return json;
+}
+
+ordered_json measure_limits(const ocl::DeviceInfo &device_info, const PaperRun &run,
+                            const RayMethod &method, const std::vector<std::uint32_t> &limits) {
+  ocl::Device device(device_info);
+  ordered_json by_limit = ordered_json::array();
+  for (const std::uint32_t limit : limits) {
+    RendererOptions options = options_of(run, method);
+    options.max_speculation = limit;
+    Renderer renderer(device, run.volume, options);
+    renderer.render(request_of(run, 0, 0));
+    std::vector<double> ms, passes, decoded;
+    each_frame(run, [&](std::size_t i, std::size_t view) {
+      renderer.clear_cache();
+      const FrameStats frame = renderer.render(request_of(run, i, view));
+      ms.push_back(frame.total_ms);
+      passes.push_back(double(frame.passes.size()));
+      decoded.push_back(double(decoded_blocks(frame)));
+    });
+    by_limit.push_back({{"limit", limit},
+                        {"cold_ms", summary(ms)},
+                        {"passes", summary(passes)},
+                        {"active_blocks", summary(decoded)}});
+  }
+  return {{"method", to_string(method.pipeline)},
+          {"look_ahead", name_of(method)},
+          {"size", {run.size.width, run.size.height}},
+          {"by_limit", by_limit}};
 }
 
 ordered_json measure_bcmc(const ocl::DeviceInfo &device_info, const PaperRun &run,

@@ -27,10 +27,17 @@ struct PaperParts {
   std::uint32_t progress = 10;  ///< isovalues whose first view is timed pass by pass
 };
 
+/// How far rays look ahead.
+enum class LookAhead {
+  kDefault,  ///< `blocks`: global, the paper's; `rays`: each ray by its own
+  kOff,
+  kScanned  ///< `blocks`: what rays leave goes to others
+};
+
 /// One way to draw with rays.
 struct RayMethod {
   PipelineKind pipeline = PipelineKind::kRays;
-  bool speculation = true;        ///< `blocks`: global, the paper's; `rays`: each ray by its own
+  LookAhead look_ahead = LookAhead::kDefault;
   std::uint32_t cache_slots = 0;  ///< 0: the renderer's default
 };
 
@@ -39,6 +46,14 @@ struct RayMethod {
 /// Throws  Error
 nlohmann::ordered_json measure_rays(const ocl::DeviceInfo &device, const PaperRun &run,
                                     const RayMethod &method, const PaperParts &parts);
+
+/// What looking ahead costs in decoding: passes and decoded blocks of cold frames, by the most
+/// blocks that rays look ahead at.
+///
+/// Throws  Error
+nlohmann::ordered_json measure_limits(const ocl::DeviceInfo &device, const PaperRun &run,
+                                      const RayMethod &method,
+                                      const std::vector<std::uint32_t> &limits);
 
 /// The same of triangles. memory_budget: 0: cache and mesh grow.
 ///

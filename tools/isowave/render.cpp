@@ -385,6 +385,10 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
   fmt::print("  {:>16} bytes  in all, with {} cache slots; at most {} during setup\n",
              with_commas(plan.total()), with_commas(plan.cache_slots),
              with_commas(plan.setup_bytes));
+  if (plan.can_grow()) {
+    fmt::print("  {:>16} bytes  at most, should frames need more slots: with {}\n",
+               with_commas(resized(plan, plan.most_slots).total()), with_commas(plan.most_slots));
+  }
 }
 
 /// --max-surface-error, --time-budget and what goes with them.

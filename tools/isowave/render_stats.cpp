@@ -20,6 +20,7 @@ ordered_json pass_json(const PassStats &pass) {
       {"ray_block_pairs", pass.counts.pair_count},
       {"intersected_pairs", pass.counts.granted_count},
       {"visible_blocks", pass.visible_blocks ? ordered_json(*pass.visible_blocks) : ordered_json()},
+      {"touched_blocks", pass.touched_blocks ? ordered_json(*pass.touched_blocks) : ordered_json()},
       {"requested_blocks", pass.counts.requested_count},
       {"decoded_blocks", pass.counts.decoded_count},
       {"recycled_blocks", pass.counts.recycled_count},

@@ -15,7 +15,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option(
          "--cache-slots", flags.values.cache_slots,
          "decoded blocks kept on the device, 8 to 2^26 [as many as the budget allows; without one "
-         "2^20 or all]")
+         "as many as frames need, growing to 2^20]")
       ->check(CLI::Range(8u, 1u << 26));
   app.add_option("--stream", flags.stream,
                  "where the compressed volume is: device, host (blocks are uploaded when they are "
@@ -38,10 +38,10 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option(
          "--speculation", flags.speculation,
          "blocks a ray looks ahead: off (1), global (W*H / active rays), per-ray (twice as many "
-         "after every "
-         "miss; in pipeline blocks no more than global), or auto: per-ray in pipeline rays, global "
+         "after every miss; in pipeline blocks no more than global), scanned (pipeline blocks: "
+         "global, and what rays leave goes to others), or auto: per-ray in pipeline rays, global "
          "in blocks")
-      ->check(CLI::IsMember({"auto", "off", "global", "per-ray"}))
+      ->check(CLI::IsMember({"auto", "off", "global", "per-ray", "scanned"}))
       ->capture_default_str();
   app.add_option("--max-speculation", flags.values.max_speculation,
                  "most blocks a ray looks ahead, 1..64")
@@ -80,6 +80,8 @@ void check_renderer_options(const CLI::App &app, const RendererFlags &flags) {
   solver_from_string(flags.solver);
   grouping_from_string(flags.grouping);
   closest_hit_from_string(flags.closest);
+  if (flags.pipeline != "blocks" && flags.speculation == "scanned")
+    throw Error("--speculation scanned: give --pipeline blocks, which alone has it");
   if (flags.pipeline != "blocks")
     refuse_options(app, {"--grouping", "--closest"}, "give --pipeline blocks, which alone has it");
 }
@@ -97,6 +99,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
   options.per_ray_speculation =
       flags.speculation == "per-ray" ||
       (flags.speculation == "auto" && options.pipeline != PipelineKind::kBlocks);
+  options.scanned_pairs = flags.speculation == "scanned";
   options.solver = solver_from_string(flags.solver);
   options.grouping = grouping_from_string(flags.grouping);
   options.stream = stream_place_from_string(flags.stream);
@@ -106,6 +109,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
 
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
   const char *speculation = options.max_speculation == 1  ? "off"
+                            : options.scanned_pairs       ? "scanned"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
   return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},

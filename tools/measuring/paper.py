@@ -40,7 +40,7 @@ def paper(run):
     rows = []
     small = {"isovalues": 4, "views": 3, "size": "640x360", "scaling": "320x180,960x540"}
     if run.options.quick:
-        small = {"isovalues": 2, "views": 2, "size": "64x48", "scaling": "32x24"}
+        small = {"isovalues": 2, "views": 2, "size": "64x48", "scaling": "32x24", "limits": "1,64"}
     options = small if run.options.quick or run.options.on_cpu else {}
     fields = run.fields() if run.options.quick else STAND_INS
     if run.options.on_cpu and not run.options.quick:
@@ -136,9 +136,19 @@ def methods(row, kind, size=None):
 
 
 def of_rays(row, kind, speculation=True, cache="default"):
+    """Of those, the paper's way to look ahead, or the default's."""
     return next(
-        m for m in methods(row, kind) if m["speculation"] == speculation and m["cache"] == cache
+        m
+        for m in methods(row, kind)
+        if m["speculation"] == speculation
+        and m["cache"] == cache
+        and m.get("look_ahead") != "scanned"
     )
+
+
+def looking(row):
+    """Pipeline `blocks`, by how far its rays look ahead."""
+    return {m.get("look_ahead"): m for m in methods(row, "blocks")}
 
 
 def tight(row):
@@ -251,6 +261,76 @@ def paper_utilisation(rows):
             cells = [f"{parts[i - 1]:.1f} %" if i <= len(parts) else "" for i in (1, 2, 3, 4, 6, 8)]
             cells += [f"{parts[i - 1]:.1f} %" if i <= len(parts) else "" for i in (12, 16)]
             yield subject(row), "global" if speculation else "off", *cells
+
+
+def paper_scanned(rows):
+    yield (
+        "volume",
+        "speculation",
+        "passes",
+        "N_Spec, mean",
+        "utilisation",
+        "blocks decoded",
+        "cold ms",
+        "of `global`",
+    )
+    for row in rows:
+        ways = looking(row)
+        for name in ("global", "scanned", "off") if "scanned" in ways else ():
+            m = ways[name]
+            part = m["cold_ms"]["median"] / ways["global"]["cold_ms"]["median"]
+            yield (
+                subject(row),
+                f"`{name}`",
+                f"{m['passes']['mean']:.2f}",
+                f"{m['n_spec']['mean']:.1f}" if m["n_spec"] else "",
+                f"{m['utilization_percent']['mean']:.1f} %",
+                f"{m['active_blocks']['mean']:,.0f}",
+                ms(m["cold_ms"]["median"]),
+                f"{part:.2f}",
+            )
+
+
+def paper_limits(rows):
+    """Blocks decoded for a cold frame, and in brackets its passes."""
+    ways = [(row, way) for row in rows for way in row.get("limits", ())]
+    limits = sorted({at["limit"] for _, way in ways for at in way["by_limit"]})
+    yield "volume", "pipeline", "speculation", *(f"at most {limit}" for limit in limits)
+    for row, way in ways:
+        by_limit = {at["limit"]: at for at in way["by_limit"]}
+        cells = [
+            f"{by_limit[limit]['active_blocks']['mean']:,.0f} "
+            f"({by_limit[limit]['passes']['mean']:.1f})"
+            for limit in limits
+        ]
+        yield subject(row), f"`{way['method']}`", f"`{way['look_ahead']}`", *cells
+
+
+def paper_working_set(rows):
+    yield (
+        "volume",
+        "blocks",
+        "pipeline",
+        "blocks of a pass, mean (max)",
+        "of all",
+        "blocks of a cold frame, mean (max)",
+        "cache slots",
+    )
+    for row in rows:
+        for kind in ("blocks", "rays"):
+            m = of_rays(row, kind)
+            touched, active = m.get("touched_blocks"), m["active_blocks"]
+            if not touched:
+                continue
+            yield (
+                subject(row),
+                f"{row['blocks']:,}",
+                f"`{kind}`",
+                both(touched["mean"], touched["max"]),
+                f"{100 * touched['mean'] / row['blocks']:.2f} %",
+                both(active["mean"], active["max"]),
+                f"{m['cache_slots']:,}",
+            )
 
 
 def paper_memory(rows):
@@ -433,6 +513,9 @@ TABLES = (
     paper_times,
     paper_progress,
     paper_utilisation,
+    paper_scanned,
+    paper_limits,
+    paper_working_set,
     paper_memory,
     paper_blocks,
     paper_scaling,

@@ -83,7 +83,8 @@ def speculation(run):
     return [
         frame_row(run, run.fields()[0], speculation=kind, pipeline=pipeline)
         for pipeline in ("rays", "blocks")
-        for kind in ("off", "global", "per-ray")
+        for kind in ("off", "global", "per-ray", "scanned")
+        if kind != "scanned" or pipeline == "blocks"
     ]
 
 

@@ -13,11 +13,13 @@
 
 namespace isowave {
 
-/// What a renderer is made for. All its memory is taken when it is made.
+/// What a renderer is made for. Its memory is taken when it is made; without a budget and
+/// cache_blocks, the cache grows between frames, should these need more blocks.
 struct RendererOptions {
   ImageSize largest{};              ///< picture: frames may have as many rays, in any shape
   std::uint64_t memory_budget = 0;  ///< of device memory [bytes]; 0: three quarters of it
-  /// Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows.
+  /// Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows, or,
+  /// without one, as frames need.
   std::uint32_t cache_blocks = 0;
   bool with_levels = false;       ///< frames may use levels of detail
   bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error

@@ -291,9 +291,11 @@ class Renderer:
         Largest picture (width, height), and rays of each of its pixels along each axis: frames may
         have as many rays, in any shape.
     memory_budget
-        Of device memory [bytes]; None: three quarters of it. Bounds all that is taken there.
+        Of device memory [bytes]; None: three quarters of it. Bounds all that is taken there. With a
+        budget all is taken at once; without, the cache begins small, and grows between frames.
     cache_blocks
-        Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows.
+        Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows, or,
+        without one, as frames need.
     levels, bounds, time_budget, rays
         Whether frames may use levels of detail, ask for `max_error` and bounds, have a
         `time_budget`; whether they may have `ambient` rays, and cast_rays() may be called.
