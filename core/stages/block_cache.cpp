@@ -104,7 +104,7 @@ void BlockCache::resize(const Limits &limits) {
   const ocl::BufferSizes made = sizes(limits);
   const auto of_slots = [&](auto &&visit) {
     visit(table), visit(values), visit(inside), visit(slot_block_ids), visit(slot_stamps),
-        visit(free_slots_), visit(request_block_ids), visit(decode_slots), visit(slot_ranks_),
+        visit(free_slots), visit(request_block_ids), visit(decode_slots), visit(slot_ranks_),
         visit(slot_changing_);
   };
   ocl::Device &device = state.device();
