@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <random>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/bricks/brick_volume.hpp"
@@ -48,6 +49,7 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       std::vector<HitRecord> hits;
       std::vector<std::uint32_t> place;
       std::vector<std::uint64_t> colors, depths, words;
+      std::vector<std::pair<std::size_t, HitRecord>> all{};  ///< ray, and what a brick has found
     };
     std::vector<Composed> frames(
         cameras.size(),
@@ -65,10 +67,13 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
         const std::uint32_t place = cuts.order_from({rays.eye_x, rays.eye_y, rays.eye_z})[brick];
         const std::vector<HitRecord> hits = renderer.hits();
         for (std::size_t ray = 0; ray < num_rays; ++ray) {
-          if (hits[ray].block_id == ISO_INVALID_ID || place > frame.place[ray]) continue;
+          HitRecord hit = hits[ray];
+          if (hit.block_id == ISO_INVALID_ID) continue;
+          hit.block_id = whole_id(whole.info(), volume.info, hit.block_id);
+          frame.all.emplace_back(ray, hit);
+          if (place > frame.place[ray]) continue;
           frame.place[ray] = place;
-          frame.hits[ray] = hits[ray];
-          frame.hits[ray].block_id = whole_id(whole.info(), volume.info, hits[ray].block_id);
+          frame.hits[ray] = hit;
         }
         color_words(renderer.shade_packed({}), place, frame.words);
         keep_first(frame.colors, frame.words);
@@ -83,6 +88,10 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       const Composed &frame = frames[view];
       const auto expected = test::twin_hits(whole, cameras[view], options.size, isovalue);
       expect_same_hits(frame.hits, expected, options.size.width);
+      std::size_t num_doubles = 0;  // of a hit: a ray in the plane of a cut is in one brick, too
+      for (const auto &[ray, hit] : frame.all)
+        num_doubles += hit.t <= expected[ray].t && hit.block_id != expected[ray].block_id;
+      EXPECT_EQ(num_doubles, 0u);
       std::vector<HitRecord> depths(num_rays, no_hit());
       set_field(frame.depths, HitField::kT, depths);
       EXPECT_EQ(depth_of(depths), depth_of(expected));
@@ -183,7 +192,7 @@ TEST_P(BricksOnDevice, SameActiveBlocks) {
 TEST_P(BricksOnDevice, LevelsOfDetail) {
   if (GetParam().pipeline == PipelineKind::kBlocks) return;  // draws the finest level alone
   const VolumeInfo info = test::grid_info({41, 37, 33});
-  ArrayReader reader(info, test::sample(info.dims, test::gyroid_field(9)));
+  ArrayReader reader(info, test::sample(info.dims, test::noise_field(6)));
   constexpr std::size_t kLevels = 3;
   const CompressedVolume whole = compress(reader, {.rate = 8, .levels = kLevels});
   const Cuts cuts(blocks_along(info), glm::uvec3(3, 2, 2), cut_unit(kLevels));
@@ -220,7 +229,7 @@ TEST_P(BricksOnDevice, LevelsOfDetail) {
     const FrameStats stats = of_whole.render(request(view));
     num_levels = std::max(num_levels, stats.last_level - stats.first_level + 1);
     std::vector<HitRecord> expected = of_whole.hits();
-    EXPECT_GT(test::num_hits(expected), 300u);
+    EXPECT_GT(test::num_hits(expected), 200u);
     for (std::size_t ray = 0; ray < expected.size(); ++ray)  // ids are a brick's own
       hits[view][ray].block_id = expected[ray].block_id;
     expect_same_hits(hits[view], expected, size.width);
