@@ -493,6 +493,10 @@ void run_render(const CLI::App &command, RenderArgs options) {
     document["setup_ms"] = frames.renderer().setup_ms();
     document["compile_ms"] = device->compile_ms();
     document["frames"] = draw_frames(options, scene, frames);
+    const MemoryPlan &plan = frames.renderer().memory_plan();
+    document["cache_slots"] = {{"first", options.renderer.cache_slots},
+                               {"last", plan.cache_slots},
+                               {"most", plan.most_slots}};
     document["memory"] = memory_json(device->ledger());
     fmt::print("setup {:.0f} ms; device memory: peak {:.1f} MiB\n", frames.renderer().setup_ms(),
                double(device->ledger().peak()) / (1 << 20));
