@@ -40,10 +40,9 @@ ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t l
 }
 
 std::string fingerprint(const std::string &path, const VolumeInfo &info) {
-  const std::string grid =
-      fmt::format("{}x{}x{} {} {} {} {} {} {} {}", info.dims.x, info.dims.y, info.dims.z,
-                  info.spacing.x, info.spacing.y, info.spacing.z, info.origin.x, info.origin.y,
-                  info.origin.z, to_string(info.type));
+  std::string grid = fmt::format("{}x{}x{} {} {} {} {} {} {} {}", info.dims.x, info.dims.y,
+                                 info.dims.z, info.spacing.x, info.spacing.y, info.spacing.z,
+                                 info.origin.x, info.origin.y, info.origin.z, to_string(info.type));
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) return grid;  // it is made
   const InputFile file(path);
