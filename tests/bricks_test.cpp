@@ -15,6 +15,7 @@
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/compose.hpp"
 #include "core/bricks/cuts.hpp"
+#include "core/bricks/surface_work.hpp"
 #include "core/render/renderer.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "kernels_cl/portable/block_cells.h"
@@ -276,6 +277,30 @@ TEST(Bricks, KeepTheWholesVoxels) {
     }
     std::filesystem::remove(path);
   }
+}
+
+/// Blocks that a surface touches are shared out.
+TEST(Bricks, SurfacesAreSharedOut) {
+  const VolumeInfo info = test::grid_info({128, 66, 80});
+  // A wall near the end of x, in three quarters of y.
+  const std::vector<float> source = test::sample(
+      info.dims, [](const glm::dvec3 &p) { return p.x > 101.5 && p.y < 48 ? 1.0 : 0.0; });
+  ArrayReader reader(info, source);
+  const CompressedVolume whole = compress(reader, {.rate = 16});
+  const glm::ivec3 blocks = blocks_along(info);
+  const std::vector<float> isovalues = {0.5f};
+  std::vector<std::uint32_t> counts;
+  for (int z = 0; z < blocks.z; z += 2 * kWorkUnit) {
+    const BlockBox slab{{0, 0, z}, {blocks.x, blocks.y, std::min(z + 2 * kWorkUnit, blocks.z)}};
+    const auto some = count_touched(cut_brick(whole, slab), isovalues);
+    counts.insert(counts.end(), some.begin(), some.end());
+  }
+  const SurfaceWork work(blocks, counts);
+  EXPECT_EQ(work({glm::ivec3(0), blocks}), 12u * 20u);
+  EXPECT_EQ(work({{24, 4, 0}, {28, 12, 8}}), 8u * 8u);
+  EXPECT_EQ(work({{0, 0, 0}, {24, blocks.y, blocks.z}}), 0u);
+  const Cuts cuts(blocks, 4, work, kWorkUnit);
+  for (const BlockBox &brick : cuts.bricks()) EXPECT_GE(work(brick), 32u);
 }
 
 /// The cells that a ray passes through in all bricks, one after the other, are those of the whole

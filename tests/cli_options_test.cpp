@@ -156,6 +156,9 @@ TEST(CliOptions, OptionsWithoutEffectAreRefused) {
   expect_one_line_error(kRender + "--grouping radix", "--grouping: ");
   expect_one_line_error(kRender + "--pipeline rays --closest scan", "--closest: ");
   expect_one_line_error(kRender + "--speculation off --max-speculation 8", "--max-speculation: ");
+  expect_one_line_error(kRender + "--speculation scanned", "give --pipeline blocks");
+  expect_one_line_error(kRender + "--speculation scanned --pipeline rays",
+                        "give --pipeline blocks");
   expect_one_line_error(kRender + "--color '#102030' --depth a.npy", "--color: ");
   expect_one_line_error("verify --isovalue 80", "give a VOLUME");
   expect_one_line_error("verify " + kHead + " -i 80 --rays 100", "--rays: ");

@@ -160,6 +160,10 @@ TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   EXPECT_EQ(stats["options"]["size"], (std::array{64, 48}));
   EXPECT_EQ(stats["options"]["max_speculation"], 2);
   EXPECT_EQ(stats["options"]["cache_slots"], 11 * 11 * 11);
+  EXPECT_EQ(stats["cache_slots"],
+            json({{"first", 11 * 11 * 11}, {"last", 11 * 11 * 11}, {"most", 11 * 11 * 11}}));
+  EXPECT_EQ(frame["per_pass"][0]["touched_blocks"], frame["per_pass"][0]["decoded_blocks"])
+      << "of an empty cache";
   EXPECT_FALSE(stats["device"]["name"].get<std::string>().empty());
   std::uint64_t bytes = 0;
   for (const json &entry : stats["memory"]["by_name"])

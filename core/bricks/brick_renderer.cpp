@@ -33,7 +33,7 @@ FrameStats BrickRenderer::render(const FrameRequest &request) {
   if (request.bound != FieldBound::kNone || request.ambient_rays != 0)
     throw Error("bricks have no bounds and no ambient rays");
   own_hits_.clear();
-  const FrameStats stats = renderer_.render(request);
+  FrameStats stats = renderer_.render(request);
   const View view = make_view(whole_, request.camera, renderer_.size());
   place_ = cuts_.order_from({view.eye_x, view.eye_y, view.eye_z})[team_.rank()];
   return stats;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
@@ -9,13 +10,6 @@
 namespace isowave::core {
 
 namespace {
-
-/// Of sides of the same length the last: rows and layers of a file, or of a generator, stay whole.
-int longest_side(const BlockBox &box) {
-  const glm::ivec3 size = box.end - box.begin;
-  const int xy = size.x > size.y ? 0 : 1;
-  return size[xy] > size.z ? xy : 2;
-}
 
 BlockBox part_below(BlockBox box, int axis, int plane) {
   box.end[axis] = plane;
@@ -25,6 +19,52 @@ BlockBox part_below(BlockBox box, int axis, int plane) {
 BlockBox part_above(BlockBox box, int axis, int plane) {
   box.begin[axis] = plane;
   return box;
+}
+
+/// Axes by the length of a box, the longest first; of the same length the last, so that rows and
+/// layers of a file, or of a generator, stay whole.
+std::array<int, 3> longest_first(const BlockBox &box) {
+  std::array<int, 3> axes = {2, 1, 0};
+  const glm::ivec3 size = box.end - box.begin;
+  std::ranges::stable_sort(axes, [&](int a, int b) { return size[a] > size[b]; });
+  return axes;
+}
+
+struct SharedCut {
+  int axis = 0, plane = 0;
+  double off = 0;  ///< of the work below that was wanted, as a part of it
+};
+
+/// The plane across an axis with the share of so many of `count` bricks below it, about.
+SharedCut cut_across(int axis, const BlockBox &box, std::uint32_t count, std::uint64_t num_below,
+                     const BoxWork &work) {
+  const auto share = [&](int plane) {
+    return static_cast<double>(work(part_below(box, axis, plane))) * count;
+  };
+  const double wanted = static_cast<double>(work(box)) * static_cast<double>(num_below);
+  int low = box.begin[axis], high = box.end[axis];
+  while (high - low > 1) {
+    const int middle = low + (high - low) / 2;
+    (share(middle) < wanted ? low : high) = middle;
+  }
+  const double too_few = wanted - share(low), too_many = share(high) - wanted;
+  if (wanted == 0) return {axis, high, 0};
+  return too_many < too_few ? SharedCut{axis, high, too_many / wanted}
+                            : SharedCut{axis, low, too_few / wanted};
+}
+
+/// Across the longest side, unless that is off by more than a quarter and another less.
+SharedCut best_cut(const BlockBox &box, std::uint32_t count, std::uint64_t num_below,
+                   const BoxWork &work) {
+  constexpr double kGoodEnough = 0.25;
+  std::optional<SharedCut> best;
+  for (const int axis : longest_first(box)) {
+    if (box.end[axis] - box.begin[axis] < 2) continue;
+    const SharedCut cut = cut_across(axis, box, count, num_below, work);
+    if (!best || cut.off < best->off) best = cut;
+    if (best->off <= kGoodEnough) break;
+  }
+  return *best;  // there is a side to cut, or there would be one brick
 }
 
 glm::ivec3 units_along(const glm::ivec3 &blocks, int unit) {
@@ -82,26 +122,16 @@ std::uint32_t Cuts::add_brick(const BlockBox &box) {
 
 std::uint32_t Cuts::cut(const BlockBox &box, std::uint32_t count, const BoxWork &work) {
   if (count == 1) return add_brick(box);
-  const int axis = longest_side(box);
-  const int begin = box.begin[axis], end = box.end[axis];
-  const std::uint64_t layer = num_blocks(box) / static_cast<std::uint64_t>(end - begin);
   std::uint64_t num_below = count / 2;
-  // The first plane with at least its share of work below, or the one before if that is nearer.
-  const auto share = [&](int plane) {
-    return static_cast<double>(work(part_below(box, axis, plane))) * count;
-  };
-  const double wanted = static_cast<double>(work(box)) * static_cast<double>(num_below);
-  int low = begin, high = end;
-  while (high - low > 1) {
-    const int middle = low + (high - low) / 2;
-    (share(middle) < wanted ? low : high) = middle;
-  }
-  int plane = share(high) - wanted < wanted - share(low) ? high : low;
+  const SharedCut found = best_cut(box, count, num_below, work);
+  const int axis = found.axis, begin = box.begin[axis], end = box.end[axis];
   // Each brick needs a block.
+  const std::uint64_t layer = num_blocks(box) / static_cast<std::uint64_t>(end - begin);
   const auto layers = [layer](std::uint64_t blocks) {
     return static_cast<int>((blocks + layer - 1) / layer);
   };
-  plane = std::min(std::max(plane, begin + layers(num_below)), end - layers(count - num_below));
+  int plane =
+      std::min(std::max(found.plane, begin + layers(num_below)), end - layers(count - num_below));
   plane = std::clamp(plane, begin + 1, end - 1);
   const std::uint64_t room_below = layer * static_cast<std::uint64_t>(plane - begin),
                       room_above = layer * static_cast<std::uint64_t>(end - plane);
@@ -116,7 +146,7 @@ std::uint32_t Cuts::cut(const BlockBox &box, std::uint32_t count, const BoxWork 
 
 std::uint32_t Cuts::cut_grid(const BlockBox &box, const glm::uvec3 &first, const glm::uvec3 &bricks,
                              const glm::uvec3 &all) {
-  const int axis = longest_side({glm::ivec3(0), glm::ivec3(bricks)});
+  const int axis = longest_first({glm::ivec3(0), glm::ivec3(bricks)}).front();
   const std::uint32_t half = bricks[axis] / 2;
   if (half == 0) {
     const std::size_t brick =

@@ -313,6 +313,7 @@ void add_bench_paper(CLI::App &bench) {
                    "compared; a list")
       ->check(CLI::Range(1u, 64u))
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->capture_default_str();
   command
       ->add_option("--range", options->range,

@@ -20,6 +20,18 @@ namespace isowave::core::tools {
 
 namespace {
 
+/// MPI itself waits as fast as a processor can, which takes that from whoever draws on it.
+void wait_for(std::span<MPI_Request> requests) {
+  constexpr std::chrono::milliseconds kFast{1};
+  constexpr std::chrono::microseconds kNap{50};
+  const auto begin = std::chrono::steady_clock::now();
+  for (int done = 0; done == 0;) {
+    MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
+    if (done == 0 && std::chrono::steady_clock::now() - begin > kFast)
+      std::this_thread::sleep_for(kNap);
+  }
+}
+
 /// MPI's own handler of errors ends the job.
 class MpiTeam : public Team {
  public:
@@ -37,9 +49,11 @@ class MpiTeam : public Team {
 
   std::vector<std::string> all_gather(const std::string &text) override {
     const auto count = static_cast<std::size_t>(size_);
-    int length = static_cast<int>(text.size());
+    const int length = static_cast<int>(text.size());
     std::vector<int> lengths(count), begins(count);
-    MPI_Allgather(&length, 1, MPI_INT, lengths.data(), 1, MPI_INT, MPI_COMM_WORLD);
+    MPI_Request request = MPI_REQUEST_NULL;
+    MPI_Iallgather(&length, 1, MPI_INT, lengths.data(), 1, MPI_INT, MPI_COMM_WORLD, &request);
+    wait_for({&request, 1});
     std::int64_t sum = 0;
     for (std::size_t rank = 0; rank < count; ++rank) {
       begins[rank] = static_cast<int>(sum);
@@ -48,8 +62,9 @@ class MpiTeam : public Team {
         throw std::length_error("the ranks' texts are too long for MPI");
     }
     std::string all(static_cast<std::size_t>(sum), '\0');
-    MPI_Allgatherv(text.data(), length, MPI_CHAR, all.data(), lengths.data(), begins.data(),
-                   MPI_CHAR, MPI_COMM_WORLD);
+    MPI_Iallgatherv(text.data(), length, MPI_CHAR, all.data(), lengths.data(), begins.data(),
+                    MPI_CHAR, MPI_COMM_WORLD, &request);
+    wait_for({&request, 1});
     std::vector<std::string> texts;
     for (std::size_t rank = 0; rank < count; ++rank)
       texts.push_back(all.substr(static_cast<std::size_t>(begins[rank]),
@@ -65,7 +80,7 @@ class MpiTeam : public Team {
   }
 
   void finish_reductions() override {
-    MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
+    wait_for(requests_);
     requests_.clear();
   }
 
@@ -140,7 +155,7 @@ int MpiJob::finish(int status) {
   if (status == 0) {
     MPI_Request request = MPI_REQUEST_NULL;
     MPI_Ibarrier(MPI_COMM_WORLD, &request);
-    MPI_Wait(&request, MPI_STATUS_IGNORE);
+    wait_for({&request, 1});
   }
   team_of_job.reset();
   MPI_Finalize();

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <filesystem>
 
 #include "core/base/error.hpp"
 #include "core/bricks/brick_volume.hpp"
+#include "core/bricks/surface_work.hpp"
 #include "core/io/input_file.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
@@ -40,10 +40,9 @@ ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t l
 }
 
 std::string fingerprint(const std::string &path, const VolumeInfo &info) {
-  const std::string grid =
-      fmt::format("{}x{}x{} {} {} {} {} {} {} {}", info.dims.x, info.dims.y, info.dims.z,
-                  info.spacing.x, info.spacing.y, info.spacing.z, info.origin.x, info.origin.y,
-                  info.origin.z, to_string(info.type));
+  std::string grid = fmt::format("{}x{}x{} {} {} {} {} {} {} {}", info.dims.x, info.dims.y,
+                                 info.dims.z, info.spacing.x, info.spacing.y, info.spacing.z,
+                                 info.origin.x, info.origin.y, info.origin.z, to_string(info.type));
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) return grid;  // it is made
   const InputFile file(path);
@@ -63,16 +62,15 @@ Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &brick
   return {blocks_along(whole), along, unit};
 }
 
-std::vector<float> gather_values(Team &team, std::span<const float> values) {
-  std::string own(values.size_bytes(), '\0');
-  std::memcpy(own.data(), values.data(), own.size());
-  std::vector<float> all;
-  for (const std::string &each : team.all_gather(own)) {
-    const std::size_t before = all.size();
-    all.resize(before + each.size() / sizeof(float));
-    std::memcpy(all.data() + before, each.data(), each.size());
-  }
-  return all;
+Cuts cut_by_surfaces(Team &team, const VolumeInfo &whole, std::span<const float> isovalues,
+                     int unit, const std::function<CompressedVolume(const BlockBox &)> &load) {
+  const glm::ivec3 blocks = blocks_along(whole);
+  // Each rank counts in a slab of its own.
+  const Cuts slabs(blocks, glm::uvec3(1, 1, team.size()), kWorkUnit);
+  std::vector<std::uint32_t> counts;
+  together(team, [&] { counts = count_touched(load(slabs.bricks()[team.rank()]), isovalues); });
+  const SurfaceWork work(blocks, gather(team, counts));
+  return {blocks, team.size(), work, std::max(unit, kWorkUnit)};
 }
 
 std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,

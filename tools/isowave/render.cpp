@@ -58,7 +58,7 @@ struct RenderArgs {
   double voxel_pixels = 0;                  ///< of whole frames
   std::string normals = "smooth";
   std::uint32_t ambient_rays = 0;
-  std::string bricks;  ///< XxYxZ
+  std::string bricks;  ///< XxYxZ, or "active"
 };
 
 /// "#RRGGBB" -> [0,1]^3.
@@ -547,7 +547,15 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
         "{} has no levels of detail, which bricks cannot make: isowave convert --levels all",
         options.input);
   }
-  const Cuts cuts = cut_for(team, whole, options.bricks, cut_unit(levels.size()));
+  const auto load = [&](const BlockBox &box, std::size_t num_levels) {
+    return load_brick(options.input, overrides, options.frame.compression, whole, num_levels, box,
+                      device.get());
+  };
+  const int unit = cut_unit(levels.size());
+  const Cuts cuts = options.bricks == "active"
+                        ? cut_by_surfaces(team, whole, options.frame.isovalues, unit,
+                                          [&](const BlockBox &box) { return load(box, 1); })
+                        : cut_for(team, whole, options.bricks, unit);
   const BlockBox &own = cuts.bricks()[team.rank()];
   Scene scene;
   scene.size = views.size;
@@ -557,12 +565,11 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   std::vector<float> samples;
   together(team, [&] {
     scene.cameras = make_cameras(options.input, whole, options.frame, views);
-    scene.volume = load_brick(options.input, overrides, options.frame.compression, whole,
-                              levels.size(), own, device.get());
+    scene.volume = load(own, levels.size());
     samples = range_samples(scene.volume, whole);
     options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   });
-  options.renderer.range_thresholds = range_thresholds(gather_values(team, samples));
+  options.renderer.range_thresholds = range_thresholds(gather(team, samples));
   std::optional<BrickRenderer> renderer;
   together(team,
            [&] { renderer.emplace(*device, scene.volume, options.renderer, cuts, whole, team); });
@@ -661,6 +668,10 @@ void run_render(const CLI::App &command, RenderArgs options) {
     document["setup_ms"] = frames.renderer().setup_ms();
     document["compile_ms"] = device->compile_ms();
     document["frames"] = draw_frames(options, scene, frames);
+    const MemoryPlan &plan = frames.renderer().memory_plan();
+    document["cache_slots"] = {{"first", options.renderer.cache_slots},
+                               {"last", plan.cache_slots},
+                               {"most", plan.most_slots}};
     document["memory"] = memory_json(device->ledger());
     fmt::print("setup {:.0f} ms; device memory: peak {:.1f} MiB\n", frames.renderer().setup_ms(),
                double(device->ledger().peak()) / (1 << 20));
@@ -708,7 +719,8 @@ void add_render(CLI::App &app) {
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`); "
                       "several, with commas: of the first process of a host, the second, ...");
   command->add_option("--bricks", options->bricks,
-                      "XxYxZ: how many along each axis, one for each process [all alike large]");
+                      "XxYxZ: how many along each axis, one for each process; active: so that "
+                      "surfaces touch like many blocks of each [all alike large]");
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();
