@@ -101,10 +101,10 @@ void measure(const Options &options) {
   std::vector<Way> ways;
   for (const HostLoops &loops : all_host_loops()) {
     const bool best = &loops == &all_host_loops().back();
-    const std::string processor = best ? "" : ", any processor";
-    ways.push_back({"rays" + processor, loops.trace_rays, false});
+    if (ways.empty() || ways.back().trace != loops.trace_rays)
+      ways.push_back({best ? "rays" : "rays, any processor", loops.trace_rays, false});
     if (loops.trace != loops.trace_rays)
-      ways.push_back({"packets" + processor, loops.trace, false});
+      ways.push_back({best ? "packets" : "packets, SSE4.1", loops.trace, false});
     if (!best) continue;
     ways.push_back({"as drawn, smooth normals", loops.trace, true});
     ways.push_back({"the same, nothing decoded", loops.trace, true, true});

@@ -1,7 +1,11 @@
 #pragma once
-// Eight float32 or int32 at a time, by AVX2 and fused multiply-add: what kernels_cl/portable/
-// packet.h needs, as kernels_cl/device/float8.h has it for OpenCL. For host_packets.cpp alone,
-// which compiles it for processors that have these.
+// Eight float32 or int32 at a time: what kernels_cl/portable/packet.h needs, as
+// kernels_cl/device/float8.h has it for OpenCL. For files that are compiled for one kind of
+// processor, and define before
+//
+//   ISO_PACKET_NAMESPACE  in which all of it is, since each kind has functions of its own
+//   ISO_PACKET_SSE4       where there are registers of four, and no fused multiply-add; elsewhere,
+//                         AVX2 and fused multiply-add
 
 #include <immintrin.h>
 
@@ -10,7 +14,7 @@
 
 #include "kernels_cl/portable/shared_types.h"
 
-#define ISO_PACKET_NAMESPACE_BEGIN namespace isowave::core::packets {
+#define ISO_PACKET_NAMESPACE_BEGIN namespace isowave::core::ISO_PACKET_NAMESPACE {
 #define ISO_PACKET_NAMESPACE_END }
 #define ISO_UNLIKELY(condition) __builtin_expect(condition, 0)
 /// A function that is called so rarely, or so seldom, that it must not burden its callers.
@@ -29,7 +33,7 @@
        left_##lane &= left_##lane - 1, lane = first_lane(left_##lane))
 // NOLINTEND(bugprone-macro-parentheses)
 
-namespace isowave::core::packets {
+namespace isowave::core::ISO_PACKET_NAMESPACE {
 
 using Floats = float __attribute__((vector_size(32)));
 using Ints = std::int32_t __attribute__((vector_size(32)));
@@ -40,14 +44,6 @@ inline Floats floats(float x) {
 }
 inline Ints ints(int x) {
   return Ints{x, x, x, x, x, x, x, x};
-}
-
-/// Lane i in bit i.
-inline unsigned bits_of(Mask mask) {
-  return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
-}
-inline bool any(Mask mask) {
-  return bits_of(mask) != 0;
 }
 
 inline unsigned first_lane(unsigned bits) {
@@ -62,60 +58,14 @@ inline Ints to_ints(Floats x) {
   return __builtin_convertvector(x, Ints);
 }
 
-/// a in the lanes of a mask, b in others. What compilers make of mask ? a : b compares the mask
-/// with 0 first.
-inline Floats pick(Mask mask, Floats a, Floats b) {
-  return reinterpret_cast<Floats>(_mm256_blendv_ps(
-      reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(mask)));
-}
-inline Ints pick(Mask mask, Ints a, Ints b) {
-  return reinterpret_cast<Ints>(
-      pick(mask, reinterpret_cast<Floats>(a), reinterpret_cast<Floats>(b)));
-}
-
-inline Floats smaller(Floats a, Floats b) {
-  return a < b ? a : b;
-}
-inline Floats larger(Floats a, Floats b) {
-  return a > b ? a : b;
-}
-inline Ints smaller(Ints a, Ints b) {
-  return a < b ? a : b;
-}
-inline Ints larger(Ints a, Ints b) {
-  return a > b ? a : b;
-}
-
 inline Floats fabs(Floats x) {
   return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7FFFFFFF);
 }
 
-inline Floats fma(Floats a, Floats b, Floats c) {
-  return reinterpret_cast<Floats>(_mm256_fmadd_ps(
-      reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(c)));
-}
-inline Floats sqrt(Floats x) {
-  return reinterpret_cast<Floats>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x)));
-}
-inline Floats floor(Floats x) {
-  return reinterpret_cast<Floats>(_mm256_floor_ps(reinterpret_cast<__m256>(x)));
-}
-/// The nearest whole number; halves to an even one.
-inline Floats rint(Floats x) {
-  return reinterpret_cast<Floats>(
-      _mm256_round_ps(reinterpret_cast<__m256>(x), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC));
-}
+}  // namespace isowave::core::ISO_PACKET_NAMESPACE
 
-/// Gives lanes the halves of each one's 64-bit number. numbers: below 2^31.
-inline void gather_halves(const ulong *from, Ints numbers, Mask lanes, Ints *low, Ints *high) {
-  const int *halves = reinterpret_cast<const int *>(from);
-  const auto gather = [&](const int *base, Ints before) {
-    return reinterpret_cast<Ints>(_mm256_mask_i32gather_epi32(
-        reinterpret_cast<__m256i>(before), base, reinterpret_cast<__m256i>(numbers),
-        reinterpret_cast<__m256i>(lanes), sizeof(ulong)));
-  };
-  *low = gather(halves, *low);
-  *high = gather(halves + 1, *high);
-}
-
-}  // namespace isowave::core::packets
+#ifdef ISO_PACKET_SSE4
+#include "core/host/float8_sse4.hpp"
+#else
+#include "core/host/float8_avx2.hpp"
+#endif

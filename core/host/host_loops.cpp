@@ -356,6 +356,18 @@ ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &param
   shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
 }
 
+uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                bool is_smooth, HitRecord *hits) {
+  const uint num_hits = trace_packets_sse4(frame, field, tile, hits);
+  if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
+  return num_hits;
+}
+
+/// With fused multiply-add, single rays are faster.
+bool is_narrow() {
+  return __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("popcnt") &&
+         !__builtin_cpu_supports("fma");
+}
 bool is_wide() {
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
          __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma") &&
@@ -367,6 +379,8 @@ constexpr HostLoops kLoops[] = {
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays_anywhere, trace_rays_anywhere,
      cast_anywhere, ambient_anywhere, shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
+    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4, trace_rays_anywhere,
+     cast_anywhere, ambient_anywhere, shade_anywhere},
     {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays_wide, cast_wide, ambient_wide,
      shade_wide},
 #endif
@@ -376,8 +390,8 @@ constexpr HostLoops kLoops[] = {
 
 std::span<const HostLoops> all_host_loops() {
 #ifdef ISO_HAS_WIDE_LOOPS
-  static const bool wide = is_wide();
-  return std::span(kLoops).first(wide ? 2 : 1);
+  static const std::size_t count = is_wide() ? 3 : is_narrow() ? 2 : 1;
+  return std::span(kLoops).first(count);
 #else
   return kLoops;
 #endif

@@ -20,6 +20,7 @@
 #pragma GCC push_options
 #pragma GCC target("avx2,bmi,bmi2,fma,popcnt")
 #endif
+#define ISO_PACKET_NAMESPACE packets_avx2
 #include "core/host/packet_trace.hpp"
 #if defined(__clang__)
 #pragma clang attribute pop
@@ -31,7 +32,7 @@ namespace isowave::core {
 
 uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits) {
-  return packets::trace_tile(frame, field, tile, hits);
+  return packets_avx2::trace_tile(frame, field, tile, hits);
 }
 
 }  // namespace isowave::core

@@ -1,6 +1,7 @@
 #pragma once
-// Rays of a frame in packets of eight, for processors with AVX2. Others trace ray by ray: with
-// vectors of four and fused multiply-add in software, packets take three times as long as that.
+// Rays of a frame in packets of eight, for processors with AVX2, or with SSE4.1 alone. Without
+// fused multiply-add, both packets and single rays compute it by other means, packets for four at a
+// time.
 
 #include "core/host/host_loops.hpp"
 
@@ -13,6 +14,9 @@ namespace isowave::core {
 /// popcnt.
 uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits);
+/// The same, for processors with sse4.1 and popcnt.
+uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                        HitRecord *hits);
 
 }  // namespace isowave::core
 #endif

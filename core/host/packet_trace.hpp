@@ -1,6 +1,7 @@
 #pragma once
 // Eight rays at a time through a HostField (kernels_cl/portable/packet_walk.h): the hits of the
-// scalar walk, bit for bit. For host_packets.cpp alone, which compiles it for processors with AVX2.
+// scalar walk, bit for bit. For host_packets*.cpp alone, each of which compiles it for a kind of
+// processor (float8.hpp).
 
 #include <bit>
 #include <cstddef>
@@ -10,7 +11,7 @@
 #include "core/stages/solvers.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
-namespace isowave::core::packets {
+namespace isowave::core::ISO_PACKET_NAMESPACE {
 
 static_assert(kDefaultSolver.kind == ISO_SOLVER_BERNSTEIN, "there is no other here");
 
@@ -60,11 +61,11 @@ inline Mask load_corners(const PacketField *field, const FrameParams *frame, con
   return ints(0);
 }
 
-}  // namespace isowave::core::packets
+}  // namespace isowave::core::ISO_PACKET_NAMESPACE
 
 #include "kernels_cl/portable/packet_walk.h"
 
-namespace isowave::core::packets {
+namespace isowave::core::ISO_PACKET_NAMESPACE {
 
 /// Rays (column, row) of the frame, those of lanes. Returns how many hit something.
 inline uint trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
@@ -101,4 +102,4 @@ __attribute__((flatten)) inline uint trace_tile(const FrameParams &frame, const 
   return num_hits;
 }
 
-}  // namespace isowave::core::packets
+}  // namespace isowave::core::ISO_PACKET_NAMESPACE

@@ -1,0 +1,38 @@
+// host_packets.cpp for processors with SSE4.1 alone.
+#include "core/host/host_packets.hpp"
+
+#ifdef ISO_HAS_PACKETS
+#include <immintrin.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/stages/solvers.hpp"
+#include "kernels_cl/portable/cell_intersect.h"
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("sse4.1,popcnt"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("sse4.1,popcnt")
+#endif
+#define ISO_PACKET_NAMESPACE packets_sse4
+#define ISO_PACKET_SSE4
+#include "core/host/packet_trace.hpp"
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+namespace isowave::core {
+
+uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                        HitRecord *hits) {
+  return packets_sse4::trace_tile(frame, field, tile, hits);
+}
+
+}  // namespace isowave::core
+#endif
