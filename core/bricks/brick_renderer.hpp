@@ -20,7 +20,8 @@ struct CompositionStats {
 /// All ranks make the same calls in the same order. Not thread-safe.
 class BrickRenderer {
  public:
-  /// cuts    as many bricks as ranks; each rank draws that of its number
+  /// cuts    as many bricks as ranks; each rank draws that of its number. As device and team, must
+  ///         outlive the renderer
   /// volume  it: see brick_volume.hpp
   /// whole   the grid of the whole volume
   /// Throws  Error: as Renderer, at the rank that it is about

@@ -16,9 +16,9 @@ glm::ivec3 cubes_along(const glm::ivec3 &blocks) {
 }
 
 bool touches(std::span<const float> voxels, std::span<const float> isovalues) {
-  const auto [least, most] = std::ranges::minmax(voxels);
-  return std::ranges::any_of(isovalues,
-                             [&](float isovalue) { return least < isovalue && isovalue <= most; });
+  const auto range = std::ranges::minmax(voxels);
+  return std::ranges::any_of(
+      isovalues, [&](float isovalue) { return range.min < isovalue && isovalue <= range.max; });
 }
 
 }  // namespace

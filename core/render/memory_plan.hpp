@@ -107,8 +107,8 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 
 /// A plan that can grow to as many slots as plan_within() gives. It begins with
-/// first_cache_slots(), or, where that would take more memory than the decoded volume, with as
-/// little as 5/8 of them; with first_slots, where these are not 0.
+/// first_cache_slots(), or, where that keeps it below the decoded volume, with as little as 5/8 of
+/// them; with first_slots, where these are not 0.
 ///
 /// budget, max_slots, Throws  as plan_within()
 MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volume,

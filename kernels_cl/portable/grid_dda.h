@@ -201,8 +201,8 @@ ISO_INLINE int is_above(RayAxis a, int axis, int plane, RayEvent e) {
 
 /// The region along one axis, within [first, last], that the ray is in just after event `e`. Where
 /// the position o + t d is further from a plane than its error, 2^-24 (|t d| + |o + t d|), it
-/// decides; else crossings are compared. Near a brick, taking its origin off the position is exact:
-/// the difference is the smaller of the two, or at most as large as the origin and far from it.
+/// decides; else crossings are compared. A brick's origin comes off the position without rounding:
+/// behind it, both are multiples of the position's ulp; just before it, they are nearly alike.
 ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
   const float p = a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o);
   const float error = 0x1p-22f * (fabs(p) + fabs(a.o));
