@@ -146,7 +146,8 @@ CompressedVolume load_brick(const std::string &path, const RawOverrides &overrid
   }
   Storage storage = to_storage(compression);
   storage.device = device;
-  return compress_brick([&] { return open_any_volume(path, overrides); }, path, storage, own);
+  return compress_brick([&] { return open_any_volume(path, overrides, device); }, path, storage,
+                        own);
 }
 
 std::string volume_stem(const std::string &path) {
