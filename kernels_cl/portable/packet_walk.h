@@ -306,7 +306,8 @@ ISO_INLINE void enter_regions(Packet *p, const PacketScene *scene, int level, Ma
     place[axis] = packet_locate(&p->rays, axis, size, t, range, lanes);
     const Floats exit = fma(exit_t, a->d, a->o),
                  error = ISO_FLOAT_DOUBT * (fabs(exit) + fabs(a->o));
-    const Ints farthest = to_ints(floor((exit + error * a->sign) * (1.0f / (float)size))),
+    const Floats in_brick = exit + error * a->sign - a->origin;
+    const Ints farthest = to_ints(floor(in_brick * (1.0f / (float)size))),
                at_least = larger(farthest, range.first), to = smaller(at_least, range.last);
     bits[axis] = bits_between(pick(a->up, place[axis], to) & 3, pick(a->up, to, place[axis]) & 3);
     places += (place[axis] & 3) << (2 * axis);

@@ -222,6 +222,7 @@ ordered_json measure_limits(const ocl::DeviceInfo &device_info, const PaperRun &
   for (const std::uint32_t limit : limits) {
     RendererOptions options = options_of(run, method);
     options.max_speculation = limit;
+    options.on_demand = DecodeOnDemand::kOff;  // on PoCL, rays would have nothing to look ahead for
     Renderer renderer(device, run.volume, options);
     renderer.render(request_of(run, 0, 0));
     std::vector<double> ms, passes, decoded;
