@@ -103,9 +103,10 @@ cl::CommandQueue &Device::transfer_queue() {
 
 const cl::Program &Device::program(std::string_view stem, const Defines &defines) {
   auto key = std::make_pair(std::string(stem), defines);
+  if (draws_bricks_) key.second.emplace("ISO_BRICKS", "1");
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
 
-  const std::string options = build_options(info_, defines);
+  const std::string options = build_options(info_, key.second);
   const Compiling now = compiling();
   try {
     cl::Program program(context_, kernel_text(stem));

@@ -91,6 +91,10 @@ class Device {
   /// Throws  BuildError: it does not build
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
 
+  /// From now on programs are built that know of bricks (ISO_BRICKS), which take 1 to 2 % longer.
+  /// They draw whole volumes, too.
+  void draw_bricks() { draws_bricks_ = true; }
+
   /// The programs built so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".
   std::vector<std::string> built_programs() const;
 
@@ -138,6 +142,7 @@ class Device {
   std::map<std::pair<std::string, Defines>, cl::Program> programs_;
   std::function<void(std::string_view)> on_new_kernel_;
   double compile_ms_ = 0;
+  bool draws_bricks_ = false;
   int compiling_depth_ = 0;
 };
 

@@ -27,6 +27,7 @@ constexpr std::uint32_t kScarcePart = 8;
 
 FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
                       const RendererOptions &options, const MemoryPlan &plan) {
+  if (volume.info.brick != BrickOf{}) device.draw_bricks();
   const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.with_levels);
   const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.with_levels));
   const RendererLimits &limits = plan.limits;

@@ -54,6 +54,8 @@ struct BrickOf {
   glm::uvec3 first_voxel{0};  ///< of the brick, in the whole volume; multiples of 4
   /// Layers of 4^3 blocks before and behind, along each axis, that belong to other bricks.
   glm::uvec3 before{0}, behind{0};
+
+  bool operator==(const BrickOf &) const = default;
 };
 
 /// The grid of a volume. Plain data; the defaults are a unit grid at the origin.

@@ -63,6 +63,7 @@ ISO_INLINE uint block_id_at(const FrameParams *frame, uint x, uint y, uint z) {
 
 /// Is the block the brick's own? All of a volume's are that is not cut.
 ISO_INLINE int is_own(const FrameParams *frame, BlockCoords b) {
+  if (!ISO_BRICKS) return 1;
   return b.x >= frame->brick.before_x && b.x + frame->brick.behind_x < frame->grid.blocks_x &&
          b.y >= frame->brick.before_y && b.y + frame->brick.behind_y < frame->grid.blocks_y &&
          b.z >= frame->brick.before_z && b.z + frame->brick.behind_z < frame->grid.blocks_z;

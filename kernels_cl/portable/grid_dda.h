@@ -155,7 +155,7 @@ ISO_INLINE TwoFloat plane_t(RayAxis a, float plane) {
 
 /// A plane of the brick as one of the whole volume.
 ISO_INLINE float whole_plane(RayAxis a, int plane) {
-  return (float)plane + a.origin;
+  return ISO_BRICKS ? (float)plane + a.origin : (float)plane;
 }
 
 /// Regions are slabs [size c, size (c+1)] of planes along one axis, cut at the domain's last plane.
@@ -207,7 +207,7 @@ ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int 
   const float p = a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o);
   const float error = 0x1p-22f * (fabs(p) + fabs(a.o));
   const int on_plane = axis == e.axis; /* on a whole number, then */
-  const float at = (on_plane ? rint(p) : p) - a.origin;
+  const float in_whole = on_plane ? rint(p) : p, at = ISO_BRICKS ? in_whole - a.origin : in_whole;
   const float x = at / (float)size; /* size is a power of two: exact */
   const float region = on_plane && a.d < 0.0f ? ceil(x) - 1.0f : floor(x);
   int c = region <= (float)first ? first : (region >= (float)last ? last : (int)region);

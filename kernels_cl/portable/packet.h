@@ -158,6 +158,14 @@ ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row
       frame->brick.origin_z, &axes[2]);
 }
 
+/// Planes of the brick as those of the whole volume, and positions the other way round.
+ISO_INLINE Floats in_whole(const PacketAxis *a, Floats planes) {
+  return ISO_BRICKS ? planes + a->origin : planes;
+}
+ISO_INLINE Floats in_brick(const PacketAxis *a, Floats positions) {
+  return ISO_BRICKS ? positions - a->origin : positions;
+}
+
 ISO_INLINE RayAxis axis_of_lane(const PacketAxis *a, int lane) {
   RayAxis axis;
   axis.o = a->o[lane];
@@ -267,7 +275,7 @@ ISO_INLINE Ints packet_locate(const PacketRays *r, int axis, int size, Floats t,
   const PacketAxis *a = &r->axis[axis];
   const Floats position = fma(t, a->d, a->o);
   const Mask on_plane = r->entered.axis == axis;
-  const Floats at = pick(on_plane, r->entered.plane, position) - a->origin,
+  const Floats at = in_brick(a, pick(on_plane, r->entered.plane, position)),
                x = at * (1.0f / (float)size);
   const Floats region = pick(on_plane & ~a->up, -floor(-x) - 1.0f, floor(x));
   const Ints at_least = larger(to_ints(region), range.first),

@@ -109,12 +109,13 @@ ISO_INLINE Ints regions(const Packet *p, int level, int axis) {
   const Floats far = p->level[level].far[axis];
   /* Where the domain's end cuts the last region, the plane before its far one is still within it.
    */
-  const Floats within = pick(p->rays.axis[axis].up, far - 1.0f, far) - p->rays.axis[axis].origin;
+  const PacketAxis *a = &p->rays.axis[axis];
+  const Floats within = in_brick(a, pick(a->up, far - 1.0f, far));
   return to_ints(floor(within * (1.0f / (float)ISO_REGION_SIZE(level))));
 }
 
 ISO_INLINE Floats far_planes(const Packet *p, int axis, int size, Ints region) {
-  const Floats near = to_floats(region * size) + p->rays.axis[axis].origin,
+  const Floats near = in_whole(&p->rays.axis[axis], to_floats(region * size)),
                end = near + (float)size;
   return pick(p->rays.axis[axis].up, smaller(end, p->last[axis]), near);
 }
@@ -138,7 +139,7 @@ ISO_INLINE void open_packet(Packet *p, const PacketScene *scene) {
     const Mask up = p->rays.axis[axis].up;
     const Ints stride = ints(axis == 0 ? 1 : (axis == 1 ? 4 : 16)),
                coarse = ints(axis == 0 ? 1 : scene->columns * (axis == 1 ? 1 : scene->rows));
-    p->last[axis] = floats((float)scene->last[axis]) + p->rays.axis[axis].origin;
+    p->last[axis] = in_whole(&p->rays.axis[axis], floats((float)scene->last[axis]));
     p->end[axis] = far_planes(p, axis, ISO_REGION_SIZE(ISO_MACROCELLS),
                               pick(up, ints(scene->final[axis]), ints(scene->first[axis])));
     ISO_EACH_OF_3(level) {
@@ -194,8 +195,8 @@ ISO_INLINE Mask enter_box(PacketRays *r, const PacketScene *scene) {
   Mask beside = ints(0);
   ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &r->axis[axis];
-    const Floats begin = floats((float)scene->begin[axis] + a->origin),
-                 end = floats((float)scene->end[axis] + a->origin),
+    const Floats begin = in_whole(a, floats((float)scene->begin[axis])),
+                 end = in_whole(a, floats((float)scene->end[axis])),
                  far_t = packet_float_t(a, pick(a->up, end, begin));
     near[axis] = pick(a->up, begin, end);
     exit = smaller(exit, far_t);
@@ -254,8 +255,8 @@ ISO_INLINE void begin_at_blocks(Packet *p, const PacketScene *scene, const Ints 
   Floats near[3];
   Ints place = ints(0), coarse = ints(0);
   ISO_EACH_OF_3(axis) {
-    const Floats begin = to_floats(4 * at[axis]) + p->rays.axis[axis].origin, whole = begin + 4.0f,
-                 end = smaller(whole, p->last[axis]);
+    const Floats begin = in_whole(&p->rays.axis[axis], to_floats(4 * at[axis])),
+                 whole = begin + 4.0f, end = smaller(whole, p->last[axis]);
     const Mask up = p->rays.axis[axis].up;
     near[axis] = pick(up, begin, end);
     blocks->far[axis] = pick(up, end, begin);
@@ -306,8 +307,8 @@ ISO_INLINE void enter_regions(Packet *p, const PacketScene *scene, int level, Ma
     place[axis] = packet_locate(&p->rays, axis, size, t, range, lanes);
     const Floats exit = fma(exit_t, a->d, a->o),
                  error = ISO_FLOAT_DOUBT * (fabs(exit) + fabs(a->o));
-    const Floats in_brick = exit + error * a->sign - a->origin;
-    const Ints farthest = to_ints(floor(in_brick * (1.0f / (float)size))),
+    const Floats at = in_brick(a, exit + error * a->sign);
+    const Ints farthest = to_ints(floor(at * (1.0f / (float)size))),
                at_least = larger(farthest, range.first), to = smaller(at_least, range.last);
     bits[axis] = bits_between(pick(a->up, place[axis], to) & 3, pick(a->up, to, place[axis]) & 3);
     places += (place[axis] & 3) << (2 * axis);
@@ -503,7 +504,7 @@ ISO_INLINE void keep_found(FoundCells *found, Brackets brackets, Crossings enter
 
 /// Cells, from their least corners in the whole volume.
 ISO_INLINE void cells_at(const Packet *p, const Floats *cell, Ints *at) {
-  ISO_EACH_OF_3(axis) at[axis] = to_ints(cell[axis] - p->rays.axis[axis].origin);
+  ISO_EACH_OF_3(axis) at[axis] = to_ints(in_brick(&p->rays.axis[axis], cell[axis]));
 }
 
 ISO_INLINE Mask load_cells(const Packet *p, const PacketScene *scene, const Floats *cell,

@@ -64,6 +64,14 @@ inline uint popcount(uint x) {
        shared */
 #endif
 
+#ifndef ISO_BRICKS /* by -D, of devices that draw bricks: ocl::Device::draw_bricks() */
+#ifdef __OPENCL_C_VERSION__
+#define ISO_BRICKS 0 /* BrickPlace is all zero, which takes 1 to 2 % less time */
+#else
+#define ISO_BRICKS 1
+#endif
+#endif
+
 #ifndef ISO_LEVELS /* by -D */
 #define ISO_LEVELS \
   0 /* 1: frames are drawn in bands of several levels of detail (core/view/detail.hpp) */
