@@ -31,8 +31,8 @@ constexpr std::uint64_t kRaysPerUsefulSlot = 8;
 constexpr double kSlotsPerFace = 12;
 /// Few rays need fewer: never more than five slots for eight of them.
 constexpr std::uint64_t kRaysPerSlot = 8, kSlotsOfThose = 5;
-/// Where that keeps the plan below the decoded volume, a cache begins with as little as 5/8.
-constexpr std::uint64_t kLeastOfFirst = 8, kLeastOfThose = 5;
+/// Where that keeps the plan below the decoded volume, a cache begins with as little as half.
+constexpr std::uint64_t kLeastPart = 2;
 /// Slots (5.3 MB) that no cache begins with fewer of, unless there are not so many blocks: those of
 /// a small noisy volume, where a frame needs most of the blocks.
 constexpr std::uint64_t kFewSlots = 1 << 14;
@@ -90,7 +90,8 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
                    .num_levels = grids.size(),
                    .with_given = request.with_given_rays,
                    .scanned_pairs = request.scanned_pairs},
-          .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays),
+          .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays,
+                                          request.sparse_table ? 4 : 2),
           .pairs = {.num_rays = rays,
                     .num_slots = cache_slots,
                     .group_size = request.group_size,
@@ -260,7 +261,7 @@ MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volum
   const std::uint64_t decoded = ISO_BLOCK_VOXELS * sizeof(float) * volume.block_count();
   if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots
     const std::uint64_t slots = plan.cache_slots,
-                        least = std::max(slots / kLeastOfFirst * kLeastOfThose, kFewSlots);
+                        least = std::max(slots / kLeastPart, kFewSlots);
     const MemoryPlan smaller = plan_of(least);
     if (least < slots && smaller.total() < decoded)
       plan = plan_of(least + (slots - least) * (decoded - smaller.total()) /

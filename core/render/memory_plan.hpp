@@ -39,6 +39,7 @@ struct MemoryRequest {
   std::uint64_t kept_rays = 0;      ///< of KeptPicture
   bool with_given_rays = false;     ///< rays of any origin, and ambient rays
   bool scanned_pairs = false;       ///< of pipeline kBlocks
+  bool sparse_table = false;        ///< the cache's, which rays look up in faster
 };
 
 /// What the lengths of a renderer's buffers depend on, beside its compressed volume: the plan adds
@@ -107,7 +108,7 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 
 /// A plan that can grow to as many slots as plan_within() gives. It begins with
-/// first_cache_slots(), or, where that keeps it below the decoded volume, with as little as 5/8 of
+/// first_cache_slots(), or, where that keeps it below the decoded volume, with as little as half of
 /// them; with first_slots, where these are not 0.
 ///
 /// budget, max_slots, Throws  as plan_within()

@@ -58,13 +58,19 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
 
 MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options) {
-  const MemoryRequest request{
-      options.size.num_rays(), options.pipeline,
-      options.grouping,        options.group_size,
-      options.stream,          options.largest_stream_part,
-      options.window_blocks,   options.with_levels,
-      options.with_bounds,     options.with_kept_picture ? halved(options.size, 1).num_rays() : 0,
-      options.with_given_rays, options.scanned_pairs};
+  const MemoryRequest request{options.size.num_rays(),
+                              options.pipeline,
+                              options.grouping,
+                              options.group_size,
+                              options.stream,
+                              options.largest_stream_part,
+                              options.window_blocks,
+                              options.with_levels,
+                              options.with_bounds,
+                              options.with_kept_picture ? halved(options.size, 1).num_rays() : 0,
+                              options.with_given_rays,
+                              options.scanned_pairs,
+                              options.memory_budget == 0 && options.cache_slots == 0};
   const std::uint64_t budget = options.memory_budget != 0
                                    ? options.memory_budget
                                    : device.capabilities().global_memory / 4 * 3;

@@ -20,11 +20,12 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
   return num_slots;
 }
 
-/// Entries / 8 of the table: twice as many entries as slots, an eighth of them with evicted blocks'
-/// keys at most before the table is rebuilt (H100, 512^3, 65,536 slots: frames take 1.26 ms; with a
-/// quarter, 1.45); not a multiple of 3, so that ISO_TABLE_STEP reaches every entry.
-std::uint32_t table_groups_for(std::uint32_t num_slots) {
-  const std::uint32_t groups = num_slots / 4 + 1;
+/// Entries / 8 of the table: with twice as many entries as slots, an eighth of them has evicted
+/// blocks' keys at most before the table is rebuilt (H100, 512^3, 65,536 slots: frames take 1.26
+/// ms; with a quarter, 1.45). Not a multiple of 3, so that ISO_TABLE_STEP reaches every entry.
+std::uint32_t table_groups_for(const BlockCache::Limits &limits) {
+  const std::uint32_t groups = limits.num_slots / 8 * limits.slot_entries +
+                               limits.num_slots % 8 * limits.slot_entries / 8 + 1;
   return groups % 3 == 0 ? groups + 1 : groups;
 }
 
@@ -37,8 +38,7 @@ std::uint32_t BlockCache::Limits::max_requests() const {
 
 ocl::BufferSizes BlockCache::sizes(const Limits &limits) {
   const std::uint64_t slots = limits.num_slots, requests = limits.max_requests();
-  return {ocl::buffer_size<BlockEntry>("block table",
-                                       8 * std::uint64_t{table_groups_for(limits.num_slots)}),
+  return {ocl::buffer_size<BlockEntry>("block table", 8 * std::uint64_t{table_groups_for(limits)}),
           ocl::buffer_size<float>("block cache", ISO_BLOCK_VOXELS * slots),
           ocl::buffer_size<ulong>("voxels inside", slots),
           ocl::buffer_size<uint>("cache slot blocks", slots),
@@ -62,7 +62,7 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, std::uint32_t 
 BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
                        std::uint32_t group_size, const ocl::Defines &defines)
     : num_slots(checked_slots(limits.num_slots)),
-      table_groups(table_groups_for(num_slots)),
+      table_groups(table_groups_for(limits)),
       capacity(limits.max_requests()),
       table(device, sizes["block table"]),
       values(device, sizes["block cache"]),
@@ -112,7 +112,7 @@ void BlockCache::resize(const Limits &limits) {
   of_slots([](auto &buffer) { const auto gone = std::move(buffer); });
   of_slots([&](auto &buffer) { buffer = {device, made[buffer.name()]}; });
   num_slots = limits.num_slots;
-  table_groups = table_groups_for(num_slots);
+  table_groups = table_groups_for(limits);
   capacity = limits.max_requests();
   slots_range_ = ocl::Range::strided(num_slots, group_size_, device);
   requests_range_ = ocl::Range::strided(capacity, group_size_, device);

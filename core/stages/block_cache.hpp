@@ -19,14 +19,16 @@ struct BlockCache {
     std::uint64_t num_rays = 0;                ///< bounds a pass's pairs
     std::uint64_t num_blocks = 0;              ///< of all levels of detail, by their ids
     std::uint64_t num_macrocells = 0;          ///< of these blocks
+    std::uint32_t slot_entries = 2;            ///< of the table, for each slot; a multiple of 2
 
     /// The most requests that are listed: no more than can be granted; a ray's block asks for at
     /// most 8, and a block is listed once.
     std::uint32_t max_requests() const;
   };
   /// For the blocks of `grid`, or, of several levels of detail, of make_id_grid().
-  static Limits limits_for(const BlockGrid &grid, std::uint32_t num_slots, std::uint64_t num_rays) {
-    return {num_slots, num_rays, block_count(grid), core::num_macrocells(grid)};
+  static Limits limits_for(const BlockGrid &grid, std::uint32_t num_slots, std::uint64_t num_rays,
+                           std::uint32_t slot_entries = 2) {
+    return {num_slots, num_rays, block_count(grid), core::num_macrocells(grid), slot_entries};
   }
   static ocl::BufferSizes sizes(const Limits &limits);
 
