@@ -260,8 +260,7 @@ MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volum
   MemoryPlan plan = plan_of(first);
   const std::uint64_t decoded = ISO_BLOCK_VOXELS * sizeof(float) * volume.block_count();
   if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots
-    const std::uint64_t slots = plan.cache_slots,
-                        least = std::max(slots / kLeastPart, kFewSlots);
+    const std::uint64_t slots = plan.cache_slots, least = std::max(slots / kLeastPart, kFewSlots);
     const MemoryPlan smaller = plan_of(least);
     if (least < slots && smaller.total() < decoded)
       plan = plan_of(least + (slots - least) * (decoded - smaller.total()) /
