@@ -25,7 +25,7 @@ ocl::Range candidates_range_for(const Group::Limits &limits, const ocl::Device &
 /// Gives a buffer back, then makes it of another length.
 template <class T>
 void remake(ocl::Buffer<T> &buffer, const ocl::BufferSizes &sizes, ocl::Device &device) {
-  const ocl::BufferSize size = sizes[buffer.name()];
+  const ocl::BufferSize &size = sizes[buffer.name()];
   { const ocl::Buffer<T> gone = std::move(buffer); }
   buffer = {device, size};
 }
