@@ -54,7 +54,8 @@ ISO_INLINE uint first_lane(uint bits) {
   return 31u - clz(bits & (0u - bits));
 }
 
-/// columns [j] = element j of each of rows [8].
+/// columns [j] = element j of each of rows [8]. Element by element: Oclgrind 21.10 crashes where a
+/// vector is made of shorter ones. Compilers make shuffles of whole vectors of it.
 ISO_INLINE void transpose(const float8 *rows, float8 *columns) {
   float8 a[8], b[8];
   _Pragma("unroll") for (int i = 0; i < 8; i += 2) {
@@ -62,15 +63,15 @@ ISO_INLINE void transpose(const float8 *rows, float8 *columns) {
     a[i] = (float8)(r.s0, s.s0, r.s1, s.s1, r.s4, s.s4, r.s5, s.s5);
     a[i + 1] = (float8)(r.s2, s.s2, r.s3, s.s3, r.s6, s.s6, r.s7, s.s7);
   }
-  _Pragma("unroll") for (int i = 0; i < 8; i += 4) {
-    b[i] = (float8)(a[i].s01, a[i + 2].s01, a[i].s45, a[i + 2].s45);
-    b[i + 1] = (float8)(a[i].s23, a[i + 2].s23, a[i].s67, a[i + 2].s67);
-    b[i + 2] = (float8)(a[i + 1].s01, a[i + 3].s01, a[i + 1].s45, a[i + 3].s45);
-    b[i + 3] = (float8)(a[i + 1].s23, a[i + 3].s23, a[i + 1].s67, a[i + 3].s67);
+  _Pragma("unroll") for (int i = 0; i < 4; ++i) {
+    const float8 r = a[i / 2 * 4 + i % 2], s = a[i / 2 * 4 + i % 2 + 2];
+    b[i / 2 * 4 + i % 2 * 2] = (float8)(r.s0, r.s1, s.s0, s.s1, r.s4, r.s5, s.s4, s.s5);
+    b[i / 2 * 4 + i % 2 * 2 + 1] = (float8)(r.s2, r.s3, s.s2, s.s3, r.s6, r.s7, s.s6, s.s7);
   }
   _Pragma("unroll") for (int i = 0; i < 4; ++i) {
-    columns[i] = (float8)(b[i].lo, b[4 + i].lo);
-    columns[4 + i] = (float8)(b[i].hi, b[4 + i].hi);
+    const float8 r = b[i], s = b[4 + i];
+    columns[i] = (float8)(r.s0, r.s1, r.s2, r.s3, s.s0, s.s1, s.s2, s.s3);
+    columns[4 + i] = (float8)(r.s4, r.s5, r.s6, r.s7, s.s4, s.s5, s.s6, s.s7);
   }
 }
 

@@ -97,8 +97,9 @@ ISO_INLINE int open_without_voxels(const CacheReader *cache, const FrameParams *
 
 /// The corners of the cell whose least one is at `least`, corner x + 2y + 4z.
 ISO_INLINE float8 cell_corners(const float *least) {
-  return (float8)(vload2(0, least), vload2(0, least + 5), vload2(0, least + 25),
-                  vload2(0, least + 30));
+  const float2 a = vload2(0, least), b = vload2(0, least + 5), c = vload2(0, least + 25),
+               d = vload2(0, least + 30);
+  return (float8)(a.x, a.y, b.x, b.y, c.x, c.y, d.x, d.y); /* see transpose() */
 }
 
 /// The corners of the dual grid (bits 0..7) that have the voxels of local cells: cell_blocks().
