@@ -54,8 +54,8 @@ ISO_INLINE uint first_lane(uint bits) {
   return 31u - clz(bits & (0u - bits));
 }
 
-/// columns [j] = element j of each of rows [8]. Element by element: Oclgrind 21.10 crashes where a
-/// vector is made of shorter ones. Compilers make shuffles of whole vectors of it.
+/// columns [j] = element j of each of rows [8]. Element by element, for Oclgrind
+/// (kernels_cl/README.md); compilers make shuffles of whole vectors of it.
 ISO_INLINE void transpose(const float8 *rows, float8 *columns) {
   float8 a[8], b[8];
   _Pragma("unroll") for (int i = 0; i < 8; i += 2) {
