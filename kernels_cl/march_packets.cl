@@ -16,12 +16,14 @@
 #include "device/march_block.h"
 #include "device/march_pass.h"
 #include "device/on_demand.h"
+#include "device/opened_blocks.h"
 
 #define ISO_LANES 8u
 // A work-item takes a chunk of packets at a time: a tile of the picture, wide enough that the hits
-// of its rows are cleared in long runs, or as many of a list.
-#define ISO_TILE_COLUMNS 128u
-#define ISO_TILE_ROWS 8u
+// of its rows are cleared in long runs, and high enough that its rays share blocks; or as many of a
+// list.
+#define ISO_TILE_COLUMNS 64u
+#define ISO_TILE_ROWS 16u
 #define ISO_TILE_PACKETS (ISO_TILE_COLUMNS * ISO_TILE_ROWS / ISO_LANES)
 #define ISO_LIST_PACKETS 32u
 
@@ -30,31 +32,16 @@ typedef struct PacketProgress {
   Mask met;         ///< have come to an active block
   Mask moved;       ///< to a second one
   uint num_blocks;  ///< blocks that they were intersected in
+  Ints opened;      ///< the places of the blocks that they have opened last ...
+  Ints have;        ///< ... and what these had: OpenedBlock
+  Mask lost;        ///< other blocks have taken these places
 } PacketProgress;
-
-/// A block that a work-item's rays have come to in this pass, in which no block leaves the cache.
-typedef struct OpenedBlock {
-  uint block_id; /* ISO_INVALID_ID: none so far */
-  uint have;     /* corners of the dual grid; see open_block() */
-  uint cells_low, cells_high;
-  uint slots[8];
-} OpenedBlock;
-
-/// Of them, each that is at such a place in its macrocell.
-#define ISO_OPENED_BLOCKS 64u
 
 /// Blocks come from the cache.
 typedef struct PacketField {
   global const uint *macrocell_masks;
-  global BlockEntry *table;
-  global const ulong *inside;
-  global const float *values;
-  global uint *slot_stamps;
-  uint stamp;
-  local OpenedBlock *opened; /* [ISO_OPENED_BLOCKS] */
-  local uint *scratch;       /* [8 * ISO_GROUP_SIZE] */
-  local uint *slots;         /* [lane][8]: of the block that it has opened last */
-  local uint *have;          /* [lane] */
+  CacheReader cache;
+  OpenedBlock *opened; /* [ISO_OPENED_BLOCKS] */
   PacketProgress *progress;
   BlockMaker *maker;
 } PacketField;
@@ -72,30 +59,20 @@ ISO_INLINE void macrocell_bits(const PacketField *field, Ints macrocells, Mask l
   *high = pick(lanes, highs, *high);
 }
 
-/// Looks block b up. Cached blocks are stamped.
-ISO_INLINE void look_up(const PacketField *field, const FrameParams *frame, BlockCoords b,
-                        local OpenedBlock *opened) {
-  uint have;
-  const ulong cells = open_block(frame, field->table, field->inside, b, field->scratch, &have);
-  for (uint corner = 0; corner < 8; ++corner)
-    opened->slots[corner] = field->scratch[corner * ISO_GROUP_SIZE];
-  if ((have & 1u) != 0)
-    field->slot_stamps[opened->slots[0]] = field->stamp; /* for all of the dual grid: last_use() */
-  opened->block_id = block_id_at(frame, b.x, b.y, b.z);
-  opened->have = have;
-  opened->cells_low = (uint)cells;
-  opened->cells_high = (uint)(cells >> 32);
-}
-
-/// Looks block b up, unless a ray has been there before. corners: of its dual grid, those that rays
-/// need, to be decoded on demand.
-ISO_INLINE local const OpenedBlock *find_opened(const PacketField *field, const FrameParams *frame,
-                                                BlockCoords b, uint corners) {
-  local OpenedBlock *opened = &field->opened[(b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3)];
-  if (opened->block_id != block_id_at(frame, b.x, b.y, b.z)) look_up(field, frame, b, opened);
-  if (ISO_ON_DEMAND && (corners & ~opened->have) != 0 && !field->maker->is_full) {
-    bring_corners(field->maker, frame, b, corners & ~opened->have);
-    look_up(field, frame, b, opened);
+/// Opens block b, unless a ray has been there before. corners: of its dual grid, those whose voxels
+/// rays need, to be decoded on demand; 0: they need its cells alone.
+ISO_INLINE const OpenedBlock *find_opened(const PacketField *field, const FrameParams *frame,
+                                          BlockCoords b, uint corners) {
+  const uint place = opened_place(b), needed = corners == 0 ? ISO_OPENED_CACHED : corners;
+  OpenedBlock *opened = &field->opened[place];
+  const int is_new = opened->block_id != block_id_at(frame, b.x, b.y, b.z);
+  if (is_new) field->progress->lost |= field->progress->opened == (int)place;
+  const int has_voxels = !is_new && (opened->have & 0xFFu) != 0;
+  if (corners != 0 ? !has_voxels : is_new && !open_without_voxels(&field->cache, frame, b, opened))
+    open_with_voxels(&field->cache, frame, b, opened);
+  if (ISO_ON_DEMAND && (needed & ~opened->have) != 0 && !field->maker->is_full) {
+    bring_corners(field->maker, frame, b, corners == 0 ? 1u : corners & ~opened->have);
+    open_with_voxels(&field->cache, frame, b, opened);
   }
   return opened;
 }
@@ -115,60 +92,60 @@ ISO_INLINE Mask open_blocks(const PacketField *field, const FrameParams *frame, 
     b.x = (uint)at[0][first];
     b.y = (uint)at[1][first];
     b.z = (uint)at[2][first];
-    local const OpenedBlock *opened = find_opened(field, frame, b, 1);
+    const OpenedBlock *opened = find_opened(field, frame, b, 0);
     left &= ~here;
-    if ((opened->have & 1u) == 0) {
+    if ((opened->have & ISO_OPENED_CACHED) == 0) {
       waits |= here;
     } else {
       *low = pick(here, ints((int)opened->cells_low), *low);
       *high = pick(here, ints((int)opened->cells_high), *high);
       progress->num_blocks += popcount(bits_of(here));
-      const uint8 slots = vload8(0, opened->slots);
-      const uint have = opened->have;
-      ISO_EACH_LANE(lane, here) {
-        vstore8(slots, lane, field->slots);
-        field->have[lane] = have;
-      }
+      progress->opened = pick(here, ints((int)opened_place(b)), progress->opened);
+      progress->have = pick(here, ints((int)opened->have), progress->have);
+      progress->lost &= ~here;
     }
   }
   return waits;
 }
 
-/// Has the blocks decoded that a lane at cell (x, y, z) misses.
-ISO_RARE void bring_missing(const PacketField *field, const FrameParams *frame, int x, int y, int z,
-                            uint lane) {
-  const BlockCoords b = {(uint)x >> 2, (uint)y >> 2, (uint)z >> 2};
-  local const OpenedBlock *opened = find_opened(field, frame, b, cell_blocks(x & 3, y & 3, z & 3));
-  vstore8(vload8(0, opened->slots), lane, field->slots);
-  field->have[lane] = opened->have;
+/// The corners of cells (x, y, z) whose voxels lanes have not at hand, into rows [lane]. Returns
+/// the lanes that must wait for them.
+ISO_SELDOM Mask bring_voxels(const PacketField *field, const FrameParams *frame, Ints x, Ints y,
+                             Ints z, Mask lanes, float8 *rows) {
+  PacketProgress *progress = field->progress;
+  Mask waits = ints(0);
+  ISO_EACH_LANE(lane, lanes) {
+    const BlockCoords b = {(uint)x[lane] >> 2, (uint)y[lane] >> 2, (uint)z[lane] >> 2};
+    const int in_x = x[lane] & 3, in_y = y[lane] & 3, in_z = z[lane] & 3;
+    const uint corners = cell_blocks(in_x, in_y, in_z);
+    const OpenedBlock *opened = find_opened(field, frame, b, corners);
+    const Mask here = ~progress->lost & (progress->opened == (int)opened_place(b));
+    progress->have = pick(here, ints((int)opened->have), progress->have);
+    if ((corners & ~opened->have) != 0) {
+      waits[lane] = -1;
+      --progress->num_blocks;
+    } else {
+      rows[lane] = cell_corners(opened->voxels + in_x + 5 * in_y + 25 * in_z);
+    }
+  }
+  return waits;
 }
 
 ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame, const Ints *at,
                              Mask lanes, Floats *w) {
-  float values[8 * ISO_LANES]; /* [corner][lane] */
+  const PacketProgress *progress = field->progress;
+  const Ints x = at[0] & 3, y = at[1] & 3, z = at[2] & 3;
+  const Mask missing =
+      lanes & (progress->lost | ((blocks_of_cells(x, y, z) & ~progress->have) != 0));
+  const Ints places = pick(lanes & ~missing,
+                           (int)ISO_OPENED_WORDS * progress->opened + x + 5 * y + 25 * z, ints(0));
+  float8 rows[ISO_LANES];
   Mask waits = ints(0);
-  for (uint i = 0; i < 8 * ISO_LANES; ++i) values[i] = 0.0f;
-  ISO_EACH_LANE(lane, lanes) {
-    const int x = at[0][lane] & 3, y = at[1][lane] & 3, z = at[2][lane] & 3;
-    const uint corners = cell_blocks(x, y, z);
-    if (ISO_ON_DEMAND && (corners & ~field->have[lane]) != 0)
-      bring_missing(field, frame, at[0][lane], at[1][lane], at[2][lane], lane);
-    if ((corners & ~field->have[lane]) != 0) {
-      waits[lane] = -1;
-      --field->progress->num_blocks;
-    } else {
-      local const uint *slots = field->slots + 8 * lane;
-      _Pragma("unroll") for (int corner = 0; corner < 8; ++corner) {
-        const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
-        const uint slot = slots[(vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)];
-        values[corner * ISO_LANES + lane] =
-            field
-                ->values[slot * ISO_BLOCK_VOXELS + (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))];
-      }
-    }
-  }
-  _Pragma("unroll") for (int corner = 0; corner < 8; ++corner) w[corner] =
-      vload8(corner, values) - frame->surface.isovalue;
+  _Pragma("unroll") for (uint lane = 0; lane < ISO_LANES; ++lane) rows[lane] =
+      cell_corners(field->opened->voxels + places[lane]);
+  if (any(missing)) waits = bring_voxels(field, frame, at[0], at[1], at[2], missing, rows);
+  transpose(rows, w);
+  _Pragma("unroll") for (int corner = 0; corner < 8; ++corner) w[corner] -= frame->surface.isovalue;
   return waits;
 }
 
@@ -218,6 +195,22 @@ ISO_INLINE PacketSource picture_packet(const View *view, uint tile, uint packet)
   return source;
 }
 
+/// hits [8] = no_hit(), at a multiple of 32 bytes.
+ISO_INLINE void clear_eight_hits(global HitRecord *hits) {
+  global float8 *to = (global float8 *)hits;
+  const HitRecord none = no_hit();
+  const float t = none.t, b = as_float(none.block_id), c = as_float(none.cell);
+  stream_out((float8)(t, b, c, 0, 0, 0, 0, 0), to);
+  stream_out((float8)(0, t, b, c, 0, 0, 0, 0), to + 1);
+  stream_out((float8)(0, 0, t, b, c, 0, 0, 0), to + 2);
+  stream_out((float8)(0, 0, 0, t, b, c, 0, 0), to + 3);
+  stream_out((float8)(0, 0, 0, 0, t, b, c, 0), to + 4);
+  stream_out((float8)(0, 0, 0, 0, 0, t, b, c), to + 5);
+  stream_out((float8)(0, 0, 0, 0, 0, 0, t, b), to + 6);
+  stream_out((float8)(c, 0, 0, 0, 0, 0, 0, t), to + 7);
+  stream_out((float8)(b, c, 0, 0, 0, 0, 0, 0), to + 8);
+}
+
 /// hits = no_hit() of a tile.
 ISO_INLINE void clear_hits(const View *view, uint tile, global HitRecord *hits) {
   const uint tiles_x = tiles_along(view->width, ISO_TILE_COLUMNS);
@@ -227,7 +220,11 @@ ISO_INLINE void clear_hits(const View *view, uint tile, global HitRecord *hits) 
              end_y = min(begin_y + ISO_TILE_ROWS, view->height);
   const HitRecord none = no_hit();
   for (uint y = begin_y; y < end_y; ++y) {
-    for (uint x = begin_x; x < end_x; ++x) hits[x + view->width * y] = none;
+    const uint row = view->width * y, end = row + end_x;
+    uint i = row + begin_x;
+    for (; i % 8 != 0 && i < end; ++i) hits[i] = none;
+    for (; i + 8 <= end; i += 8) clear_eight_hits(hits + i);
+    for (; i < end; ++i) hits[i] = none;
   }
 }
 
@@ -308,8 +305,8 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     global uint *slot_block_ids, global uint *slot_stamps, global uint *requested_bits,
     global const uint *free_slots, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local OpenedBlock opened[ISO_OPENED_BLOCKS];
-  local uint slots[8 * ISO_LANES], have[ISO_LANES], scratch[8 * ISO_GROUP_SIZE];
+  local uint scratch[8 * ISO_GROUP_SIZE];
+  OpenedBlock opened[ISO_OPENED_BLOCKS];
   const uint num_rays = prev->next_active_count, stamp = read_stamp(counts->pass),
              chunk_packets = begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS;
   const uint num_chunks = begins != 0 ? tiles_along(frame->view.width, ISO_TILE_COLUMNS) *
@@ -338,19 +335,19 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
   PacketField field;
   PacketScene scene;
   progress.num_blocks = 0;
+  progress.opened = progress.have = progress.lost = ints(0);
   field.macrocell_masks = macrocell_masks;
-  field.table = table;
-  field.inside = inside;
-  field.values = cache_values;
-  field.slot_stamps = slot_stamps;
-  field.stamp = stamp;
+  field.cache.table = table;
+  field.cache.inside = inside;
+  field.cache.values = cache_values;
+  field.cache.slot_stamps = slot_stamps;
+  field.cache.stamp = stamp;
+  field.cache.scratch = scratch;
   field.opened = opened;
-  field.scratch = scratch;
-  field.slots = slots;
-  field.have = have;
   field.progress = &progress;
   field.maker = &maker;
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
+  for (uint i = 0; i < ISO_BRICK_VOXELS; ++i) opened[0].voxels[i] = 0; /* read by idle lanes */
   const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
   for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0)) {
     if (begins != 0) clear_hits(&frame->view, chunk, hits);
@@ -360,18 +357,20 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
                                       : listed_packet(&frame->view, active_ray_ids, num_rays,
                                                       ISO_LIST_PACKETS * chunk + packet);
       Packet p;
+      Mask lanes = begins != 0 ? on_screen(frame->screen, source) : source.lanes;
       progress.met = progress.moved = ints(0);
       p.waits = p.found.lanes = ints(0);
-      if (is_active_somewhere && any(source.lanes)) {
+      if (is_active_somewhere && any(lanes)) {
         make_packet_axes(frame, source.column, source.row, p.rays.axis);
-        open_packet(&p, &scene);
-        if (begins != 0) {
-          const Mask on = on_screen(frame->screen, source);
-          if (any(on)) begin_at_box(&p, &scene, on & enter_box(&p.rays, &scene));
-        } else {
-          resume(&p, &scene, source, ray_block_ids);
+        if (begins != 0) lanes &= enter_box(&p.rays, &scene);
+        if (any(lanes)) {
+          open_packet(&p, &scene);
+          if (begins != 0)
+            begin_at_box(&p, &scene, lanes);
+          else
+            resume(&p, &scene, source, ray_block_ids);
+          walk_packet(&p, &scene);
         }
-        walk_packet(&p, &scene);
       }
       if (any(p.found.lanes)) write_hits(&p, &scene, source.ray_ids, ISO_ROOT_STEPS, hits);
       if (any(p.waits)) {
@@ -382,6 +381,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       num_hits += popcount(bits_of(p.found.lanes));
     }
   }
+  end_streams();
   if (num_hits != 0) atomic_add(&counts->hit_count, num_hits);
   if (maker.num_made != 0) {
     atomic_add(&counts->decoded_count, maker.num_made);

@@ -280,6 +280,18 @@ TEST_P(MarchPacketsOnDevice, NoiseFromAwkwardCameras) {
   }
 }
 
+/// Rays of a packet that are far apart, with blocks at the same positions in groups of 4^3 blocks:
+/// one takes the place of another that somebody still looks into (opened_blocks.h). Frames come
+/// again, when the cells of blocks are known before their voxels are needed.
+TEST_P(MarchPacketsOnDevice, RaysApartTakeEachOthersPlaces) {
+  const test::TestVolume volume({90, 34, 37}, test::noise_field(3), 8);
+  std::vector<CameraCase> cameras = orbit(volume, 4);
+  cameras.insert(cameras.end(), cameras.begin(), cameras.begin() + 4);
+  for (const DecodeOnDemand on_demand : {DecodeOnDemand::kOff, DecodeOnDemand::kOn}) {
+    EXPECT_GT(expect_pictures(volume, cameras, {8, 6}, 0.6f, {.on_demand = on_demand}), 50u);
+  }
+}
+
 /// Rays wait for each other's blocks, and for blocks that were freed.
 TEST_P(MarchPacketsOnDevice, TinyCaches) {
   const test::TestVolume volume({30, 27, 33}, test::gyroid_field(10), 8);

@@ -54,4 +54,36 @@ ISO_INLINE uint first_lane(uint bits) {
   return 31u - clz(bits & (0u - bits));
 }
 
+/// columns [j] = element j of each of rows [8]. Element by element, for Oclgrind
+/// (kernels_cl/README.md); compilers make shuffles of whole vectors of it.
+ISO_INLINE void transpose(const float8 *rows, float8 *columns) {
+  float8 a[8], b[8];
+  _Pragma("unroll") for (int i = 0; i < 8; i += 2) {
+    const float8 r = rows[i], s = rows[i + 1];
+    a[i] = (float8)(r.s0, s.s0, r.s1, s.s1, r.s4, s.s4, r.s5, s.s5);
+    a[i + 1] = (float8)(r.s2, s.s2, r.s3, s.s3, r.s6, s.s6, r.s7, s.s7);
+  }
+  _Pragma("unroll") for (int i = 0; i < 4; ++i) {
+    const float8 r = a[i / 2 * 4 + i % 2], s = a[i / 2 * 4 + i % 2 + 2];
+    b[i / 2 * 4 + i % 2 * 2] = (float8)(r.s0, r.s1, s.s0, s.s1, r.s4, r.s5, s.s4, s.s5);
+    b[i / 2 * 4 + i % 2 * 2 + 1] = (float8)(r.s2, r.s3, s.s2, s.s3, r.s6, r.s7, s.s6, s.s7);
+  }
+  _Pragma("unroll") for (int i = 0; i < 4; ++i) {
+    const float8 r = b[i], s = b[4 + i];
+    columns[i] = (float8)(r.s0, r.s1, r.s2, r.s3, s.s0, s.s1, s.s2, s.s3);
+    columns[4 + i] = (float8)(r.s4, r.s5, r.s6, r.s7, s.s4, s.s5, s.s6, s.s7);
+  }
+}
+
+// Stores past the processor's caches, of what it will not read soon: it need not fetch what was
+// there before. `to` is a multiple of 32 bytes. Whoever has done so calls end_streams() before
+// others may read.
+#if defined(__AVX__)
+#define stream_out(x, to) __builtin_nontemporal_store(x, to)
+#define end_streams() __builtin_ia32_sfence()
+#else
+#define stream_out(x, to) (*(to) = (x))
+#define end_streams()
+#endif
+
 #endif

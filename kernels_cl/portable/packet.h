@@ -224,14 +224,14 @@ typedef struct Exits {
   Mask on[3];
 } Exits;
 
-/// By value: what a rare call is given a pointer to would be kept in memory by all others.
-ISO_RARE Exits settle_exits(const PacketRays *r, Floats far_x, Floats far_y, Floats far_z,
-                            Mask lanes, Exits exits) {
-  Exits settled = exits;
+/// The axis of each. Vectors go by value, and so does what is returned: what a rare call is given a
+/// pointer to, or returns as a struct, would be kept in memory by all others.
+ISO_RARE Ints settle_exits(const PacketRays *r, Floats far_x, Floats far_y, Floats far_z,
+                           Mask lanes) {
+  Ints settled = ints(0);
   ISO_EACH_LANE(lane, lanes) {
     const Ray ray = ray_of_lane(r, lane);
-    const int first = first_exit(&ray, far_x[lane], far_y[lane], far_z[lane]).axis;
-    ISO_EACH_OF_3(axis) settled.on[axis][lane] = axis == first ? -1 : 0;
+    settled[lane] = first_exit(&ray, far_x[lane], far_y[lane], far_z[lane]).axis;
   }
   return settled;
 }
@@ -247,7 +247,10 @@ ISO_INLINE Exits find_exits(const PacketRays *r, const Floats *far, Mask lanes) 
   exits.on[2] = (z < xy) & lanes;
   exits.on[1] = (y < x) & ~exits.on[2] & lanes;
   exits.on[0] = lanes & ~(exits.on[1] | exits.on[2]);
-  if (ISO_UNLIKELY(any(doubt))) return settle_exits(r, far[0], far[1], far[2], doubt, exits);
+  if (ISO_UNLIKELY(any(doubt))) {
+    const Ints settled = settle_exits(r, far[0], far[1], far[2], doubt);
+    ISO_EACH_OF_3(axis) exits.on[axis] = pick(doubt, settled == axis, exits.on[axis]);
+  }
   return exits;
 }
 
@@ -267,22 +270,21 @@ ISO_RARE Ints settle_places(const PacketRays *r, int axis, int size, Range range
 }
 
 /// The regions along one axis that rays are in just after they crossed r->entered, about at t.
-/// Where that is a plane of this axis, it says so itself. Else the position o + t d decides where
-/// it is further from a plane than its error: 7.1 u |t d| of t (grid_dda.h) and u |o + t d| of
-/// rounding, at most 8.2 u (|o + t d| + |o|).
+/// Where that is a plane of this axis, half a voxel behind it decides, which is exact. Else the
+/// position o + t d decides where it is further from a plane than its error: 7.1 u |t d| of t
+/// (grid_dda.h) and u |o + t d| of rounding, at most 8.2 u (|o + t d| + |o|).
 ISO_INLINE Ints packet_locate(const PacketRays *r, int axis, int size, Floats t, Range range,
                               Mask lanes) {
   const PacketAxis *a = &r->axis[axis];
   const Floats position = fma(t, a->d, a->o);
   const Mask on_plane = r->entered.axis == axis;
-  const Floats at = in_brick(a, pick(on_plane, r->entered.plane, position)),
-               x = at * (1.0f / (float)size);
-  const Floats region = pick(on_plane & ~a->up, -floor(-x) - 1.0f, floor(x));
-  const Ints at_least = larger(to_ints(region), range.first),
-             places = smaller(at_least, range.last);
+  const Floats behind = r->entered.plane + 0.5f * a->sign,
+               at = in_brick(a, pick(on_plane, behind, position)), x = at * (1.0f / (float)size);
+  const Ints at_least = larger(to_ints(x), range.first), /* below 0, either way the first */
+      places = smaller(at_least, range.last);
   const Floats distance = fabs(at - (float)size * rint(x)),
                error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o));
-  const Mask doubt = lanes & ~on_plane & (a->d != 0.0f) & (distance <= error);
+  const Mask doubt = lanes & ~on_plane & (distance <= error);
   if (ISO_UNLIKELY(any(doubt))) return settle_places(r, axis, size, range, doubt, places);
   return places;
 }

@@ -111,7 +111,7 @@ ISO_INLINE Ints regions(const Packet *p, int level, int axis) {
    */
   const PacketAxis *a = &p->rays.axis[axis];
   const Floats within = in_brick(a, pick(a->up, far - 1.0f, far));
-  return to_ints(floor(within * (1.0f / (float)ISO_REGION_SIZE(level))));
+  return to_ints(within * (1.0f / (float)ISO_REGION_SIZE(level)));
 }
 
 ISO_INLINE Floats far_planes(const Packet *p, int axis, int size, Ints region) {
@@ -308,7 +308,7 @@ ISO_INLINE void enter_regions(Packet *p, const PacketScene *scene, int level, Ma
     const Floats exit = fma(exit_t, a->d, a->o),
                  error = ISO_FLOAT_DOUBT * (fabs(exit) + fabs(a->o));
     const Floats at = in_brick(a, exit + error * a->sign);
-    const Ints farthest = to_ints(floor(at * (1.0f / (float)size))),
+    const Ints farthest = to_ints(at * (1.0f / (float)size)),
                at_least = larger(farthest, range.first), to = smaller(at_least, range.last);
     bits[axis] = bits_between(pick(a->up, place[axis], to) & 3, pick(a->up, to, place[axis]) & 3);
     places += (place[axis] & 3) << (2 * axis);
@@ -485,7 +485,12 @@ ISO_INLINE Brackets packet_isolate(const Segments *s, Mask lanes) {
   found.lo = floats(0.0f);
   found.hi = floats(1.0f);
   found.lanes = differs & ~hard;
-  if (any(hard)) return isolate_each(s, c, hard, found);
+  if (any(hard)) {
+    const Brackets each = isolate_each(s, c, hard, found); /* a copy: see settle_exits() */
+    found.lanes = each.lanes;
+    found.lo = each.lo;
+    found.hi = each.hi;
+  }
   return found;
 }
 
