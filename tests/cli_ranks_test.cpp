@@ -1,11 +1,14 @@
-// `mpirun isowave render`: what several processes draw together has the bytes that one writes, and
-// what goes wrong at one rank is said in one line, and ends all.
+// `mpirun isowave render` and `convert`: what several processes draw or compress together has the
+// bytes that one writes, and what goes wrong at one rank is said in one line, and ends all.
 
 #include <gtest/gtest.h>
 #include <signal.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
+#include <functional>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -75,6 +78,50 @@ class CliRanks : public testing::Test {
     EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
   }
 
+  /// Compresses with one process, and with so many.
+  void expect_same_file(const std::string &volume, const std::string &options, int count) {
+    const std::string path = (folder_ / "v.zfp").string();
+    const std::string arguments = "convert " + volume + " " + options + " -o " + quoted(path);
+    const ProgramResult one = run_isowave(arguments);
+    ASSERT_EQ(one.status, 0) << one.err;
+    const std::string expected = read_file(path);
+    std::filesystem::remove(path);
+    const ProgramResult several = run_command(on_ranks(count, arguments));
+    ASSERT_EQ(several.status, 0) << several.err;
+    EXPECT_TRUE(read_file(path) == expected) << arguments << " with " << count << " ranks";
+    EXPECT_EQ(several.out, one.out);
+    std::filesystem::remove(path);
+    EXPECT_EQ(folder_.num_files(), num_inputs_);
+  }
+
+  /// Voxels [z][y][x] of a volume of uneven sides, of which a function gives some.
+  template <class Value>
+  std::string write_raw(const std::string &type, const std::function<Value(int, int, int)> &voxel) {
+    std::string path = (folder_ / ("v_13x9x45_" + type + ".raw")).string();
+    std::ofstream file(path, std::ios::binary);
+    for (int z = 0; z < 45; ++z) {
+      for (int y = 0; y < 9; ++y) {
+        for (int x = 0; x < 13; ++x) {
+          const Value value = voxel(x, y, z);
+          file.write(reinterpret_cast<const char *>(&value), sizeof(value));
+        }
+      }
+    }
+    ++num_inputs_;
+    return path;
+  }
+
+  /// ids: lines of a rank and its process.
+  static void kill_rank_1(const std::filesystem::path &ids) {
+    pid_t dying = 0;
+    std::ifstream stream(ids);
+    for (long rank = 0, id = 0; stream >> rank >> id;) {
+      if (rank == 1) dying = static_cast<pid_t>(id);
+    }
+    ASSERT_GT(dying, 0);
+    EXPECT_EQ(::kill(dying, SIGKILL), 0);
+  }
+
   std::string convert(const std::string &options) {
     std::string path = quoted(folder_ / "volume.zfp");
     const ProgramResult result = run_isowave("convert " + kFuel + " " + options + " -o " + path);
@@ -83,6 +130,7 @@ class CliRanks : public testing::Test {
   }
 
   TemporaryFolder folder_;
+  std::size_t num_inputs_ = 0;  ///< files that write_raw() has made
 };
 
 TEST_F(CliRanks, DrawWhatOneProcessDraws) {
@@ -104,6 +152,45 @@ TEST_F(CliRanks, ManyRanks) {
     expect_same(volume, "--orbit 2 -i 40 -i 90 --size 320x200", count);
     expect_same(volume, "--orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", count);
   }
+}
+
+TEST_F(CliRanks, CompressWhatOneProcessCompresses) {
+  expect_same_file(kFuel, "--rate 5 --no-verify", 2);
+  expect_same_file(kFuel, "--exact --levels all", 3);
+  expect_same_file("generate:mixing_layer_30x40x47_float32", "--rate 7 --levels all", 5);
+  // Nearly all blocks take one bit, so bytes are shared by ranks; and some have no layer.
+  const std::string spot = write_raw<std::uint8_t>("uint8", [](int x, int y, int z) {
+    return static_cast<std::uint8_t>(x == 4 && y == 3 && z == 17 ? 200 : 0);
+  });
+  expect_same_file(spot, "--exact --levels all", 3);
+  expect_same_file(spot, "--tolerance 0.4", 14);
+}
+
+/// What casts to float32 lose, and tiny values, count in the errors of all levels.
+TEST_F(CliRanks, CompressWithErrorsOfTheSource) {
+  const std::string waves = write_raw<double>("float64", [](int x, int y, int z) {
+    const double value = std::sin(0.3 * x) * std::cos(0.2 * z) + 0.1 * y + 1.0 / 3;
+    return x % 3 == 0 ? 1e-32 * value : value;
+  });
+  expect_same_file(waves, "--tolerance-relative 1e-3 --levels all", 5);
+  expect_same_file(waves, "--rate 9 --levels all", 3);
+}
+
+TEST_F(CliRanks, CompressOnEachRanksDevice) {
+  expect_same_file("generate:mixing_layer_30x24x21_uint8", "--rate 8 --levels 2 --device 0", 2);
+}
+
+TEST_F(CliRanks, RefusedVoxelsAreCountedOnce) {
+  const std::string bad = write_raw<float>("float32", [](int x, int y, int z) {
+    return x == 5 && y == 2 && z % 11 == 10 ? std::numeric_limits<float>::quiet_NaN() : 1.0f;
+  });
+  const std::string arguments = "convert " + bad + " -o " + quoted(folder_ / "v.zfp") + " ";
+  for (const char *options : {"--rate 8 --levels all", "--tolerance 0.1"}) {
+    expect_error(on_ranks(3, arguments + options),
+                 "isowave: 4 of 5265 voxels are NaN or infinite, the first at (5,2,10)");
+  }
+  expect_error(on_ranks(3, arguments + "--map-nan 0 --levels 7"), "7 levels of detail");
+  EXPECT_EQ(folder_.num_files(), 1u);
 }
 
 TEST_F(CliRanks, StatisticsOfEachRank) {
@@ -130,7 +217,7 @@ TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   expect_error(on_ranks(2, render + "--ambient 4"), "--ambient");
   expect_error(on_ranks(2, render + "--bricks 2x2x1"), "2 processes draw a brick each");
   expect_error(on_ranks(2, render + "--voxel-pixels 1"), "convert --levels all");
-  expect_error(on_ranks(2, "info " + kFuel), "only render");
+  expect_error(on_ranks(2, "info " + kFuel), "only render and convert");
   test::expect_one_line_error(render + "--bricks 1x1x1", "--bricks");
 }
 
@@ -169,6 +256,46 @@ TEST_F(CliRanks, FullDisk) {
   EXPECT_EQ(folder_.num_files(), 0u);
 }
 
+TEST_F(CliRanks, FullDiskWhileCompressing) {
+  for (const char *options : {"--rate 16", "--exact --levels 2"}) {
+    expect_error(kMpirun + "--mca btl tcp,self -n 3 sh -c 'ulimit -f 64; exec \"$0\" \"$@\"' " +
+                     test::isowave_program() + " convert generate:mixing_layer_64x64x64_uint8 " +
+                     options + " -o " + quoted(folder_ / "x.zfp"),
+                 "x.zfp: cannot write: File too large");
+  }
+  EXPECT_EQ(folder_.num_files(), 0u);
+}
+
+/// One rank's file has become shorter; and of a rank that dies, nothing is left.
+TEST_F(CliRanks, ARankThatFailsLeavesNoFile) {
+  const auto raw = [&](const char *name) { return folder_ / name / "v_64x64x64_uint8.raw"; };
+  for (const char *name : {"a", "b"}) {
+    std::filesystem::create_directory(folder_ / name);
+    std::ofstream(raw(name)) << std::string(64 * 64 * 64, 'x');
+  }
+  std::filesystem::resize_file(raw("b"), 1000);
+  const auto in = [&](const char *name) {
+    return "-n 1 --wdir " + quoted(folder_ / name) + " " + test::isowave_program() +
+           " convert v_64x64x64_uint8.raw -o " + quoted(folder_ / "x.zfp");
+  };
+  expect_error(kMpirun + in("a") + " : " + in("b"), "rank 1: v_64x64x64_uint8.raw: truncated");
+  EXPECT_EQ(folder_.num_files(), 2u);
+
+  const std::string command =
+      kMpirun + "-n 2 sh -c 'echo $OMPI_COMM_WORLD_RANK $$ >> " + (folder_ / "ids").string() +
+      "; exec \"$0\" \"$@\"' " + test::isowave_program() +
+      " convert generate:turbulence_2048x2048x1024_uint8 -o " + quoted(folder_ / "x.zfp");
+  ProgramResult result;
+  std::thread job([&] { result = run_command(command); });
+  for (int tries = 0; tries < 600 && folder_.num_files() < 4; ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // the file under its other name
+  EXPECT_EQ(folder_.num_files(), 4u);
+  kill_rank_1(folder_ / "ids");
+  job.join();
+  EXPECT_NE(result.status, 0);
+  EXPECT_EQ(folder_.num_files(), 3u);
+}
+
 /// Without rank 1, rank 0 must not wait for ever, and leaves nothing half-written.
 TEST_F(CliRanks, ARankThatDiesEndsTheJob) {
   const std::string ids = (folder_ / "ids").string();
@@ -181,16 +308,8 @@ TEST_F(CliRanks, ARankThatDiesEndsTheJob) {
   const auto first = folder_ / "x_iso40_view3.npy";
   for (int tries = 0; tries < 600 && !std::filesystem::exists(first); ++tries)
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  pid_t dying = 0;
-  std::ifstream stream(ids);
-  for (long rank = 0, id = 0; stream >> rank >> id;) {
-    if (rank == 1) dying = static_cast<pid_t>(id);
-  }
   const auto begin = std::chrono::steady_clock::now();
-  EXPECT_GT(dying, 0);
-  if (dying > 0) {
-    EXPECT_EQ(::kill(dying, SIGKILL), 0);
-  }
+  kill_rank_1(ids);
   job.join();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
   EXPECT_NE(result.status, 0);

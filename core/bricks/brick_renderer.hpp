@@ -4,9 +4,9 @@
 
 #include <vector>
 
+#include "core/base/team.hpp"
 #include "core/bricks/compose.hpp"
 #include "core/bricks/cuts.hpp"
-#include "core/bricks/team.hpp"
 #include "core/render/renderer.hpp"
 
 namespace isowave::core {

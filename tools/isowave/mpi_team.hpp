@@ -3,10 +3,12 @@
 // there is none.
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 
-#include "core/bricks/team.hpp"
+#include "core/base/team.hpp"
+#include "core/bricks/compress_together.hpp"
 
 namespace isowave::core::tools {
 
@@ -28,6 +30,11 @@ class MpiJob {
   static std::string command_line();
   /// Number of this process among those of its host.
   static std::uint32_t local_rank();
+  /// Of a team, all processes: a file that they write by MPI-IO, under another name until its
+  /// commit(). The target is a regular file, or none.
+  ///
+  /// Throws  Error at all of them
+  static std::unique_ptr<SharedFile> create_file(const std::filesystem::path &target);
 };
 
 }  // namespace isowave::core::tools

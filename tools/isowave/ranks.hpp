@@ -1,15 +1,14 @@
 #pragma once
 // What the processes of a team have to know of each other before they draw bricks.
 
-#include <cstring>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/base/team.hpp"
 #include "core/bricks/cuts.hpp"
-#include "core/bricks/team.hpp"
 #include "core/ocl/device.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -31,20 +30,6 @@ std::string fingerprint(const std::string &path, const VolumeInfo &info);
 
 /// A brick for each rank. bricks: XxYxZ, or empty; unit: see Cuts. Throws Error.
 Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit);
-
-/// All ranks' values, by rank.
-template <class Value>
-std::vector<Value> gather(Team &team, const std::vector<Value> &values) {
-  std::string own(values.size() * sizeof(Value), '\0');
-  std::memcpy(own.data(), values.data(), own.size());
-  std::vector<Value> all;
-  for (const std::string &each : team.all_gather(own)) {
-    const std::size_t before = all.size();
-    all.resize(before + each.size() / sizeof(Value));
-    std::memcpy(all.data() + before, each.data(), each.size());
-  }
-  return all;
-}
 
 /// A brick for each rank, which isosurfaces touch about alike. load: gives a brick of those blocks.
 ///

@@ -10,6 +10,7 @@
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
 #include "core/bricks/brick_volume.hpp"
+#include "core/bricks/compress_together.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
@@ -111,7 +112,12 @@ std::optional<BlockPrecision> find_precision(const std::string &path, const RawO
   Storage storage = to_storage(options);
   storage.map_nan = input.map_nan;
   storage.num_threads = input.num_threads;
-  return core::find_precision([&] { return open_any_volume(path, overrides); }, path, storage);
+  storage.part = input.part;
+  const OpenReader open = [&] { return open_any_volume(path, overrides); };
+  const VolumePart *part = input.part;
+  if (part == nullptr) return core::find_precision(open, path, storage);
+  return core::find_precision(
+      [&] { return open_part(*part, part->own_end - part->own_begin, open); }, path, storage);
 }
 
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,

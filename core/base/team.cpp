@@ -1,4 +1,4 @@
-#include "core/bricks/team.hpp"
+#include "core/base/team.hpp"
 
 #include <algorithm>
 #include <new>
