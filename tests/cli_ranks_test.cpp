@@ -80,7 +80,7 @@ class CliRanks : public testing::Test {
 
   /// Compresses with one process, and with so many.
   void expect_same_file(const std::string &volume, const std::string &options, int count) {
-    const std::string path = (folder_ / "v.zfp").string();
+    const std::filesystem::path path = folder_ / "v.zfp";
     const std::string arguments = "convert " + volume + " " + options + " -o " + quoted(path);
     const ProgramResult one = run_isowave(arguments);
     ASSERT_EQ(one.status, 0) << one.err;
