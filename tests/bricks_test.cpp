@@ -19,6 +19,7 @@
 #include "core/render/renderer.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "kernels_cl/portable/block_cells.h"
+#include "reference/twin.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
@@ -236,6 +237,113 @@ TEST_P(BricksOnDevice, LevelsOfDetail) {
     expect_same_hits(hits[view], expected, size.width);
   }
   EXPECT_EQ(num_levels, kLevels);
+}
+
+/// Ambient rays begin in any brick and go on in others: they meet what they meet in the whole.
+class AmbientBricksOnDevice : public BricksOnDevice {
+ protected:
+  void check(const CompressedVolume &whole, const Cuts &cuts, const std::vector<Camera> &cameras,
+             RendererOptions options, std::uint32_t num_rays, double voxel_pixels = 0) {
+    constexpr float kIsovalue = 0.2f;
+    options.with_given_rays = true;
+    options.with_levels = voxel_pixels > 0;
+    const Twin twin(whole, voxel_pixels);
+    std::vector<CompressedVolume> bricks;
+    std::vector<std::unique_ptr<Renderer>> renderers;
+    const std::size_t num_levels = 1 + (options.with_levels ? whole.coarser_levels.size() : 0);
+    for (const BlockBox &own : cuts.bricks()) {
+      bricks.push_back(cut_brick(whole, own, num_levels));
+      renderers.push_back(
+          std::make_unique<Renderer>(device_, bricks.back(), GetParam().with(options)));
+    }
+    const std::size_t num_pixels = options.size.num_rays();
+    std::uint64_t num_met_elsewhere = 0;
+    for (std::size_t view = 0; view < cameras.size(); ++view) {
+      SCOPED_TRACE(fmt::format("view {}", view));
+      const View rays = make_view(whole.info, cameras[view], options.size);
+      const auto places = cuts.order_from({rays.eye_x, rays.eye_y, rays.eye_z});
+      std::vector<HitRecord> placed(num_pixels, no_hit());
+      std::vector<std::uint32_t> place(num_pixels, kNoPlace);
+      for (std::size_t brick = 0; brick < bricks.size(); ++brick) {
+        renderers[brick]->render(
+            {.camera = cameras[view], .isovalue = kIsovalue, .voxel_pixels = voxel_pixels});
+        const std::vector<HitRecord> own = renderers[brick]->placed_hits();
+        for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
+          if (!std::isfinite(own[pixel].t) || places[brick] > place[pixel]) continue;
+          place[pixel] = places[brick];
+          placed[pixel] = own[pixel];
+        }
+      }
+      OpenCounts open{std::vector<uchar>(num_pixels), num_rays};
+      for (std::uint32_t round = 0; round < num_rays; ++round) {
+        std::vector<bool> is_met(num_pixels);
+        for (std::size_t brick = 0; brick < bricks.size(); ++brick) {
+          if (round == 0) renderers[brick]->set_hits(placed);
+          LaterPasses stats;
+          const auto blocked = renderers[brick]->blocked_rays(round, num_rays, stats);
+          EXPECT_GT(stats.passes, 0u);
+          for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
+            const bool meets = (blocked[pixel / 64] >> pixel % 64 & 1) != 0;
+            num_met_elsewhere += meets && place[pixel] != places[brick];
+            is_met[pixel] = is_met[pixel] || meets;
+          }
+        }
+        for (std::size_t pixel = 0; pixel < num_pixels; ++pixel)
+          open.counts[pixel] = static_cast<uchar>(
+              open.counts[pixel] + (std::isfinite(placed[pixel].t) && !is_met[pixel]));
+      }
+      const std::vector<HitRecord> hits = twin.render(cameras[view], options.size, kIsovalue);
+      const OpenCounts expected = twin.open(cameras[view], options.size, kIsovalue, hits, num_rays);
+      EXPECT_EQ(open.counts, expected.counts);
+      Renderer &renderer = *renderers.front();
+      renderer.set_open(open);
+      const FrameParams frame =
+          make_frame_params(whole.info, cameras[view], options.size, kIsovalue);
+      EXPECT_EQ(renderer.shade().pixels,
+                shade_scalar(frame, make_shade_params(whole.info, {}), hits, 1, expected).pixels);
+    }
+    EXPECT_GT(num_met_elsewhere, 0u);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Pipelines, AmbientBricksOnDevice,
+                         testing::ValuesIn(pipelines_under_test()), pipeline_test_name);
+
+TEST_P(AmbientBricksOnDevice, SmallFrame) {
+  const TestVolume volume({14, 15, 13}, test::gyroid_field(6));
+  check(volume.compressed, Cuts(blocks_along(volume.info()), 2),
+        {orbit_cameras(volume.info(), 1)[0]}, {.size = {9, 7}}, 2);
+}
+
+TEST_P(AmbientBricksOnDevice, EyesOutsideInsideAndOnCuts) {
+  const TestVolume volume({37, 30, 26}, test::gyroid_field(9));
+  check(volume.compressed, Cuts(blocks_along(volume.info()), glm::uvec3(2, 2, 1)),
+        views_of(volume.info(), {16, 16, 12}), {.size = {31, 23}, .cache_slots = 100}, 3);
+}
+
+TEST_P(AmbientBricksOnDevice, LevelsOfDetail) {
+  if (GetParam().pipeline == PipelineKind::kBlocks) return;  // draws the finest level alone
+  const VolumeInfo info = test::grid_info({50, 44, 60});
+  ArrayReader reader(info, test::sample(info.dims, test::gyroid_field(14)));
+  const CompressedVolume whole = compress(reader, {.rate = 8, .levels = 3});
+  const Cuts cuts(blocks_along(info), 3, num_blocks, cut_unit(3));
+  for (const double voxel_pixels : {0.7, 6.0})  // several levels, and a coarser one alone
+    check(whole, cuts, {orbit_cameras(info, 2)[1]}, {.size = {37, 29}}, 2, voxel_pixels);
+}
+
+TEST_P(BricksOnDevice, SmallRaysThatGoOnAreRefused) {
+  const TestVolume volume({9, 10, 11}, test::noise_field(3), 8);
+  const Cuts cuts(blocks_along(volume.info()), 2);
+  const CompressedVolume brick = cut_brick(volume.compressed, cuts.bricks()[0]);
+  RendererOptions options = GetParam().with({.size = {6, 5}});
+  options.with_given_rays = true;
+  Renderer renderer(device_, brick, options);
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  EXPECT_THROW(renderer.render({.camera = camera, .ambient_rays = 1}), Error);
+  EXPECT_THROW(renderer.cast_rays({}, 0.1f, Normals::kCell), Error);
+  Renderer whole(device_, volume.compressed, options);
+  whole.render({.camera = camera});
+  LaterPasses stats;
+  EXPECT_THROW(whole.blocked_rays(0, 1, stats), Error);
 }
 
 // ---- without a device

@@ -20,6 +20,12 @@ struct Message {
 using Outgoing = Message<const std::byte>;
 using Incoming = Message<std::byte>;
 
+enum class Reduction {
+  kMin,  ///< the smallest word
+  kOr    ///< the bits of all
+};
+enum class Receiver { kRank0, kAll };
+
 /// All of them make the same calls in the same order.
 class Team {
  public:
@@ -28,9 +34,9 @@ class Team {
   virtual std::uint32_t size() const = 0;
   /// Everybody's text, by rank.
   virtual std::vector<std::string> all_gather(const std::string &text) = 0;
-  /// Begins to find the smallest word of all processes at each place, which rank 0 will have in
-  /// `words`. Until finish_reductions() these must not be touched.
-  virtual void begin_reduce_min(std::span<std::uint64_t> words) = 0;
+  /// Begins to make one word of those of all processes at each place, which rank 0 will have in
+  /// `words`, or all. Until finish_reductions() these must not be touched.
+  virtual void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) = 0;
   virtual void finish_reductions() = 0;
   /// Sends and receives, in order, and is back when both are done; none is of this process. To be
   /// called by those alone that are named.

@@ -87,11 +87,17 @@ class MpiTeam : public Team {
     return texts;
   }
 
-  void begin_reduce_min(std::span<std::uint64_t> words) override {
+  void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
     requests_.push_back(MPI_REQUEST_NULL);
-    MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : words.data(), words.data(),
-                static_cast<int>(words.size()), MPI_UINT64_T, MPI_MIN, 0, MPI_COMM_WORLD,
-                &requests_.back());
+    const int count = static_cast<int>(words.size());
+    const MPI_Op op = how == Reduction::kMin ? MPI_MIN : MPI_BOR;
+    if (who == Receiver::kAll) {
+      MPI_Iallreduce(MPI_IN_PLACE, words.data(), count, MPI_UINT64_T, op, MPI_COMM_WORLD,
+                     &requests_.back());
+    } else {
+      MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : words.data(), words.data(), count, MPI_UINT64_T, op,
+                  0, MPI_COMM_WORLD, &requests_.back());
+    }
   }
 
   void finish_reductions() override {

@@ -55,6 +55,15 @@ std::string fingerprint(const std::string &path, const VolumeInfo &info) {
   return fmt::format("{} {} {:x}", grid, file.size(), crc);
 }
 
+std::size_t num_cut_levels(const VolumeInfo &whole, std::size_t num_levels, std::uint32_t bricks) {
+  const auto num_units = [&](std::size_t levels) {
+    const int unit = cut_unit(levels);
+    return num_blocks({glm::ivec3(0), (blocks_along(whole) + (unit - 1)) / unit});
+  };
+  while (num_levels > 1 && num_units(num_levels) < bricks) --num_levels;
+  return num_levels;
+}
+
 Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit) {
   if (bricks.empty()) return {blocks_along(whole), team.size(), num_blocks, unit};
   const glm::uvec3 along = parse_bricks(bricks);

@@ -28,6 +28,10 @@ ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t l
 /// Throws  Error: the file cannot be read
 std::string fingerprint(const std::string &path, const VolumeInfo &info);
 
+/// How many of a volume's levels of detail, from the finest on, can be cut into so many bricks at
+/// the same planes.
+std::size_t num_cut_levels(const VolumeInfo &whole, std::size_t num_levels, std::uint32_t bricks);
+
 /// A brick for each rank. bricks: XxYxZ, or empty; unit: see Cuts. Throws Error.
 Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit);
 
