@@ -4,19 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <functional>
-#include <limits>
-#include <stdexcept>
 
 #include "core/base/error.hpp"
-#include "core/base/parallel_for.hpp"
 #include "core/io/input_file.hpp"
-#include "core/volume/block_errors.hpp"
 #include "core/volume/pyramid.hpp"
-#include "core/zfp/level_bounds.hpp"
 #include "core/zfp/libzfp.hpp"
-#include "core/zfp/zfp_accuracy.hpp"
-#include "core/zfp/zfp_encode.hpp"
+#include "core/zfp/pyramid_coder.hpp"
 #include "core/zfp/zfp_file.hpp"
 
 namespace isowave::core {

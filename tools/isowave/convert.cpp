@@ -10,6 +10,7 @@
 #include "core/base/error.hpp"
 #include "core/base/printed_bound.hpp"
 #include "core/bricks/compress_together.hpp"
+#include "core/bricks/ranks.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
@@ -18,7 +19,6 @@
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
-#include "tools/isowave/ranks.hpp"
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
@@ -114,9 +114,9 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
                            .levels = options.compression.levels,
                            .input = options.input};
   Team *team = MpiJob::team();
-  const CompressedVolume volume =
-      team != nullptr ? convert_together(options, overrides, compress, *team)
-                      : convert_alone(options, overrides, compress);
+  const CompressedVolume volume = team != nullptr
+                                      ? convert_together(options, overrides, compress, *team)
+                                      : convert_alone(options, overrides, compress);
   if (team == nullptr || team->rank() == 0) print_summary(options, volume);
 }
 

@@ -17,6 +17,7 @@
 #include "core/base/error.hpp"
 #include "core/bricks/brick_renderer.hpp"
 #include "core/bricks/brick_volume.hpp"
+#include "core/bricks/ranks.hpp"
 #include "core/io/npy.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/surface_camera.hpp"
@@ -32,7 +33,6 @@
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
-#include "tools/isowave/ranks.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -581,7 +581,7 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   together(team, [&] {
     if (team.rank() == 0) outputs = check_outputs(options, views.count);
     device = open_device(options, choose_local_device(options.device, MpiJob::local_rank()));
-    levels = read_volume_levels(options.input, overrides);
+    levels = read_levels(options.input, overrides);
   });
   const VolumeInfo &whole = levels.front();
   agree_on(team, "volume", fingerprint(options.input, whole));

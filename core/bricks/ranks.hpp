@@ -13,7 +13,7 @@
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave::core::tools {
+namespace isowave::core {
 
 /// The device of a host's process of that number. selector: for ocl::choose_device(), or several
 /// with commas, of which processes take one each, again and again. Without commas, the devices of
@@ -48,4 +48,4 @@ Cuts cut_by_surfaces(Team &team, const VolumeInfo &whole, std::span<const float>
 std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
                                    const std::optional<BlockBox> &own);
 
-}  // namespace isowave::core::tools
+}  // namespace isowave::core

@@ -1,4 +1,4 @@
-#include "tools/isowave/ranks.hpp"
+#include "core/bricks/ranks.hpp"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "core/io/input_file.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
-namespace isowave::core::tools {
+namespace isowave::core {
 
 namespace {
 
@@ -104,4 +104,4 @@ std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
   return all;
 }
 
-}  // namespace isowave::core::tools
+}  // namespace isowave::core
