@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
 #include <utility>
 
 #include "core/api/device_implementation.hpp"
@@ -34,9 +33,6 @@ class ProcessTeam : public core::Team {
         who == core::Receiver::kAll);
   }
   void finish_reductions() override {}
-  void exchange(std::span<const core::Outgoing>, std::span<const core::Incoming>) override {
-    throw std::logic_error("drawing sends no messages");
-  }
 
  private:
   Processes &processes_;

@@ -39,8 +39,8 @@ class Team {
   virtual void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) = 0;
   virtual void finish_reductions() = 0;
   /// Sends and receives, in order, and is back when both are done; none is of this process. To be
-  /// called by those alone that are named.
-  virtual void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received) = 0;
+  /// called by those alone that are named. Drawing needs none.
+  virtual void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received);
 };
 
 /// Throws Error at every rank if one gives a text: that of the first, with its rank, unless all
