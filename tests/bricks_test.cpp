@@ -250,7 +250,8 @@ class AmbientBricksOnDevice : public BricksOnDevice {
     const Twin twin(whole, voxel_pixels);
     std::vector<CompressedVolume> bricks;
     std::vector<std::unique_ptr<Renderer>> renderers;
-    const std::size_t num_levels = 1 + (options.with_levels ? whole.coarser_levels.size() : 0);
+    const std::vector<VolumeInfo> infos = level_infos(whole, options.with_levels);
+    const std::size_t num_levels = infos.size();
     for (const BlockBox &own : cuts.bricks()) {
       bricks.push_back(cut_brick(whole, own, num_levels));
       renderers.push_back(
@@ -274,11 +275,20 @@ class AmbientBricksOnDevice : public BricksOnDevice {
           placed[pixel] = own[pixel];
         }
       }
+      const std::vector<FrameParams> frames =
+          make_level_frames(infos, cameras[view], options.size, kIsovalue, voxel_pixels);
+      const auto first = std::ranges::find_if(frames, draws);
+      const LevelRange levels{
+          std::size_t(first - frames.begin()),
+          std::size_t(first - frames.begin() + std::count_if(first, frames.end(), draws))};
       OpenCounts open{std::vector<uchar>(num_pixels), num_rays};
       for (std::uint32_t round = 0; round < num_rays; ++round) {
         std::vector<bool> is_met(num_pixels);
         for (std::size_t brick = 0; brick < bricks.size(); ++brick) {
-          if (round == 0) renderers[brick]->set_hits(placed);
+          if (round == 0) {
+            renderers[brick]->begin_ambient({.camera = cameras[view], .isovalue = kIsovalue},
+                                            placed, levels);
+          }
           LaterPasses stats;
           const auto blocked = renderers[brick]->blocked_rays(round, num_rays, stats);
           EXPECT_GT(stats.passes, 0u);
@@ -342,8 +352,7 @@ TEST_P(BricksOnDevice, SmallRaysThatGoOnAreRefused) {
   EXPECT_THROW(renderer.cast_rays({}, 0.1f, Normals::kCell), Error);
   Renderer whole(device_, volume.compressed, options);
   whole.render({.camera = camera});
-  LaterPasses stats;
-  EXPECT_THROW(whole.blocked_rays(0, 1, stats), Error);
+  EXPECT_THROW(whole.begin_ambient({.camera = camera}, whole.hits(), {}), Error);
 }
 
 // ---- without a device
@@ -384,6 +393,25 @@ TEST(Bricks, KeepTheWholesVoxels) {
       }
     }
     std::filesystem::remove(path);
+  }
+}
+
+/// Another spacing moves no brick: see isowave::core::tools::load_brick().
+TEST(Bricks, LevelsKeepTheirPlaces) {
+  const VolumeInfo info = test::grid_info({41, 37, 33});
+  ArrayReader reader(info, test::sample(info.dims, test::noise_field(6)));
+  const CompressedVolume whole = compress(reader, {.rate = 8, .levels = 3});
+  const Cuts cuts(blocks_along(info), 2, num_blocks, cut_unit(3));
+  CompressedVolume brick = cut_brick(whole, cuts.bricks()[1], 3);
+  const std::vector<VolumeInfo> before = level_infos(brick, true);
+  set_spacing(brick, {2, 3, 4});
+  const std::vector<VolumeInfo> after = level_infos(brick, true);
+  ASSERT_EQ(after.size(), 3u);
+  for (std::size_t level = 0; level < 3; ++level) {
+    EXPECT_NE(before[level].brick, BrickOf{});
+    EXPECT_EQ(after[level].brick, before[level].brick);
+    EXPECT_EQ(after[level].dims, before[level].dims);
+    EXPECT_EQ(after[level].spacing, before[level].spacing * glm::dvec3(2, 3, 4));
   }
 }
 

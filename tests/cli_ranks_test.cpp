@@ -1,6 +1,7 @@
 // `mpirun isowave render` and `convert`: what several processes draw or compress together has the
 // bytes that one writes, and what goes wrong at one rank is said in one line, and ends all.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -9,11 +10,15 @@
 #include <cstdlib>
 #include <functional>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "core/zfp/zfp_stream.hpp"
 #include "tests/run_program.hpp"
 
 namespace isowave::core {
@@ -45,26 +50,21 @@ class CliRanks : public testing::Test {
     const std::string outputs =
         " -o " + quoted(folder_ / "x.png") + " --depth " + quoted(folder_ / "x.npy");
     const std::string arguments = "render " + volume + " " + options + outputs;
-    std::vector<std::string> names = {"x.png", "x.npy"};
-    if (options.find("--orbit 2 -i") != std::string::npos) {
-      names.clear();
-      for (const char *frame : {"40_view0", "40_view1", "90_view0", "90_view1"}) {
-        for (const char *extension : {".png", ".npy"})
-          names.push_back(std::string("x_iso") + frame + extension);
-      }
-    }
     const auto files = [&] {
-      std::vector<std::string> texts;
-      for (const std::string &name : names) {
-        texts.push_back(read_file(folder_ / name));
-        EXPECT_FALSE(texts.back().empty()) << name;
-        std::filesystem::remove(folder_ / name);
+      std::map<std::string, std::string> texts;
+      for (const auto &entry : std::filesystem::directory_iterator(folder_.path())) {
+        const std::string name = entry.path().filename().string();
+        if (!name.starts_with("x")) continue;
+        texts[name] = read_file(entry.path());
+        EXPECT_FALSE(texts[name].empty()) << name;
       }
+      for (const auto &[name, text] : texts) std::filesystem::remove(folder_ / name);
       return texts;
     };
     const ProgramResult one = run_isowave(arguments);
     ASSERT_EQ(one.status, 0) << one.err;
-    const std::vector<std::string> expected = files();
+    const auto expected = files();
+    EXPECT_GE(expected.size(), 2u);
     const ProgramResult several = run_command(on_ranks(count, arguments + bricks));
     ASSERT_EQ(several.status, 0) << several.err;
     EXPECT_TRUE(files() == expected) << arguments << " with " << count << " ranks";
@@ -145,12 +145,72 @@ TEST_F(CliRanks, SamplesLevelsAndBricksAsAskedFor) {
   expect_same("generate:mixing_layer_30x40x24_uint8", "-i 128 --size 64x48 --cache-slots 64", 2);
 }
 
-TEST_F(CliRanks, ManyRanks) {
+TEST_F(CliRanks, AmbientRays) {
+  expect_same(convert("--exact --levels 3"),
+              "-i 40 --size 48x32 --voxel-pixels 1.5 --ambient 3 --samples 2", 3);
+}
+
+/// The picture grows from pass to pass, up to what one process draws.
+TEST_F(CliRanks, PicturesPassByPass) {
+  const std::string render = "render " + kFuel + " -i 40 --size 64x48 --cache-slots 64 -o ";
+  ASSERT_EQ(run_isowave(render + quoted(folder_ / "one.png")).status, 0);
+  const ProgramResult result = run_command(
+      on_ranks(3, render + quoted(folder_ / "x.png") + " --progress-dir " + quoted(folder_ / "p") +
+                      " --stats " + quoted(folder_ / "s.json")));
+  ASSERT_EQ(result.status, 0) << result.err;
+  const std::string one = read_file(folder_ / "one.png");
+  EXPECT_TRUE(one == read_file(folder_ / "x.png"));
+  std::size_t num_passes = 0;
+  const auto stats = nlohmann::json::parse(read_file(folder_ / "s.json"));
+  for (const auto &rank : stats["ranks"]) {
+    const auto &frame = rank["frames"][0];
+    num_passes = std::max(num_passes,
+                          std::size_t(frame["passes"]) + std::size_t(frame["normals"]["passes"]));
+  }
+  std::size_t num_pictures = 0;
+  std::string last;
+  for (; num_pictures < 9999; ++num_pictures) {
+    const auto path = folder_ / "p" / fmt::format("pass{:04}.png", num_pictures + 1);
+    if (!std::filesystem::exists(path)) break;
+    if (num_pictures == 0) {
+      EXPECT_TRUE(one != read_file(path));
+    }
+    last = read_file(path);
+  }
+  EXPECT_EQ(num_pictures, num_passes);
+  EXPECT_TRUE(one == last);
+}
+
+TEST_F(CliRanks, PicturesWithinATime) {
+  const std::string render =
+      "render " + convert("--levels all") + " -i 40 --size 64x48 --ambient 2 --samples 2 ";
+  const std::string picture = quoted(folder_ / "x.png"), refined = quoted(folder_ / "r.png");
+  ASSERT_EQ(run_isowave(render + "-o " + quoted(folder_ / "one.png")).status, 0);
+  const std::string one = read_file(folder_ / "one.png");
+  for (const bool is_short : {true, false}) {
+    const ProgramResult result = run_command(on_ranks(
+        2, render + "-o " + picture + " --refined " + refined + " --time-budget " +
+               (is_short ? "0.001" : "1000000") + " --stats " + quoted(folder_ / "s.json")));
+    ASSERT_EQ(result.status, 0) << result.err;
+    const auto stats = nlohmann::json::parse(read_file(folder_ / "s.json"));
+    EXPECT_EQ(stats["frames"][0]["time_budget"]["complete"], !is_short);
+    EXPECT_EQ(one == read_file(folder_ / "x.png"), !is_short);
+    EXPECT_TRUE(one == read_file(folder_ / "r.png"));
+  }
+}
+
+void skip_unless_long() {
   if (std::getenv("ISOWAVE_LONG_TESTS") == nullptr) GTEST_SKIP() << "among the long tests";
+}
+
+TEST_F(CliRanks, ManyRanks) {
+  skip_unless_long();
+  if (IsSkipped()) return;
   const std::string volume = convert("--rate 6");
   for (const int count : {5, 8, 27}) {
     expect_same(volume, "--orbit 2 -i 40 -i 90 --size 320x200", count);
     expect_same(volume, "--orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", count);
+    expect_same(volume, "-i 40 --size 64x48 --ambient 4 --cache-slots 64", count);
   }
 }
 
@@ -193,6 +253,54 @@ TEST_F(CliRanks, RefusedVoxelsAreCountedOnce) {
   EXPECT_EQ(folder_.num_files(), 1u);
 }
 
+/// Of 64 ranks each gives one word for each ray of a picture, whatever it has drawn.
+TEST_F(CliRanks, ManyRanksGiveOneWordForEachRay) {
+  skip_unless_long();
+  if (IsSkipped()) return;
+  expect_same(kFuel, "-i 40 --size 32x24", 64);
+  const std::string stats_file = quoted(folder_ / "s.json");
+  const ProgramResult result =
+      run_command(on_ranks(64, "render " + kFuel + " -i 40 --orbit 3 --size 32x24 -o " +
+                                   quoted(folder_ / "x.png") + " --stats " + stats_file));
+  ASSERT_EQ(result.status, 0) << result.err;
+  const auto stats = nlohmann::json::parse(read_file(folder_ / "s.json"));
+  ASSERT_EQ(stats["ranks"].size(), 64u);
+  for (const auto &rank : stats["ranks"]) {
+    EXPECT_EQ(rank["composition"]["reductions"], 3);
+    EXPECT_EQ(rank["composition"]["bytes"], 3 * 32 * 24 * 8);
+  }
+}
+
+/// Of the folder that the environment names, such as one of Open SciVis sets; three isovalues among
+/// the middle 80 % of each volume's voxels.
+TEST_F(CliRanks, RealVolumes) {
+  const char *folder = std::getenv("ISOWAVE_TEST_VOLUMES");
+  if (folder == nullptr) GTEST_SKIP() << "ISOWAVE_TEST_VOLUMES names no folder of volumes";
+  std::set<std::filesystem::path> paths;
+  for (const auto &entry : std::filesystem::directory_iterator(folder)) paths.insert(entry.path());
+  std::size_t num_volumes = 0;
+  for (const auto &path : paths) {
+    const std::string name = path.filename().string();
+    const std::string volume = quoted(folder_ / "volume.zfp");
+    if (name.ends_with(".md") ||
+        run_isowave("convert " + quoted(path) + " --rate 8 -o " + volume).status != 0)
+      continue;  // not a volume, or one that needs options
+    SCOPED_TRACE(name);
+    ++num_volumes;
+    const CompressedVolume info = read_zfp_file_info(folder_ / "volume.zfp");
+    const auto [low, high] = info.value_range;
+    std::mt19937 random(static_cast<unsigned>(name.size()));
+    std::string isovalues;
+    for (int i = 0; i < 3; ++i) {
+      const float share = std::uniform_real_distribution<float>(0.1f, 0.9f)(random);
+      isovalues += fmt::format(" -i {}", low + share * (high - low));
+    }
+    for (const int count : {2, 3, 8})
+      expect_same(volume, isovalues + " --orbit 1 --size 320x180", count);
+  }
+  EXPECT_GE(num_volumes, 1u);
+}
+
 TEST_F(CliRanks, StatisticsOfEachRank) {
   const ProgramResult result = run_command(
       on_ranks(2, "render " + kFuel + " -i 40 --size 64x48 --stats " + quoted(folder_ / "s.json")));
@@ -214,7 +322,7 @@ TEST_F(CliRanks, StatisticsOfEachRank) {
 
 TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   const std::string render = "render " + kFuel + " -i 40 --size 16x16 ";
-  expect_error(on_ranks(2, render + "--ambient 4"), "--ambient");
+  expect_error(on_ranks(2, render + "--max-surface-error 1"), "--max-surface-error");
   expect_error(on_ranks(2, render + "--bricks 2x2x1"), "2 processes draw a brick each");
   expect_error(on_ranks(2, render + "--voxel-pixels 1"), "convert --levels all");
   expect_error(on_ranks(2, "info " + kFuel), "only render and convert");

@@ -9,6 +9,8 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/view/detail.hpp"
+#include "core/volume/pyramid.hpp"
 
 namespace isowave::core {
 
@@ -22,11 +24,14 @@ constexpr std::size_t kSlabRays = 1u << 18;
 BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume,
                              const RendererOptions &options, const Cuts &cuts,
                              const VolumeInfo &whole, Team &team)
-    : renderer_(device, volume, options), cuts_(cuts), whole_(whole), team_(team) {}
+    : renderer_(device, volume, options), cuts_(cuts), whole_levels_{whole}, team_(team) {
+  while (options.with_levels && whole_levels_.size() <= volume.coarser_levels.size())
+    whole_levels_.push_back(coarser_level(whole_levels_.back()));
+}
 
 FrameStats BrickRenderer::render(const FrameRequest &request) {
   if (request.bound != FieldBound::kNone) throw Error("bricks have no bounds");
-  const View view = make_view(whole_, request.camera, renderer_.size_of(request));
+  const View view = make_view(whole_levels_.front(), request.camera, renderer_.size_of(request));
   place_ = cuts_.order_from({view.eye_x, view.eye_y, view.eye_z})[team_.rank()];
   own_hits_.clear();
   has_whole_ = false;
@@ -113,7 +118,15 @@ void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) 
   });
   const std::vector<HitRecord> hits = compose_hits(placed, kHitFields, Receiver::kAll);
   OpenCounts open{std::vector<uchar>(hits.size()), 0};
-  together(team_, [&] { renderer_.set_hits(hits); });
+  together(team_, [&] {
+    const std::vector<FrameParams> frames = make_level_frames(
+        whole_levels_, request.camera, renderer_.size(), request.isovalue, request.voxel_pixels);
+    const auto first = std::ranges::find_if(frames, draws);
+    const auto end = std::find_if_not(first, frames.end(), draws);
+    renderer_.begin_ambient(request, hits,
+                            {static_cast<std::size_t>(first - frames.begin()),
+                             static_cast<std::size_t>(end - frames.begin())});
+  });
   has_whole_ = true;
   for (std::uint32_t round = 0; round < request.ambient_rays && !stats.cancelled; ++round) {
     std::vector<std::uint64_t> blocked;

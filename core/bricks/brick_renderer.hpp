@@ -76,7 +76,7 @@ class BrickRenderer {
 
   Renderer renderer_;
   const Cuts &cuts_;
-  VolumeInfo whole_;
+  std::vector<VolumeInfo> whole_levels_;
   Team &team_;
   std::uint32_t place_ = 0;           ///< of the brick, seen from the frame's eye
   std::vector<HitRecord> own_hits_;   ///< empty: not read yet

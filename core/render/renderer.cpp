@@ -603,21 +603,35 @@ std::vector<HitRecord> Renderer::placed_hits() const {
       ++level;
     const FrameParams &frame = level_frames_[level];
     if (has_level_ids) hit.block_id = level_block_of(&frame, hit.block_id);
-    hit = placed_hit(&frame, static_cast<uint>(level), hit);
+    hit = placed_hit(&frame, static_cast<uint>(state_.drawing.first + level), hit);
   }
   return hits;
 }
 
-std::vector<std::uint64_t> Renderer::blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
-                                                  LaterPasses &stats) {
+void Renderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,
+                             LevelRange levels) {
   check_has_picture();
   check_has_given();
   if (!is_brick()) throw Error("only a brick's frames leave their ambient rays to others");
+  for (HitRecord &hit : placed) hit.cell -= static_cast<uint>(levels.first);
+  set_hits(placed);
+  // A ray stays in the level that has its hit, which this brick need not have drawn.
+  std::vector<FrameParams> frames =
+      make_level_frames(infos_of(state_.levels), request.camera, size_, request.isovalue, 0);
+  for (std::size_t level = 0; level < frames.size(); ++level) {
+    const bool may_have_rays = level >= levels.first && level < levels.end;
+    const View &view = frames[level].view;
+    frames[level].screen = {0, 0, view.width, view.height};  // hits are other bricks', too
+    frames[level].band = {.begin_t = 0,
+                          .end_t = may_have_rays ? std::numeric_limits<float>::infinity() : 0};
+  }
+  open_frame(std::move(frames), decoded_values(request), FieldBound::kNone, RaySource::kGiven);
+}
+
+std::vector<std::uint64_t> Renderer::blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
+                                                  LaterPasses &stats) {
   const auto begin = std::chrono::steady_clock::now();
-  const FrameOfPicture kept{state_.rays, state_.rays.frame};
   state_.rays.frame = level_frames_.front();
-  const View &view = state_.rays.frame.view;
-  state_.rays.frame.screen = {0, 0, view.width, view.height};  // hits are other bricks', too
   ambient_->begin(state_.levels[state_.drawing.first].info, num_rounds);
   LaterPasses passes;
   {
@@ -625,6 +639,7 @@ std::vector<std::uint64_t> Renderer::blocked_rays(std::uint32_t round, std::uint
     (*ambient_)(state_.rays, round);
   }
   trace_given({}, passes);
+  state_.rays.frame = state_.levels[0].frame;  // for shading
   std::vector<HitRecord> met(size_.num_rays());
   state_.rays.given_hits.read(met);
   std::vector<std::uint64_t> blocked((met.size() + 63) / 64);

@@ -100,16 +100,21 @@ class Renderer {
   // For bricks, of which pictures are put together (core/bricks): a brick's own frames have no
   // ambient rays, since these go on in others.
 
-  /// hits() as all bricks can read them: see placed_hit().
+  /// hits() as all bricks can read them, of any level of detail: see placed_hit().
   std::vector<HitRecord> placed_hits() const;
-  /// Casts a round of the frame's ambient rays through this brick, where the placed hits of all
-  /// bricks have been given by set_hits().
+  /// Begins the rounds of ambient rays of a frame that was drawn last and is not cancelled. They
+  /// leave the placed hits of all bricks, in the place of the brick's own.
   ///
-  /// round     0..num_rounds - 1
-  /// Returns   bits [(rays + 63) / 64]: the rays that meet a surface in this brick
-  /// Throws    Error: no frame was drawn; the renderer is not a brick's, or was made without given
-  ///           rays
-  /// Waits     yes
+  /// levels   of detail that draw the frame of the whole volume
+  /// Throws   Error: no frame was drawn; the renderer is not a brick's, or was made without given
+  ///          rays
+  /// Waits    yes
+  void begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed, LevelRange levels);
+  /// Casts a round of them through this brick.
+  ///
+  /// round    0..num_rounds - 1
+  /// Returns  bits [(rays + 63) / 64]: the rays that meet a surface in this brick
+  /// Waits    yes
   std::vector<std::uint64_t> blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
                                           LaterPasses &stats);
   /// What shade() takes for open(). Waits.

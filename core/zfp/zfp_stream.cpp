@@ -92,11 +92,8 @@ void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_
 
 void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing) {
   volume.info.spacing = spacing;
-  const VolumeInfo *finer = &volume.info;
-  for (CompressedVolume &level : volume.coarser_levels) {
-    level.info = coarser_level(*finer);
-    finer = &level.info;
-  }
+  glm::dvec3 of_level = spacing;
+  for (CompressedVolume &level : volume.coarser_levels) level.info.spacing = of_level *= 2.0;
 }
 
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options) {

@@ -99,7 +99,7 @@ ISO_INLINE AmbientDirection around(AmbientDirection n, AmbientDirection d) {
 }
 
 /// A hit that any brick can read: x, y, z are its position in the index space of its level of
-/// detail, of the whole volume, and cell is that level's number.
+/// detail, of the whole volume, and cell is that level's number, by which its rays go.
 ///
 /// of_level  of the level of detail that has the hit
 /// level     its number, 0: the finest that draws the frame

@@ -368,9 +368,6 @@ int MpiJob::finish(int status) {
 std::string MpiJob::command_line() {
   return {};
 }
-Team *MpiJob::team() {
-  return nullptr;
-}
 std::uint32_t MpiJob::local_rank() {
   return 0;
 }

@@ -25,7 +25,13 @@ class MpiJob {
   int finish(int status);
 
   /// None: this process is alone.
+#ifdef ISOWAVE_HAS_MPI
   static Team *team();
+#else
+  static Team *team() {
+    return nullptr;
+  }  // and compilers leave out what teams do
+#endif
   /// Where and how this process was started: a checksum.
   static std::string command_line();
   /// Number of this process among those of its host.

@@ -19,7 +19,7 @@ RANKS = 3
 @pytest.fixture(scope="module")
 def levelled(tmp_path_factory):
     path = tmp_path_factory.mktemp("levels") / "fuel.zfp"
-    isowave.open(FUEL, exact=True, levels=0).save(path)
+    isowave.open(FUEL, exact=True, levels=2).save(path)
     return path
 
 
