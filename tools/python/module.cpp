@@ -569,7 +569,8 @@ class PyProcesses : public isowave::Processes {
   std::vector<std::string> all_gather(const std::string &bytes) override {
     std::vector<std::string> all;
     call([&] {
-      for (const nb::handle each : object_.attr("all_gather")(nb::bytes(bytes.data(), bytes.size())))
+      for (const nb::handle each :
+           object_.attr("all_gather")(nb::bytes(bytes.data(), bytes.size())))
         all.emplace_back(nb::cast<nb::bytes>(each).c_str(), nb::cast<nb::bytes>(each).size());
     });
     return all;
@@ -628,8 +629,9 @@ class PyBrickRenderer {
     return frame_dict(processes_.without_gil([&] { return renderer_->render(request); }));
   }
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
-    return camera_tuple(processes_.without_gil(
-        [&] { return renderer_->camera(isovalue, isowave::ImageSize{width, height, 1}); }));
+    return camera_tuple(processes_.without_gil([&] {
+      return renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
+    }));
   }
   nb::dict device() const { return device_dict(renderer_->device()); }
   const isowave::Grid &grid() const { return renderer_->grid(); }

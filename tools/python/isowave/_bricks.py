@@ -44,7 +44,7 @@ class Processes:
 
     def together(self, work: Callable[[], Result]) -> Result:
         """What work() gives. Where it raises at one process, all raise, so that none waits."""
-        result, error = None, None
+        error: Exception | None = None
         try:
             result = work()
         except Exception as raised:  # noqa: BLE001: raised again below
@@ -55,7 +55,7 @@ class Processes:
         for rank, text in enumerate(texts):
             if text is not None:
                 raise _core.Error(f"rank {rank}: {text}")
-        return result  # type: ignore[return-value]
+        return result
 
 
 class BrickRenderer:
@@ -152,7 +152,8 @@ class BrickRenderer:
     @property
     def direction(self) -> npt.NDArray[np.float64]:
         """3 x 3; column a is the unit world direction (x, y, z) of index axis a, x, y, z."""
-        return np.array(self._core.direction).T
+        columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
+        return np.ascontiguousarray(columns.T)
 
     @property
     def device(self) -> dict[str, Any]:
