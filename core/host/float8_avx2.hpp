@@ -5,6 +5,29 @@
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {
 
+using Floats = float __attribute__((vector_size(32)));
+using Ints = std::int32_t __attribute__((vector_size(32)));
+using Mask = Ints;  ///< -1 or 0 in each lane
+
+inline Floats floats(float x) {
+  return Floats{x, x, x, x, x, x, x, x};
+}
+inline Ints ints(int x) {
+  return Ints{x, x, x, x, x, x, x, x};
+}
+
+inline Floats to_floats(Ints x) {
+  return __builtin_convertvector(x, Floats);
+}
+/// Towards 0.
+inline Ints to_ints(Floats x) {
+  return __builtin_convertvector(x, Ints);
+}
+
+inline Floats fabs(Floats x) {
+  return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7FFFFFFF);
+}
+
 /// Lane i in bit i.
 inline unsigned bits_of(Mask mask) {
   return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));

@@ -5,25 +5,100 @@
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {
 
-using Half = __m128;  ///< four lanes
+using Half = float __attribute__((vector_size(16), may_alias));  ///< four lanes; __m128
+using HalfInts = std::int32_t __attribute__((vector_size(16), may_alias));
 
-struct Halves {
-  Half low, high;
+template <class Lane>
+struct HalfOf {
+  using Type = Half;
+};
+template <>
+struct HalfOf<std::int32_t> {
+  using Type = HalfInts;
 };
 
-inline Halves halves(Floats x) {
-  return std::bit_cast<Halves>(x);
+/// Two halves, since compilers compare vectors of eight lane by lane where registers have four.
+template <class Lane>
+struct Eight {
+  using Four = typename HalfOf<Lane>::Type;
+  Four low, high;
+
+  Eight() = default;
+  Eight(Four a, Four b) : low(a), high(b) {}
+  // Of one number for all lanes, as vectors do in arithmetic.
+  Eight(Lane x) : low{x, x, x, x}, high{x, x, x, x} {}
+  Eight(Lane a, Lane b, Lane c, Lane d, Lane e, Lane f, Lane g, Lane h)
+      : low{a, b, c, d}, high{e, f, g, h} {}
+
+  Lane &operator[](std::size_t lane) { return reinterpret_cast<Lane *>(this)[lane]; }
+  Lane operator[](std::size_t lane) const { return reinterpret_cast<const Lane *>(this)[lane]; }
+
+  friend Eight operator-(Eight a) { return {-a.low, -a.high}; }
+  friend Eight operator~(Eight a) { return {~a.low, ~a.high}; }
+// NOLINTBEGIN(bugprone-macro-parentheses): an operator
+#define ISO_BY_HALVES(op)                           \
+  friend Eight operator op(Eight a, Eight b) {      \
+    return {a.low op b.low, a.high op b.high};      \
+  }                                                 \
+  friend Eight &operator op##=(Eight &a, Eight b) { \
+    return a = a op b;                              \
+  }
+  ISO_BY_HALVES(+)
+  ISO_BY_HALVES(-)
+  ISO_BY_HALVES(*)
+  ISO_BY_HALVES(/)
+  ISO_BY_HALVES(&)
+  ISO_BY_HALVES(|)
+  ISO_BY_HALVES(^)
+  ISO_BY_HALVES(<<)
+  ISO_BY_HALVES(>>)
+#undef ISO_BY_HALVES
+#define ISO_BY_HALVES(op)                                          \
+  friend Eight<std::int32_t> operator op(Eight a, Eight b) {       \
+    return {HalfInts(a.low op b.low), HalfInts(a.high op b.high)}; \
+  }
+  ISO_BY_HALVES(==)
+  ISO_BY_HALVES(!=)
+  ISO_BY_HALVES(<)
+  ISO_BY_HALVES(<=)
+  ISO_BY_HALVES(>)
+  ISO_BY_HALVES(>=)
+#undef ISO_BY_HALVES
+  // NOLINTEND(bugprone-macro-parentheses)
+};
+using Floats = Eight<float>;
+using Ints = Eight<std::int32_t>;
+using Mask = Ints;  ///< -1 or 0 in each lane
+
+inline Floats floats(float x) {
+  return x;
 }
-inline Halves halves(Ints x) {
-  return std::bit_cast<Halves>(x);
+inline Ints ints(int x) {
+  return x;
 }
-inline Floats joined(Half low, Half high) {
-  return std::bit_cast<Floats>(Halves{low, high});
+inline Floats to_floats(Ints x) {
+  return {__builtin_convertvector(x.low, Half), __builtin_convertvector(x.high, Half)};
+}
+/// Towards 0.
+inline Ints to_ints(Floats x) {
+  return {__builtin_convertvector(x.low, HalfInts), __builtin_convertvector(x.high, HalfInts)};
+}
+
+/// The same bits as the other kind.
+inline Floats as_floats(Ints x) {
+  return {reinterpret_cast<Half>(x.low), reinterpret_cast<Half>(x.high)};
+}
+inline Ints as_ints(Floats x) {
+  return {reinterpret_cast<HalfInts>(x.low), reinterpret_cast<HalfInts>(x.high)};
+}
+
+inline Floats fabs(Floats x) {
+  return as_floats(as_ints(x) & 0x7FFFFFFF);
 }
 
 /// Lane i in bit i.
 inline unsigned bits_of(Mask mask) {
-  const Halves x = halves(mask);
+  const Floats x = as_floats(mask);
   return static_cast<unsigned>(_mm_movemask_ps(x.low) | _mm_movemask_ps(x.high) << 4);
 }
 inline bool any(Mask mask) {
@@ -32,33 +107,24 @@ inline bool any(Mask mask) {
 
 /// a in the lanes of a mask, b in others.
 inline Floats pick(Mask mask, Floats a, Floats b) {
-  const Halves m = halves(mask), x = halves(a), y = halves(b);
-  return joined(_mm_blendv_ps(y.low, x.low, m.low), _mm_blendv_ps(y.high, x.high, m.high));
+  const Floats m = as_floats(mask);
+  return {_mm_blendv_ps(b.low, a.low, m.low), _mm_blendv_ps(b.high, a.high, m.high)};
 }
 inline Ints pick(Mask mask, Ints a, Ints b) {
-  return std::bit_cast<Ints>(pick(mask, std::bit_cast<Floats>(a), std::bit_cast<Floats>(b)));
+  return as_ints(pick(mask, as_floats(a), as_floats(b)));
 }
 
 inline Floats smaller(Floats a, Floats b) {
-  const Halves x = halves(a), y = halves(b);
-  return joined(_mm_min_ps(x.low, y.low), _mm_min_ps(x.high, y.high));
+  return {_mm_min_ps(a.low, b.low), _mm_min_ps(a.high, b.high)};
 }
 inline Floats larger(Floats a, Floats b) {
-  const Halves x = halves(a), y = halves(b);
-  return joined(_mm_max_ps(x.low, y.low), _mm_max_ps(x.high, y.high));
-}
-inline Ints joined(__m128i low, __m128i high) {
-  return std::bit_cast<Ints>(Halves{_mm_castsi128_ps(low), _mm_castsi128_ps(high)});
+  return {_mm_max_ps(a.low, b.low), _mm_max_ps(a.high, b.high)};
 }
 inline Ints smaller(Ints a, Ints b) {
-  const Halves x = halves(a), y = halves(b);
-  return joined(_mm_min_epi32(_mm_castps_si128(x.low), _mm_castps_si128(y.low)),
-                _mm_min_epi32(_mm_castps_si128(x.high), _mm_castps_si128(y.high)));
+  return pick(a < b, a, b);
 }
 inline Ints larger(Ints a, Ints b) {
-  const Halves x = halves(a), y = halves(b);
-  return joined(_mm_max_epi32(_mm_castps_si128(x.low), _mm_castps_si128(y.low)),
-                _mm_max_epi32(_mm_castps_si128(x.high), _mm_castps_si128(y.high)));
+  return pick(a > b, a, b);
 }
 
 /// Of the two lower lanes, in those. The product is exact in float64. The sum is rounded to odd:
@@ -81,28 +147,25 @@ inline Half fma_of_two(Half a, Half b, Half c) {
                 moved = _mm_and_si128(_mm_andnot_si128(is_odd, step), _mm_castpd_si128(is_inexact));
   return _mm_cvtpd_ps(_mm_castsi128_pd(_mm_add_epi64(bits, moved)));
 }
-inline Half fma_of_half(Half a, Half b, Half c) {
+/// A call: there are many, and it is long.
+[[maybe_unused]] static __attribute__((noinline)) Half fma_of_half(Half a, Half b, Half c) {
   return _mm_movelh_ps(fma_of_two(a, b, c),
                        fma_of_two(_mm_movehl_ps(a, a), _mm_movehl_ps(b, b), _mm_movehl_ps(c, c)));
 }
 inline Floats fma(Floats a, Floats b, Floats c) {
-  const Halves x = halves(a), y = halves(b), z = halves(c);
-  return joined(fma_of_half(x.low, y.low, z.low), fma_of_half(x.high, y.high, z.high));
+  return {fma_of_half(a.low, b.low, c.low), fma_of_half(a.high, b.high, c.high)};
 }
 
-inline Floats sqrt(Floats a) {
-  const Halves x = halves(a);
-  return joined(_mm_sqrt_ps(x.low), _mm_sqrt_ps(x.high));
+inline Floats sqrt(Floats x) {
+  return {_mm_sqrt_ps(x.low), _mm_sqrt_ps(x.high)};
 }
-inline Floats floor(Floats a) {
-  const Halves x = halves(a);
-  return joined(_mm_floor_ps(x.low), _mm_floor_ps(x.high));
+inline Floats floor(Floats x) {
+  return {_mm_floor_ps(x.low), _mm_floor_ps(x.high)};
 }
 /// The nearest whole number; halves to an even one.
-inline Floats rint(Floats a) {
+inline Floats rint(Floats x) {
   constexpr int kNearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC;
-  const Halves x = halves(a);
-  return joined(_mm_round_ps(x.low, kNearest), _mm_round_ps(x.high, kNearest));
+  return {_mm_round_ps(x.low, kNearest), _mm_round_ps(x.high, kNearest)};
 }
 
 /// Gives lanes the halves of each one's 64-bit number. numbers: below 2^31.

@@ -9,6 +9,7 @@
 
 // All that a loop calls becomes part of it, and so is compiled for the processor that it is for.
 #define ISO_WHOLE_LOOP __attribute__((flatten))
+#define ISO_OF_ITS_OWN __attribute__((noinline))
 #if defined(__x86_64__)
 #include <immintrin.h>
 #define ISO_HAS_WIDE_LOOPS 1
@@ -177,8 +178,8 @@ inline ActiveBox active_box(const Surface &surface, LastPlanes last) {
 
 /// Walks from macrocell to macrocell, in those with an active block from block to block, and in
 /// active blocks from cell to cell.
-inline bool trace_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
-                      LastPlanes last, const Ray &ray, HitRecord *hit) {
+inline bool walk_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
+                     LastPlanes last, const Ray &ray, HitRecord *hit) {
   constexpr int kVoxels = 4 * ISO_MACROCELL_BLOCKS;
   const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
   RayEvent enter;
@@ -213,6 +214,21 @@ inline bool trace_ray(const FrameParams &frame, const HostField &field, const Ac
   return false;
 }
 
+// Three loops trace rays: each calls this, which is long.
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_anywhere(const FrameParams &frame,
+                                                      const HostField &field, const ActiveBox &box,
+                                                      LastPlanes last, const Ray &ray,
+                                                      HitRecord *hit) {
+  return walk_ray(frame, field, box, last, ray, hit);
+}
+#ifdef ISO_HAS_WIDE_LOOPS
+ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_wide(const FrameParams &frame, const HostField &field,
+                                                 const ActiveBox &box, LastPlanes last,
+                                                 const Ray &ray, HitRecord *hit) {
+  return walk_ray(frame, field, box, last, ray, hit);
+}
+#endif
+
 /// Gives the hits of a tile smooth gradients.
 inline void smooth(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits) {
@@ -225,6 +241,7 @@ inline void smooth(const FrameParams &frame, const HostField &field, const RayTi
   }
 }
 
+template <auto kTraceRay>
 inline uint trace_rays(const FrameParams &frame, const HostField &field, const RayTile &tile,
                        bool is_smooth, HitRecord *hits) {
   const LastPlanes last = last_planes(&frame);
@@ -233,24 +250,26 @@ inline uint trace_rays(const FrameParams &frame, const HostField &field, const R
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
       const uint ray_id = x + frame.view.width * y;
-      num_hits += trace_ray(frame, field, box, last, make_ray(&frame, ray_id), hits + ray_id);
+      num_hits += kTraceRay(frame, field, box, last, make_ray(&frame, ray_id), hits + ray_id);
     }
   }
   if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
   return num_hits;
 }
 
+template <auto kTraceRay>
 inline void cast(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                  uint num_rays, bool is_smooth, HitRecord *hits) {
   const LastPlanes last = last_planes(&frame);
   const ActiveBox box = active_box(frame.surface, last);
   for (uint i = 0; i < num_rays; ++i) {
-    if (!trace_ray(frame, field, box, last, make_given_ray(rays[i].ray), hits + i)) continue;
+    if (!kTraceRay(frame, field, box, last, make_given_ray(rays[i].ray), hits + i)) continue;
     hits[i].t *= rays[i].t_scale;
     if (is_smooth) smooth_gradient(frame, field, last, hits + i);
   }
 }
 
+template <auto kTraceRay>
 inline void ambient(const FrameParams &frame, const HostField &field, const RayTile &tile,
                     const AmbientRays &rays, const HitRecord *hits, uchar *open_counts) {
   const LastPlanes last = last_planes(&frame);
@@ -266,7 +285,7 @@ inline void ambient(const FrameParams &frame, const HostField &field, const RayT
       for (uint k = 0; k < rays.num_rays; ++k) {
         const GivenRay given = ambient_ray(&frame, &rays.params, placed, ray_id,
                                            rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
-        num_open += !trace_ray(frame, field, box, last, make_given_ray(given), &met);
+        num_open += !kTraceRay(frame, field, box, last, make_given_ray(given), &met);
       }
       open_counts[ray_id] = static_cast<uchar>(num_open);
     }
@@ -296,17 +315,17 @@ ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
 }
 ISO_WHOLE_LOOP uint trace_rays_anywhere(const FrameParams &frame, const HostField &field,
                                         const RayTile &tile, bool is_smooth, HitRecord *hits) {
-  return trace_rays(frame, field, tile, is_smooth, hits);
+  return trace_rays<trace_ray_anywhere>(frame, field, tile, is_smooth, hits);
 }
 ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &field,
                                   const IndexRay *rays, uint num_rays, bool is_smooth,
                                   HitRecord *hits) {
-  cast(frame, field, rays, num_rays, is_smooth, hits);
+  cast<trace_ray_anywhere>(frame, field, rays, num_rays, is_smooth, hits);
 }
 ISO_WHOLE_LOOP void ambient_anywhere(const FrameParams &frame, const HostField &field,
                                      const RayTile &tile, const AmbientRays &rays,
                                      const HitRecord *hits, uchar *open_counts) {
-  ambient(frame, field, tile, rays, hits, open_counts);
+  ambient<trace_ray_anywhere>(frame, field, tile, rays, hits, open_counts);
 }
 ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
                                    uint samples, uint row, const HitRecord *hits,
@@ -340,16 +359,16 @@ ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, 
 }
 ISO_WIDE_LOOP uint trace_rays_wide(const FrameParams &frame, const HostField &field,
                                    const RayTile &tile, bool is_smooth, HitRecord *hits) {
-  return trace_rays(frame, field, tile, is_smooth, hits);
+  return trace_rays<trace_ray_wide>(frame, field, tile, is_smooth, hits);
 }
 ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                              uint num_rays, bool is_smooth, HitRecord *hits) {
-  cast(frame, field, rays, num_rays, is_smooth, hits);
+  cast<trace_ray_wide>(frame, field, rays, num_rays, is_smooth, hits);
 }
 ISO_WIDE_LOOP void ambient_wide(const FrameParams &frame, const HostField &field,
                                 const RayTile &tile, const AmbientRays &rays, const HitRecord *hits,
                                 uchar *open_counts) {
-  ambient(frame, field, tile, rays, hits, open_counts);
+  ambient<trace_ray_wide>(frame, field, tile, rays, hits, open_counts);
 }
 ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
                               uint row, const HitRecord *hits, const uchar *open_counts,
