@@ -173,7 +173,10 @@ class MpiFile : public SharedFile {
     target_ = target.string();
     try {
       together(team, [&] {
-        check(MPI_File_open(MPI_COMM_SELF, name_.c_str(), MPI_MODE_WRONLY, MPI_INFO_NULL, &file_));
+        check([&] {
+          return MPI_File_open(MPI_COMM_SELF, name_.c_str(), MPI_MODE_WRONLY, MPI_INFO_NULL,
+                               &file_);
+        });
       });
     } catch (...) {
       remove();
@@ -188,15 +191,12 @@ class MpiFile : public SharedFile {
     while (!bytes.empty()) {
       MPI_Status status;
       int count = 0;
-      int result = MPI_SUCCESS;
-      {
+      check([&] {
         const Hushed hushed;
-        errno = 0;
-        result = MPI_File_write_at(file_, static_cast<MPI_Offset>(offset), bytes.data(),
-                                   static_cast<int>(std::min(bytes.size(), kMostBytes)), MPI_BYTE,
-                                   &status);
-      }
-      check(result);
+        return MPI_File_write_at(file_, static_cast<MPI_Offset>(offset), bytes.data(),
+                                 static_cast<int>(std::min(bytes.size(), kMostBytes)), MPI_BYTE,
+                                 &status);
+      });
       // On a full disk, it may write what fits, and say why not the rest only when asked again.
       MPI_Get_count(&status, MPI_BYTE, &count);
       if (count <= 0) fail(std::strerror(errno != 0 ? errno : EIO));
@@ -207,8 +207,8 @@ class MpiFile : public SharedFile {
 
   void commit() override {
     together(team_, [&] {
-      check(MPI_File_sync(file_));
-      check(MPI_File_close(&file_));
+      check([&] { return MPI_File_sync(file_); });
+      check([&] { return MPI_File_close(&file_); });
     });
     together(team_, [&] {
       if (is_first() && std::rename(name_.c_str(), follow_links(target_).c_str()) != 0)
@@ -223,7 +223,10 @@ class MpiFile : public SharedFile {
   [[noreturn]] void fail(const char *reason) const {
     throw Error("{}: cannot write: {}", target_, reason);
   }
-  void check(int result) const {
+  template <class Call>
+  void check(const Call &call) const {
+    errno = 0;
+    const int result = call();
     if (result == MPI_SUCCESS) return;
     if (errno != 0) fail(std::strerror(errno));
     std::array<char, MPI_MAX_ERROR_STRING + 1> text{};
