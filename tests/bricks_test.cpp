@@ -240,7 +240,7 @@ TEST_P(BricksOnDevice, LevelsOfDetail) {
 }
 
 /// Ambient rays begin in any brick and go on in others: they meet what they meet in the whole.
-class AmbientBricksOnDevice : public BricksOnDevice {
+class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   void check(const CompressedVolume &whole, const Cuts &cuts, const std::vector<Camera> &cameras,
              RendererOptions options, std::uint32_t num_rays, double voxel_pixels = 0) {
@@ -254,8 +254,7 @@ class AmbientBricksOnDevice : public BricksOnDevice {
     const std::size_t num_levels = infos.size();
     for (const BlockBox &own : cuts.bricks()) {
       bricks.push_back(cut_brick(whole, own, num_levels));
-      renderers.push_back(
-          std::make_unique<Renderer>(device_, bricks.back(), GetParam().with(options)));
+      renderers.push_back(std::make_unique<Renderer>(device_, bricks.back(), options));
     }
     const std::size_t num_pixels = options.size.num_rays();
     std::uint64_t num_met_elsewhere = 0;
@@ -314,9 +313,11 @@ class AmbientBricksOnDevice : public BricksOnDevice {
     }
     EXPECT_GT(num_met_elsewhere, 0u);
   }
+
+  ocl::Device device_{GetParam()};
 };
-INSTANTIATE_TEST_SUITE_P(Pipelines, AmbientBricksOnDevice,
-                         testing::ValuesIn(pipelines_under_test()), pipeline_test_name);
+INSTANTIATE_TEST_SUITE_P(Devices, AmbientBricksOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
 
 TEST_P(AmbientBricksOnDevice, SmallFrame) {
   const TestVolume volume({14, 15, 13}, test::gyroid_field(6));
@@ -331,7 +332,6 @@ TEST_P(AmbientBricksOnDevice, EyesOutsideInsideAndOnCuts) {
 }
 
 TEST_P(AmbientBricksOnDevice, LevelsOfDetail) {
-  if (GetParam().pipeline == PipelineKind::kBlocks) return;  // draws the finest level alone
   const VolumeInfo info = test::grid_info({50, 44, 60});
   ArrayReader reader(info, test::sample(info.dims, test::gyroid_field(14)));
   const CompressedVolume whole = compress(reader, {.rate = 8, .levels = 3});
