@@ -36,13 +36,11 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
     open_counts[pixel] =
         (uchar)(round == 0 ? 0u : open_counts[pixel] + (given_hits[pixel].t == INFINITY));
     if (round == num_rounds) continue;
-#if ISO_PLACED_HITS
-    const HitRecord placed = hit;
-#else
-    ISO_FRAME_OF(level, hit.block_id);
-    const HitRecord placed =
-        placed_hit(level, ISO_LEVELS ? level_of(frames, num_frames, hit.block_id) : 0u, hit);
-#endif
+    HitRecord placed = hit;
+    if (!ISO_PLACED_HITS) {
+      ISO_FRAME_OF(level, hit.block_id);
+      placed = placed_hit(level, ISO_LEVELS ? level_of(frames, num_frames, hit.block_id) : 0u, hit);
+    }
     given[pixel] =
         ambient_ray(frame, &params, placed, pixel,
                     directions[round * ISO_AMBIENT_PATTERNS + ambient_pattern(frame, pixel)]);

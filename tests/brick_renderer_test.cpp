@@ -75,6 +75,11 @@ constexpr ImageSize kFrame{49, 33};
 
 class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
+  void SetUp() override {
+    if (is_llvmpipe(GetParam()) && !long_tests())
+      GTEST_SKIP() << "each thread compiles all kernels, which takes llvmpipe minutes";
+  }
+
   using Work = std::function<void(BrickRenderer &renderer, std::uint32_t rank)>;
 
   /// Each rank of a team does this with its brick.

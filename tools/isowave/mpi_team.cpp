@@ -90,7 +90,7 @@ class MpiTeam : public Team {
   void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
     requests_.push_back(MPI_REQUEST_NULL);
     const int count = static_cast<int>(words.size());
-    const MPI_Op op = how == Reduction::kMin ? MPI_MIN : MPI_BOR;
+    MPI_Op op = how == Reduction::kMin ? MPI_MIN : MPI_BOR;
     if (who == Receiver::kAll) {
       MPI_Iallreduce(MPI_IN_PLACE, words.data(), count, MPI_UINT64_T, op, MPI_COMM_WORLD,
                      &requests_.back());
@@ -107,18 +107,18 @@ class MpiTeam : public Team {
 
   void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received) override {
     std::vector<MPI_Request> requests;
-    for (const auto &[rank, bytes] : sent) {
-      for_pieces(bytes, [&](std::span<const std::byte> piece) {
+    for (const Outgoing &message : sent) {
+      for_pieces(message.bytes, [&](std::span<const std::byte> piece) {
         requests.push_back(MPI_REQUEST_NULL);
-        MPI_Isend(piece.data(), static_cast<int>(piece.size()), MPI_BYTE, static_cast<int>(rank), 0,
-                  MPI_COMM_WORLD, &requests.back());
+        MPI_Isend(piece.data(), static_cast<int>(piece.size()), MPI_BYTE,
+                  static_cast<int>(message.rank), 0, MPI_COMM_WORLD, &requests.back());
       });
     }
-    for (const auto &[rank, bytes] : received) {
-      for_pieces(bytes, [&](std::span<std::byte> piece) {
+    for (const Incoming &message : received) {
+      for_pieces(message.bytes, [&](std::span<std::byte> piece) {
         requests.push_back(MPI_REQUEST_NULL);
-        MPI_Irecv(piece.data(), static_cast<int>(piece.size()), MPI_BYTE, static_cast<int>(rank), 0,
-                  MPI_COMM_WORLD, &requests.back());
+        MPI_Irecv(piece.data(), static_cast<int>(piece.size()), MPI_BYTE,
+                  static_cast<int>(message.rank), 0, MPI_COMM_WORLD, &requests.back());
       });
     }
     wait_for(requests);
