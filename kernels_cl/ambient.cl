@@ -6,6 +6,10 @@
 #include "device/level_borders.h"
 #include "portable/ambient.h"
 
+#ifndef ISO_PLACED_HITS   /* by -D */
+#define ISO_PLACED_HITS 0 /* 1: hits are placed_hit()s, of whatever brick */
+#endif
+
 /// frame_params, frames, num_frames  as start_rays
 /// directions  [num_rounds][ISO_AMBIENT_PATTERNS]
 /// round       0..num_rounds: the rays to make; num_rounds: none
@@ -32,9 +36,13 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
     open_counts[pixel] =
         (uchar)(round == 0 ? 0u : open_counts[pixel] + (given_hits[pixel].t == INFINITY));
     if (round == num_rounds) continue;
-    ISO_FRAME_OF(level, hit.block_id);
-    given[pixel] = ambient_ray(
-        frame, level, ISO_LEVELS ? level_of(frames, num_frames, hit.block_id) : 0u, &params, hit,
-        pixel, directions[round * ISO_AMBIENT_PATTERNS + ambient_pattern(frame, pixel)]);
+    HitRecord placed = hit;
+    if (!ISO_PLACED_HITS) {
+      ISO_FRAME_OF(level, hit.block_id);
+      placed = placed_hit(level, ISO_LEVELS ? level_of(frames, num_frames, hit.block_id) : 0u, hit);
+    }
+    given[pixel] =
+        ambient_ray(frame, &params, placed, pixel,
+                    directions[round * ISO_AMBIENT_PATTERNS + ambient_pattern(frame, pixel)]);
   }
 }

@@ -293,10 +293,11 @@ std::vector<uchar> count_open(std::span<const FrameParams> frames,
       while (frames.size() > 1 && level_block_of(&frames[level], hit.block_id) == ISO_INVALID_ID)
         ++level;
       if (frames.size() > 1) hit.block_id = level_block_of(&frames[level], hit.block_id);
+      const HitRecord placed = placed_hit(&frames[level], static_cast<uint>(level - first), hit);
       for (std::uint32_t k = 0; k < num_rays; ++k) {
-        const GivenRay given = ambient_ray(
-            &seen, &frames[level], static_cast<uint>(level - first), &params, hit, pixel,
-            directions[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
+        const GivenRay given =
+            ambient_ray(&seen, &params, placed, pixel,
+                        directions[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
         const HitRecord met =
             trace(frames[level], voxels[level].data(), solver, make_given_ray(given));
         counts[pixel] = static_cast<uchar>(counts[pixel] + !std::isfinite(met.t));

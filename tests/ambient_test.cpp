@@ -114,14 +114,16 @@ TEST(AmbientRays, BeginAboveTheHitAndLeaveByTheNormal) {
     glm::dvec3 normal = glm::normalize(glm::transpose(glm::inverse(to_world)) * gradient);
     if (glm::dot(normal, view) > 0) normal = -normal;
     for (const AmbientDirection &direction : directions) {
-      const GivenRay given = ambient_ray(&frame, &frame, 0, &params, hit, pixel, direction);
+      const GivenRay given =
+          ambient_ray(&frame, &params, placed_hit(&frame, 0, hit), pixel, direction);
       const glm::dvec3 lift = glm::dvec3(given.o_x, given.o_y, given.o_z) - at;
       // Coordinates are below 32 and rounded by at most 2^-20 of a voxel.
       EXPECT_NEAR(glm::length(lift), 0.5, 1e-5);
       EXPECT_NEAR(glm::dot(glm::normalize(to_world * lift), normal), 1, 1e-5);
       const glm::dvec3 d = glm::normalize(to_world * glm::dvec3(given.d_x, given.d_y, given.d_z));
       EXPECT_NEAR(glm::dot(d, normal), direction.z, 1e-5);
-      const GivenRay coarser = ambient_ray(&frame, &frame, 2, &params, hit, pixel, direction);
+      const GivenRay coarser =
+          ambient_ray(&frame, &params, placed_hit(&frame, 2, hit), pixel, direction);
       EXPECT_EQ(coarser.d_x, given.d_x / 4) << "voxels four times as long";
       EXPECT_EQ(coarser.level, 2u);
     }

@@ -19,6 +19,7 @@
 #include "core/render/renderer.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "kernels_cl/portable/block_cells.h"
+#include "reference/twin.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
@@ -238,6 +239,127 @@ TEST_P(BricksOnDevice, LevelsOfDetail) {
   EXPECT_EQ(num_levels, kLevels);
 }
 
+/// Ambient rays begin in any brick and go on in others: they meet what they meet in the whole.
+class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  /// Frames that say no more of a device than a small one.
+  bool is_too_slow() const { return is_llvmpipe(GetParam()) && !long_tests(); }
+
+  void check(const CompressedVolume &whole, const Cuts &cuts, const std::vector<Camera> &cameras,
+             RendererOptions options, std::uint32_t num_rays, double voxel_pixels = 0) {
+    constexpr float kIsovalue = 0.2f;
+    options.with_given_rays = true;
+    options.with_levels = voxel_pixels > 0;
+    const Twin twin(whole, voxel_pixels);
+    std::vector<CompressedVolume> bricks;
+    std::vector<std::unique_ptr<Renderer>> renderers;
+    const std::vector<VolumeInfo> infos = level_infos(whole, options.with_levels);
+    const std::size_t num_levels = infos.size();
+    for (const BlockBox &own : cuts.bricks()) {
+      bricks.push_back(cut_brick(whole, own, num_levels));
+      renderers.push_back(std::make_unique<Renderer>(device_, bricks.back(), options));
+    }
+    const std::size_t num_pixels = options.size.num_rays();
+    std::uint64_t num_met_elsewhere = 0;
+    for (std::size_t view = 0; view < cameras.size(); ++view) {
+      SCOPED_TRACE(fmt::format("view {}", view));
+      const View rays = make_view(whole.info, cameras[view], options.size);
+      const auto places = cuts.order_from({rays.eye_x, rays.eye_y, rays.eye_z});
+      std::vector<HitRecord> placed(num_pixels, no_hit());
+      std::vector<std::uint32_t> place(num_pixels, kNoPlace);
+      for (std::size_t brick = 0; brick < bricks.size(); ++brick) {
+        renderers[brick]->render(
+            {.camera = cameras[view], .isovalue = kIsovalue, .voxel_pixels = voxel_pixels});
+        const std::vector<HitRecord> own = renderers[brick]->placed_hits();
+        for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
+          if (!std::isfinite(own[pixel].t) || places[brick] > place[pixel]) continue;
+          place[pixel] = places[brick];
+          placed[pixel] = own[pixel];
+        }
+      }
+      const std::vector<FrameParams> frames =
+          make_level_frames(infos, cameras[view], options.size, kIsovalue, voxel_pixels);
+      const auto first = std::ranges::find_if(frames, draws);
+      const LevelRange levels{
+          std::size_t(first - frames.begin()),
+          std::size_t(first - frames.begin() + std::count_if(first, frames.end(), draws))};
+      OpenCounts open{std::vector<uchar>(num_pixels), num_rays};
+      for (std::uint32_t round = 0; round < num_rays; ++round) {
+        std::vector<bool> is_met(num_pixels);
+        for (std::size_t brick = 0; brick < bricks.size(); ++brick) {
+          if (round == 0) {
+            renderers[brick]->begin_ambient({.camera = cameras[view], .isovalue = kIsovalue},
+                                            placed, levels);
+          }
+          LaterPasses stats;
+          const auto blocked = renderers[brick]->blocked_rays(round, num_rays, stats);
+          EXPECT_GT(stats.passes, 0u);
+          for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
+            const bool meets = (blocked[pixel / 64] >> pixel % 64 & 1) != 0;
+            num_met_elsewhere += meets && place[pixel] != places[brick];
+            is_met[pixel] = is_met[pixel] || meets;
+          }
+        }
+        for (std::size_t pixel = 0; pixel < num_pixels; ++pixel)
+          open.counts[pixel] = static_cast<uchar>(
+              open.counts[pixel] + (std::isfinite(placed[pixel].t) && !is_met[pixel]));
+      }
+      const std::vector<HitRecord> hits = twin.render(cameras[view], options.size, kIsovalue);
+      const OpenCounts expected = twin.open(cameras[view], options.size, kIsovalue, hits, num_rays);
+      EXPECT_EQ(open.counts, expected.counts);
+      Renderer &renderer = *renderers.front();
+      renderer.set_open(open);
+      const FrameParams frame =
+          make_frame_params(whole.info, cameras[view], options.size, kIsovalue);
+      EXPECT_EQ(renderer.shade().pixels,
+                shade_scalar(frame, make_shade_params(whole.info, {}), hits, 1, expected).pixels);
+    }
+    EXPECT_GT(num_met_elsewhere, 0u);
+  }
+
+  ocl::Device device_{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, AmbientBricksOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+TEST_P(AmbientBricksOnDevice, SmallFrame) {
+  const TestVolume volume({14, 15, 13}, test::gyroid_field(6));
+  check(volume.compressed, Cuts(blocks_along(volume.info()), 2),
+        {orbit_cameras(volume.info(), 1)[0]}, {.size = {7, 5}}, 1);
+}
+
+TEST_P(AmbientBricksOnDevice, EyesOutsideInsideAndOnCuts) {
+  if (is_too_slow()) GTEST_SKIP() << "llvmpipe takes minutes";
+  const TestVolume volume({37, 30, 26}, test::gyroid_field(9));
+  check(volume.compressed, Cuts(blocks_along(volume.info()), glm::uvec3(2, 2, 1)),
+        views_of(volume.info(), {16, 16, 12}), {.size = {31, 23}, .cache_slots = 100}, 3);
+}
+
+TEST_P(AmbientBricksOnDevice, LevelsOfDetail) {
+  if (is_too_slow()) GTEST_SKIP() << "llvmpipe takes minutes";
+  const VolumeInfo info = test::grid_info({50, 44, 60});
+  ArrayReader reader(info, test::sample(info.dims, test::gyroid_field(14)));
+  const CompressedVolume whole = compress(reader, {.rate = 8, .levels = 3});
+  const Cuts cuts(blocks_along(info), 3, num_blocks, cut_unit(3));
+  for (const double voxel_pixels : {0.7, 6.0})  // several levels, and a coarser one alone
+    check(whole, cuts, {orbit_cameras(info, 2)[1]}, {.size = {37, 29}}, 2, voxel_pixels);
+}
+
+TEST_P(AmbientBricksOnDevice, RaysThatGoOnAreRefused) {
+  if (is_too_slow()) GTEST_SKIP() << "compiling its kernels takes llvmpipe minutes";
+  const TestVolume volume({9, 10, 11}, test::noise_field(3), 8);
+  const Cuts cuts(blocks_along(volume.info()), 2);
+  const CompressedVolume brick = cut_brick(volume.compressed, cuts.bricks()[0]);
+  const RendererOptions options{.size = {6, 5}, .with_given_rays = true};
+  Renderer renderer(device_, brick, options);
+  const Camera camera = orbit_cameras(volume.info(), 1)[0];
+  EXPECT_THROW(renderer.render({.camera = camera, .ambient_rays = 1}), Error);
+  EXPECT_THROW(renderer.cast_rays({}, 0.1f, Normals::kCell), Error);
+  Renderer whole(device_, volume.compressed, options);
+  whole.render({.camera = camera});
+  EXPECT_THROW(whole.begin_ambient({.camera = camera}, whole.hits(), {}), Error);
+}
+
 // ---- without a device
 
 /// What a brick keeps is the whole's, bit for bit, cut out of it or compressed by itself.
@@ -276,6 +398,25 @@ TEST(Bricks, KeepTheWholesVoxels) {
       }
     }
     std::filesystem::remove(path);
+  }
+}
+
+/// Another spacing moves no brick: see isowave::core::tools::load_brick().
+TEST(Bricks, LevelsKeepTheirPlaces) {
+  const VolumeInfo info = test::grid_info({41, 37, 33});
+  ArrayReader reader(info, test::sample(info.dims, test::noise_field(6)));
+  const CompressedVolume whole = compress(reader, {.rate = 8, .levels = 3});
+  const Cuts cuts(blocks_along(info), 2, num_blocks, cut_unit(3));
+  CompressedVolume brick = cut_brick(whole, cuts.bricks()[1], 3);
+  const std::vector<VolumeInfo> before = level_infos(brick, true);
+  set_spacing(brick, {2, 3, 4});
+  const std::vector<VolumeInfo> after = level_infos(brick, true);
+  ASSERT_EQ(after.size(), 3u);
+  for (std::size_t level = 0; level < 3; ++level) {
+    EXPECT_NE(before[level].brick, BrickOf{});
+    EXPECT_EQ(after[level].brick, before[level].brick);
+    EXPECT_EQ(after[level].dims, before[level].dims);
+    EXPECT_EQ(after[level].spacing, before[level].spacing * glm::dvec3(2, 3, 4));
   }
 }
 

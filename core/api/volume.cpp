@@ -40,15 +40,6 @@ glm::uvec3 to_uvec3(const std::array<std::uint32_t, 3> &values) {
   return {values[0], values[1], values[2]};
 }
 
-Grid public_grid(const core::VolumeInfo &info) {
-  Grid grid;
-  grid.dims = {info.dims.x, info.dims.y, info.dims.z};
-  grid.spacing = from_glm(info.spacing);
-  grid.origin = from_glm(info.origin);
-  for (int axis = 0; axis < 3; ++axis) grid.direction.at(axis) = from_glm(info.direction[axis]);
-  return grid;
-}
-
 bool is_default(const Compression &compression) {
   return !compression.rate && !compression.tolerance && !compression.relative_tolerance &&
          !compression.exact && !compression.measure_error && compression.levels == 1 &&
@@ -100,6 +91,29 @@ std::shared_ptr<const Volume> make_volume(core::CompressedVolume volume) {
 }
 
 }  // namespace
+
+Grid public_grid(const core::VolumeInfo &info) {
+  Grid grid;
+  grid.dims = {info.dims.x, info.dims.y, info.dims.z};
+  grid.spacing = from_glm(info.spacing);
+  grid.origin = from_glm(info.origin);
+  for (int axis = 0; axis < 3; ++axis) grid.direction.at(axis) = from_glm(info.direction[axis]);
+  return grid;
+}
+
+core::RawOverrides to_overrides(const RawFile &raw) {
+  core::RawOverrides overrides;
+  if (raw.dims) overrides.dims = to_uvec3(*raw.dims);
+  if (raw.type) overrides.type = core_type(*raw.type);
+  if (raw.spacing) overrides.spacing = to_glm(*raw.spacing);
+  return overrides;
+}
+
+core::Storage storage_for(const std::string &path, const Compression &compression) {
+  if (core::is_zfp_name(path) && !is_default(compression))
+    throw core::Error("{}: is compressed already: leave out how to compress it", path);
+  return to_storage(compression);
+}
 
 Volume::Implementation::Implementation(core::CompressedVolume compressed)
     : volume(std::move(compressed)), grid(public_grid(volume.info)) {}
@@ -165,17 +179,11 @@ std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
                                           const Compression &compression, const RawFile &raw) {
   const std::string name = path.string();
   return guarded("opening a volume", [&] {
-    core::RawOverrides overrides;
-    if (raw.dims) overrides.dims = {(*raw.dims)[0], (*raw.dims)[1], (*raw.dims)[2]};
-    if (raw.type) overrides.type = core_type(*raw.type);
-    if (raw.spacing) overrides.spacing = to_glm(*raw.spacing);
-    if (core::is_zfp_name(name)) {
-      if (!is_default(compression))
-        throw core::Error("{}: is compressed already: leave out how to compress it", name);
-      return make_volume(core::open_compressed_volume(name, overrides));
-    }
+    const core::RawOverrides overrides = to_overrides(raw);
+    const core::Storage storage = storage_for(name, compression);
+    if (core::is_zfp_name(name)) return make_volume(core::open_compressed_volume(name, overrides));
     return make_volume(core::compress_volume([&] { return core::open_any_volume(name, overrides); },
-                                             name, to_storage(compression)));
+                                             name, storage));
   });
 }
 

@@ -1,6 +1,9 @@
 #pragma once
-// Private to core/api: what is behind isowave::Volume.
+// Private to core/api: what is behind isowave::Volume, and what opening one asks for.
 
+#include <string>
+
+#include "core/sources/load_volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/volume.hpp"
 
@@ -12,5 +15,10 @@ struct Volume::Implementation {
   core::CompressedVolume volume;
   Grid grid;
 };
+
+Grid public_grid(const core::VolumeInfo &info);
+core::RawOverrides to_overrides(const RawFile &raw);
+/// Throws  core::Error: a `.zfp` file cannot be compressed; several ways to compress
+core::Storage storage_for(const std::string &path, const Compression &compression);
 
 }  // namespace isowave

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <limits>
+#include <cmath>
+#include <cstring>
+#include <exception>
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/view/detail.hpp"
+#include "core/volume/pyramid.hpp"
 
 namespace isowave::core {
 
@@ -15,28 +19,137 @@ namespace {
 /// Rays of a slab.
 constexpr std::size_t kSlabRays = 1u << 18;
 
-HitRecord nothing() {
-  HitRecord hit{};
-  hit.t = std::numeric_limits<float>::infinity();
-  hit.block_id = hit.cell = ISO_INVALID_ID;
-  return hit;
-}
-
 }  // namespace
 
 BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume,
                              const RendererOptions &options, const Cuts &cuts,
                              const VolumeInfo &whole, Team &team)
-    : renderer_(device, volume, options), cuts_(cuts), whole_(whole), team_(team) {}
+    : renderer_(device, volume, options), cuts_(cuts), whole_levels_{whole}, team_(team) {
+  while (options.with_levels && whole_levels_.size() <= volume.coarser_levels.size())
+    whole_levels_.push_back(coarser_level(whole_levels_.back()));
+}
 
 FrameStats BrickRenderer::render(const FrameRequest &request) {
-  if (request.bound != FieldBound::kNone || request.ambient_rays != 0)
-    throw Error("bricks have no bounds and no ambient rays");
-  own_hits_.clear();
-  FrameStats stats = renderer_.render(request);
-  const View view = make_view(whole_, request.camera, renderer_.size());
+  if (request.bound != FieldBound::kNone) throw Error("bricks have no bounds");
+  const View view = make_view(whole_levels_.front(), request.camera, renderer_.size_of(request));
   place_ = cuts_.order_from({view.eye_x, view.eye_y, view.eye_z})[team_.rank()];
+  own_hits_.clear();
+  has_whole_ = false;
+  FrameRequest own = request;
+  own.ambient_rays = 0;
+  FrameStats stats;
+  if (request.on_pass) {
+    stats = render_in_step(own);
+  } else {
+    together(team_, [&] { stats = renderer_.render(own); });
+  }
+  if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
   return stats;
+}
+
+/// A rank that is through goes on to take part in pictures, until all are.
+FrameStats BrickRenderer::render_in_step(const FrameRequest &request) {
+  enum State : char { kAtWork, kThrough, kFailed };
+  bool all_through = false, one_failed = false, is_stopped = false;
+  PassStats last;
+  const auto tell = [&](State state) {
+    const std::vector<std::string> states = team_.all_gather(std::string(1, state));
+    const auto is = [](State wanted) {
+      return [wanted](const std::string &each) { return each.front() == wanted; };
+    };
+    all_through = std::ranges::all_of(states, is(kThrough));
+    one_failed = std::ranges::any_of(states, is(kFailed));
+  };
+  const auto take_part = [&](State state) {
+    tell(state);
+    if (all_through || one_failed) return false;
+    own_hits_.clear();
+    is_stopped = !request.on_pass(last);
+    return !is_stopped;
+  };
+  FrameStats stats;
+  FrameRequest own = request;
+  own.on_pass = [&](const PassStats &pass) {
+    last = pass;
+    return take_part(kAtWork);
+  };
+  try {
+    stats = renderer_.render(own);
+    while (!is_stopped && !one_failed && take_part(kThrough)) {
+    }
+  } catch (...) {
+    if (!is_stopped && !one_failed) tell(kFailed);
+    const auto failure = std::current_exception();
+    together(team_, [&] { std::rethrow_exception(failure); });
+  }
+  together(team_, [] {});
+  const std::vector<std::string> cancelled =
+      team_.all_gather(stats.cancelled ? "cancelled" : std::string());
+  stats.cancelled =
+      std::ranges::any_of(cancelled, [](const std::string &each) { return !each.empty(); });
+  return stats;
+}
+
+TimedFrame BrickRenderer::render_within(const FrameRequest &request, double budget_ms) {
+  if (!timed_frames_) {
+    const auto now = [this] {
+      const double ms = TimedFrames::steady_clock_ms();
+      std::string text(sizeof(ms), '\0');
+      std::memcpy(text.data(), &ms, sizeof(ms));
+      double of_rank0 = 0;
+      std::memcpy(&of_rank0, team_.all_gather(text).front().data(), sizeof(of_rank0));
+      return of_rank0;
+    };
+    timed_frames_.emplace(renderer_, now,
+                          [this](const FrameRequest &of_step) { return render(of_step); });
+  }
+  TimedFrame frame = timed_frames_->render(request, budget_ms);
+  if (!has_whole_) own_hits_.clear();  // the kept picture's may fill them
+  return frame;
+}
+
+/// All ranks get the hits that are seen, and each casts their rays through its brick. A ray is open
+/// where it meets nothing in any.
+void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
+  std::vector<HitRecord> placed;
+  together(team_, [&] {
+    own_hits();
+    placed = renderer_.placed_hits();
+  });
+  const std::vector<HitRecord> hits = compose_hits(placed, kHitFields, Receiver::kAll);
+  OpenCounts open{std::vector<uchar>(hits.size()), 0};
+  together(team_, [&] {
+    const std::vector<FrameParams> frames = make_level_frames(
+        whole_levels_, request.camera, renderer_.size(), request.isovalue, request.voxel_pixels);
+    const auto first = std::ranges::find_if(frames, draws);
+    const auto end = std::find_if_not(first, frames.end(), draws);
+    renderer_.begin_ambient(request, hits,
+                            {static_cast<std::size_t>(first - frames.begin()),
+                             static_cast<std::size_t>(end - frames.begin())});
+  });
+  has_whole_ = true;
+  for (std::uint32_t round = 0; round < request.ambient_rays && !stats.cancelled; ++round) {
+    std::vector<std::uint64_t> blocked;
+    together(team_,
+             [&] { blocked = renderer_.blocked_rays(round, request.ambient_rays, stats.ambient); });
+    const auto begin = std::chrono::steady_clock::now();
+    reduce(blocked, Reduction::kOr, Receiver::kRank0);
+    team_.finish_reductions();
+    composition_.ms += ms_since(begin);
+    open.num_ambient = round + 1;
+    for (std::size_t ray = 0; ray < hits.size(); ++ray) {
+      const bool is_open = std::isfinite(hits[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
+      open.counts[ray] = static_cast<uchar>(open.counts[ray] + is_open);
+    }
+    const bool is_last = open.num_ambient == request.ambient_rays;
+    if (!is_last && !request.on_pass) continue;
+    together(team_, [&] {
+      renderer_.set_open(open);
+      PassStats pass;
+      pass.completed_percent = 100;
+      stats.cancelled = request.on_pass && !request.on_pass(pass) && !is_last;
+    });
+  }
 }
 
 std::span<const HitRecord> BrickRenderer::own_hits() {
@@ -44,15 +157,20 @@ std::span<const HitRecord> BrickRenderer::own_hits() {
   return own_hits_;
 }
 
-void BrickRenderer::compose(const MakeWords &make_words) {
+/// Begins one.
+void BrickRenderer::reduce(std::span<std::uint64_t> words, Reduction how, Receiver who) {
+  team_.begin_reduction(words, how, who);
+  ++composition_.reductions;
+  composition_.bytes += words.size_bytes();
+}
+
+void BrickRenderer::compose(const MakeWords &make_words, Receiver who) {
   const auto begin = std::chrono::steady_clock::now();
   words_.resize(renderer_.size().num_rays());
   for (std::size_t first = 0; first < words_.size(); first += kSlabRays) {
     const auto slab = std::span(words_).subspan(first, std::min(kSlabRays, words_.size() - first));
     make_words(first, slab);
-    team_.begin_reduce_min(slab);
-    ++composition_.reductions;
-    composition_.bytes += slab.size_bytes();
+    reduce(slab, Reduction::kMin, who);
   }
   team_.finish_reductions();
   num_hits_ = static_cast<std::uint64_t>(
@@ -60,43 +178,52 @@ void BrickRenderer::compose(const MakeWords &make_words) {
   composition_.ms += ms_since(begin);
 }
 
-void BrickRenderer::compose_field(HitField field, std::span<HitRecord> hits) {
-  const std::span own = own_hits();
-  compose([&](std::size_t begin, std::span<std::uint64_t> words) {
-    field_words(own.subspan(begin, words.size()), field, place_, words);
-  });
-  if (team_.rank() == 0) set_field(words_, field, hits);
+std::vector<HitRecord> BrickRenderer::compose_hits(std::span<const HitRecord> own,
+                                                   std::span<const HitField> fields, Receiver who) {
+  const bool receives = who == Receiver::kAll || team_.rank() == 0;
+  std::vector<HitRecord> hits(receives ? own.size() : 0, no_hit());
+  for (const HitField field : fields) {
+    compose(
+        [&](std::size_t begin, std::span<std::uint64_t> words) {
+          field_words(own.subspan(begin, words.size()), field, place_, words);
+        },
+        who);
+    set_field(words_, field, hits);
+  }
+  return hits;
 }
 
 Image8 BrickRenderer::shade(const Appearance &appearance) {
+  const bool receives = team_.rank() == 0;
+  if (has_whole_) return receives ? renderer_.shade(appearance) : Image8{};
   const ImageSize size = renderer_.size();
   if (size.samples > 1) {
     // The mean of a pixel's colours is made of more than 8 bits of each.
-    std::vector<HitRecord> hits(team_.rank() == 0 ? size.num_rays() : 0, nothing());
-    for (const HitField field :
-         {HitField::kT, HitField::kGradX, HitField::kGradY, HitField::kGradZ})
-      compose_field(field, hits);
-    if (team_.rank() != 0) return {};
+    constexpr HitField kShaded[] = {HitField::kT, HitField::kGradX, HitField::kGradY,
+                                    HitField::kGradZ};
+    const std::vector<HitRecord> hits = compose_hits(own_hits(), kShaded);
+    if (!receives) return {};
     renderer_.set_hits(hits);
-    return renderer_.shade(appearance);
+    Image8 image = renderer_.shade(appearance);
+    renderer_.set_hits(own_hits());  // passes may follow
+    return image;
   }
   const std::vector<std::uint32_t> colors = renderer_.shade_packed(appearance);
-  compose([&](std::size_t begin, std::span<std::uint64_t> words) {
-    color_words(std::span(colors).subspan(begin, words.size()), place_, words);
-  });
-  return team_.rank() == 0 ? image_of(words_, size.width, size.height) : Image8{};
+  compose(
+      [&](std::size_t begin, std::span<std::uint64_t> words) {
+        color_words(std::span(colors).subspan(begin, words.size()), place_, words);
+      },
+      Receiver::kRank0);
+  return receives ? image_of(words_, size.width, size.height) : Image8{};
 }
 
 std::vector<float> BrickRenderer::depth() {
-  std::vector<HitRecord> hits(team_.rank() == 0 ? own_hits().size() : 0, nothing());
-  compose_field(HitField::kT, hits);
-  return depth_of(hits);
+  constexpr HitField kDepth[] = {HitField::kT};
+  return depth_of(compose_hits(own_hits(), kDepth));
 }
 
 std::vector<HitRecord> BrickRenderer::hits() {
-  std::vector<HitRecord> hits(team_.rank() == 0 ? own_hits().size() : 0, nothing());
-  for (const HitField field : kHitFields) compose_field(field, hits);
-  return hits;
+  return compose_hits(own_hits(), kHitFields);
 }
 
 }  // namespace isowave::core

@@ -2,12 +2,14 @@
 // Draws one brick of a volume, and with the team that draws the others the picture of the whole:
 // at rank 0, with the bits that one renderer of all would draw.
 
+#include <optional>
 #include <vector>
 
+#include "core/base/team.hpp"
 #include "core/bricks/compose.hpp"
 #include "core/bricks/cuts.hpp"
-#include "core/bricks/team.hpp"
 #include "core/render/renderer.hpp"
+#include "core/render/time_budget.hpp"
 
 namespace isowave::core {
 
@@ -28,11 +30,17 @@ class BrickRenderer {
   BrickRenderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
                 const Cuts &cuts, const VolumeInfo &whole, Team &team);
 
-  /// Draws this rank's brick.
+  /// Draws this rank's brick. Ambient rays go through those of all ranks.
   ///
-  /// Returns  what that took
-  /// Throws   Error: as Renderer::render(); bounds and ambient rays, which go on in other bricks
+  /// request  its on_pass, which all ranks have or none, is called at all of them after each pass
+  ///          that any has, be this rank through or not: it may ask for the picture so far, and
+  ///          must return the same at all
+  /// Returns  what that took; cancelled: where any rank is not through
+  /// Throws   Error at every rank: as Renderer::render(), and what on_pass throws, at one; bounds,
+  ///          which go on in other bricks
   FrameStats render(const FrameRequest &request);
+  /// As TimedFrames::render(), by the clock of rank 0.
+  TimedFrame render_within(const FrameRequest &request, double budget_ms);
 
   // Of the last frame, all bricks together. Rank 0 has the picture, the others nothing.
 
@@ -55,20 +63,28 @@ class BrickRenderer {
  private:
   using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
 
+  FrameStats render_in_step(const FrameRequest &request);
+  void add_ambient(const FrameRequest &request, FrameStats &stats);
+  void reduce(std::span<std::uint64_t> words, Reduction how, Receiver who);
   /// In slabs: while one is on its way, the next is made.
-  void compose(const MakeWords &make_words);
-  void compose_field(HitField field, std::span<HitRecord> hits);
+  void compose(const MakeWords &make_words, Receiver who);
+  /// Of bricks' hits, those that win.
+  std::vector<HitRecord> compose_hits(std::span<const HitRecord> own,
+                                      std::span<const HitField> fields,
+                                      Receiver who = Receiver::kRank0);
   std::span<const HitRecord> own_hits();
 
   Renderer renderer_;
   const Cuts &cuts_;
-  VolumeInfo whole_;
+  std::vector<VolumeInfo> whole_levels_;
   Team &team_;
   std::uint32_t place_ = 0;           ///< of the brick, seen from the frame's eye
   std::vector<HitRecord> own_hits_;   ///< empty: not read yet
+  bool has_whole_ = false;            ///< the renderer has the hits of all bricks already
   std::vector<std::uint64_t> words_;  ///< [ray]; at rank 0 the smallest ones
   std::uint64_t num_hits_ = 0;
   CompositionStats composition_;
+  std::optional<TimedFrames> timed_frames_;
 };
 
 }  // namespace isowave::core

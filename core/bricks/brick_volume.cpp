@@ -5,8 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/error.hpp"
 #include "core/bricks/cuts.hpp"
 #include "core/ocl/device.hpp"
+#include "core/view/detail.hpp"
+#include "core/view/frame.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "core/zfp/block_decoder.hpp"
 #include "core/zfp/cut_blocks.hpp"
@@ -129,6 +132,28 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
   CompressedVolume volume = compress(reader, options);
   if (storage.device) storage.device->timer().collect();  // they belong to no frame
   return volume;
+}
+
+std::vector<VolumeInfo> read_levels(const std::string &path, const RawOverrides &overrides) {
+  if (!is_zfp_name(path)) return {open_any_volume(path, overrides)->info()};
+  if (overrides.dims || overrides.type) throw Error("{}: dims and type are for raw files", path);
+  CompressedVolume volume = read_zfp_file_info(path);
+  if (overrides.spacing) set_spacing(volume, *overrides.spacing);
+  check_volume_info(volume.info, path);
+  return level_infos(volume, true);
+}
+
+CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
+                            const Storage &storage, const VolumeInfo &info, std::size_t num_levels,
+                            const BlockBox &own) {
+  check_drawable(brick_info(info, own), path);
+  if (is_zfp_name(path)) {
+    CompressedVolume volume = read_brick(path, own, num_levels);
+    set_spacing(volume, info.spacing);
+    return volume;
+  }
+  return compress_brick([&] { return open_any_volume(path, overrides, storage.device); }, path,
+                        storage, own);
 }
 
 std::vector<float> range_samples(const CompressedVolume &brick, const VolumeInfo &whole) {

@@ -5,6 +5,7 @@
 // whole volume ends, so does a brick. So its hits, and their normals, have the bits of the whole.
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "core/sources/load_volume.hpp"
@@ -53,6 +54,21 @@ CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &o
 /// Throws  Error as compress_volume()
 CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
                                 const Storage &storage, const BlockBox &own);
+
+/// What open_compressed_volume() or open_any_volume() would give, of which only grids are there,
+/// the finest level of detail first.
+///
+/// Throws  Error as those do, but not on what only bricks can be drawn of
+std::vector<VolumeInfo> read_levels(const std::string &path, const RawOverrides &overrides);
+
+/// A brick of such a volume, with so many levels of detail: read, or compressed.
+///
+/// info    of the finest level, as read_levels() has it
+/// storage its device also makes generated voxels
+/// Throws  Error also on what cannot be drawn
+CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
+                            const Storage &storage, const VolumeInfo &info, std::size_t num_levels,
+                            const BlockBox &own);
 
 /// What the whole volume's thresholds of value ranges are made of (range_thresholds()), as far as
 /// it is in the brick's own blocks: together, the bricks give what the whole would. Of volumes of

@@ -279,10 +279,11 @@ inline void ambient(const FrameParams &frame, const HostField &field, const RayT
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
       const uint ray_id = x + frame.view.width * y;
       if (hits[ray_id].t == INFINITY) continue;
+      const HitRecord placed = placed_hit(&frame, 0, hits[ray_id]);
       const uint pattern = ambient_pattern(&frame, ray_id);
       uint num_open = 0;
       for (uint k = 0; k < rays.num_rays; ++k) {
-        const GivenRay given = ambient_ray(&frame, &frame, 0, &rays.params, hits[ray_id], ray_id,
+        const GivenRay given = ambient_ray(&frame, &rays.params, placed, ray_id,
                                            rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
         num_open += !kTraceRay(frame, field, box, last, make_given_ray(given), &met);
       }

@@ -262,7 +262,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
   if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
   if (options_.with_given_rays) {
     given_pipeline_ = make_given_pipeline(state_, options_.group_size, options_.solver);
-    ambient_.emplace(device, state_.rays.num_rays, state_.levels.size() > 1);
+    ambient_.emplace(device, state_.rays.num_rays, state_.levels.size() > 1, is_brick());
   }
   options_.cache_slots = wanted_slots_ = plan_.cache_slots;
   is_small_cache_ = plan_.cache_slots < kSmallCache && !plan_.can_grow() &&
@@ -367,6 +367,8 @@ void Renderer::check(const FrameRequest &request) const {
 
 void Renderer::begin_frame(const FrameRequest &request) {
   check(request);
+  if (request.ambient_rays != 0 && is_brick())
+    throw Error("a brick's ambient rays go on in other bricks: see BrickRenderer");
   const ImageSize size = size_of(request);
   std::vector<FrameParams> frames = make_level_frames(infos_of(state_.levels), request.camera, size,
                                                       request.isovalue, request.voxel_pixels);
@@ -502,6 +504,7 @@ Camera Renderer::camera(std::span<const float> isovalues, std::optional<ImageSiz
 std::vector<HitRecord> Renderer::cast_rays(std::span<const WorldRay> world_rays, float isovalue,
                                            Normals normals) {
   check_has_given();
+  if (is_brick()) throw Error("rays of any origin go on in other bricks");
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
   const std::vector<IndexRay> rays = make_index_rays(state_.levels[0].info, world_rays);
   Wavefront &wavefront = state_.rays;
@@ -588,6 +591,73 @@ OpenCounts Renderer::open() const {
   open.counts.resize(size_.num_rays());
   state_.rays.open_counts.read(open.counts);
   return open;
+}
+
+std::vector<HitRecord> Renderer::placed_hits() const {
+  std::vector<HitRecord> hits = this->hits();
+  const bool has_level_ids = level_frames_.size() > 1 || level_frames_.front().place.begin_z != 0;
+  for (HitRecord &hit : hits) {
+    if (hit.t == std::numeric_limits<float>::infinity()) continue;
+    std::size_t level = 0;
+    while (has_level_ids && level_block_of(&level_frames_[level], hit.block_id) == ISO_INVALID_ID)
+      ++level;
+    const FrameParams &frame = level_frames_[level];
+    if (has_level_ids) hit.block_id = level_block_of(&frame, hit.block_id);
+    hit = placed_hit(&frame, static_cast<uint>(state_.drawing.first + level), hit);
+  }
+  return hits;
+}
+
+void Renderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,
+                             LevelRange levels) {
+  check_has_picture();
+  check_has_given();
+  if (!is_brick()) throw Error("only a brick's frames leave their ambient rays to others");
+  for (HitRecord &hit : placed) hit.cell -= static_cast<uint>(levels.first);
+  set_hits(placed);
+  // A ray stays in the level that has its hit, which this brick need not have drawn.
+  std::vector<FrameParams> frames =
+      make_level_frames(infos_of(state_.levels), request.camera, size_, request.isovalue, 0);
+  for (std::size_t level = 0; level < frames.size(); ++level) {
+    const bool may_have_rays = level >= levels.first && level < levels.end;
+    const View &view = frames[level].view;
+    frames[level].screen = {0, 0, view.width, view.height};  // hits are other bricks', too
+    frames[level].band = {.begin_t = 0,
+                          .end_t = may_have_rays ? std::numeric_limits<float>::infinity() : 0};
+  }
+  open_frame(std::move(frames), decoded_values(request), FieldBound::kNone, RaySource::kGiven);
+}
+
+std::vector<std::uint64_t> Renderer::blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
+                                                  LaterPasses &stats) {
+  const auto begin = std::chrono::steady_clock::now();
+  state_.rays.frame = level_frames_.front();
+  ambient_->begin(state_.levels[state_.drawing.first].info, num_rounds);
+  LaterPasses passes;
+  {
+    const auto stage = device_.timer().stage("ambient");
+    (*ambient_)(state_.rays, round);
+  }
+  trace_given({}, passes);
+  state_.rays.frame = state_.levels[0].frame;  // for shading
+  std::vector<HitRecord> met(size_.num_rays());
+  state_.rays.given_hits.read(met);
+  std::vector<std::uint64_t> blocked((met.size() + 63) / 64);
+  for (std::size_t ray = 0; ray < met.size(); ++ray) {
+    const bool meets = met[ray].t != std::numeric_limits<float>::infinity();
+    blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
+  }
+  wanted_slots_ = std::max(wanted_slots_, grown_cache_slots(plan_, passes.recycled_blocks));
+  passes.ms = ms_since(begin);
+  stats += passes;
+  return blocked;
+}
+
+void Renderer::set_open(const OpenCounts &open) {
+  check_has_picture();
+  check_has_given();
+  state_.rays.open_counts.write(open.counts);
+  state_.rays.num_ambient = open.num_ambient;
 }
 
 KeptPicture &Renderer::kept() {

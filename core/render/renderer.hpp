@@ -97,6 +97,29 @@ class Renderer {
   /// Waits   yes
   OpenCounts open() const;
 
+  // For bricks, of which pictures are put together (core/bricks): a brick's own frames have no
+  // ambient rays, since these go on in others.
+
+  /// hits() as all bricks can read them, of any level of detail: see placed_hit().
+  std::vector<HitRecord> placed_hits() const;
+  /// Begins the rounds of ambient rays of a frame that was drawn last and is not cancelled. They
+  /// leave the placed hits of all bricks, in the place of the brick's own.
+  ///
+  /// levels   of detail that draw the frame of the whole volume
+  /// Throws   Error: no frame was drawn; the renderer is not a brick's, or was made without given
+  ///          rays
+  /// Waits    yes
+  void begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed, LevelRange levels);
+  /// Casts a round of them through this brick.
+  ///
+  /// round    0..num_rounds - 1
+  /// Returns  bits [(rays + 63) / 64]: the rays that meet a surface in this brick
+  /// Waits    yes
+  std::vector<std::uint64_t> blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
+                                          LaterPasses &stats);
+  /// What shade() takes for open(). Waits.
+  void set_open(const OpenCounts &open);
+
   // For pictures of one frame with more and more pixels (core/render/time_budget.hpp). Without
   // options().with_kept_picture these three throw Error.
 
@@ -144,6 +167,7 @@ class Renderer {
   void compile_kernels();
   void check_has_picture() const;
   void check_has_given() const;
+  bool is_brick() const { return state_.levels[0].info.brick != BrickOf{}; }
   KeptPicture &kept();
   void begin_frame(const FrameRequest &request);
   void open_frame(std::vector<FrameParams> frames, const std::vector<DecodedValues> &values,

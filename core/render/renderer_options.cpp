@@ -14,9 +14,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   check_volume_info(volume.info, "the volume");
   check_image_size(options.size);
   if (options.with_levels) check_has_levels(volume);
-  const BrickOf &brick = volume.info.brick;
-  if (options.with_given_rays && (brick.first_voxel + brick.before + brick.behind) != glm::uvec3(0))
-    throw Error("a brick draws rays of the camera alone: others go on in other bricks");
   if (options.with_levels && options.pipeline == PipelineKind::kBlocks)
     throw Error(
         "pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");

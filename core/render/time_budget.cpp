@@ -35,8 +35,8 @@ double TimedFrames::steady_clock_ms() {
       .count();
 }
 
-TimedFrames::TimedFrames(Renderer &renderer, Clock now)
-    : renderer_(renderer), now_(std::move(now)) {
+TimedFrames::TimedFrames(Renderer &renderer, Clock now, Draw draw)
+    : renderer_(renderer), now_(std::move(now)), draw_(std::move(draw)) {
   if (!renderer.options().with_kept_picture)
     throw Error("no frame can be drawn within a time: the renderer was made to keep no picture");
 }
@@ -61,7 +61,7 @@ TimedFrame TimedFrames::render(const FrameRequest &request, double budget_ms) {
       pass_begin = now;
       return !frame.stopped && (!may_be_cancelled || now + pass_ms - begin <= budget_ms);
     };
-    const FrameStats stats = renderer_.render(in_time);
+    const FrameStats stats = draw_ ? draw_(in_time) : renderer_.render(in_time);
     const bool whole = !stats.cancelled,
                has_all_hits = stats.passes.back().counts.next_active_count == 0;
     const double now = now_(), step_ms = now - step_begin;

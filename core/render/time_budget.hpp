@@ -35,11 +35,13 @@ struct TimedFrame {
 class TimedFrames {
  public:
   using Clock = std::function<double()>;  ///< [ms]
+  using Draw = std::function<FrameStats(const FrameRequest &)>;
 
-  /// now: for tests. `renderer` must outlive this.
+  /// now: for tests, and for bricks, which decide alike; draw: instead of Renderer::render(), with
+  /// that renderer. `renderer` must outlive this.
   ///
   /// Throws  Error: it was made to keep no picture
-  explicit TimedFrames(Renderer &renderer, Clock now = steady_clock_ms);
+  explicit TimedFrames(Renderer &renderer, Clock now = steady_clock_ms, Draw draw = {});
 
   /// Draws the smallest picture, however long it takes, then the largest that is expected to be
   /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
@@ -63,6 +65,7 @@ class TimedFrames {
 
   Renderer &renderer_;
   Clock now_;
+  Draw draw_;
   std::array<double, kNumSteps>
       last_ms_{};  ///< what each step took when it was drawn last; 0: unknown
 };

@@ -94,7 +94,7 @@ std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string
   };
   check("tolerance", storage.tolerance);
   check("relative tolerance", storage.relative_tolerance);
-  InputOptions input{storage.map_nan, {}, storage.num_threads};
+  InputOptions input{storage.map_nan, {}, storage.num_threads, storage.part};
   ErrorGoal goal{storage.tolerance.value_or(0), storage.exact};
   if (storage.relative_tolerance) goal.tolerance = absolute_tolerance(open, what, storage, input);
   input.progress = step(storage, "measuring errors");

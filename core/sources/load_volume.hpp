@@ -24,6 +24,7 @@ struct Storage {
   std::optional<float> map_nan{};              ///< see InputOptions
   std::uint32_t num_threads = 0;               ///< see InputOptions
   ocl::Device *device = nullptr;               ///< encodes at a fixed rate
+  const VolumePart *part = nullptr;            ///< see InputOptions
   /// Makes the progress of each step, which it is told: "compressing".
   std::function<Progress(std::string_view step)> progress{};
 

@@ -8,6 +8,16 @@
 
 namespace isowave::core {
 
+namespace {
+
+ocl::Defines defines_of(bool placed) {
+  ocl::Defines defines = group_defines(ocl::kGroupSize);
+  if (placed) defines.insert({"ISO_PLACED_HITS", "1"});
+  return defines;
+}
+
+}  // namespace
+
 void check_ambient_rays(std::uint32_t num_rays) {
   if (num_rays > ISO_MAX_AMBIENT_RAYS)
     throw Error("{} ambient rays of a hit are too many: up to {} can be cast", num_rays,
@@ -44,10 +54,10 @@ ocl::BufferSizes Ambient::sizes() {
                                              ISO_MAX_AMBIENT_RAYS * ISO_AMBIENT_PATTERNS)};
 }
 
-Ambient::Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels)
+Ambient::Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels, bool placed)
     : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       directions_(device, sizes()["ambient directions"]),
-      kernel_(device, "ambient", group_defines(ocl::kGroupSize), levels) {}
+      kernel_(device, "ambient", defines_of(placed), levels) {}
 
 void Ambient::begin(const VolumeInfo &info, std::uint32_t num_rays) {
   check_ambient_rays(num_rays);

@@ -24,7 +24,8 @@ class Ambient {
  public:
   static ocl::BufferSizes sizes();
   /// levels: frames may have several levels of detail.
-  Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels = false);
+  /// placed: rays.hits are placed_hit()s.
+  Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels = false, bool placed = false);
 
   /// Before the rounds of a frame.
   ///

@@ -45,7 +45,9 @@ struct Findings {
   double source_min = std::numeric_limits<double>::infinity(),
          source_max = -std::numeric_limits<double>::infinity();
 
-  bool refused() const { return bad_count > 0 || too_large_count > 0; }
+  bool others_refused = false;  ///< of voxels that another process counts
+
+  bool refused() const { return bad_count > 0 || too_large_count > 0 || others_refused; }
 
   void add(const Findings &other) {
     bad_count += other.bad_count;
@@ -54,6 +56,7 @@ struct Findings {
     first_too_large = std::min(first_too_large, other.first_too_large);
     min = std::min(min, other.min);
     max = std::max(max, other.max);
+    others_refused |= other.others_refused;
     add_source(other.source_min, other.source_max);
   }
   void add_source(double least, double largest) {
@@ -171,12 +174,18 @@ void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
   }
 }
 
+/// Whether this process counts a layer of its reader.
+bool is_own(const VolumePart *part, std::uint32_t z) {
+  return part == nullptr || (part->begin + z >= part->own_begin && part->begin + z < part->own_end);
+}
+
 /// Checks the rows of a chunk and has them coded, unless a voxel was refused: what follows is only
 /// counted then. source: of its voxels, where they are still to be cast.
 Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm::uvec3 &dims,
                    const InputOptions &options, ChunkCoder &coder) {
   const std::uint64_t layer = std::uint64_t(dims.x) * dims.y, rows_per_slab = (dims.y + 3u) / 4u;
   const std::uint64_t blocks_x = (dims.x + 3u) / 4u;
+  const std::uint32_t first_z = chunk.z + (options.part != nullptr ? options.part->begin : 0);
   std::vector<Findings> findings(thread_count(options.num_threads));
   parallel_for(chunk.num_rows, options.num_threads, [&](std::uint64_t index, std::uint32_t thread) {
     const auto y = std::uint32_t(index % rows_per_slab) * kBlockEdge,
@@ -185,14 +194,21 @@ Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm
     float *lost = chunk.lost.data() + index * blocks_x;
     const BlockRow row{index, chunk.voxels.data() + begin, std::min(kBlockEdge, dims.y - y),
                        std::min(kBlockEdge, chunk.num_layers - z), lost};
-    Findings &found = findings[thread];
+    Findings found;
     for (std::uint64_t i = 0; i < std::uint64_t(row.ny) * row.nz; ++i) {
       const std::uint64_t at = begin + i / row.ny * layer + i % row.ny * dims.x;
       check_line({chunk.voxels.subspan(at, dims.x),
-                  source.empty() ? source : source.subspan(at, dims.x), chunk.z * layer + at, lost},
+                  source.empty() ? source : source.subspan(at, dims.x), first_z * layer + at, lost},
                  options.map_nan, found);
     }
-    if (!found.refused()) coder.code_row(row, thread);
+    if (!is_own(options.part, chunk.z + z)) {
+      const bool refused = found.refused();
+      found = {};
+      found.others_refused = refused;
+    }
+    Findings &all = findings[thread];
+    all.add(found);
+    if (!all.refused()) coder.code_row(row, thread);
   });
   Findings total;
   for (const Findings &found : findings) total.add(found);
@@ -222,7 +238,7 @@ void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options
 }
 
 ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder) {
-  check_volume_info(reader.info(), "volume");
+  check_volume_info(options.part != nullptr ? options.part->whole : reader.info(), "volume");
   if (options.map_nan && !(std::abs(*options.map_nan) < kMaxMagnitude)) {
     throw Error("--map-nan {}: must be finite and below {:.4g}", *options.map_nan, kMaxMagnitude);
   }
@@ -256,20 +272,32 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
   Findings total;
   Layers current, next;
   std::vector<float> lost;
-  std::future<void> pending = read_ahead(0, next);
-  for (std::uint32_t z = 0; z < dims.z; z += chunk_layers) {
-    pending.get();
-    std::swap(current, next);
-    pending = read_ahead(std::uint64_t(z) + chunk_layers, next);
-    Chunk chunk = make_chunk(dims, z, current.voxels);
-    lost.assign(chunk.num_rows * ((dims.x + 3u) / 4u), 0.0f);
-    chunk.lost = lost;
-    coder.begin_chunk(chunk);
-    total.add(code_rows(chunk, current.source, dims, options, coder));
-    if (!total.refused()) coder.end_chunk(chunk);
-    if (options.progress) options.progress(z + layers_at(z), dims.z);
+  const auto read_all = [&] {
+    std::future<void> pending = read_ahead(0, next);
+    for (std::uint32_t z = 0; z < dims.z; z += chunk_layers) {
+      pending.get();
+      std::swap(current, next);
+      pending = read_ahead(std::uint64_t(z) + chunk_layers, next);
+      Chunk chunk = make_chunk(dims, z, current.voxels);
+      lost.assign(chunk.num_rows * ((dims.x + 3u) / 4u), 0.0f);
+      chunk.lost = lost;
+      coder.begin_chunk(chunk);
+      total.add(code_rows(chunk, current.source, dims, options, coder));
+      if (!total.refused()) coder.end_chunk(chunk);
+      if (options.progress) options.progress(z + layers_at(z), dims.z);
+    }
+  };
+  if (options.part == nullptr) {
+    read_all();
+    refuse_bad_voxels(total, reader.info());
+  } else {
+    Team &team = *options.part->team;
+    together(team, read_all);
+    const std::vector<Findings> of_ranks = gather(team, std::vector{total});
+    total = {};
+    for (const Findings &found : of_ranks) total.add(found);
+    refuse_bad_voxels(total, options.part->whole);
   }
-  refuse_bad_voxels(total, reader.info());
   // + 0: not -0; of equal values, the one met first would depend on the threads
   return {{total.min + 0.0f, total.max + 0.0f}, {total.source_min + 0.0, total.source_max + 0.0}};
 }

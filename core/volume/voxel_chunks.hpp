@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "core/base/team.hpp"
 #include "core/volume/volume.hpp"
 
 namespace isowave::core {
@@ -23,12 +24,22 @@ inline constexpr float kMinMagnitude = 0x1p-97f;
 
 inline constexpr std::uint32_t kBlockEdge = 4;  ///< voxels
 
+/// A volume that processes read together: of layers that several have, one counts what is found.
+struct VolumePart {
+  Team *team = nullptr;
+  VolumeInfo whole{};
+  std::uint32_t begin = 0;  ///< layer of the whole that this process's reader begins with
+  std::uint32_t own_begin = 0, own_end = 0;  ///< layers of the whole that it counts; may be none
+};
+
 /// How a volume is read for compression.
 struct InputOptions {
   std::optional<float>
       map_nan{};  ///< replaces NaN and +-Inf; unset: refused with count and first position
   Progress progress{};
   std::uint32_t num_threads = 0;  ///< 0: one per processor; the result is the same for any number
+  /// The reader gives this part. What is found, and refused, is the whole's, at all processes.
+  const VolumePart *part = nullptr;
 };
 
 /// A few voxel layers, whole layers of blocks but at the volume's end.
@@ -78,7 +89,7 @@ struct ValueRange {
   std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
   std::array<double, 2> source{};  ///< as the source has them
 };
-/// Reads the volume from front to back for `coder`.
+/// Reads the volume from front to back for `coder`. Of a part, all processes make the same call.
 ///
 /// Throws  Error: voxels that cannot be compressed, after all of them were looked at; a bad grid;
 ///         an unfit map_nan

@@ -138,11 +138,14 @@ LevelBounds::Off LevelBounds::finish(std::span<const float> finer) const {
 }
 
 BlockBounds encode_bounds(std::span<const float> bounds) {
+  return encode_bounds(bounds, bounds.empty() ? 0.0f : std::ranges::max(bounds));
+}
+
+BlockBounds encode_bounds(std::span<const float> bounds, float largest) {
   BlockBounds result;
-  const double largest = bounds.empty() ? 0.0 : double{std::ranges::max(bounds)};
   if (largest > 0) {
-    result.exponent = std::clamp(std::ilogb(largest / double{ISO_BOUND_MAX}) + 1, kMinBoundExponent,
-                                 kMaxBoundExponent);
+    result.exponent = std::clamp(std::ilogb(double{largest} / double{ISO_BOUND_MAX}) + 1,
+                                 kMinBoundExponent, kMaxBoundExponent);
   }
   std::array<double, ISO_BOUND_CODES> values{};
   for (std::uint32_t code = 0; code < values.size(); ++code)

@@ -63,6 +63,8 @@ class LevelBounds {
 
 /// Never below.
 BlockBounds encode_bounds(std::span<const float> bounds);
+/// Of some blocks of a level, whose largest bound is that.
+BlockBounds encode_bounds(std::span<const float> bounds, float largest);
 /// Exponents that they can have.
 inline constexpr std::int32_t kMinBoundExponent = -126, kMaxBoundExponent = 127;
 

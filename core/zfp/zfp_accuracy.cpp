@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "core/base/error.hpp"
@@ -118,6 +119,17 @@ class ErrorMeter : public ChunkCoder {
     }
   }
 
+  /// What other processes have found counts, too.
+  void merge(Team &team) {
+    const std::size_t width = kMaxCandidates;
+    std::vector<double> own(width);
+    for (std::size_t i = 0; i < num_candidates_; ++i)
+      own[i] = given_up_[i].load() ? std::numeric_limits<double>::infinity() : error(i);
+    const std::vector<double> all = gather(team, own);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      errors_[0][i % width] = std::max(errors_[0][i % width], all[i]);
+  }
+
   /// The coarsest within the limit, or none.
   std::optional<BlockPrecision> best() const {
     for (std::size_t i = num_candidates_; i-- > 0;) {
@@ -180,6 +192,7 @@ BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
   const std::array<std::int32_t, 2> exponents = exponents_to_try(info.type, goal);
   ErrorMeter meter(info.dims, exponents[0], exponents[1], limit, goal.exact, options.num_threads);
   const std::array<float, 2> range = read_in_chunks(reader, options, meter).coded;
+  if (options.part != nullptr) meter.merge(*options.part->team);
   if (goal.exact && std::max(-range[0], range[1]) >= kIntegerEnd) {
     throw Error(
         "values from {} to {}: exact compression is for integers below 2^24, which float32 holds",

@@ -6,6 +6,7 @@
 #include <array>
 #include <new>
 #include <string>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/zfp/libzfp.hpp"
@@ -14,25 +15,35 @@
 namespace isowave::core {
 namespace fs = std::filesystem;
 
-namespace {
-
-constexpr std::size_t kItemsAtOnce = 1u << 15;
-
 /// zlib's stream, closed whatever happens.
-struct Deflater : z_stream {
-  Deflater() : z_stream{} {
+struct Deflater::Stream : z_stream {
+  Stream() : z_stream{} {
     if (::deflateInit(this, Z_DEFAULT_COMPRESSION) != Z_OK) throw std::bad_alloc();
   }
-  ~Deflater() { ::deflateEnd(this); }
-  Deflater(const Deflater &) = delete;
-  Deflater &operator=(const Deflater &) = delete;
+  ~Stream() { ::deflateEnd(this); }
+  Stream(const Stream &) = delete;
+  Stream &operator=(const Stream &) = delete;
 };
 
-std::uint32_t version_of(const CompressedVolume &volume, bool has_levels) {
-  return has_levels ? kPyramidVersion : volume.is_indexed() ? kIndexedVersion : kVersion;
+Deflater::Deflater(Sink sink)
+    : sink_(std::move(sink)), stream_(std::make_unique<Stream>()), out_(1u << 16) {}
+
+Deflater::~Deflater() = default;
+
+void Deflater::deflate(std::span<const std::byte> bytes, bool last) {
+  stream_->next_in = const_cast<Bytef *>(reinterpret_cast<const Bytef *>(bytes.data()));
+  stream_->avail_in = static_cast<uInt>(bytes.size());
+  do {
+    stream_->next_out = reinterpret_cast<Bytef *>(out_.data());
+    stream_->avail_out = static_cast<uInt>(out_.size());
+    ::deflate(stream_.get(), last ? Z_FINISH : Z_NO_FLUSH);
+    sink_(std::span(out_).first(out_.size() - stream_->avail_out));
+  } while (stream_->avail_out == 0);
 }
 
-}  // namespace
+std::uint32_t zfp_version(const CompressedVolume &volume, bool has_levels) {
+  return has_levels ? kPyramidVersion : volume.is_indexed() ? kIndexedVersion : kVersion;
+}
 
 ZfpFileWriter::ZfpFileWriter(const fs::path &path, const CompressedVolume &volume) {
   for (std::size_t level = 0; level <= volume.coarser_levels.size(); ++level) {
@@ -54,12 +65,12 @@ void ZfpFileWriter::commit(const CompressedVolume &volume) {
     Part &part = parts_[level];
     const CompressedVolume &coarse = volume.coarser_levels[level - 1];
     const ZfpLayout part_layout{part.write_index(coarse), part.write_bounds(coarse)};
-    part.write_trailer(zfp_trailer_text(coarse, part_layout), version_of(coarse, false));
+    part.write_trailer(zfp_trailer_text(coarse, part_layout), zfp_version(coarse, false));
     layout.level_bytes.push_back(part.size);
     part.file.read_back([&all](std::span<const std::byte> bytes) { all.write(bytes); });
   }
   all.write_trailer(zfp_trailer_text(volume, layout),
-                    version_of(volume, !layout.level_bytes.empty()));
+                    zfp_version(volume, !layout.level_bytes.empty()));
   all.file.commit();
 }
 
@@ -76,52 +87,34 @@ void ZfpFileWriter::Part::write_trailer(const std::string &text, std::uint32_t v
   write(std::as_bytes(std::span(&footer, 1)));
 }
 
-/// Deflates what next() returns, again and again, until that is empty; returns its size.
-template <typename T>
-std::uint64_t ZfpFileWriter::Part::write_deflated(const std::function<std::span<const T>()> &next) {
-  const std::uint64_t begin = size;
-  Deflater deflater;
-  std::vector<std::byte> out(1u << 16);
-  for (bool last = false; !last;) {
-    const std::span<const T> items = next();
-    last = items.empty();
-    deflater.next_in = const_cast<Bytef *>(reinterpret_cast<const Bytef *>(items.data()));
-    deflater.avail_in = static_cast<uInt>(items.size_bytes());
-    do {
-      deflater.next_out = reinterpret_cast<Bytef *>(out.data());
-      deflater.avail_out = static_cast<uInt>(out.size());
-      ::deflate(&deflater, last ? Z_FINISH : Z_NO_FLUSH);
-      write(std::span(out).first(out.size() - deflater.avail_out));
-    } while (deflater.avail_out == 0);
-  }
-  return size - begin;
-}
-
 /// Behind the padding of the payload; returns its size, 0 at a fixed rate.
 std::uint64_t ZfpFileWriter::Part::write_index(const CompressedVolume &volume) {
   const std::array<std::byte, 8> zeros{};
   write(std::span(zeros).first((8 - size % 8) % 8));
   if (!volume.is_indexed()) return 0;
-  const std::uint64_t num_blocks = volume.block_count();
-  std::uint64_t done = 0;
+  const std::uint64_t num_blocks = volume.block_count(), begin = size;
+  Deflater deflater([this](std::span<const std::byte> bytes) { write(bytes); });
   std::vector<std::uint16_t> lengths;
-  return write_deflated<std::uint16_t>([&] {
-    lengths.resize(std::min<std::uint64_t>(kItemsAtOnce, num_blocks - done));
+  for (std::uint64_t done = 0; done < num_blocks;) {
+    lengths.resize(std::min<std::uint64_t>(kDeflatedAtOnce, num_blocks - done));
     for (std::uint16_t &length : lengths)
       length = static_cast<std::uint16_t>(volume.block_bits(static_cast<std::uint32_t>(done++)));
-    return std::span<const std::uint16_t>(lengths);
-  });
+    deflater.add(std::as_bytes(std::span(lengths)));
+  }
+  deflater.finish();
+  return size - begin;
 }
 
 /// Behind the index; returns its size, 0 where there are none.
 std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) {
   std::span<const std::uint8_t> left = volume.bounds.codes;
   if (left.empty()) return 0;
-  return write_deflated<std::uint8_t>([&] {
-    const std::span<const std::uint8_t> some = left.first(std::min(kItemsAtOnce, left.size()));
-    left = left.subspan(some.size());
-    return some;
-  });
+  const std::uint64_t begin = size;
+  Deflater deflater([this](std::span<const std::byte> bytes) { write(bytes); });
+  for (; !left.empty(); left = left.subspan(std::min(kDeflatedAtOnce, left.size())))
+    deflater.add(std::as_bytes(left.first(std::min(kDeflatedAtOnce, left.size()))));
+  deflater.finish();
+  return size - begin;
 }
 
 void write_zfp_file(const CompressedVolume &volume, const fs::path &path) {
@@ -135,7 +128,7 @@ void write_zfp_file(const CompressedVolume &volume, const fs::path &path) {
     const CompressedVolume &level = i == 0 ? volume : volume.coarser_levels[i - 1];
     const std::uint64_t num_words = (level.payload_bits() + 31) / 32;
     for (std::uint64_t begin = 0; begin < num_words; begin += words.size()) {
-      words.resize(std::min<std::uint64_t>(kItemsAtOnce, num_words - begin));
+      words.resize(std::min<std::uint64_t>(kDeflatedAtOnce, num_words - begin));
       level.read_words(32 * begin, words);
       file.write(std::as_bytes(std::span(words)), i);
     }

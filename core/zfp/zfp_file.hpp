@@ -8,6 +8,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -15,6 +16,29 @@
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
+
+/// What index and bounds are deflated by. The same bytes come in the same pieces, whoever writes.
+class Deflater {
+ public:
+  using Sink = std::function<void(std::span<const std::byte>)>;
+  explicit Deflater(Sink sink);
+  ~Deflater();
+  /// In pieces of kDeflatedAtOnce items, but for the last.
+  void add(std::span<const std::byte> bytes) { deflate(bytes, false); }
+  void finish() { deflate({}, true); }
+
+ private:
+  struct Stream;
+  void deflate(std::span<const std::byte> bytes, bool last);
+
+  Sink sink_;
+  std::unique_ptr<Stream> stream_;
+  std::vector<std::byte> out_;
+};
+inline constexpr std::size_t kDeflatedAtOnce = 1u << 15;
+
+/// Of the footer; has_levels: others are in its file.
+std::uint32_t zfp_version(const CompressedVolume &volume, bool has_levels);
 
 /// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left
 /// behind without commit().
@@ -35,8 +59,6 @@ class ZfpFileWriter {
     void write(std::span<const std::byte> bytes);
     std::uint64_t write_index(const CompressedVolume &volume);
     std::uint64_t write_bounds(const CompressedVolume &volume);
-    template <typename T>
-    std::uint64_t write_deflated(const std::function<std::span<const T>()> &next);
     void write_trailer(const std::string &text, std::uint32_t version);
 
     AtomicFile file;

@@ -91,6 +91,10 @@ std::uint32_t update_crc(std::uint32_t crc, std::span<const std::byte> bytes) {
   return std::uint32_t(::crc32_z(crc, reinterpret_cast<const Bytef *>(bytes.data()), bytes.size()));
 }
 
+std::uint32_t combine_crcs(std::uint32_t first, std::uint32_t second, std::uint64_t second_bytes) {
+  return std::uint32_t(::crc32_combine(first, second, static_cast<z_off_t>(second_bytes)));
+}
+
 std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer) {
   const std::array<std::uint32_t, 3> numbers{footer.version, footer.json_bytes, footer.stream_crc};
   return update_crc(update_crc(0, std::as_bytes(std::span(text))),

@@ -10,8 +10,11 @@
 /// given  [pixel] the list; not read where ISO_GIVEN_RAYS is 0
 ISO_INLINE Ray ray_of(const FrameParams *frame, global const GivenRay *given, uint pixel) {
 #if ISO_GIVEN_RAYS
-  (void)frame;
-  return make_given_ray(given[pixel]);
+  Ray ray = make_given_ray(given[pixel]);
+  ray.x.origin = frame->brick.origin_x;
+  ray.y.origin = frame->brick.origin_y;
+  ray.z.origin = frame->brick.origin_z;
+  return ray;
 #else
   (void)given;
   return make_ray(frame, pixel);

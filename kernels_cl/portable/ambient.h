@@ -98,34 +98,44 @@ ISO_INLINE AmbientDirection around(AmbientDirection n, AmbientDirection d) {
   return v;
 }
 
+/// A hit that any brick can read: x, y, z are its position in the index space of its level of
+/// detail, of the whole volume, and cell is that level's number, by which its rays go.
+///
+/// of_level  of the level of detail that has the hit
+/// level     its number, 0: the finest that draws the frame
+ISO_INLINE HitRecord placed_hit(const FrameParams *of_level, uint level, HitRecord hit) {
+  const BlockCoords b = block_coords(of_level, hit.block_id);
+  hit.x = (float)(4 * b.x + (hit.cell & 3u)) + of_level->brick.origin_x + hit.x;
+  hit.y = (float)(4 * b.y + (hit.cell >> 2 & 3u)) + of_level->brick.origin_y + hit.y;
+  hit.z = (float)(4 * b.z + (hit.cell >> 4)) + of_level->brick.origin_z + hit.z;
+  hit.cell = level;
+  return hit;
+}
+
 /// An ambient ray of a pixel's hit.
 ///
 /// frame      of the camera
-/// of_level   of the level of detail that has the hit
-/// level      its number, 0: frame's
+/// placed     see placed_hit()
 /// direction  see ambient_pattern()
-ISO_INLINE GivenRay ambient_ray(const FrameParams *frame, const FrameParams *of_level, uint level,
-                                const AmbientParams *p, HitRecord hit, uint pixel,
-                                AmbientDirection direction) {
+ISO_INLINE GivenRay ambient_ray(const FrameParams *frame, const AmbientParams *p, HitRecord placed,
+                                uint pixel, AmbientDirection direction) {
   const Ray ray = make_ray(frame, pixel);
   GivenRay given;
   AmbientDirection normal, up, d;
-  BlockCoords b;
   float scale = 1.0f;
   uint i;
-  normal = seen_normal(p, &ray, hit);
+  normal = seen_normal(p, &ray, placed);
   up = normalized(turned(p->to_index, normal.x, normal.y, normal.z));
   d = around(normal, direction);
   d = turned(p->to_index, d.x, d.y, d.z);
-  for (i = 0; i < level; ++i) scale *= 0.5f;
-  b = block_coords(of_level, hit.block_id);
-  given.o_x = fma(up.x, ISO_AMBIENT_LIFT, (float)(4 * b.x + (hit.cell & 3u)) + hit.x);
-  given.o_y = fma(up.y, ISO_AMBIENT_LIFT, (float)(4 * b.y + (hit.cell >> 2 & 3u)) + hit.y);
-  given.o_z = fma(up.z, ISO_AMBIENT_LIFT, (float)(4 * b.z + (hit.cell >> 4)) + hit.z);
+  for (i = 0; i < placed.cell; ++i) scale *= 0.5f;
+  given.o_x = fma(up.x, ISO_AMBIENT_LIFT, placed.x);
+  given.o_y = fma(up.y, ISO_AMBIENT_LIFT, placed.y);
+  given.o_z = fma(up.z, ISO_AMBIENT_LIFT, placed.z);
   given.d_x = d.x * scale;
   given.d_y = d.y * scale;
   given.d_z = d.z * scale;
-  given.level = level;
+  given.level = placed.cell;
   return given;
 }
 

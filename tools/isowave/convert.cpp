@@ -9,12 +9,16 @@
 
 #include "core/base/error.hpp"
 #include "core/base/printed_bound.hpp"
+#include "core/bricks/compress_together.hpp"
+#include "core/bricks/ranks.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
+#include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
@@ -31,22 +35,41 @@ struct ConvertArgs {
   bool no_verify = false;
 };
 
-void run_convert(const CLI::App &command, const ConvertArgs &options) {
-  if (!is_zfp_name(options.output))
-    throw Error("{}: end the output's name in .zfp", options.output);
-  if (is_zfp_name(options.path)) throw Error("{}: is compressed already", options.path);
-  if (options.device && options.compression.bounded())
-    throw Error("--device compresses at a fixed rate only: leave it, or the bound on the error");
-  if (options.compression.bounded())
-    refuse_options(command, {"--no-verify"}, "a bound on the error is found by measuring it");
-  const RawOverrides overrides = to_overrides(options.volume);
+void check_output(const ConvertArgs &options) {
   Outputs outputs;
   outputs.read_volume(options.path);
   outputs.write("--output", options.output);
-  CompressOptions compress{.rate = options.compression.rate,
-                           .measure_error = !options.no_verify,
-                           .levels = options.compression.levels,
-                           .input = options.input};
+}
+
+/// Each process of a team writes its slab. Returns what the file then has.
+CompressedVolume convert_together(const ConvertArgs &options, const RawOverrides &overrides,
+                                  CompressOptions &compress, Team &team) {
+  agree_on(team, "version", program_name());
+  agree_on(team, "command line", MpiJob::command_line());
+  std::optional<ocl::Device> device;
+  VolumeInfo info;
+  together(team, [&] {
+    if (team.rank() == 0) check_output(options);
+    if (options.device) {
+      compress.device = &device.emplace(choose_local_device(*options.device, MpiJob::local_rank()));
+    }
+    info = open_any_volume(options.path, overrides, compress.device)->info();
+  });
+  agree_on(team, "volume", fingerprint(options.path, info));
+  const VolumePart part = own_part(team, info);
+  InputOptions input = options.input;
+  input.part = &part;
+  compress.precision = find_precision(options.path, overrides, options.compression, input);
+  compress.input.progress = make_progress_bar("compressing");
+  const std::unique_ptr<SharedFile> file = MpiJob::create_file(options.output);
+  return compress_together(
+      team, [&] { return open_any_volume(options.path, overrides, compress.device); }, compress,
+      *file);
+}
+
+CompressedVolume convert_alone(const ConvertArgs &options, const RawOverrides &overrides,
+                               CompressOptions &compress) {
+  check_output(options);
   std::optional<ocl::Device> device;
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   const std::unique_ptr<VolumeReader> reader =
@@ -55,9 +78,12 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   if (device) compiling.emplace(*device);
   compress.precision = find_precision(options.path, overrides, options.compression, options.input);
   compress.input.progress = make_progress_bar("compressing");
-  const CompressedVolume volume = compress_to_file(*reader, compress, options.output);
+  CompressedVolume volume = compress_to_file(*reader, compress, options.output);
   if (compiling) compiling->finish();
+  return volume;
+}
 
+void print_summary(const ConvertArgs &options, const CompressedVolume &volume) {
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);
   const std::uint64_t bytes_out = std::filesystem::file_size(options.output);
@@ -72,6 +98,26 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
     fmt::print("  level of detail {}x{}x{}: {} bytes\n", coarse.x, coarse.y, coarse.z,
                with_commas((level.payload_bits() + 7) / 8));
   }
+}
+
+void run_convert(const CLI::App &command, const ConvertArgs &options) {
+  if (!is_zfp_name(options.output))
+    throw Error("{}: end the output's name in .zfp", options.output);
+  if (is_zfp_name(options.path)) throw Error("{}: is compressed already", options.path);
+  if (options.device && options.compression.bounded())
+    throw Error("--device compresses at a fixed rate only: leave it, or the bound on the error");
+  if (options.compression.bounded())
+    refuse_options(command, {"--no-verify"}, "a bound on the error is found by measuring it");
+  const RawOverrides overrides = to_overrides(options.volume);
+  CompressOptions compress{.rate = options.compression.rate,
+                           .measure_error = !options.no_verify,
+                           .levels = options.compression.levels,
+                           .input = options.input};
+  Team *team = MpiJob::team();
+  const CompressedVolume volume = team != nullptr
+                                      ? convert_together(options, overrides, compress, *team)
+                                      : convert_alone(options, overrides, compress);
+  if (team == nullptr || team->rank() == 0) print_summary(options, volume);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 /// All processes would do the same, and write the same files.
 [[noreturn]] void refuse_team(const CLI::App &command) {
   throw isowave::core::Error(
-      "mpirun has started {} processes, and {} is for one: only render is shared",
+      "mpirun has started {} processes, and {} is for one: only render and convert are shared",
       isowave::core::tools::MpiJob::team()->size(), command.get_name());
 }
 
@@ -48,7 +48,7 @@ int main(int argc, char **argv) {
   app.footer(statuses);
   if (MpiJob::team() != nullptr) {
     for (CLI::App *command : app.get_subcommands({})) {
-      if (command->get_name() == "render") continue;
+      if (command->get_name() == "render" || command->get_name() == "convert") continue;
       command->preparse_callback([command](std::size_t) { refuse_team(*command); });
     }
   }

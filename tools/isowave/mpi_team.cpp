@@ -6,14 +6,20 @@
 #include <mpi.h>
 #include <unistd.h>
 
+#include <array>
+#include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string_view>
 #include <thread>
 
+#include "core/base/error.hpp"
+#include "core/io/atomic_file.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
 namespace isowave::core::tools {
@@ -30,6 +36,15 @@ void wait_for(std::span<MPI_Request> requests) {
     if (done == 0 && std::chrono::steady_clock::now() - begin > kFast)
       std::this_thread::sleep_for(kNap);
   }
+}
+
+/// MPI counts bytes by an int.
+constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+
+template <class Byte, class Use>
+void for_pieces(std::span<Byte> bytes, const Use &use) {
+  for (; !bytes.empty(); bytes = bytes.subspan(std::min(bytes.size(), kMostBytes)))
+    use(bytes.first(std::min(bytes.size(), kMostBytes)));
 }
 
 /// MPI's own handler of errors ends the job.
@@ -72,16 +87,41 @@ class MpiTeam : public Team {
     return texts;
   }
 
-  void begin_reduce_min(std::span<std::uint64_t> words) override {
+  void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
     requests_.push_back(MPI_REQUEST_NULL);
-    MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : words.data(), words.data(),
-                static_cast<int>(words.size()), MPI_UINT64_T, MPI_MIN, 0, MPI_COMM_WORLD,
-                &requests_.back());
+    const int count = static_cast<int>(words.size());
+    MPI_Op op = how == Reduction::kMin ? MPI_MIN : MPI_BOR;
+    if (who == Receiver::kAll) {
+      MPI_Iallreduce(MPI_IN_PLACE, words.data(), count, MPI_UINT64_T, op, MPI_COMM_WORLD,
+                     &requests_.back());
+    } else {
+      MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : words.data(), words.data(), count, MPI_UINT64_T, op,
+                  0, MPI_COMM_WORLD, &requests_.back());
+    }
   }
 
   void finish_reductions() override {
     wait_for(requests_);
     requests_.clear();
+  }
+
+  void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received) override {
+    std::vector<MPI_Request> requests;
+    for (const Outgoing &message : sent) {
+      for_pieces(message.bytes, [&](std::span<const std::byte> piece) {
+        requests.push_back(MPI_REQUEST_NULL);
+        MPI_Isend(piece.data(), static_cast<int>(piece.size()), MPI_BYTE,
+                  static_cast<int>(message.rank), 0, MPI_COMM_WORLD, &requests.back());
+      });
+    }
+    for (const Incoming &message : received) {
+      for_pieces(message.bytes, [&](std::span<std::byte> piece) {
+        requests.push_back(MPI_REQUEST_NULL);
+        MPI_Irecv(piece.data(), static_cast<int>(piece.size()), MPI_BYTE,
+                  static_cast<int>(message.rank), 0, MPI_COMM_WORLD, &requests.back());
+      });
+    }
+    wait_for(requests);
   }
 
  private:
@@ -90,6 +130,145 @@ class MpiTeam : public Team {
 };
 
 std::unique_ptr<MpiTeam> team_of_job;
+
+/// What a signal that ends this process has to remove: mpirun ends the others where one dies.
+std::array<char, 4096> unfinished_file;
+
+extern "C" void remove_unfinished(int number) {
+  ::unlink(unfinished_file.data());
+  std::signal(number, SIG_DFL);
+  ::raise(number);
+}
+
+/// Open MPI prints a line of its own where a write fails. Silent as long as this lives.
+class Hushed {
+ public:
+  Hushed() : stderr_(::dup(STDERR_FILENO)), nowhere_(::open("/dev/null", O_WRONLY | O_CLOEXEC)) {
+    if (stderr_ >= 0 && nowhere_ >= 0) ::dup2(nowhere_, STDERR_FILENO);
+  }
+  ~Hushed() {
+    const int error_number = errno;
+    if (stderr_ >= 0) ::dup2(stderr_, STDERR_FILENO);
+    for (const int file : {stderr_, nowhere_}) {
+      if (file >= 0) ::close(file);
+    }
+    errno = error_number;
+  }
+  Hushed(const Hushed &) = delete;
+  Hushed &operator=(const Hushed &) = delete;
+
+ private:
+  int stderr_, nowhere_;
+};
+
+/// Each process opens it by itself, so that one that cannot leaves no other waiting.
+class MpiFile : public SharedFile {
+ public:
+  MpiFile(Team &team, const std::filesystem::path &target) : team_(team) {
+    std::string name;
+    together(team, [&] {
+      if (is_first()) name = create(target);
+    });
+    name_ = team.all_gather(name).front();
+    target_ = target.string();
+    try {
+      together(team, [&] {
+        check([&] {
+          return MPI_File_open(MPI_COMM_SELF, name_.c_str(), MPI_MODE_WRONLY, MPI_INFO_NULL,
+                               &file_);
+        });
+      });
+    } catch (...) {
+      remove();
+      throw;
+    }
+  }
+  ~MpiFile() override { remove(); }
+  MpiFile(const MpiFile &) = delete;
+  MpiFile &operator=(const MpiFile &) = delete;
+
+  void write(std::uint64_t offset, std::span<const std::byte> bytes) override {
+    while (!bytes.empty()) {
+      MPI_Status status;
+      int count = 0;
+      check([&] {
+        const Hushed hushed;
+        return MPI_File_write_at(file_, static_cast<MPI_Offset>(offset), bytes.data(),
+                                 static_cast<int>(std::min(bytes.size(), kMostBytes)), MPI_BYTE,
+                                 &status);
+      });
+      // On a full disk, it may write what fits, and say why not the rest only when asked again.
+      MPI_Get_count(&status, MPI_BYTE, &count);
+      if (count <= 0) fail(std::strerror(errno != 0 ? errno : EIO));
+      bytes = bytes.subspan(static_cast<std::size_t>(count));
+      offset += static_cast<std::uint64_t>(count);
+    }
+  }
+
+  void commit() override {
+    together(team_, [&] {
+      check([&] { return MPI_File_sync(file_); });
+      check([&] { return MPI_File_close(&file_); });
+    });
+    together(team_, [&] {
+      if (is_first() && std::rename(name_.c_str(), follow_links(target_).c_str()) != 0)
+        fail(std::strerror(errno));
+    });
+    name_.clear();
+    forget();
+  }
+
+ private:
+  bool is_first() const { return team_.rank() == 0; }
+  [[noreturn]] void fail(const char *reason) const {
+    throw Error("{}: cannot write: {}", target_, reason);
+  }
+  template <class Call>
+  void check(const Call &call) const {
+    errno = 0;
+    const int result = call();
+    if (result == MPI_SUCCESS) return;
+    if (errno != 0) fail(std::strerror(errno));
+    std::array<char, MPI_MAX_ERROR_STRING + 1> text{};
+    int length = 0;
+    MPI_Error_string(result, text.data(), &length);
+    fail(text.data());
+  }
+  /// Returns its name, which is the same from any folder.
+  std::string create(const std::filesystem::path &target) {
+    target_ = target.string();
+    const std::filesystem::path folder =
+        std::filesystem::absolute(follow_links(target)).parent_path();
+    for (unsigned id = 0;; ++id) {
+      std::string name = (folder / fmt::format(".isowave.{}.mpi{}.tmp", ::getpid(), id)).string();
+      const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      if (file < 0 && errno == EEXIST) continue;
+      if (file < 0) fail(std::strerror(errno));
+      ::close(file);
+      if (name.size() < unfinished_file.size()) {
+        std::ranges::copy(name, unfinished_file.begin());
+        for (const int number : {SIGTERM, SIGINT}) std::signal(number, remove_unfinished);
+      }
+      return name;
+    }
+  }
+  void forget() const {
+    if (is_first()) {
+      for (const int number : {SIGTERM, SIGINT}) std::signal(number, SIG_DFL);
+    }
+  }
+  void remove() {
+    if (file_ != MPI_FILE_NULL) MPI_File_close(&file_);
+    if (!is_first() || name_.empty()) return;
+    ::unlink(name_.c_str());
+    forget();
+  }
+
+  Team &team_;
+  std::string target_, name_;  ///< as asked for; of the file until commit()
+  MPI_File file_ = MPI_FILE_NULL;
+};
+
 std::string checksum;  ///< of the command line
 int loud_stderr = -1;  ///< of a rank that is silent
 
@@ -174,6 +353,10 @@ std::uint32_t MpiJob::local_rank() {
   return team_of_job ? team_of_job->local_rank() : 0;
 }
 
+std::unique_ptr<SharedFile> MpiJob::create_file(const std::filesystem::path &target) {
+  return std::make_unique<MpiFile>(*team_of_job, target);
+}
+
 }  // namespace isowave::core::tools
 
 #else
@@ -188,11 +371,11 @@ int MpiJob::finish(int status) {
 std::string MpiJob::command_line() {
   return {};
 }
-Team *MpiJob::team() {
-  return nullptr;
-}
 std::uint32_t MpiJob::local_rank() {
   return 0;
+}
+std::unique_ptr<SharedFile> MpiJob::create_file(const std::filesystem::path &) {
+  return nullptr;
 }
 
 }  // namespace isowave::core::tools

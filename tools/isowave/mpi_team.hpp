@@ -3,10 +3,12 @@
 // there is none.
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 
-#include "core/bricks/team.hpp"
+#include "core/base/team.hpp"
+#include "core/bricks/compress_together.hpp"
 
 namespace isowave::core::tools {
 
@@ -23,11 +25,22 @@ class MpiJob {
   int finish(int status);
 
   /// None: this process is alone.
+#ifdef ISOWAVE_HAS_MPI
   static Team *team();
+#else
+  static Team *team() {
+    return nullptr;
+  }  // and compilers leave out what teams do
+#endif
   /// Where and how this process was started: a checksum.
   static std::string command_line();
   /// Number of this process among those of its host.
   static std::uint32_t local_rank();
+  /// Of a team, all processes: a file that they write by MPI-IO, under another name until its
+  /// commit(). The target is a regular file, or none.
+  ///
+  /// Throws  Error at all of them
+  static std::unique_ptr<SharedFile> create_file(const std::filesystem::path &target);
 };
 
 }  // namespace isowave::core::tools

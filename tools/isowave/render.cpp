@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -15,6 +17,7 @@
 #include "core/base/error.hpp"
 #include "core/bricks/brick_renderer.hpp"
 #include "core/bricks/brick_volume.hpp"
+#include "core/bricks/ranks.hpp"
 #include "core/io/npy.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/surface_camera.hpp"
@@ -30,7 +33,6 @@
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
-#include "tools/isowave/ranks.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -100,6 +102,25 @@ class FrameSource {
   virtual void report(const fs::path & /*error_map*/, nlohmann::ordered_json & /*frame*/) {}
 };
 
+/// Prints them, too.
+nlohmann::ordered_json timed_steps(const TimedFrame &frame, double budget_ms) {
+  nlohmann::ordered_json steps = nlohmann::ordered_json::array();
+  for (const TimedStep &step : frame.steps) {
+    fmt::print("  {}x{}, {}: {:.2f} ms, {}\n", step.size.width, step.size.height,
+               step.voxel_pixels == 0
+                   ? "finest level"
+                   : fmt::format("voxels up to {} of its pixels apart", step.voxel_pixels),
+               step.ms,
+               step.cancelled ? fmt::format("{:.1f} % of it", step.completed_percent) : "whole");
+    steps.push_back({{"size", {step.size.width, step.size.height}},
+                     {"voxel_pixels", step.voxel_pixels},
+                     {"ms", step.ms},
+                     {"completed_percent", step.completed_percent},
+                     {"cancelled", step.cancelled}});
+  }
+  return {{"budget_ms", budget_ms}, {"complete", frame.complete}, {"steps", steps}};
+}
+
 class DeviceFrames : public FrameSource {
  public:
   DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance,
@@ -134,7 +155,7 @@ class DeviceFrames : public FrameSource {
   Camera surface_camera(std::span<const float> isovalues) { return renderer_.camera(isovalues); }
   void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
     if (max_surface_error_) frame["error"] = bound_error(error_map);
-    if (timed_frames_) frame["time_budget"] = timed_steps();
+    if (timed_frames_) frame["time_budget"] = timed_steps(timed_, *time_budget_);
   }
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
   Image8 shade() override { return renderer_.shade(appearance_); }
@@ -142,7 +163,6 @@ class DeviceFrames : public FrameSource {
 
  private:
   nlohmann::ordered_json bound_error(const fs::path &error_map);
-  nlohmann::ordered_json timed_steps() const;
 
   const CompressedVolume &volume_;
   Renderer renderer_;
@@ -154,24 +174,6 @@ class DeviceFrames : public FrameSource {
   DetailChoice choice_;
   TimedFrame timed_;
 };
-
-nlohmann::ordered_json DeviceFrames::timed_steps() const {
-  nlohmann::ordered_json steps = nlohmann::ordered_json::array();
-  for (const TimedStep &step : timed_.steps) {
-    fmt::print("  {}x{}, {}: {:.2f} ms, {}\n", step.size.width, step.size.height,
-               step.voxel_pixels == 0
-                   ? "finest level"
-                   : fmt::format("voxels up to {} of its pixels apart", step.voxel_pixels),
-               step.ms,
-               step.cancelled ? fmt::format("{:.1f} % of it", step.completed_percent) : "whole");
-    steps.push_back({{"size", {step.size.width, step.size.height}},
-                     {"voxel_pixels", step.voxel_pixels},
-                     {"ms", step.ms},
-                     {"completed_percent", step.completed_percent},
-                     {"cancelled", step.cancelled}});
-  }
-  return {{"budget_ms", *time_budget_}, {"complete", timed_.complete}, {"steps", steps}};
-}
 
 nlohmann::ordered_json detail_json(const Detail &detail) {
   return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
@@ -271,13 +273,16 @@ void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &f
   }
 }
 
-/// Writes the picture after every pass to --progress-dir, if that was asked for.
-OnPass progress_writer(const RenderArgs &options, const Scene &scene, FrameSource &frames,
-                       float isovalue, std::size_t view) {
+/// Writes the picture after every pass to --progress-dir, if that was asked for. shade: gives it,
+/// or none where this process has none to write.
+OnPass progress_writer(const RenderArgs &options, const Scene &scene,
+                       const std::function<Image8()> &shade, float isovalue, std::size_t view) {
   if (options.progress_dir.empty()) return {};
-  return [&options, &scene, &frames, isovalue, view, pass = 0](const PassStats &) mutable {
+  return [&options, &scene, shade, isovalue, view, pass = 0](const PassStats &) mutable {
     const fs::path name = fs::path(options.progress_dir) / fmt::format("pass{:04}.png", ++pass);
-    write_png(frames.shade(), frame_path(name, scene.cameras.size(), options, isovalue, view));
+    const Image8 image = shade();
+    if (!image.pixels.empty())
+      write_png(image, frame_path(name, scene.cameras.size(), options, isovalue, view));
     return true;
   };
 }
@@ -288,8 +293,9 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
   for (const float isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
-      const FrameStats stats =
-          frames.render(camera, isovalue, progress_writer(options, scene, frames, isovalue, view));
+      const OnPass on_pass = progress_writer(
+          options, scene, [&frames] { return frames.shade(); }, isovalue, view);
+      const FrameStats stats = frames.render(camera, isovalue, on_pass);
       write_outputs(options, scene, frames, isovalue, view);
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
@@ -461,8 +467,7 @@ void print_picture_name(const RenderArgs &options, std::size_t num_views) {
 /// What bricks cannot do, since it goes on in other bricks, or is not put together.
 void check_brick_options(const CLI::App &command, const Team &team) {
   refuse_options(command,
-                 {"--reference", "--levels", "--max-surface-error", "--error-map", "--time-budget",
-                  "--refined", "--ambient", "--progress-dir", "--verbose"},
+                 {"--reference", "--levels", "--max-surface-error", "--error-map", "--verbose"},
                  fmt::format("not of a volume that {} processes draw together", team.size()));
 }
 
@@ -486,6 +491,35 @@ void write_brick_outputs(const RenderArgs &options, const Scene &scene,
   });
 }
 
+/// Each step is as complete as the rank that has got least far.
+TimedFrame within_time(BrickRenderer &renderer, Team &team, const FrameRequest &request,
+                       double budget_ms) {
+  TimedFrame frame = renderer.render_within(request, budget_ms);
+  std::vector<double> own;
+  for (const TimedStep &step : frame.steps) own.push_back(step.completed_percent);
+  const std::vector<double> all = gather(team, own);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    double &percent = frame.steps[i % own.size()].completed_percent;
+    percent = std::min(percent, all[i]);
+  }
+  return frame;
+}
+
+/// --refined: draws the frame once more, however long that takes.
+void write_refined(const RenderArgs &options, const Scene &scene, const Appearance &appearance,
+                   BrickRenderer &renderer, Team &team, const FrameRequest &request,
+                   std::size_t view) {
+  const FrameStats refined = renderer.render(request);
+  const Image8 image = renderer.shade(appearance);
+  together(team, [&] {
+    if (team.rank() != 0) return;
+    write_png(image,
+              frame_path(options.refined, scene.cameras.size(), options, request.isovalue, view));
+  });
+  fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(renderer.num_hits()),
+             refined.total_ms);
+}
+
 /// Draws a volume's bricks, one at each rank. frames: of the whole, at rank 0; own: this rank's.
 void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appearance &appearance,
                        BrickRenderer &renderer, Team &team, nlohmann::ordered_json &frames,
@@ -494,19 +528,24 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
   base.voxel_pixels = options.voxel_pixels;
   base.voxel_error = options.frame.voxel_error;
   base.normals = normals_from_string(options.normals);
+  base.ambient_rays = options.ambient_rays;
   for (const float isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const auto begin = Clock::now();
       const double composed_before = renderer.composition().ms;
-      FrameStats stats;
-      together(team, [&] {
-        FrameRequest request = seen_from(camera, base);
-        request.isovalue = isovalue;
-        stats = renderer.render(request);
-      });
+      FrameRequest request = seen_from(camera, base);
+      request.isovalue = isovalue;
+      request.on_pass = progress_writer(
+          options, scene, [&] { return renderer.shade(appearance); }, isovalue, view);
+      TimedFrame timed;
+      if (options.time_budget) {
+        timed = within_time(renderer, team, request, *options.time_budget);
+      } else {
+        timed.stats = renderer.render(request);
+      }
       write_brick_outputs(options, scene, appearance, renderer, team, isovalue, view);
-      own.push_back(frame_json(isovalue, view, camera, stats));
+      own.push_back(frame_json(isovalue, view, camera, timed.stats));
       const double ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
       fmt::print("isovalue {}, view {}: {} rays hit, {} bricks, {:.1f} ms\n", isovalue, view,
                  with_commas(renderer.num_hits()), team.size(), ms);
@@ -515,6 +554,10 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
                         {"rays_hit", renderer.num_hits()},
                         {"written_ms", ms},
                         {"composition_ms", renderer.composition().ms - composed_before}});
+      if (options.time_budget)
+        frames.back()["time_budget"] = timed_steps(timed, *options.time_budget);
+      if (!options.refined.empty())
+        write_refined(options, scene, appearance, renderer, team, request, view);
     }
   }
 }
@@ -534,14 +577,17 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   const RawOverrides overrides = to_overrides(options.volume);
   std::unique_ptr<ocl::Device> device;
   std::vector<VolumeInfo> levels;
+  Outputs outputs;
   together(team, [&] {
-    if (team.rank() == 0) check_outputs(options, views.count);
+    if (team.rank() == 0) outputs = check_outputs(options, views.count);
     device = open_device(options, choose_local_device(options.device, MpiJob::local_rank()));
-    levels = read_volume_levels(options.input, overrides);
+    levels = read_levels(options.input, overrides);
   });
   const VolumeInfo &whole = levels.front();
   agree_on(team, "volume", fingerprint(options.input, whole));
-  if (options.voxel_pixels == 0) levels.resize(1);
+  const bool may_use_levels = options.time_budget && options.renderer_flags.pipeline != "blocks";
+  if (options.voxel_pixels == 0)
+    levels.resize(may_use_levels ? num_cut_levels(whole, levels.size(), team.size()) : 1);
   if (options.voxel_pixels > 0 && levels.size() == 1 && max_levels(whole.dims) > 1) {
     throw Error(
         "{} has no levels of detail, which bricks cannot make: isowave convert --levels all",
@@ -560,12 +606,17 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   Scene scene;
   scene.size = views.size;
   RendererOptions &wanted = options.renderer_flags.values;
-  wanted.with_shading = !options.image.empty();
+  wanted.with_shading =
+      !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
+  wanted.with_kept_picture = options.time_budget.has_value();
+  wanted.with_given_rays = options.ambient_rays != 0;
+  wanted.with_levels = levels.size() > 1;
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
   std::vector<float> samples;
   together(team, [&] {
     scene.cameras = make_cameras(options.input, whole, options.frame, views);
     scene.volume = load(own, levels.size());
+    outputs.make_folder();
     samples = range_samples(scene.volume, whole);
     options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   });

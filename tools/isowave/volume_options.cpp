@@ -10,11 +10,10 @@
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
 #include "core/bricks/brick_volume.hpp"
+#include "core/bricks/compress_together.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
-#include "core/view/detail.hpp"
-#include "core/view/frame.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/strict_options.hpp"
 
@@ -111,7 +110,12 @@ std::optional<BlockPrecision> find_precision(const std::string &path, const RawO
   Storage storage = to_storage(options);
   storage.map_nan = input.map_nan;
   storage.num_threads = input.num_threads;
-  return core::find_precision([&] { return open_any_volume(path, overrides); }, path, storage);
+  storage.part = input.part;
+  const OpenReader open = [&] { return open_any_volume(path, overrides); };
+  const VolumePart *part = input.part;
+  if (part == nullptr) return core::find_precision(open, path, storage);
+  return core::find_precision(
+      [&] { return open_part(*part, part->own_end - part->own_begin, open); }, path, storage);
 }
 
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
@@ -125,29 +129,13 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   return compress_volume([&] { return open_any_volume(path, overrides, device); }, path, storage);
 }
 
-std::vector<VolumeInfo> read_volume_levels(const std::string &path, const RawOverrides &overrides) {
-  if (!is_zfp_name(path)) return {open_any_volume(path, overrides)->info()};
-  if (overrides.dims || overrides.type) throw Error("{}: dims and type are for raw files", path);
-  CompressedVolume volume = read_zfp_file_info(path);
-  if (overrides.spacing) set_spacing(volume, *overrides.spacing);
-  check_volume_info(volume.info, path);
-  return level_infos(volume, true);
-}
-
 CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
                             const CompressionOptions &compression, const VolumeInfo &info,
                             std::size_t num_levels, const BlockBox &own, ocl::Device *device) {
-  check_drawable(brick_info(info, own), path);
-  if (is_zfp_name(path)) {
-    refuse_compression(compression, path);
-    CompressedVolume volume = read_brick(path, own, num_levels);
-    set_spacing(volume, info.spacing);
-    return volume;
-  }
+  if (is_zfp_name(path)) refuse_compression(compression, path);
   Storage storage = to_storage(compression);
   storage.device = device;
-  return compress_brick([&] { return open_any_volume(path, overrides, device); }, path, storage,
-                        own);
+  return core::load_brick(path, overrides, storage, info, num_levels, own);
 }
 
 std::string volume_stem(const std::string &path) {

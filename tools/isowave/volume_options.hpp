@@ -72,12 +72,7 @@ inline constexpr const char *kVolumeHelp =
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device = nullptr);
 
-/// What load_volume() would load, of which only grids are there, the finest first. Throws Error as
-/// that does.
-std::vector<VolumeInfo> read_volume_levels(const std::string &path, const RawOverrides &overrides);
-
-/// A brick of what load_volume() would load, with so many levels of detail. info: of the finest, as
-/// read_volume_levels() has it. Throws Error.
+/// A brick of what load_volume() would load: see core::load_brick(). Throws Error.
 CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
                             const CompressionOptions &compression, const VolumeInfo &info,
                             std::size_t num_levels, const BlockBox &own, ocl::Device *device);

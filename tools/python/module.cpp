@@ -554,6 +554,93 @@ class PyHostRenderer {
   std::unique_ptr<isowave::HostRenderer> renderer_;
 };
 
+/// A Python object with rank, size, local_rank, all_gather() and reduce(): see _bricks.py.
+class PyProcesses : public isowave::Processes {
+ public:
+  explicit PyProcesses(const nb::object &object)
+      : object_(object),
+        rank_(nb::cast<std::uint32_t>(object.attr("rank"))),
+        size_(nb::cast<std::uint32_t>(object.attr("size"))),
+        local_rank_(nb::cast<std::uint32_t>(object.attr("local_rank"))) {}
+
+  std::uint32_t rank() const override { return rank_; }
+  std::uint32_t size() const override { return size_; }
+  std::uint32_t local_rank() const override { return local_rank_; }
+  std::vector<std::string> all_gather(const std::string &bytes) override {
+    std::vector<std::string> all;
+    call([&] {
+      for (const nb::handle each :
+           object_.attr("all_gather")(nb::bytes(bytes.data(), bytes.size())))
+        all.emplace_back(nb::cast<nb::bytes>(each).c_str(), nb::cast<nb::bytes>(each).size());
+    });
+    return all;
+  }
+  void reduce(std::span<std::uint64_t> words, Reduction how, bool for_all) override {
+    call([&] {
+      const nb::ndarray<nb::numpy, std::uint64_t> array(words.data(), {words.size()}, nb::handle());
+      object_.attr("reduce")(nb::cast(array, nb::rv_policy::reference), how == Reduction::kMin,
+                             for_all);
+    });
+  }
+
+  /// Calls work(), which calls these, without the GIL, and raises what they have raised.
+  template <class Work>
+  auto without_gil(const Work &work) {
+    callbacks_ = {};
+    return callbacks_.without_gil(work);
+  }
+
+ private:
+  template <class Work>
+  void call(const Work &work) {
+    if (!callbacks_.run(work)) throw Stopped();
+  }
+
+  nb::object object_;
+  std::uint32_t rank_, size_, local_rank_;
+  Callbacks callbacks_;
+};
+
+class PyBrickRenderer {
+ public:
+  PyBrickRenderer(const nb::object &processes, const std::filesystem::path &path,
+                  const nb::dict &compression, const nb::dict &options)
+      : processes_(processes) {
+    isowave::BrickOptions wanted;
+    const auto get = reader_of(options);
+    get("device", wanted.device);
+    get("bricks", wanted.bricks);
+    get("width", wanted.renderer.largest.width);
+    get("height", wanted.renderer.largest.height);
+    get("samples", wanted.renderer.largest.samples);
+    get("memory_budget", wanted.renderer.memory_budget);
+    get("cache_blocks", wanted.renderer.cache_blocks);
+    get("with_levels", wanted.renderer.with_levels);
+    get("with_rays", wanted.renderer.with_rays);
+    const isowave::Compression how = compression_of(compression);
+    processes_.without_gil([&] {
+      renderer_.reset(
+          new isowave::BrickRenderer(processes_, path, how, isowave::RawFile{}, wanted));
+    });
+  }
+
+  nb::dict render(const nb::dict &options) {
+    const isowave::FrameRequest request = request_of(options);
+    return frame_dict(processes_.without_gil([&] { return renderer_->render(request); }));
+  }
+  nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
+    return camera_tuple(processes_.without_gil([&] {
+      return renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
+    }));
+  }
+  nb::dict device() const { return device_dict(renderer_->device()); }
+  const isowave::Grid &grid() const { return renderer_->grid(); }
+
+ private:
+  PyProcesses processes_;  // which the renderer does not call when it goes
+  std::unique_ptr<isowave::BrickRenderer, DestroyWithoutGil<isowave::BrickRenderer>> renderer_;
+};
+
 using Picture =
     nb::ndarray<std::uint8_t, nb::ro, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 
@@ -655,4 +742,15 @@ NB_MODULE(_core, m) {
       .def_prop_ro("ready", &PyRenderer::ready)
       .def("wait", &PyRenderer::wait)
       .def_prop_ro("memory_bytes", &PyRenderer::memory_bytes);
+  nb::class_<PyBrickRenderer>(m, "BrickRenderer")
+      .def(nb::init<const nb::object &, const std::filesystem::path &, const nb::dict &,
+                    const nb::dict &>(),
+           "processes"_a, "path"_a, "compression"_a, "options"_a)
+      .def("render", &PyBrickRenderer::render, "request"_a)
+      .def("camera", &PyBrickRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
+      .def_prop_ro("device", &PyBrickRenderer::device)
+      .def_prop_ro("dims", [](const PyBrickRenderer &r) { return r.grid().dims; })
+      .def_prop_ro("spacing", [](const PyBrickRenderer &r) { return r.grid().spacing; })
+      .def_prop_ro("origin", [](const PyBrickRenderer &r) { return r.grid().origin; })
+      .def_prop_ro("direction", [](const PyBrickRenderer &r) { return r.grid().direction; });
 }

@@ -10,6 +10,7 @@
 // What goes wrong is thrown as isowave::Error. Devices, volumes and renderers may be used from
 // several threads; see each.
 
+#include "isowave/bricks.hpp"
 #include "isowave/camera.hpp"
 #include "isowave/device.hpp"
 #include "isowave/error.hpp"

@@ -15,6 +15,7 @@ from isowave import _loader
 
 _loader.prepare()
 
+from isowave._bricks import BrickRenderer  # noqa: E402
 from isowave._core import Error, __version__  # noqa: E402
 from isowave._levels import Level  # noqa: E402
 from isowave._mesh import Mesh  # noqa: E402
@@ -23,6 +24,7 @@ from isowave._report import Report, devices  # noqa: E402
 from isowave._volume import Volume, compress, open, view  # noqa: E402
 
 __all__ = [
+    "BrickRenderer",
     "Camera",
     "Error",
     "Image",

@@ -1,20 +1,19 @@
 #pragma once
 // What the processes of a team have to know of each other before they draw bricks.
 
-#include <cstring>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/base/team.hpp"
 #include "core/bricks/cuts.hpp"
-#include "core/bricks/team.hpp"
 #include "core/ocl/device.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
-namespace isowave::core::tools {
+namespace isowave::core {
 
 /// The device of a host's process of that number. selector: for ocl::choose_device(), or several
 /// with commas, of which processes take one each, again and again. Without commas, the devices of
@@ -29,22 +28,12 @@ ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t l
 /// Throws  Error: the file cannot be read
 std::string fingerprint(const std::string &path, const VolumeInfo &info);
 
+/// How many of a volume's levels of detail, from the finest on, can be cut into so many bricks at
+/// the same planes.
+std::size_t num_cut_levels(const VolumeInfo &whole, std::size_t num_levels, std::uint32_t bricks);
+
 /// A brick for each rank. bricks: XxYxZ, or empty; unit: see Cuts. Throws Error.
 Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit);
-
-/// All ranks' values, by rank.
-template <class Value>
-std::vector<Value> gather(Team &team, const std::vector<Value> &values) {
-  std::string own(values.size() * sizeof(Value), '\0');
-  std::memcpy(own.data(), values.data(), own.size());
-  std::vector<Value> all;
-  for (const std::string &each : team.all_gather(own)) {
-    const std::size_t before = all.size();
-    all.resize(before + each.size() / sizeof(Value));
-    std::memcpy(all.data() + before, each.data(), each.size());
-  }
-  return all;
-}
 
 /// A brick for each rank, which isosurfaces touch about alike. load: gives a brick of those blocks.
 ///
@@ -59,4 +48,4 @@ Cuts cut_by_surfaces(Team &team, const VolumeInfo &whole, std::span<const float>
 std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
                                    const std::optional<BlockBox> &own);
 
-}  // namespace isowave::core::tools
+}  // namespace isowave::core

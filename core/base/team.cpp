@@ -1,11 +1,16 @@
-#include "core/bricks/team.hpp"
+#include "core/base/team.hpp"
 
 #include <algorithm>
 #include <new>
+#include <stdexcept>
 
 #include "core/base/error.hpp"
 
 namespace isowave::core {
+
+void Team::exchange(std::span<const Outgoing>, std::span<const Incoming>) {
+  throw std::logic_error("this team has no messages");
+}
 
 void agree_on_error(Team &team, const std::string &error) {
   const std::vector<std::string> errors = team.all_gather(error);

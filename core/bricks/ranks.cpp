@@ -1,9 +1,10 @@
-#include "tools/isowave/ranks.hpp"
+#include "core/bricks/ranks.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <filesystem>
 
 #include "core/base/error.hpp"
@@ -12,7 +13,7 @@
 #include "core/io/input_file.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
-namespace isowave::core::tools {
+namespace isowave::core {
 
 namespace {
 
@@ -52,6 +53,15 @@ std::string fingerprint(const std::string &path, const VolumeInfo &info) {
   file.read(file.size() - end.size(), end);
   crc = update_crc(crc, end);
   return fmt::format("{} {} {:x}", grid, file.size(), crc);
+}
+
+std::size_t num_cut_levels(const VolumeInfo &whole, std::size_t num_levels, std::uint32_t bricks) {
+  const auto num_units = [&](std::size_t levels) {
+    const int unit = cut_unit(levels);
+    return num_blocks({glm::ivec3(0), (blocks_along(whole) + (unit - 1)) / unit});
+  };
+  while (num_levels > 1 && num_units(num_levels) < bricks) --num_levels;
+  return num_levels;
 }
 
 Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit) {
@@ -94,4 +104,4 @@ std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
   return all;
 }
 
-}  // namespace isowave::core::tools
+}  // namespace isowave::core

@@ -1,0 +1,201 @@
+#include "isowave/bricks.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "core/api/device_implementation.hpp"
+#include "core/api/frame_parts.hpp"
+#include "core/api/guarded.hpp"
+#include "core/api/volume_implementation.hpp"
+#include "core/bricks/brick_renderer.hpp"
+#include "core/bricks/brick_volume.hpp"
+#include "core/bricks/ranks.hpp"
+#include "core/render/surface_camera.hpp"
+#include "core/volume/range_thresholds.hpp"
+#include "isowave/version.hpp"
+
+namespace isowave {
+
+class ProcessTeam : public core::Team {
+ public:
+  explicit ProcessTeam(Processes &processes) : processes_(processes) {}
+  std::uint32_t rank() const override { return processes_.rank(); }
+  std::uint32_t size() const override { return processes_.size(); }
+  std::vector<std::string> all_gather(const std::string &text) override {
+    return processes_.all_gather(text);
+  }
+  void begin_reduction(std::span<std::uint64_t> words, core::Reduction how,
+                       core::Receiver who) override {
+    processes_.reduce(
+        words,
+        how == core::Reduction::kMin ? Processes::Reduction::kMin : Processes::Reduction::kOr,
+        who == core::Receiver::kAll);
+  }
+  void finish_reductions() override {}
+
+ private:
+  Processes &processes_;
+};
+
+namespace {
+
+using core::guarded;
+
+core::RendererOptions core_options(const RendererOptions &options) {
+  if (options.with_bounds || options.with_time_budget)
+    throw core::Error("bricks have no bounds and no time budget");
+  core::RendererOptions result;
+  result.size = core_size(options.largest);
+  result.memory_budget = options.memory_budget;
+  result.cache_slots = options.cache_blocks;
+  result.with_levels = options.with_levels;
+  result.with_given_rays = options.with_rays;
+  return result;
+}
+
+std::string text_of(const ImageSize &size) {
+  return fmt::format("{} {} {} ", size.width, size.height, size.samples);
+}
+
+/// What all processes must ask for alike.
+std::string text_of(const FrameRequest &request) {
+  const Camera &camera = request.camera;
+  const Appearance &look = request.appearance;
+  std::string text = text_of(request.size);
+  for (const Vector3 &v : {camera.eye, camera.at, camera.up})
+    text += fmt::format("{} {} {} ", v[0], v[1], v[2]);
+  for (const std::array<float, 3> &c : {look.surface, look.background})
+    text += fmt::format("{} {} {} ", c[0], c[1], c[2]);
+  return text + fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {}", camera.fovy_degrees,
+                            request.isovalue, look.ambient, look.diffuse, look.specular, look.above,
+                            request.voxel_pixels, request.voxel_error,
+                            static_cast<int>(request.normals), request.ambient_rays,
+                            request.want_picture, request.want_depth, request.want_normals);
+}
+
+void check_for_bricks(const FrameRequest &request, const RendererOptions &options) {
+  if (request.want_positions || request.want_hits || request.want_bounds ||
+      request.max_surface_error || request.time_budget_ms || request.on_pass ||
+      request.bound != FieldBound::kNone)
+    throw core::Error(
+        "frames of bricks have picture, depth and normals: no positions, hits, bounds, "
+        "max_surface_error, time budget or on_pass");
+  if (request.ambient_rays != 0 && !options.with_rays)
+    throw core::Error("ambient rays need a renderer that was made with_rays");
+}
+
+}  // namespace
+
+struct BrickRenderer::Implementation {
+  Implementation(Processes &processes, const std::string &path, const Compression &compression,
+                 const RawFile &raw, const BrickOptions &wanted);
+
+  Frame draw(const FrameRequest &request);
+
+  ProcessTeam team;
+  RendererOptions options;
+  std::unique_ptr<Device::Implementation> device{};
+  core::VolumeInfo whole{};
+  Grid grid{};
+  std::optional<core::Cuts> cuts{};
+  core::CompressedVolume volume{};
+  std::optional<core::BrickRenderer> renderer{};
+};
+
+BrickRenderer::Implementation::Implementation(Processes &processes, const std::string &path,
+                                              const Compression &compression, const RawFile &raw,
+                                              const BrickOptions &wanted)
+    : team(processes), options(wanted.renderer) {
+  core::agree_on(team, "version", std::string(version()));
+  core::Storage storage;
+  core::RawOverrides overrides;
+  std::vector<core::VolumeInfo> levels;
+  std::string print;
+  core::together(team, [&] {
+    storage = storage_for(path, compression);
+    overrides = to_overrides(raw);
+    levels = core::read_levels(path, overrides);
+    print = core::fingerprint(path, levels.front());
+    device = std::make_unique<Device::Implementation>(
+        core::choose_local_device(wanted.device, processes.local_rank()), DeviceOptions{});
+  });
+  core::agree_on(team, "volume", print);
+  core::agree_on(team, "request",
+                 fmt::format("{} {} {} {} {} {} {} {} {} {}", text_of(options.largest),
+                             options.with_levels, options.with_rays, wanted.bricks, storage.rate,
+                             storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
+                             storage.exact, storage.levels, storage.map_nan.value_or(0)));
+  whole = levels.front();
+  grid = public_grid(whole);
+  if (!options.with_levels) levels.resize(1);
+  if (compression.levels != 1 || (options.with_levels && levels.size() == 1))
+    throw core::Error("{}: bricks have levels of detail that are in a .zfp file: convert it", path);
+  cuts.emplace(core::cut_for(team, whole, wanted.bricks, core::cut_unit(levels.size())));
+  std::vector<float> samples;
+  core::together(team, [&] {
+    storage.device = &device->device;
+    volume = core::load_brick(path, overrides, storage, whole, levels.size(),
+                              cuts->bricks()[team.rank()]);
+    samples = core::range_samples(volume, whole);
+  });
+  core::RendererOptions of_core;
+  core::together(team, [&] { of_core = core_options(options); });
+  of_core.range_thresholds = core::range_thresholds(core::gather(team, samples));
+  core::together(team,
+                 [&] { renderer.emplace(device->device, volume, of_core, *cuts, whole, team); });
+}
+
+Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {
+  core::agree_on(team, "request", text_of(request));
+  check_for_bricks(request, options);
+  const core::FrameRequest wanted = core_request(request);
+  Frame frame;
+  describe_frame(request, renderer->render(wanted), frame);
+  if (request.want_normals) {
+    const std::vector<core::HitRecord> hits = renderer->hits();
+    fill_frame(request, hits, volume, false, frame);
+  } else if (request.want_depth || !request.want_picture) {
+    frame.depth = renderer->depth();
+  }
+  frame.statistics.hits = renderer->num_hits();
+  if (request.want_picture)
+    frame.picture = renderer->shade(core_appearance(request.appearance)).pixels;
+  if (!request.want_depth) frame.depth.clear();
+  return frame;
+}
+
+BrickRenderer::BrickRenderer(Processes &processes, const std::filesystem::path &path,
+                             const Compression &compression, const RawFile &raw,
+                             const BrickOptions &options) {
+  guarded("making a renderer", [&] {
+    implementation_ =
+        std::make_unique<Implementation>(processes, path.string(), compression, raw, options);
+  });
+}
+
+BrickRenderer::~BrickRenderer() = default;
+
+Frame BrickRenderer::render(const FrameRequest &request) {
+  return guarded("rendering", [&] { return implementation_->draw(request); });
+}
+
+Camera BrickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
+  return guarded("looking for the surface", [&] {
+    Implementation &self = *implementation_;
+    std::optional<core::BlockBox> own;
+    core::together(self.team, [&] { own = self.renderer->surface_box({&isovalue, 1}); });
+    return public_camera(core::surface_camera(self.whole,
+                                              core::gather_box(self.team, self.volume.info, own),
+                                              core_size(size.value_or(self.options.largest))));
+  });
+}
+
+const Grid &BrickRenderer::grid() const {
+  return implementation_->grid;
+}
+const DeviceInfo &BrickRenderer::device() const {
+  return implementation_->device->info;
+}
+
+}  // namespace isowave

@@ -1,0 +1,72 @@
+#pragma once
+// The processes that work on a volume together, and what they say to each other. tools/isowave has
+// those of MPI; the library itself needs none.
+
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace isowave::core {
+
+/// What goes to another process, or comes from it.
+template <class Byte>
+struct Message {
+  std::uint32_t rank;
+  std::span<Byte> bytes;
+};
+using Outgoing = Message<const std::byte>;
+using Incoming = Message<std::byte>;
+
+enum class Reduction {
+  kMin,  ///< the smallest word
+  kOr    ///< the bits of all
+};
+enum class Receiver { kRank0, kAll };
+
+/// All of them make the same calls in the same order.
+class Team {
+ public:
+  virtual ~Team() = default;
+  virtual std::uint32_t rank() const = 0;  ///< of this process, 0 to size() - 1
+  virtual std::uint32_t size() const = 0;
+  /// Everybody's text, by rank.
+  virtual std::vector<std::string> all_gather(const std::string &text) = 0;
+  /// Begins to make one word of those of all processes at each place, which rank 0 will have in
+  /// `words`, or all. Until finish_reductions() these must not be touched.
+  virtual void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) = 0;
+  virtual void finish_reductions() = 0;
+  /// Sends and receives, in order, and is back when both are done; none is of this process. To be
+  /// called by those alone that are named. Drawing needs none.
+  virtual void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received);
+};
+
+/// Throws Error at every rank if one gives a text: that of the first, with its rank, unless all
+/// give the same.
+void agree_on_error(Team &team, const std::string &error);
+
+/// Does what each rank has to do by itself. Where one fails, all throw what it throws, so that none
+/// waits for it.
+void together(Team &team, const std::function<void()> &work);
+
+/// Throws Error at every rank, which says which, unless all have the same. what: that they have.
+void agree_on(Team &team, const std::string &what, const std::string &text);
+
+/// All ranks' values, by rank.
+template <class Value>
+std::vector<Value> gather(Team &team, const std::vector<Value> &values) {
+  std::string own(values.size() * sizeof(Value), '\0');
+  if (!values.empty()) std::memcpy(own.data(), values.data(), own.size());
+  std::vector<Value> all;
+  for (const std::string &each : team.all_gather(own)) {
+    if (each.empty()) continue;
+    const std::size_t before = all.size();
+    all.resize(before + each.size() / sizeof(Value));
+    std::memcpy(all.data() + before, each.data(), each.size());
+  }
+  return all;
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,586 @@
+#include "core/bricks/compress_together.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <functional>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.hpp"
+#include "core/bricks/brick_volume.hpp"
+#include "core/volume/pyramid.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "core/zfp/libzfp.hpp"
+#include "core/zfp/pyramid_coder.hpp"
+#include "core/zfp/zfp_file.hpp"
+#include "core/zfp/zfp_trailer.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+/// From one to the other, not included: of layers of blocks, or of voxels.
+struct Layers {
+  std::uint32_t begin = 0, end = 0;
+
+  std::uint32_t count() const { return end - begin; }
+  bool empty() const { return begin == end; }
+};
+
+Layers common(const Layers &a, const Layers &b) {
+  const std::uint32_t begin = std::max(a.begin, b.begin);
+  return {begin, std::max(begin, std::min(a.end, b.end))};
+}
+
+/// Some layers of a reader's.
+class LayersReader : public VolumeReader {
+ public:
+  LayersReader(std::unique_ptr<VolumeReader> whole, const Layers &layers)
+      : whole_(std::move(whole)), begin_(layers.begin) {
+    info_ = whole_->info();
+    info_.dims.z = layers.count();
+  }
+  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
+    whole_->read_layers(begin_ + z_begin, num_layers, out);
+  }
+  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
+                         std::span<double> out) override {
+    whole_->read_exact_layers(begin_ + z_begin, num_layers, out);
+  }
+
+ private:
+  std::unique_ptr<VolumeReader> whole_;
+  std::uint32_t begin_;
+};
+
+/// How a level is cut into slabs.
+struct LevelCuts {
+  /// Layers of blocks of each rank's slab, and those that it works on: with as many of its
+  /// neighbours' as the next level's slab depends on.
+  std::vector<Layers> own, worked;
+};
+
+std::uint32_t block_layers(const VolumeInfo &info) {
+  return (info.dims.z + 3) / 4;
+}
+
+/// Of layers of blocks of a level.
+Layers voxel_layers(const VolumeInfo &info, const Layers &blocks) {
+  return {std::min(4 * blocks.begin, info.dims.z), std::min(4 * blocks.end, info.dims.z)};
+}
+
+std::vector<Layers> share_out(std::uint32_t layers, std::uint32_t size) {
+  std::vector<Layers> shares;
+  for (std::uint64_t rank = 0; rank < size; ++rank) {
+    shares.push_back({static_cast<std::uint32_t>(layers * rank / size),
+                      static_cast<std::uint32_t>(layers * (rank + 1) / size)});
+  }
+  return shares;
+}
+
+/// A block of the next level belongs to whom its first fine block belongs to, or the first behind
+/// that. Of it must be known, as the whole volume would give them: the blocks before and behind it,
+/// of which voxels are decoded, and layers of voxels of this level around those, of which they are
+/// made.
+std::vector<LevelCuts> cut_levels(std::span<CompressedVolume *const> levels, std::uint32_t size) {
+  constexpr std::uint32_t kAround = 4;
+  std::vector<LevelCuts> cuts = {{share_out(block_layers(levels[0]->info), size), {}}};
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const std::uint32_t total = block_layers(levels[i]->info);
+    if (i + 1 == levels.size()) {
+      cuts[i].worked = cuts[i].own;
+      break;
+    }
+    const std::uint32_t next_total = block_layers(levels[i + 1]->info);
+    const auto half = [&](std::uint32_t b) { return b == total ? next_total : (b + 1) / 2; };
+    LevelCuts next;
+    for (const Layers &own : cuts[i].own) {
+      const Layers coarse = {half(own.begin), half(own.end)};
+      next.own.push_back(coarse);
+      Layers worked = own;
+      if (!coarse.empty()) {
+        worked.begin = 2 * coarse.begin - std::min(2 * coarse.begin, kAround);
+        worked.end = std::min(total, std::max(own.end, 2 * coarse.end + kAround));
+      }
+      cuts[i].worked.push_back(worked);
+    }
+    cuts.push_back(std::move(next));
+  }
+  return cuts;
+}
+
+/// Consecutive bytes of a file, and their checksum.
+struct Section {
+  std::uint64_t bytes = 0;
+  std::uint32_t crc = 0;
+
+  void add(std::span<const std::byte> more) {
+    crc = update_crc(crc, more);
+    bytes += more.size();
+  }
+  void add(const Section &behind) {
+    crc = combine_crcs(crc, behind.crc, behind.bytes);
+    bytes += behind.bytes;
+  }
+};
+
+/// Writes one section of a shared file.
+class SectionWriter {
+ public:
+  SectionWriter(SharedFile &file, std::uint64_t begin) : file_(file), begin_(begin) {}
+  void write(std::span<const std::byte> bytes) {
+    if (bytes.empty()) return;
+    file_.write(begin_ + section_.bytes, bytes);
+    section_.add(bytes);
+  }
+  const Section &section() const { return section_; }
+
+ private:
+  SharedFile &file_;
+  std::uint64_t begin_;
+  Section section_;
+};
+
+/// What a rank's slab of a level becomes.
+struct CodedSlab {
+  CompressedVolume volume;                 ///< of the layers worked on
+  std::vector<float> errors;               ///< of its own blocks, where they are kept
+  LevelBounds::Off off_next;               ///< of the blocks of the next level that were made
+  std::optional<SectionWriter> payload{};  ///< its own, at a fixed rate
+};
+
+/// A level on its way from one step to the next.
+struct LevelData {
+  std::vector<float> voxels;   ///< of the layers worked on
+  std::vector<float> made;     ///< of their blocks: LevelBounds::Off
+  std::vector<float> decoded;  ///< of its own blocks
+};
+
+/// Of a list with so many values for each layer of blocks of `all`, those of `some`.
+template <class Value>
+std::span<Value> part_of(std::span<Value> values, std::size_t per_layer, const Layers &all,
+                         const Layers &some) {
+  return values.subspan((some.begin - all.begin) * per_layer, some.count() * per_layer);
+}
+
+class TeamCompressor {
+ public:
+  TeamCompressor(Team &team, const OpenReader &open, const CompressOptions &options,
+                 SharedFile &file, CompressedVolume &volume)
+      : team_(team), open_(open), options_(options), file_(file) {
+    levels_.push_back(&volume);
+    for (CompressedVolume &level : volume.coarser_levels) levels_.push_back(&level);
+    cuts_ = cut_levels(levels_, team.size());
+  }
+
+  void run() {
+    Section all;
+    ZfpLayout layout;
+    for (level_ = 0; level_ < levels_.size(); ++level_) {
+      const std::uint64_t begin = all.bytes;
+      LevelData next;
+      CodedSlab slab = code(begin, next);
+      Section section = write_payload(begin, slab);
+      ZfpLayout own_layout;
+      section.add(write_tables(begin + section.bytes, section.bytes, slab, own_layout));
+      if (level_ == 0) {
+        layout = own_layout;
+      } else {
+        section.add(write_trailer(begin + section.bytes, section, own_layout, false));
+        layout.level_bytes.push_back(section.bytes);
+      }
+      all.add(section);
+      data_ = std::move(next);
+      if (level_ + 1 < levels_.size()) fetch_neighbours();
+    }
+    level_ = 0;
+    write_trailer(all.bytes, all, layout, levels_.size() > 1);
+  }
+
+ private:
+  CompressedVolume &level() { return *levels_[level_]; }
+  const Layers &own() const { return cuts_[level_].own[team_.rank()]; }
+  const Layers &worked() const { return cuts_[level_].worked[team_.rank()]; }
+  bool is_first() const { return team_.rank() == 0; }
+  /// Of a layer of the level's blocks.
+  std::size_t blocks_of_layer(std::size_t level) const {
+    const glm::uvec3 blocks = levels_[level]->num_blocks();
+    return std::size_t{blocks.x} * blocks.y;
+  }
+  std::size_t voxels_of_layer(std::size_t level) const {
+    const glm::uvec3 &dims = levels_[level]->info.dims;
+    return std::size_t{dims.x} * dims.y;
+  }
+
+  CodedSlab code(std::uint64_t begin, LevelData &next);
+  void read_finest(PyramidCoder &coder);
+  void keep_next(const Chunk &chunk, LevelData &next) const;
+  void agree_on_error(const CodedSlab &slab);
+  Section write_payload(std::uint64_t begin, const CodedSlab &slab);
+  Section write_bits(std::uint64_t begin, const CompressedVolume &coded);
+  Section write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
+                       ZfpLayout &layout);
+  std::uint64_t write_deflated(SectionWriter &out, std::span<const std::byte> own,
+                               std::size_t item_size);
+  Section write_trailer(std::uint64_t begin, const Section &before, const ZfpLayout &layout,
+                        bool has_levels);
+  Section of_first(const std::function<Section()> &write);
+  void fetch_neighbours();
+
+  Team &team_;
+  const OpenReader &open_;
+  const CompressOptions &options_;
+  SharedFile &file_;
+  std::vector<CompressedVolume *> levels_;
+  std::vector<LevelCuts> cuts_;
+  std::size_t level_ = 0;
+  LevelData data_;  ///< of the present level, but the finest
+};
+
+/// Rank 0 writes, and all get to know what.
+Section TeamCompressor::of_first(const std::function<Section()> &write) {
+  Section section;
+  together(team_, [&] {
+    if (is_first()) section = write();
+  });
+  return gather(team_, is_first() ? std::vector{section} : std::vector<Section>()).front();
+}
+
+/// The next level's layers that are this rank's own.
+void TeamCompressor::keep_next(const Chunk &chunk, LevelData &next) const {
+  const LevelCuts &cuts = cuts_[level_ + 1];
+  const VolumeInfo &info = levels_[level_ + 1]->info;
+  const std::uint32_t rank = team_.rank(), first = 2 * worked().begin + chunk.z;
+  const Layers kept = common(voxel_layers(info, cuts.own[rank]), {first, first + chunk.num_layers});
+  const std::uint32_t begin = voxel_layers(info, cuts.worked[rank]).begin;
+  const std::size_t size = voxels_of_layer(level_ + 1);
+  for (std::uint32_t z = kept.begin; z < kept.end; ++z)
+    std::ranges::copy(chunk.voxels.subspan((z - first) * size, size),
+                      next.voxels.begin() + std::ptrdiff_t((z - begin) * size));
+}
+
+void TeamCompressor::read_finest(PyramidCoder &coder) {
+  VolumePart part = own_part(team_, level().info);
+  const Layers layers = voxel_layers(level().info, worked());
+  part.begin = layers.begin;
+  InputOptions input = options_.input;
+  input.part = &part;
+  const std::unique_ptr<VolumeReader> reader = open_part(part, layers.count(), open_);
+  level().value_range = read_in_chunks(*reader, input, coder).coded;
+}
+
+/// Codes the layers worked on; at a fixed rate, writes what is the rank's own.
+CodedSlab TeamCompressor::code(std::uint64_t begin, LevelData &next) {
+  const std::uint32_t rank = team_.rank();
+  const bool has_next = level_ + 1 < levels_.size() && !cuts_[level_ + 1].own[rank].empty();
+  CompressOptions options = options_;
+  if (worked().empty()) options.device = nullptr;
+  CodedSlab slab;
+  CompressedVolume coarse;
+  std::optional<PyramidCoder> coder;
+  std::vector<CompressedVolume *> volumes = {&slab.volume};
+  const auto describe = [](const CompressedVolume &level) {
+    CompressedVolume volume;
+    volume.info = level.info;
+    volume.bits_per_block = level.bits_per_block;
+    volume.precision = level.precision;
+    return volume;
+  };
+  std::uint64_t done = 0;  // bytes of payload
+  const std::size_t layer_bytes = blocks_of_layer(level_) * level().bits_per_block / 8;
+  const std::uint64_t own_begin = (own().begin - worked().begin) * layer_bytes,
+                      own_end = (own().end - worked().begin) * layer_bytes;
+  const std::vector<PayloadSink> sinks = {
+      [&](std::span<const std::byte> payload) {
+        if (level().is_indexed()) {
+          std::vector<std::uint32_t> &words = slab.volume.words;
+          const std::size_t size = words.size();
+          words.resize(size + payload.size() / sizeof(std::uint32_t));
+          std::ranges::copy(payload, std::as_writable_bytes(std::span(words)).begin() +
+                                         std::ptrdiff_t(size * sizeof(std::uint32_t)));
+          return;
+        }
+        const std::uint64_t from = std::max(done, own_begin),
+                            to = std::min(done + payload.size(), own_end);
+        if (from < to) slab.payload->write(payload.subspan(from - done, to - from));
+        done += payload.size();
+      },
+      [](std::span<const std::byte>) {}};
+  together(team_, [&] {
+    slab.volume = describe(level());
+    slab.volume.info.dims.z = voxel_layers(level().info, worked()).count();
+    slab.payload.emplace(file_, begin + sizeof(ZfpHeader) + own().begin * layer_bytes);
+    if (has_next) {
+      coarse = describe(*levels_[level_ + 1]);
+      coarse.info.dims.z = slab.volume.info.dims.z / 2 + 1;
+      volumes.push_back(&coarse);
+      const LevelCuts &cuts = cuts_[level_ + 1];
+      const VolumeInfo &info = levels_[level_ + 1]->info;
+      next.voxels.resize(voxel_layers(info, cuts.worked[rank]).count() *
+                         voxels_of_layer(level_ + 1));
+      next.made.resize(cuts.worked[rank].count() * blocks_of_layer(level_ + 1));
+    }
+    coder.emplace(options, volumes, std::span(sinks).first(volumes.size()), level_ == 0,
+                  level_ == 0 && levels_.size() > 1,
+                  [&](const Chunk &chunk) { keep_next(chunk, next); });
+  });
+  if (level_ == 0) read_finest(*coder);
+  together(team_, [&] {
+    const glm::uvec3 &dims = slab.volume.info.dims;
+    const std::uint32_t chunk_layers = layers_per_chunk(dims);
+    const std::size_t layer = voxels_of_layer(level_);
+    for (std::uint32_t z = 0; level_ > 0 && z < dims.z; z += chunk_layers) {
+      const std::size_t count = std::min(chunk_layers, dims.z - z) * layer;
+      code_chunk(make_chunk(dims, z, std::span(data_.voxels).subspan(z * layer, count)), dims,
+                 options.input, *coder);
+    }
+    slab.errors = coder->finish_level();
+    if (!slab.errors.empty()) {
+      const std::span<const float> errors =
+          part_of(std::span<const float>(slab.errors), blocks_of_layer(level_), worked(), own());
+      slab.errors = std::vector<float>(errors.begin(), errors.end());
+    }
+    if (!has_next) return;
+    LevelBounds::Off off = coder->finish_bounds(data_.made);
+    if (off.made.empty()) {
+      next.made.clear();
+      return;
+    }
+    const LevelCuts &cuts = cuts_[level_ + 1];
+    const std::size_t per_layer = blocks_of_layer(level_ + 1);
+    const Layers made = {worked().begin / 2, worked().begin / 2 + block_layers(coarse.info)};
+    const std::span<float> of_own = part_of(std::span(off.made), per_layer, made, cuts.own[rank]);
+    std::ranges::copy(
+        of_own,
+        part_of(std::span(next.made), per_layer, cuts.worked[rank], cuts.own[rank]).begin());
+    const std::span<float> decoded =
+        part_of(std::span(off.decoded), per_layer, made, cuts.own[rank]);
+    next.decoded.assign(decoded.begin(), decoded.end());
+  });
+  agree_on_error(slab);
+  return slab;
+}
+
+void TeamCompressor::agree_on_error(const CodedSlab &slab) {
+  CompressedVolume &volume = level();
+  const std::vector<double> errors =
+      gather(team_, std::vector{slab.volume.max_voxel_error.value_or(-1)});
+  const double largest = std::ranges::max(errors);
+  if (largest >= 0) volume.max_voxel_error = largest;
+  if (volume.is_indexed()) volume.precision.max_voxel_error = volume.max_voxel_error;
+}
+
+Section TeamCompressor::write_payload(std::uint64_t begin, const CodedSlab &slab) {
+  Section section = of_first([&] {
+    SectionWriter out(file_, begin);
+    const ZfpHeader header =
+        make_zfp_header(level().info.dims, level().bits_per_block, level().precision.min_exponent);
+    out.write(std::as_bytes(std::span(header)));
+    return out.section();
+  });
+  const Section own = level().is_indexed() ? write_bits(begin + section.bytes, slab.volume)
+                                           : slab.payload->section();
+  for (const Section &of_rank : gather(team_, std::vector{own})) section.add(of_rank);
+  return section;
+}
+
+/// A slab's bits at their place in a payload. A byte that several ranks have bits of is written by
+/// the one that has its first.
+Section TeamCompressor::write_bits(std::uint64_t begin, const CompressedVolume &coded) {
+  struct Bits {
+    std::uint64_t first, count;  ///< in the payload
+    std::uint64_t in_first_byte;
+  };
+  const std::uint64_t layer = blocks_of_layer(level_);
+  const std::uint64_t source = coded.block_begin((own().begin - worked().begin) * layer),
+                      count = coded.block_begin((own().end - worked().begin) * layer) - source;
+  const std::vector<std::uint64_t> counts = gather(team_, std::vector{count});
+  const std::uint32_t rank = team_.rank();
+  const std::uint64_t first =
+      std::accumulate(counts.begin(), counts.begin() + rank, std::uint64_t{0});
+  level().indexed_bits = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  const std::span<const std::byte> bytes = std::as_bytes(std::span(coded.words));
+  // Bits of the byte that a rank before this one writes.
+  const std::uint64_t shared = std::min((8 - first % 8) % 8, count);
+  std::uint32_t head = 0;
+  if (shared != 0) copy_bits(bytes, source, shared, {&head, 1});
+  const std::vector<Bits> all = gather(team_, std::vector{Bits{first, count, head << first % 8}});
+  SectionWriter out(file_, begin + (first + 7) / 8);
+  together(team_, [&] {
+    constexpr std::uint64_t kPieceWords = 1u << 18;
+    const std::uint64_t end = first + count;
+    std::vector<std::uint32_t> words;
+    for (std::uint64_t at = first + shared; at < end;) {
+      const std::uint64_t num_bits = std::min(32 * kPieceWords, end - at);
+      words.resize((num_bits + 31) / 32);
+      copy_bits(bytes, source + (at - first), num_bits, words);
+      at += num_bits;
+      const std::span<std::byte> piece =
+          std::as_writable_bytes(std::span(words)).first((num_bits + 7) / 8);
+      for (std::size_t other = rank + 1; at == end && end % 8 != 0 && other < all.size(); ++other) {
+        if (all[other].count != 0 && all[other].first / 8 == end / 8)
+          piece.back() |= static_cast<std::byte>(all[other].in_first_byte);
+      }
+      out.write(piece);
+    }
+  });
+  return out.section();
+}
+
+/// Padding, index and bounds: what comes behind so many bytes of the level's own.
+Section TeamCompressor::write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
+                                     ZfpLayout &layout) {
+  const std::uint64_t layer = blocks_of_layer(level_), num_own = own().count() * layer,
+                      first = (own().begin - worked().begin) * layer;
+  std::vector<std::uint16_t> lengths;
+  if (level().is_indexed()) {
+    for (std::uint64_t block = first; block < first + num_own; ++block)
+      lengths.push_back(static_cast<std::uint16_t>(slab.volume.block_bits(block)));
+  }
+  const std::vector<float> &bounds = level_ == 0 ? slab.errors : data_.decoded;
+  const std::vector<float> largest =
+      gather(team_, bounds.empty() ? std::vector<float>() : std::vector{std::ranges::max(bounds)});
+  const BlockBounds coded =
+      encode_bounds(bounds, largest.empty() ? 0.0f : std::ranges::max(largest));
+  level().bounds.exponent = coded.exponent;
+  level().bounds.by_place = level_ == 0 && !largest.empty();
+  SectionWriter out(file_, begin);
+  together(team_, [&] {
+    if (is_first()) out.write(std::vector<std::byte>((8 - size % 8) % 8));
+  });
+  if (level().is_indexed())
+    layout.index_bytes =
+        write_deflated(out, std::as_bytes(std::span(lengths)), sizeof(std::uint16_t));
+  if (!largest.empty())
+    layout.bounds_bytes = write_deflated(out, std::as_bytes(std::span(coded.codes)), 1);
+  return gather(team_, is_first() ? std::vector{out.section()} : std::vector<Section>()).front();
+}
+
+/// A list with items for each block, of which rank 0 gets a piece after the other. Returns its
+/// size there.
+std::uint64_t TeamCompressor::write_deflated(SectionWriter &out,
+                                             std::span<const std::byte> own_bytes,
+                                             std::size_t item_size) {
+  const std::uint64_t begin = out.section().bytes;
+  const std::uint64_t per_layer = blocks_of_layer(level_) * item_size;
+  const std::vector<Layers> &slabs = cuts_[level_].own;
+  const std::uint64_t piece_size = kDeflatedAtOnce * item_size,
+                      total = per_layer * slabs.back().end;
+  together(team_, [&] {
+    std::exception_ptr failure;
+    std::optional<Deflater> deflater;
+    std::vector<std::byte> piece(is_first() ? piece_size : 0);
+    // Others send what they have, whatever fails here.
+    const auto attempt = [&](const auto &work) {
+      if (failure) return;
+      try {
+        work();
+      } catch (...) {
+        failure = std::current_exception();
+      }
+    };
+    if (is_first()) {
+      attempt(
+          [&] { deflater.emplace([&](std::span<const std::byte> bytes) { out.write(bytes); }); });
+    }
+    for (std::uint64_t at = 0; at < total; at += piece_size) {
+      const std::uint64_t end = std::min(at + piece_size, total);
+      std::vector<Incoming> received;
+      for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
+        const std::uint64_t slab_begin = slabs[rank].begin * per_layer,
+                            from = std::max(at, slab_begin),
+                            to = std::min(end, slabs[rank].end * per_layer);
+        if (from >= to) continue;
+        if (rank == team_.rank()) {
+          const std::span<const std::byte> some = own_bytes.subspan(from - slab_begin, to - from);
+          if (is_first()) {
+            std::ranges::copy(some, piece.begin() + std::ptrdiff_t(from - at));
+          } else {
+            const Outgoing sent{0, some};
+            team_.exchange({&sent, 1}, {});
+          }
+        } else if (is_first()) {
+          received.push_back({rank, std::span(piece).subspan(from - at, to - from)});
+        }
+      }
+      if (!is_first()) continue;
+      team_.exchange({}, received);
+      attempt([&] { deflater->add(std::span(piece).first(end - at)); });
+    }
+    if (is_first()) attempt([&] { deflater->finish(); });
+    if (failure) std::rethrow_exception(failure);
+  });
+  return out.section().bytes - begin;
+}
+
+Section TeamCompressor::write_trailer(std::uint64_t begin, const Section &before,
+                                      const ZfpLayout &layout, bool has_levels) {
+  return of_first([&] {
+    const std::string text = zfp_trailer_text(level(), layout);
+    ZfpFooter footer{zfp_version(level(), has_levels), std::uint32_t(text.size()), before.crc, 0,
+                     kZfpFooterMagic};
+    footer.json_crc = json_crc(text, footer);
+    SectionWriter out(file_, begin);
+    out.write(std::as_bytes(std::span(text)));
+    out.write(std::as_bytes(std::span(&footer, 1)));
+    return out.section();
+  });
+}
+
+/// Of the next level, the layers worked on that are other ranks' own.
+void TeamCompressor::fetch_neighbours() {
+  const std::size_t next = level_ + 1;
+  const LevelCuts &cuts = cuts_[next];
+  const VolumeInfo &info = levels_[next]->info;
+  const std::uint32_t self = team_.rank();
+  const auto slices = [&](const Layers &some, const auto &use) {
+    const Layers all = cuts.worked[self];
+    use(std::as_writable_bytes(part_of(std::span(data_.voxels), voxels_of_layer(next),
+                                       voxel_layers(info, all), voxel_layers(info, some))));
+    if (!data_.made.empty())
+      use(std::as_writable_bytes(part_of(std::span(data_.made), blocks_of_layer(next), all, some)));
+  };
+  std::vector<Outgoing> sent;
+  std::vector<Incoming> received;
+  for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
+    if (rank == self) continue;
+    const Layers for_it = common(cuts.own[self], cuts.worked[rank]),
+                 for_us = common(cuts.own[rank], cuts.worked[self]);
+    if (!for_it.empty())
+      slices(for_it, [&](std::span<std::byte> bytes) { sent.push_back({rank, bytes}); });
+    if (!for_us.empty())
+      slices(for_us, [&](std::span<std::byte> bytes) { received.push_back({rank, bytes}); });
+  }
+  team_.exchange(sent, received);
+}
+
+}  // namespace
+
+VolumePart own_part(Team &team, const VolumeInfo &whole) {
+  const Layers own = voxel_layers(whole, share_out(block_layers(whole), team.size())[team.rank()]);
+  return {&team, whole, own.begin, own.begin, own.end};
+}
+
+std::unique_ptr<VolumeReader> open_part(const VolumePart &part, std::uint32_t num_layers,
+                                        const OpenReader &open) {
+  std::unique_ptr<VolumeReader> reader;
+  together(*part.team, [&] {
+    reader = std::make_unique<LayersReader>(open(), Layers{part.begin, part.begin + num_layers});
+  });
+  return reader;
+}
+
+CompressedVolume compress_together(Team &team, const OpenReader &open,
+                                   const CompressOptions &options, SharedFile &file) {
+  VolumeInfo info;
+  together(team, [&] { info = open()->info(); });
+  CompressedVolume volume = describe_compressed(info, options);
+  TeamCompressor(team, open, options, file, volume).run();
+  file.commit();
+  return volume;
+}
+
+}  // namespace isowave::core

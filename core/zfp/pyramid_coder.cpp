@@ -1,0 +1,241 @@
+// Compression of whole volumes by libzfp, or by a device. With a whole number of bits per voxel a
+// block is a whole number of 64-bit words, so rows of blocks are compressed apart, in parallel, and
+// laid end to end: the same bytes as one call for the whole array. A device gets whole layers
+// (zfp_encode). Blocks of lengths of their own: zfp_accuracy.
+
+#include "core/zfp/pyramid_coder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/base/error.hpp"
+#include "core/volume/block_errors.hpp"
+#include "core/zfp/libzfp.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
+#include "core/zfp/zfp_encode.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+/// Compresses rows of blocks by libzfp.
+class FixedRateCoder : public LevelCoder {
+ public:
+  FixedRateCoder(const glm::uvec3 &dims, const CompressOptions &options, const PayloadSink &sink,
+                 bool keep)
+      : dims_(dims), options_(options), sink_(sink), errors_(keep) {}
+
+  void begin_chunk(const Chunk &chunk) override {
+    words_.resize(chunk.num_rows * row_words());
+    if (!options_.measure_error) return;
+    errors_.begin(chunk.num_rows * blocks_x());
+    chunk_ = chunk.voxels;
+    decoded_.resize(chunk_.size());
+  }
+
+  void code_row(const BlockRow &row, std::uint32_t) override {
+    const std::span<std::uint64_t> words =
+        std::span(words_).subspan(row.index * row_words(), row_words());
+    const ZfpStream stream = make_zfp_stream(64 * options_.rate);
+    const ZfpBits bits(stream_open(words.data(), words.size_bytes()), &stream_close);
+    zfp_stream_set_bit_stream(stream.get(), bits.get());
+    const ZfpField field(
+        zfp_field_3d(const_cast<float *>(row.voxels), zfp_type_float, dims_.x, row.ny, row.nz),
+        &zfp_field_free);
+    zfp_field_set_stride_3d(field.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
+    if (zfp_compress(stream.get(), field.get()) != words.size_bytes()) {
+      throw std::logic_error("zfp: a row of blocks has not its fixed size");
+    }
+    if (!options_.measure_error) return;
+
+    float *decoded = decoded_.data() + (row.voxels - chunk_.data());
+    const ZfpField copy(zfp_field_3d(decoded, zfp_type_float, dims_.x, row.ny, row.nz),
+                        &zfp_field_free);
+    zfp_field_set_stride_3d(copy.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
+    zfp_stream_rewind(stream.get());
+    if (zfp_decompress(stream.get(), copy.get()) == 0)
+      throw std::logic_error("zfp: cannot decode its own blocks");
+    BlockError *errors = errors_.some().data() + row.index * blocks_x();
+    for (std::uint32_t z = 0; z < row.nz; ++z) {
+      for (std::uint32_t y = 0; y < row.ny; ++y) {
+        const std::ptrdiff_t begin = z * layer_size() + std::ptrdiff_t(y) * dims_.x;
+        const float *source = row.voxels + begin, *value = decoded + begin;
+        for (std::uint32_t x = 0; x < dims_.x; ++x)
+          errors[x / 4].add(x % 4 + 4 * y + 16 * z, std::abs(double(value[x]) - double(source[x])));
+      }
+    }
+  }
+
+  void end_chunk(const Chunk &chunk) override {
+    sink_(std::as_bytes(std::span(words_)));
+    if (!options_.measure_error) return;
+    errors_.add_lost(chunk.lost);
+    errors_.end();
+  }
+
+  std::vector<float> finish(CompressedVolume &volume) override {
+    if (options_.measure_error) volume.max_voxel_error = errors_.max();
+    return errors_.take();
+  }
+
+  std::span<const float> decoded() const override { return decoded_; }
+
+ private:
+  std::uint32_t blocks_x() const { return (dims_.x + 3u) / 4u; }
+  std::uint64_t row_words() const { return std::uint64_t{blocks_x()} * options_.rate; }
+  std::ptrdiff_t layer_size() const { return std::ptrdiff_t(dims_.x) * dims_.y; }
+
+  glm::uvec3 dims_;
+  const CompressOptions &options_;
+  const PayloadSink &sink_;
+  std::vector<std::uint64_t> words_;  ///< of the present chunk
+  std::span<const float> chunk_{};    ///< its voxels
+  std::vector<float> decoded_{};      ///< and what becomes of them
+  BlockErrors errors_;
+};
+
+/// Has a device compress whole chunks; what they become is not read back.
+class DeviceCoder : public LevelCoder {
+ public:
+  DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const PayloadSink &sink,
+              bool keep)
+      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error,
+                 BlockErrors(keep)),
+        measure_error_(options.measure_error),
+        sink_(sink) {}
+
+  void end_chunk(const Chunk &chunk) override {
+    if (measure_error_) encoder_.errors().add_lost(chunk.lost);
+    encoder_.encode(chunk.voxels, chunk.num_layers, sink_);
+  }
+
+  std::vector<float> finish(CompressedVolume &volume) override {
+    encoder_.finish(sink_);
+    if (measure_error_) volume.max_voxel_error = encoder_.errors().max();
+    return encoder_.errors().take();
+  }
+
+  std::span<const float> decoded() const override { return {}; }
+
+ private:
+  LayerEncoder encoder_;
+  bool measure_error_;
+  const PayloadSink &sink_;
+};
+
+/// Compresses blocks of lengths of their own.
+class BoundedCoder : public LevelCoder {
+ public:
+  BoundedCoder(const glm::uvec3 &dims, const BlockPrecision &bound, const PayloadSink &sink,
+               bool keep)
+      : coder_(dims, bound, sink,
+               keep || !bound.max_voxel_error ? std::optional(BlockErrors(keep)) : std::nullopt) {}
+  void begin_chunk(const Chunk &chunk) override { coder_.begin_chunk(chunk); }
+  void code_row(const BlockRow &row, std::uint32_t thread) override {
+    coder_.code_row(row, thread);
+  }
+  void end_chunk(const Chunk &chunk) override { coder_.end_chunk(chunk); }
+  std::vector<float> finish(CompressedVolume &volume) override {
+    volume.index = coder_.finish();
+    volume.indexed_bits = volume.block_begin(static_cast<std::uint32_t>(volume.block_count()));
+    std::optional<BlockErrors> &errors = coder_.errors();
+    if (!volume.precision.max_voxel_error) volume.precision.max_voxel_error = errors->max();
+    volume.max_voxel_error = volume.precision.max_voxel_error;
+    return errors ? errors->take() : std::vector<float>();
+  }
+  std::span<const float> decoded() const override { return coder_.decoded(); }
+
+ private:
+  ErrorBoundCoder coder_;
+};
+
+}  // namespace
+
+CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options) {
+  if (options.precision && options.device)
+    throw Error("a device compresses at a fixed rate only: leave the device, or the error bound");
+  if (!options.precision && (options.rate < 1 || options.rate > 32))
+    throw Error("rate {}: must be 1 to 32 bits per voxel", options.rate);
+  check_volume_info(info, "volume");
+  const glm::uvec3 dims = info.dims;
+  const std::uint32_t num_levels = options.levels != 0 ? options.levels : max_levels(dims);
+  if (num_levels > max_levels(dims)) {
+    throw Error("{} levels of detail: a volume of {}x{}x{} voxels can have 1 to {}", num_levels,
+                dims.x, dims.y, dims.z, max_levels(dims));
+  }
+  CompressedVolume volume;
+  volume.info = info;
+  if (options.precision) {
+    volume.precision = *options.precision;
+  } else {
+    volume.bits_per_block = 64 * options.rate;
+  }
+  for (CompressedVolume level = volume; volume.coarser_levels.size() + 1 < num_levels;) {
+    level.info = coarser_level(level.info);
+    level.precision.whole_numbers = false;  // means of integers are none
+    level.precision.max_voxel_error.reset();
+    volume.coarser_levels.push_back(level);
+  }
+  return volume;
+}
+
+PyramidCoder::PyramidCoder(const CompressOptions &options,
+                           std::span<CompressedVolume *const> volumes,
+                           std::span<const PayloadSink> sinks, bool is_finest, bool keep_errors,
+                           NextLevel next_level)
+    : volume_(*volumes[0]), is_finest_(is_finest) {
+  const glm::uvec3 dims = volume_.info.dims;
+  if (volume_.is_indexed()) {
+    coder_ = std::make_unique<BoundedCoder>(dims, volume_.precision, sinks[0], keep_errors);
+  } else if (options.device && is_finest) {
+    coder_ = std::make_unique<DeviceCoder>(dims, options, sinks[0], keep_errors);
+  } else {
+    coder_ = std::make_unique<FixedRateCoder>(dims, options, sinks[0], keep_errors);
+  }
+  if (volumes.size() == 1) return;
+  next_ =
+      std::make_unique<PyramidCoder>(options, volumes.subspan(1), sinks.subspan(1), false, false);
+  const glm::uvec3 coarse_dims = next_->volume_.info.dims;
+  if (options.measure_error || volume_.is_indexed())
+    bounds_.emplace(dims, coarse_dims, options.input.num_threads);
+  downsampler_.emplace(dims, options.input.num_threads,
+                       [this, &options, coarse_dims, next_level](const Chunk &chunk) {
+                         if (next_level) next_level(chunk);
+                         code_chunk(chunk, coarse_dims, options.input, *next_);
+                         if (bounds_) bounds_->add_coarse(chunk.voxels, next_->coder_->decoded());
+                       });
+}
+
+void PyramidCoder::end_chunk(const Chunk &chunk) {
+  coder_->end_chunk(chunk);
+  if (!next_) return;
+  if (bounds_) {
+    bounds_->add_fine(chunk.voxels);
+    if (is_finest_) keep_lost(chunk.lost);
+  }
+  downsampler_->add(chunk.voxels);
+}
+
+void PyramidCoder::finish(const LevelBounds::Off &off) {
+  const std::vector<float> errors = finish_level();
+  volume_.bounds = encode_bounds(errors.empty() ? off.decoded : errors);
+  volume_.bounds.by_place = !errors.empty();
+  if (next_) next_->finish(finish_bounds(off.made));
+}
+
+LevelBounds::Off PyramidCoder::finish_bounds(std::span<const float> made) {
+  if (!bounds_) return {};
+  if (!lost_.empty()) lost_.resize(num_blocks_);
+  return bounds_->finish(is_finest_ ? std::span<const float>(lost_) : made);
+}
+
+void PyramidCoder::keep_lost(std::span<const float> lost) {
+  if (std::ranges::any_of(lost, [](float of_block) { return of_block > 0; })) {
+    lost_.resize(num_blocks_);
+    lost_.insert(lost_.end(), lost.begin(), lost.end());
+  }
+  num_blocks_ += lost.size();
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,84 @@
+#pragma once
+// Compresses a volume and its levels of detail, chunk by chunk.
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/volume/pyramid.hpp"
+#include "core/volume/voxel_chunks.hpp"
+#include "core/zfp/level_bounds.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+/// Takes a level's payload in order.
+using PayloadSink = std::function<void(std::span<const std::byte>)>;
+
+/// A volume of that grid and its coarser levels, as they will be compressed: all but what the
+/// voxels decide.
+///
+/// Throws  Error: bad rate, a bad grid, more levels than it can have
+CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options);
+
+/// Compresses the voxels of a level.
+class LevelCoder : public ChunkCoder {
+ public:
+  /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be
+  /// kept of each block's errors, where they were measured.
+  virtual std::vector<float> finish(CompressedVolume &volume) = 0;
+  /// The last chunk's voxels as they are decoded, where errors are measured.
+  virtual std::span<const float> decoded() const = 0;
+};
+
+/// Compresses a level, and makes the voxels of the next from its own.
+class PyramidCoder : public ChunkCoder {
+ public:
+  /// Takes layers of the next level, in order, before they are checked.
+  using NextLevel = std::function<void(const Chunk &)>;
+
+  /// volumes, sinks  of this level and all coarser ones. Those are compressed on the host, since
+  ///                 they are needed as they are decoded, and are a seventh. As options, must
+  ///                 outlive this
+  /// is_finest       this level is the volume itself
+  /// keep_errors     of each block, where they are measured
+  PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
+               std::span<const PayloadSink> sinks, bool is_finest, bool keep_errors,
+               NextLevel next_level = {});
+  void begin_chunk(const Chunk &chunk) override { coder_->begin_chunk(chunk); }
+  void code_row(const BlockRow &row, std::uint32_t thread) override {
+    coder_->code_row(row, thread);
+  }
+  void end_chunk(const Chunk &chunk) override;
+
+  /// After the last chunk: completes all volumes.
+  ///
+  /// off  how far this level's blocks are from the source; of the finest, none
+  void finish(const LevelBounds::Off &off = {});
+
+  // What finish() does, for callers who put parts of volumes together: each once, in this order.
+
+  /// Completes this level's volume but for its bounds. Returns the errors that were to be kept.
+  std::vector<float> finish_level() { return coder_->finish(volume_); }
+  /// How far the next level's blocks are from the source; made: the same of this one's, as they
+  /// were made.
+  LevelBounds::Off finish_bounds(std::span<const float> made);
+
+ private:
+  /// Takes no memory as long as nothing was lost.
+  void keep_lost(std::span<const float> lost);
+
+  CompressedVolume &volume_;
+  bool is_finest_;
+  std::unique_ptr<LevelCoder> coder_;
+  std::unique_ptr<PyramidCoder> next_;
+  std::optional<Downsampler> downsampler_;
+  std::optional<LevelBounds> bounds_;  ///< of the next level
+  std::vector<float> lost_;     ///< of the finest level's blocks (Chunk::lost); empty: nothing
+  std::size_t num_blocks_ = 0;  ///< that lost_ is known of
+};
+
+}  // namespace isowave::core

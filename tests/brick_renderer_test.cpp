@@ -1,0 +1,264 @@
+// Teams of threads that draw a volume's bricks together, each on a device of its own: pictures pass
+// by pass, within a time, with ambient rays; and what they do where one fails.
+
+#include "core/bricks/brick_renderer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <barrier>
+#include <cmath>
+#include <functional>
+#include <thread>
+
+#include "core/base/error.hpp"
+#include "core/bricks/brick_volume.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave::core {
+namespace {
+
+using test::TestVolume;
+
+/// What the threads of a team have in common.
+struct Meeting {
+  explicit Meeting(std::uint32_t size) : texts(size), words(size), barrier(size) {}
+  std::vector<std::string> texts;
+  std::vector<std::span<std::uint64_t>> words;
+  std::barrier<> barrier;
+};
+
+class ThreadTeam : public Team {
+ public:
+  ThreadTeam(Meeting &meeting, std::uint32_t rank) : meeting_(meeting), rank_(rank) {}
+  std::uint32_t rank() const override { return rank_; }
+  std::uint32_t size() const override { return static_cast<std::uint32_t>(meeting_.texts.size()); }
+  std::vector<std::string> all_gather(const std::string &text) override {
+    meeting_.texts[rank_] = text;
+    meeting_.barrier.arrive_and_wait();
+    std::vector<std::string> texts = meeting_.texts;
+    meeting_.barrier.arrive_and_wait();
+    return texts;
+  }
+  void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
+    begun_.push_back({words, how, who});
+  }
+  void finish_reductions() override {
+    for (const Begun &each : begun_) {
+      meeting_.words[rank_] = each.words;
+      meeting_.barrier.arrive_and_wait();
+      std::vector<std::uint64_t> sum(each.words.begin(), each.words.end());
+      for (const auto &others : meeting_.words) {
+        for (std::size_t i = 0; i < sum.size(); ++i)
+          sum[i] = each.how == Reduction::kOr ? sum[i] | others[i] : std::min(sum[i], others[i]);
+      }
+      meeting_.barrier.arrive_and_wait();
+      if (rank_ == 0 || each.who == Receiver::kAll) std::ranges::copy(sum, each.words.begin());
+    }
+    begun_.clear();
+  }
+
+ private:
+  struct Begun {
+    std::span<std::uint64_t> words;
+    Reduction how;
+    Receiver who;
+  };
+  Meeting &meeting_;
+  std::uint32_t rank_;
+  std::vector<Begun> begun_;
+};
+
+constexpr float kIsovalue = 0.2f;
+constexpr ImageSize kFrame{49, 33};
+
+class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  void SetUp() override {
+    if (is_llvmpipe(GetParam()) && !long_tests())
+      GTEST_SKIP() << "each thread compiles all kernels, which takes llvmpipe minutes";
+  }
+
+  using Work = std::function<void(BrickRenderer &renderer, std::uint32_t rank)>;
+
+  /// Each rank of a team does this with its brick.
+  void on_ranks(std::uint32_t size, const RendererOptions &options, const Work &work) {
+    const Cuts cuts(blocks_along(volume_.info()), size);
+    Meeting meeting(size);
+    std::vector<std::jthread> threads;
+    for (std::uint32_t rank = 0; rank < size; ++rank) {
+      threads.emplace_back([&, rank] {
+        ThreadTeam team(meeting, rank);
+        ocl::Device device(GetParam());
+        const CompressedVolume brick = cut_brick(volume_.compressed, cuts.bricks()[rank]);
+        BrickRenderer renderer(device, brick, options, cuts, volume_.info(), team);
+        work(renderer, rank);
+      });
+    }
+  }
+
+  /// What one renderer draws.
+  Image8 picture_of_one(const FrameRequest &request, const RendererOptions &options) {
+    ocl::Device device(GetParam());
+    Renderer renderer(device, volume_.compressed, options);
+    renderer.render(request);
+    return renderer.shade();
+  }
+
+  TestVolume volume_{{37, 30, 26}, test::gyroid_field(9)};
+  Camera camera_ = orbit_cameras(volume_.info(), 3)[1];
+  FrameRequest request_{.camera = camera_, .isovalue = kIsovalue};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, BrickTeamOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+std::size_t num_drawn(const Image8 &image) {
+  std::size_t drawn = 0;
+  for (std::size_t i = 0; i < image.pixels.size(); i += 3)
+    drawn += image.pixels[i] != 255 || image.pixels[i + 1] != 255 || image.pixels[i + 2] != 255;
+  return drawn;
+}
+
+/// Ranks are through after different numbers of passes. More and more rays have hits, and the last
+/// picture is the whole's.
+TEST_P(BrickTeamOnDevice, PicturesPassByPass) {
+  for (const std::uint32_t samples : {1u, 2u}) {
+    // A small cache, so that there are many passes.
+    const RendererOptions options{.size = {kFrame.width, kFrame.height, samples},
+                                  .cache_slots = 60};
+    const Image8 whole = picture_of_one(request_, options);
+    std::vector<std::size_t> num_calls(3), num_passes(3);
+    std::vector<Image8> images;
+    Image8 last;
+    on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+      FrameRequest request = request_;
+      request.on_pass = [&](const PassStats &) {
+        ++num_calls[rank];
+        Image8 image = renderer.shade({});
+        if (rank == 0) images.push_back(std::move(image));
+        return true;
+      };
+      const FrameStats stats = renderer.render(request);
+      EXPECT_FALSE(stats.cancelled);
+      num_passes[rank] = stats.passes.size() + stats.normals.passes;
+      Image8 image = renderer.shade({});
+      if (rank == 0) last = std::move(image);
+    });
+    const std::size_t most = std::ranges::max(num_passes);
+    EXPECT_THAT(num_calls, testing::Each(most));
+    EXPECT_GT(most, std::ranges::min(num_passes)) << "one is through before others";
+    ASSERT_EQ(images.size(), most);
+    EXPECT_LT(num_drawn(images.front()), num_drawn(whole));
+    for (std::size_t i = 1; i < images.size(); ++i)
+      EXPECT_GE(num_drawn(images[i]), num_drawn(images[i - 1]));
+    EXPECT_EQ(images.back().pixels, whole.pixels);
+    EXPECT_EQ(last.pixels, whole.pixels);
+  }
+}
+
+TEST_P(BrickTeamOnDevice, AllStopInTheSamePass) {
+  const RendererOptions options{.size = kFrame, .cache_slots = 60};
+  const Image8 whole = picture_of_one(request_, options);
+  on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+    FrameRequest request = request_;
+    int calls = 0;
+    request.on_pass = [&](const PassStats &) { return ++calls < 3; };
+    EXPECT_TRUE(renderer.render(request).cancelled);
+    EXPECT_EQ(calls, 3);
+    EXPECT_FALSE(renderer.render(request_).cancelled);
+    const Image8 image = renderer.shade({});
+    if (rank == 0) {
+      EXPECT_EQ(image.pixels, whole.pixels);
+    }
+  });
+}
+
+/// In a pass, or between rounds of ambient rays; then all throw, and the next frame is drawn as
+/// any.
+TEST_P(BrickTeamOnDevice, WhereOneFailsAllDo) {
+  const RendererOptions options{.size = kFrame, .cache_slots = 60, .with_given_rays = true};
+  const Image8 whole = picture_of_one(request_, options);
+  on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+    for (const bool in_ambient : {false, true}) {
+      FrameRequest request = request_;
+      request.ambient_rays = 2;
+      const std::uint64_t before = renderer.composition().reductions;
+      int calls = 0;
+      request.on_pass = [&](const PassStats &) {
+        const bool fails = in_ambient ? renderer.composition().reductions > before : ++calls == 2;
+        if (rank == 1 && fails) throw Error("the disk is full");
+        return true;
+      };
+      std::string failure;
+      try {
+        renderer.render(request);
+      } catch (const Error &error) {
+        failure = error.what();
+      }
+      EXPECT_EQ(failure, "rank 1: the disk is full");
+    }
+    FrameRequest bounded = request_;
+    bounded.bound = FieldBound::kUpper;
+    EXPECT_THROW(renderer.render(bounded), Error);
+    renderer.render(request_);
+    const Image8 image = renderer.shade({});
+    if (rank == 0) {
+      EXPECT_EQ(image.pixels, whole.pixels);
+    }
+  });
+}
+
+TEST_P(BrickTeamOnDevice, AmbientRays) {
+  request_.ambient_rays = 3;
+  for (const std::uint32_t samples : {1u, 2u}) {
+    const ImageSize size{kFrame.width, kFrame.height, samples};
+    const RendererOptions options{.size = size, .with_given_rays = true};
+    const Image8 whole = picture_of_one(request_, options);
+    on_ranks(4, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+      for (const bool in_step : {false, true}) {
+        FrameRequest request = request_;
+        std::size_t calls = 0;
+        if (in_step) request.on_pass = [&](const PassStats &) { return ++calls != 0; };
+        const CompositionStats before = renderer.composition();
+        const FrameStats stats = renderer.render(request);
+        EXPECT_GE(stats.ambient.passes, request_.ambient_rays);
+        EXPECT_EQ(calls != 0, in_step);
+        // Eight fields of a hit; then a bit for each ray of a hit.
+        const std::uint64_t rays = size.num_rays();
+        EXPECT_EQ(renderer.composition().reductions - before.reductions, 8 + request_.ambient_rays);
+        EXPECT_EQ(renderer.composition().bytes - before.bytes,
+                  8 * (8 * rays + request_.ambient_rays * ((rays + 63) / 64)));
+        const Image8 image = renderer.shade({});
+        const std::vector<float> depth = renderer.depth();
+        if (rank != 0) continue;
+        EXPECT_EQ(image.pixels, whole.pixels);
+        EXPECT_EQ(
+            std::uint64_t(std::ranges::count_if(depth, [](float t) { return std::isfinite(t); })),
+            renderer.num_hits());
+      }
+    });
+  }
+}
+
+TEST_P(BrickTeamOnDevice, PicturesWithinATime) {
+  request_.ambient_rays = 2;
+  const RendererOptions options{.size = kFrame, .with_kept_picture = true, .with_given_rays = true};
+  const Image8 whole = picture_of_one(request_, options);
+  on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+    const TimedFrame hurried = renderer.render_within(request_, 1e-6);
+    EXPECT_FALSE(hurried.complete);
+    const Image8 coarse = renderer.shade({});
+    const TimedFrame frame = renderer.render_within(request_, 1e9);
+    EXPECT_TRUE(frame.complete);
+    const Image8 image = renderer.shade({});
+    if (rank != 0) return;
+    EXPECT_EQ(image.pixels, whole.pixels);
+    EXPECT_EQ(coarse.pixels.size(), whole.pixels.size());
+    EXPECT_GT(num_drawn(coarse), num_drawn(whole) / 2);
+    EXPECT_NE(coarse.pixels, whole.pixels);
+  });
+}
+
+}  // namespace
+}  // namespace isowave::core

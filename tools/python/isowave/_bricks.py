@@ -1,0 +1,227 @@
+"""A volume that the processes of mpirun draw together, each a brick of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+from isowave._renderer import Camera, Color, Image, camera_of, request_for, size_of
+from isowave._volume import compression_options
+
+OUTPUTS = ("rgb", "depth", "normals")
+
+Result = TypeVar("Result")
+
+
+class Processes:
+    """What the compiled part calls, of a communicator of mpi4py's."""
+
+    def __init__(self, comm: Any) -> None:
+        from mpi4py import MPI
+
+        self._mpi, self._comm = MPI, comm
+        self.rank, self.size = comm.Get_rank(), comm.Get_size()
+        machine = comm.Split_type(MPI.COMM_TYPE_SHARED, self.rank)
+        self.local_rank = machine.Get_rank()
+        machine.Free()
+
+    def all_gather(self, data: bytes) -> list[bytes]:
+        return list(self._comm.allgather(data))
+
+    def reduce(self, words: npt.NDArray[np.uint64], smallest: bool, for_all: bool) -> None:
+        operation = self._mpi.MIN if smallest else self._mpi.BOR
+        if for_all:
+            self._comm.Allreduce(self._mpi.IN_PLACE, words, operation)
+        elif self.rank == 0:
+            self._comm.Reduce(self._mpi.IN_PLACE, words, operation)
+        else:
+            self._comm.Reduce(words, None, operation)
+
+    def together(self, work: Callable[[], Result]) -> Result:
+        """What work() gives. Where it raises at one process, all raise, so that none waits."""
+        error: Exception | None = None
+        try:
+            result = work()
+        except Exception as raised:  # noqa: BLE001: raised again below
+            error = raised
+        texts = self._comm.allgather(None if error is None else str(error))
+        if error is not None:
+            raise error
+        for rank, text in enumerate(texts):
+            if text is not None:
+                raise _core.Error(f"rank {rank}: {text}")
+        return result
+
+
+class BrickRenderer:
+    """Draws a volume that may be larger than one machine: each process has a brick of it.
+
+    The pictures have the bits of Renderer's. All processes of the communicator make the same calls
+    in the same order; what goes wrong at one is raised at all. Needs mpi4py.
+
+    Parameters
+    ----------
+    path
+        A .zfp file, of which each process reads its blocks alone, or another volume, as
+        isowave.open(): each reads its layers, and compresses its brick.
+    comm
+        A communicator of mpi4py's: MPI.COMM_WORLD. Of a machine's processes, each takes one of its
+        devices.
+    device, size, samples, memory_budget, cache_blocks, rays
+        As Renderer's, of each process; devices with commas between are taken in turn.
+    levels
+        Frames may use the levels of detail that are in the .zfp file.
+    bricks
+        How many along x, y and z; None: as fits.
+    tolerance, relative_tolerance, rate, exact, map_nan
+        As isowave.open()'s.
+
+    Raises
+    ------
+    Error
+        At all processes: what Renderer raises; different arguments or volumes; more processes than
+        can have bricks.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        comm: Any,
+        *,
+        device: str | int | None = None,
+        size: tuple[int, int] = (1280, 720),
+        samples: int = 1,
+        memory_budget: int | None = None,
+        cache_blocks: int = 0,
+        levels: bool = False,
+        rays: bool = False,
+        bricks: tuple[int, int, int] | None = None,
+        tolerance: float | None = None,
+        relative_tolerance: float | None = None,
+        rate: int | None = None,
+        exact: bool = False,
+        map_nan: float | None = None,
+    ) -> None:
+        self._processes = Processes(comm)
+
+        def read() -> tuple[tuple[int, int], dict[str, Any], dict[str, Any]]:
+            width, height = size_of(size)
+            compression = compression_options(
+                tolerance, relative_tolerance, rate, exact, 1, map_nan, 0
+            )
+            compression["measure_error"] = False
+            options = {
+                "device": "" if device is None else str(device),
+                "bricks": None if bricks is None else "{}x{}x{}".format(*bricks),
+                "width": width,
+                "height": height,
+                "samples": samples,
+                "memory_budget": memory_budget,
+                "cache_blocks": cache_blocks,
+                "with_levels": levels,
+                "with_rays": rays,
+            }
+            return (width, height), compression, options
+
+        self.size, compression, options = self._processes.together(read)
+        self._core = _core.BrickRenderer(self._processes, os.fspath(path), compression, options)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Of the whole volume: (z, y, x)."""
+        x, y, z = self._core.dims
+        return z, y, x
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """World units between voxels, (z, y, x)."""
+        x, y, z = self._core.spacing
+        return z, y, x
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """World position of voxel (0, 0, 0), (z, y, x)."""
+        x, y, z = self._core.origin
+        return z, y, x
+
+    @property
+    def direction(self) -> npt.NDArray[np.float64]:
+        """3 x 3; column a is the unit world direction (x, y, z) of index axis a, x, y, z."""
+        columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
+        return np.ascontiguousarray(columns.T)
+
+    @property
+    def device(self) -> dict[str, Any]:
+        """This process's, as an entry of isowave.devices()."""
+        return self._core.device
+
+    def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
+        """As Renderer.camera()."""
+        value, (width, height) = self._processes.together(
+            lambda: (float(isovalue), self.size if size is None else size_of(size))
+        )
+        return Camera(*self._core.camera(value, width, height))
+
+    def render(
+        self,
+        isovalue: float,
+        *,
+        camera: Camera | None = None,
+        size: tuple[int, int] | None = None,
+        samples: int = 1,
+        color: Color | None = None,
+        background: Color | None = None,
+        normals: str = "smooth",
+        outputs: Sequence[str] = OUTPUTS,
+        voxel_pixels: float = 0.0,
+        voxel_error: float = 0.0,
+        ambient: int = 0,
+    ) -> Image | None:
+        """Draws a frame; arguments as Renderer.render(). There are no positions, no bounds.
+
+        Returns
+        -------
+        Image
+            At rank 0: of the whole volume. Its statistics are rank 0's, but for hits.
+        None
+            At the others.
+
+        Raises
+        ------
+        Error, ValueError
+            At all processes, as Renderer.render(); and where they ask for different frames.
+        """
+        if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:
+            raise _core.Error("some processes give a camera, and others none: ask alike")
+        if camera is None:
+            camera = self.camera(isovalue, size)
+
+        def ask() -> dict[str, Any]:
+            unknown = set(outputs) - {*OUTPUTS}
+            if unknown:
+                listed = ", ".join(sorted(unknown))
+                raise ValueError(f"outputs {listed}: bricks have {', '.join(OUTPUTS)}")
+            return request_for(
+                isovalue,
+                camera,
+                self.size if size is None else size_of(size),
+                samples=samples,
+                color=color,
+                background=background,
+                normals=normals,
+                outputs=outputs,
+                voxel_pixels=voxel_pixels,
+                voxel_error=voxel_error,
+                ambient=ambient,
+            )
+
+        request = self._processes.together(ask)
+        frame = self._core.render(request)
+        if self._processes.rank != 0:
+            return None
+        return Image(frame, camera_of(request), isovalue, samples)

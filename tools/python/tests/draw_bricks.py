@@ -1,0 +1,68 @@
+"""Run by test_bricks.py under mpirun: draws bricks, and finds out what goes wrong."""
+
+import json
+import sys
+
+import numpy as np
+from mpi4py import MPI
+
+import isowave
+
+comm = MPI.COMM_WORLD
+rank, size = comm.Get_rank(), comm.Get_size()
+fuel, levelled, folder = sys.argv[1:]
+
+pictures = {}
+
+
+def keep(name, image):
+    assert (image is None) == (rank != 0)
+    if image is not None:
+        pictures[name + "_rgb"], pictures[name + "_depth"] = image.rgb, image.depth
+        pictures[name + "_normals"] = image.normals
+        pictures[name + "_hits"] = image.statistics["hits"]
+
+
+renderer = isowave.BrickRenderer(fuel, comm, size=(96, 64), samples=2, rays=True, exact=True)
+keep("plain", renderer.render(40))
+keep("samples", renderer.render(40, samples=2, size=(48, 32), normals="cell"))
+keep("ambient", renderer.render(40, ambient=3, color="#3070b0"))
+camera = isowave.Camera.orbit(renderer, 3)[1]
+keep("orbit", renderer.render(90, camera=camera, outputs=("rgb", "depth")))
+keep("depth", renderer.render(90, outputs=("depth",)))
+assert renderer.shape == (32, 33, 64)
+assert renderer.device["name"]
+
+finer = isowave.BrickRenderer(levelled, comm, size=(64, 48), levels=True, bricks=(1, 1, size))
+keep("levels", finer.render(40, voxel_pixels=1.5))
+keep("level", finer.render(40, voxel_error=2.0))
+
+errors = {}
+
+
+def fails(name, work):
+    """All processes must raise; their messages, by rank."""
+    text = None
+    try:
+        work()
+    except (isowave.Error, ValueError) as error:
+        text = str(error)
+    errors[name] = comm.allgather(text)
+
+
+fails("isovalue", lambda: renderer.render(40 + rank))
+fails("camera", lambda: renderer.render(40, camera=camera if rank == 1 else None))
+fails("color", lambda: renderer.render(40, color="blue" if rank == 1 else None))
+fails("outputs", lambda: renderer.render(40, outputs=("position",)))
+fails("too large", lambda: renderer.render(40, size=(960, 640)))
+fails("levels", lambda: isowave.BrickRenderer(fuel, comm, size=(8, 8), levels=True))
+fails("compressed", lambda: isowave.BrickRenderer(levelled, comm, size=(8, 8), rate=8))
+fails("missing", lambda: isowave.BrickRenderer(f"{folder}/{rank}.zfp", comm, size=(8, 8)))
+fails("volume", lambda: isowave.BrickRenderer((levelled, fuel)[rank == 1], comm, size=(8, 8)))
+fails("bricks", lambda: isowave.BrickRenderer(fuel, comm, size=(8, 8), bricks=(2, 2, 2)))
+keep("again", renderer.render(40))
+
+if rank == 0:
+    np.savez(f"{folder}/pictures.npz", **{k: v for k, v in pictures.items() if v is not None})
+    with open(f"{folder}/errors.json", "w") as file:
+        json.dump(errors, file)

@@ -1,0 +1,94 @@
+"""Processes that draw a volume together: the bits of one, and what goes wrong is raised at all."""
+
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import FUEL
+
+import isowave
+
+pytest.importorskip("mpi4py", reason="mpi4py is not installed: pip install mpi4py")
+RANKS = 3
+
+
+@pytest.fixture(scope="module")
+def levelled(tmp_path_factory):
+    path = tmp_path_factory.mktemp("levels") / "fuel.zfp"
+    isowave.open(FUEL, exact=True, levels=2).save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory, levelled):
+    """What the processes have drawn, and their errors."""
+    if shutil.which("mpirun") is None:
+        pytest.skip("there is no mpirun: apt install openmpi-bin")
+    folder = tmp_path_factory.mktemp("bricks")
+    program = pathlib.Path(__file__).with_name("draw_bricks.py")
+    mpirun = ["mpirun", "-q", "--oversubscribe", "--bind-to", "none", "--allow-run-as-root"]
+    command = [*mpirun, "-n", RANKS, sys.executable, program, FUEL, levelled, folder]
+    done = subprocess.run(
+        [*map(str, command)], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return dict(np.load(folder / "pictures.npz")), json.loads((folder / "errors.json").read_text())
+
+
+def expect(pictures, name, image):
+    for array in ("rgb", "depth", "normals"):
+        expected = getattr(image, array)
+        if expected is None:
+            assert f"{name}_{array}" not in pictures
+        else:
+            np.testing.assert_array_equal(pictures[f"{name}_{array}"], expected)
+    assert pictures[f"{name}_hits"] == image.statistics["hits"] > 100
+
+
+def test_the_bits_of_one_process(drawn):
+    pictures, _ = drawn
+    volume = isowave.open(FUEL, exact=True)
+    renderer = volume.renderer(size=(96, 64), samples=2, rays=True)
+    outputs = ("rgb", "depth", "normals")
+    plain = renderer.render(40, outputs=outputs)
+    expect(pictures, "plain", plain)
+    expect(pictures, "again", plain)
+    samples = renderer.render(40, samples=2, size=(48, 32), normals="cell", outputs=outputs)
+    expect(pictures, "samples", samples)
+    ambient = renderer.render(40, ambient=3, color="#3070b0", outputs=outputs)
+    expect(pictures, "ambient", ambient)
+    camera = isowave.Camera.orbit(volume, 3)[1]
+    expect(pictures, "orbit", renderer.render(90, camera=camera, outputs=("rgb", "depth")))
+    expect(pictures, "depth", renderer.render(90, outputs=("depth",)))
+
+
+def test_levels_of_detail(drawn, levelled):
+    pictures, _ = drawn
+    renderer = isowave.open(levelled).renderer(size=(64, 48), levels=True)
+    outputs = ("rgb", "depth", "normals")
+    expect(pictures, "levels", renderer.render(40, voxel_pixels=1.5, outputs=outputs))
+    expect(pictures, "level", renderer.render(40, voxel_error=2.0, outputs=outputs))
+
+
+@pytest.mark.parametrize(
+    ("case", "text"),
+    [
+        ("isovalue", "rank 1 has another request than rank 0"),
+        ("camera", "some processes give a camera"),
+        ("color", "color 'blue': give '#rrggbb'"),
+        ("outputs", "outputs position: bricks have rgb, depth, normals"),
+        ("too large", "960"),
+        ("levels", "bricks have levels of detail that are in a .zfp file"),
+        ("compressed", "is compressed already"),
+        ("missing", "rank 0: "),
+        ("volume", "rank 1 has another volume than rank 0"),
+        ("bricks", f"{RANKS} processes draw a brick each"),
+    ],
+)
+def test_errors_are_raised_at_all(drawn, case, text):
+    _, errors = drawn
+    assert all(text in (error or "nothing") for error in errors[case]), errors[case]
