@@ -104,7 +104,8 @@ ISO_INLINE int make_packet_scene(const FrameParams *frame, const PacketField *fi
 
 // ---- Regions
 
-/// The numbers of the regions of a level along an axis, from their far planes.
+/// The numbers of the regions of a level along an axis, from their far planes. None is negative, so
+/// that to_ints() is floor().
 ISO_INLINE Ints regions(const Packet *p, int level, int axis) {
   const Floats far = p->level[level].far[axis];
   /* Where the domain's end cuts the last region, the plane before its far one is still within it.
@@ -308,8 +309,8 @@ ISO_INLINE void enter_regions(Packet *p, const PacketScene *scene, int level, Ma
     const Floats exit = fma(exit_t, a->d, a->o),
                  error = ISO_FLOAT_DOUBT * (fabs(exit) + fabs(a->o));
     const Floats at = in_brick(a, exit + error * a->sign);
-    const Ints farthest = to_ints(at * (1.0f / (float)size)),
-               at_least = larger(farthest, range.first), to = smaller(at_least, range.last);
+    const Ints farthest = to_ints(at * (1.0f / (float)size)), /* below 0: range.first, then */
+        at_least = larger(farthest, range.first), to = smaller(at_least, range.last);
     bits[axis] = bits_between(pick(a->up, place[axis], to) & 3, pick(a->up, to, place[axis]) & 3);
     places += (place[axis] & 3) << (2 * axis);
   }
