@@ -3,7 +3,7 @@
 What is installed comes first. Only what is missing is added, and only for this process:
 
 - libOpenCL.so.1 of the system, else the one that the wheel has;
-- PoCL from PyPI (`pip install isowave[cpu]`), where the system has no PoCL;
+- PoCL from PyPI (`pip install isowave[cpu]`), where the system has no PoCL, and has a linker;
 - NVIDIA's driver by its name, where it is there and not registered, as in many GPU containers.
 
 OCL_ICD_VENDORS and OCL_ICD_FILENAMES, if they are set, are the user's word, and nothing is added.
@@ -16,7 +16,9 @@ import hashlib
 import importlib.util
 import os
 import pathlib
+import shutil
 import tempfile
+import warnings
 
 PACKAGE = pathlib.Path(__file__).resolve().parent
 SYSTEM_VENDORS = pathlib.Path("/etc/OpenCL/vendors")
@@ -24,7 +26,8 @@ LOADER = "libOpenCL.so.1"
 BUNDLED_LOADER = PACKAGE / "opencl" / LOADER
 NVIDIA_DRIVER = "libnvidia-opencl.so.1"
 
-#: What prepare() found, for isowave.Report: "loader", and "added", the drivers that it registered.
+#: What prepare() found, for isowave.Report: "loader", "added", the drivers that it registered, and
+#: "left out", a driver that cannot be used, and why.
 found: dict[str, str] = {}
 
 
@@ -48,6 +51,20 @@ def pip_pocl() -> pathlib.Path | None:
     return None
 
 
+def can_link(usr: pathlib.Path = pathlib.Path("/usr")) -> bool:
+    """Whether PoCL from PyPI can link the kernels that it compiles.
+
+    It takes `ld`, libgcc and libc's development files, and ends the process without.
+    """
+    path = os.pathsep.join((os.environ.get("PATH", ""), str(usr / "bin")))
+    libgcc, libc = "lib*/gcc*/*/*/crtbeginS.o", ("lib*/crti.o", "lib/*/crti.o")
+    return (
+        shutil.which("ld", path=path) is not None
+        and any(usr.glob(libgcc))
+        and any(file for pattern in libc for file in usr.glob(pattern))
+    )
+
+
 def registered(vendors: pathlib.Path) -> dict[str, str]:
     """File name and driver of each registration in a folder."""
     try:
@@ -64,8 +81,10 @@ def unregistered(drivers: dict[str, str]) -> dict[str, str]:
         added["isowave_nvidia.icd"] = NVIDIA_DRIVER
     if not any("pocl" in driver for driver in drivers.values()):
         pocl = pip_pocl()
-        if pocl:
+        if pocl and can_link():
             added["isowave_pocl.icd"] = str(pocl)
+        elif pocl:
+            found["left out"] = f"{pocl}, which needs a linker: apt install gcc libc6-dev"
     return added
 
 
@@ -115,3 +134,5 @@ def prepare() -> None:
     if added:
         found["added"] = ", ".join(added.values())
         register({**drivers, **added})
+    elif not drivers and "left out" in found:
+        warnings.warn(f"isowave has no OpenCL device but {found['left out']}", stacklevel=2)

@@ -34,8 +34,9 @@ class Report:
             ("system", f"{platform.platform()}, {os.cpu_count()} processors"),
             ("OpenCL loader", _loader.found["loader"]),
         ]
-        if "added" in _loader.found:
-            self.lines.append(("drivers added", _loader.found["added"]))
+        for name in ("added", "left out"):
+            if name in _loader.found:
+                self.lines.append((f"drivers {name}", _loader.found[name]))
         for package in PACKAGES:
             try:
                 self.lines.append((package, importlib.metadata.version(package)))

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 import isowave
+from isowave import _loader as loader
 
 # The loader's part of the package runs before the rest, on a machine without registrations.
 SCRIPT = """
@@ -18,12 +19,15 @@ import os
 import pathlib
 import sys
 
-package, vendors = map(pathlib.Path, sys.argv[1:])
+package, vendors, *drivers = map(pathlib.Path, sys.argv[1:])
 spec = importlib.util.spec_from_file_location("loader", package / "_loader.py")
 loader = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(loader)
 loader.SYSTEM_VENDORS = vendors
 loader.pip_pocl = lambda: None
+if drivers:
+    loader.pip_pocl = lambda: drivers[0]
+    loader.can_link = lambda: False
 loader.prepare()
 
 import isowave
@@ -31,6 +35,7 @@ import isowave
 folder = os.environ.get("OCL_ICD_VENDORS")
 print(json.dumps({
     "added": loader.found.get("added"),
+    "left out": loader.found.get("left out"),
     "registered": loader.registered(pathlib.Path(folder)) if folder else None,
     "devices": [device["platform"] for device in isowave.devices()],
 }))
@@ -48,14 +53,14 @@ def pocl():
     pytest.skip("the system has no PoCL that could pose as NVIDIA's driver")
 
 
-def found_with(tmp_path, libraries, vendors):
+def run_loader(tmp_path, libraries, *arguments):
     variables = {k: v for k, v in os.environ.items() if not k.startswith("OCL_ICD_")}
     paths = [str(libraries), os.environ.get("LD_LIBRARY_PATH", "")]
     variables["LD_LIBRARY_PATH"] = ":".join(filter(None, paths))
     variables["XDG_CACHE_HOME"] = str(tmp_path / "cache")
     package = pathlib.Path(isowave.__file__).parent
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, package, vendors],
+        [sys.executable, "-c", SCRIPT, package, *arguments],
         cwd=tmp_path,
         env=variables,
         capture_output=True,
@@ -63,7 +68,11 @@ def found_with(tmp_path, libraries, vendors):
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    return json.loads(done.stdout.splitlines()[-1]), done.stderr
+
+
+def found_with(tmp_path, libraries, vendors):
+    return run_loader(tmp_path, libraries, vendors)[0]
 
 
 @pytest.fixture
@@ -99,3 +108,28 @@ def test_other_registrations_stay(tmp_path, folders):
         "isowave_nvidia.icd": "libnvidia-opencl.so.1",
         "other.icd": "libother.so.1",
     }
+
+
+def test_pocl_from_pypi_is_left_out_where_it_would_end_the_process(tmp_path, folders):
+    vendors, libraries = folders
+    (libraries / "libnvidia-opencl.so.1").unlink()  # else it would be found
+    found, err = run_loader(tmp_path, libraries, vendors, "/somewhere/libpocl.so.2")
+    assert found["added"] is None
+    assert found["left out"].startswith("/somewhere/libpocl.so.2, which needs a linker")
+    assert "isowave has no OpenCL device but /somewhere/libpocl.so.2" in err
+    (vendors / "other.icd").write_text("libother.so.1\n")
+    assert (
+        "isowave has no OpenCL device"
+        not in run_loader(tmp_path, libraries, vendors, "/somewhere/libpocl.so.2")[1]
+    )
+
+
+def test_what_linking_takes(tmp_path, monkeypatch):
+    assert loader.can_link(), "this machine compiles"
+    monkeypatch.setenv("PATH", "")
+    files = ["bin/ld", "lib/gcc/x86_64-linux-gnu/12/crtbeginS.o", "lib/x86_64-linux-gnu/crti.o"]
+    for file in files:
+        assert not loader.can_link(tmp_path)
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).touch(mode=0o755)
+    assert loader.can_link(tmp_path)
