@@ -242,8 +242,10 @@ TEST_P(BricksOnDevice, LevelsOfDetail) {
 /// Ambient rays begin in any brick and go on in others: they meet what they meet in the whole.
 class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  /// Frames that say no more of a device than a small one.
-  bool is_too_slow() const { return is_llvmpipe(GetParam()) && !long_tests(); }
+  void SetUp() override {
+    if (is_llvmpipe(GetParam()) && !long_tests())
+      GTEST_SKIP() << "compiling the kernels of both kinds of rays takes llvmpipe minutes";
+  }
 
   void check(const CompressedVolume &whole, const Cuts &cuts, const std::vector<Camera> &cameras,
              RendererOptions options, std::uint32_t num_rays, double voxel_pixels = 0) {
@@ -329,14 +331,12 @@ TEST_P(AmbientBricksOnDevice, SmallFrame) {
 }
 
 TEST_P(AmbientBricksOnDevice, EyesOutsideInsideAndOnCuts) {
-  if (is_too_slow()) GTEST_SKIP() << "llvmpipe takes minutes";
   const TestVolume volume({37, 30, 26}, test::gyroid_field(9));
   check(volume.compressed, Cuts(blocks_along(volume.info()), glm::uvec3(2, 2, 1)),
         views_of(volume.info(), {16, 16, 12}), {.size = {31, 23}, .cache_slots = 100}, 3);
 }
 
 TEST_P(AmbientBricksOnDevice, LevelsOfDetail) {
-  if (is_too_slow()) GTEST_SKIP() << "llvmpipe takes minutes";
   const VolumeInfo info = test::grid_info({50, 44, 60});
   ArrayReader reader(info, test::sample(info.dims, test::gyroid_field(14)));
   const CompressedVolume whole = compress(reader, {.rate = 8, .levels = 3});
@@ -346,7 +346,6 @@ TEST_P(AmbientBricksOnDevice, LevelsOfDetail) {
 }
 
 TEST_P(AmbientBricksOnDevice, RaysThatGoOnAreRefused) {
-  if (is_too_slow()) GTEST_SKIP() << "compiling its kernels takes llvmpipe minutes";
   const TestVolume volume({9, 10, 11}, test::noise_field(3), 8);
   const Cuts cuts(blocks_along(volume.info()), 2);
   const CompressedVolume brick = cut_brick(volume.compressed, cuts.bricks()[0]);

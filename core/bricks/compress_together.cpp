@@ -148,7 +148,6 @@ class SectionWriter {
 struct CodedSlab {
   CompressedVolume volume;                 ///< of the layers worked on
   std::vector<float> errors;               ///< of its own blocks, where they are kept
-  LevelBounds::Off off_next;               ///< of the blocks of the next level that were made
   std::optional<SectionWriter> payload{};  ///< its own, at a fixed rate
 };
 

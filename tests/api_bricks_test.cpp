@@ -1,0 +1,127 @@
+// isowave::BrickRenderer: threads in the place of processes draw together what one renderer draws.
+// tools/python/tests/test_bricks.py has real ones.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <barrier>
+#include <isowave/isowave.hpp>
+#include <thread>
+
+namespace isowave {
+namespace {
+
+const std::string kFuel = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
+constexpr std::uint32_t kCount = 2;
+
+/// Where threads meet.
+struct Meeting {
+  std::barrier<> barrier{kCount};
+  std::vector<std::string> bytes{kCount};
+  std::array<std::span<std::uint64_t>, kCount> words{};
+};
+
+class ThreadProcess : public Processes {
+ public:
+  ThreadProcess(Meeting &meeting, std::uint32_t rank) : meeting_(meeting), rank_(rank) {}
+  std::uint32_t rank() const override { return rank_; }
+  std::uint32_t size() const override { return kCount; }
+  std::uint32_t local_rank() const override { return rank_; }
+  std::vector<std::string> all_gather(const std::string &bytes) override {
+    meeting_.bytes[rank_] = bytes;
+    meeting_.barrier.arrive_and_wait();
+    std::vector<std::string> all = meeting_.bytes;
+    meeting_.barrier.arrive_and_wait();
+    return all;
+  }
+  void reduce(std::span<std::uint64_t> words, Reduction how, bool for_all) override {
+    meeting_.words.at(rank_) = words;
+    meeting_.barrier.arrive_and_wait();
+    std::vector<std::uint64_t> result(words.begin(), words.end());
+    for (const std::span<std::uint64_t> others : meeting_.words) {
+      for (std::size_t i = 0; i < result.size(); ++i)
+        result[i] = how == Reduction::kOr ? result[i] | others[i] : std::min(result[i], others[i]);
+    }
+    meeting_.barrier.arrive_and_wait();
+    if (rank_ == 0 || for_all) std::ranges::copy(result, words.begin());
+  }
+
+ private:
+  Meeting &meeting_;
+  std::uint32_t rank_;
+};
+
+/// Calls work(processes, rank) in a thread for each.
+template <class Work>
+void in_threads(const Work &work) {
+  Meeting meeting;
+  std::vector<std::jthread> threads;
+  for (std::uint32_t rank = 0; rank < kCount; ++rank) {
+    threads.emplace_back([&, rank] {
+      ThreadProcess process(meeting, rank);
+      work(process, rank);
+    });
+  }
+}
+
+TEST(ApiBricks, DrawWhatOneRendererDraws) {
+  const Compression exact{.exact = true};
+  FrameRequest request{.isovalue = 40, .size = {48, 32}, .want_depth = true, .want_normals = true};
+  Renderer whole(open_device(), open_volume(kFuel, exact), {.largest = {48, 32}});
+  request.camera = whole.camera(40);
+  const Frame expected = whole.render(request);
+  in_threads([&](Processes &processes, std::uint32_t rank) {
+    BrickRenderer renderer(processes, kFuel, exact, {}, {.renderer = {.largest = {48, 32}}});
+    FrameRequest own = request;
+    own.camera = renderer.camera(40);
+    EXPECT_EQ(own.camera.eye, request.camera.eye);
+    const Frame frame = renderer.render(own);
+    EXPECT_EQ(frame.picture, rank == 0 ? expected.picture : std::vector<std::uint8_t>());
+    EXPECT_EQ(frame.depth, rank == 0 ? expected.depth : std::vector<float>());
+    EXPECT_EQ(frame.normals.size(), rank == 0 ? expected.normals.size() : 0u);
+    if (rank == 0) {
+      EXPECT_EQ(frame.normals, expected.normals);
+      EXPECT_EQ(frame.statistics.hits, expected.statistics.hits);
+    }
+  });
+  EXPECT_GT(expected.statistics.hits, 100u);
+}
+
+TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
+  in_threads([&](Processes &processes, std::uint32_t rank) {
+    const auto expect_error = [](const auto &work, const std::string &text) {
+      try {
+        work();
+        ADD_FAILURE() << "no error: " << text;
+      } catch (const Error &error) {
+        EXPECT_THAT(error.what(), testing::HasSubstr(text));
+      }
+    };
+    const auto make = [&](const std::string &path, const BrickOptions &options) {
+      return BrickRenderer(processes, path, {}, {}, options);
+    };
+    const BrickOptions small{.renderer = {.largest = {16, 16}}};
+    expect_error([&] { make(rank == 1 ? "nowhere.zfp" : kFuel, small); }, "rank 1: nowhere.zfp");
+    expect_error(
+        [&] {
+          make(kFuel, {.renderer = {.largest = {16 + rank, 16}}});
+        },
+        "rank 1 has another request");
+    expect_error([&] { make(kFuel, {.renderer = {.with_bounds = true}}); }, "no bounds");
+    BrickRenderer renderer = make(kFuel, small);
+    FrameRequest request{.isovalue = 40, .size = {16, 16}};
+    request.camera = renderer.camera(40);
+    request.want_positions = true;
+    expect_error([&] { renderer.render(request); }, "no positions");
+    request.want_positions = false;
+    request.isovalue = static_cast<float>(40 + rank);
+    expect_error([&] { renderer.render(request); }, "rank 1 has another request");
+    request.isovalue = 40;
+    EXPECT_EQ(renderer.render(request).picture.size(), rank == 0 ? 3u * 16 * 16 : 0u);
+  });
+}
+
+}  // namespace
+}  // namespace isowave
