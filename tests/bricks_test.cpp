@@ -146,7 +146,7 @@ TEST_P(BricksOnDevice, SurfacesInTheCuts) {
               100u);
 }
 
-TEST_P(BricksOnDevice, BricksOfOneBlockWithSmallCaches) {
+TEST_P(BricksOnDevice, OneBlockEachInTightCaches) {
   const TestVolume volume(test::grid_info({13, 9, 12}, {1, 2, 0.5}),
                           test::sample({13, 9, 12}, test::noise_field(4)), ErrorGoal{0.01});
   const Cuts cuts(blocks_along(volume.info()), 36);

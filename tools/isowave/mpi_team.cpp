@@ -131,13 +131,32 @@ class MpiTeam : public Team {
 
 std::unique_ptr<MpiTeam> team_of_job;
 
-/// What a signal that ends this process has to remove: mpirun ends the others where one dies.
+/// What is to be removed where this process ends before its time: where one dies, mpirun ends the
+/// others, by a signal, or MPI itself does.
 std::array<char, 4096> unfinished_file;
+constexpr int kEndingSignals[] = {SIGTERM, SIGINT, SIGHUP, SIGABRT};
 
-extern "C" void remove_unfinished(int number) {
-  ::unlink(unfinished_file.data());
+extern "C" void remove_unfinished() {
+  if (unfinished_file.front() != '\0') ::unlink(unfinished_file.data());
+}
+
+extern "C" void remove_unfinished_by_signal(int number) {
+  remove_unfinished();
   std::signal(number, SIG_DFL);
   ::raise(number);
+}
+
+void remove_at_end(const std::string &name) {
+  static const int registered = std::atexit(remove_unfinished);
+  static_cast<void>(registered);
+  if (name.size() >= unfinished_file.size()) return;
+  std::strcpy(unfinished_file.data(), name.c_str());
+  for (const int number : kEndingSignals) std::signal(number, remove_unfinished_by_signal);
+}
+
+void forget_unfinished() {
+  for (const int number : kEndingSignals) std::signal(number, SIG_DFL);
+  unfinished_file.front() = '\0';
 }
 
 /// Open MPI prints a line of its own where a write fails. Silent as long as this lives.
@@ -215,7 +234,7 @@ class MpiFile : public SharedFile {
         fail(std::strerror(errno));
     });
     name_.clear();
-    forget();
+    if (is_first()) forget_unfinished();
   }
 
  private:
@@ -241,27 +260,19 @@ class MpiFile : public SharedFile {
         std::filesystem::absolute(follow_links(target)).parent_path();
     for (unsigned id = 0;; ++id) {
       std::string name = (folder / fmt::format(".isowave.{}.mpi{}.tmp", ::getpid(), id)).string();
+      remove_at_end(name);
       const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
       if (file < 0 && errno == EEXIST) continue;
       if (file < 0) fail(std::strerror(errno));
       ::close(file);
-      if (name.size() < unfinished_file.size()) {
-        std::ranges::copy(name, unfinished_file.begin());
-        for (const int number : {SIGTERM, SIGINT}) std::signal(number, remove_unfinished);
-      }
       return name;
-    }
-  }
-  void forget() const {
-    if (is_first()) {
-      for (const int number : {SIGTERM, SIGINT}) std::signal(number, SIG_DFL);
     }
   }
   void remove() {
     if (file_ != MPI_FILE_NULL) MPI_File_close(&file_);
     if (!is_first() || name_.empty()) return;
     ::unlink(name_.c_str());
-    forget();
+    forget_unfinished();
   }
 
   Team &team_;
