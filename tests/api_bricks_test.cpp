@@ -4,11 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
-#include <barrier>
 #include <isowave/isowave.hpp>
 #include <thread>
+
+#include "tests/thread_meeting.hpp"
 
 namespace isowave {
 namespace {
@@ -16,47 +15,29 @@ namespace {
 const std::string kFuel = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
 constexpr std::uint32_t kCount = 2;
 
-/// Where threads meet.
-struct Meeting {
-  std::barrier<> barrier{kCount};
-  std::vector<std::string> bytes{kCount};
-  std::array<std::span<std::uint64_t>, kCount> words{};
-};
-
 class ThreadProcess : public Processes {
  public:
-  ThreadProcess(Meeting &meeting, std::uint32_t rank) : meeting_(meeting), rank_(rank) {}
+  ThreadProcess(core::test::ThreadMeeting &meeting, std::uint32_t rank)
+      : meeting_(meeting), rank_(rank) {}
   std::uint32_t rank() const override { return rank_; }
   std::uint32_t size() const override { return kCount; }
   std::uint32_t local_rank() const override { return rank_; }
   std::vector<std::string> all_gather(const std::string &bytes) override {
-    meeting_.bytes[rank_] = bytes;
-    meeting_.barrier.arrive_and_wait();
-    std::vector<std::string> all = meeting_.bytes;
-    meeting_.barrier.arrive_and_wait();
-    return all;
+    return meeting_.all_gather(rank_, bytes);
   }
   void reduce(std::span<std::uint64_t> words, Reduction how, bool for_all) override {
-    meeting_.words.at(rank_) = words;
-    meeting_.barrier.arrive_and_wait();
-    std::vector<std::uint64_t> result(words.begin(), words.end());
-    for (const std::span<std::uint64_t> others : meeting_.words) {
-      for (std::size_t i = 0; i < result.size(); ++i)
-        result[i] = how == Reduction::kOr ? result[i] | others[i] : std::min(result[i], others[i]);
-    }
-    meeting_.barrier.arrive_and_wait();
-    if (rank_ == 0 || for_all) std::ranges::copy(result, words.begin());
+    meeting_.reduce(rank_, words, how == Reduction::kOr, for_all);
   }
 
  private:
-  Meeting &meeting_;
+  core::test::ThreadMeeting &meeting_;
   std::uint32_t rank_;
 };
 
 /// Calls work(processes, rank) in a thread for each.
 template <class Work>
 void in_threads(const Work &work) {
-  Meeting meeting;
+  core::test::ThreadMeeting meeting(kCount);
   std::vector<std::jthread> threads;
   for (std::uint32_t rank = 0; rank < kCount; ++rank) {
     threads.emplace_back([&, rank] {

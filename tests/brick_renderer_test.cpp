@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <barrier>
 #include <cmath>
 #include <functional>
 #include <thread>
@@ -15,46 +14,27 @@
 #include "core/bricks/brick_volume.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
+#include "tests/thread_meeting.hpp"
 
 namespace isowave::core {
 namespace {
 
 using test::TestVolume;
 
-/// What the threads of a team have in common.
-struct Meeting {
-  explicit Meeting(std::uint32_t size) : texts(size), words(size), barrier(size) {}
-  std::vector<std::string> texts;
-  std::vector<std::span<std::uint64_t>> words;
-  std::barrier<> barrier;
-};
-
 class ThreadTeam : public Team {
  public:
-  ThreadTeam(Meeting &meeting, std::uint32_t rank) : meeting_(meeting), rank_(rank) {}
+  ThreadTeam(test::ThreadMeeting &meeting, std::uint32_t rank) : meeting_(meeting), rank_(rank) {}
   std::uint32_t rank() const override { return rank_; }
-  std::uint32_t size() const override { return static_cast<std::uint32_t>(meeting_.texts.size()); }
+  std::uint32_t size() const override { return meeting_.size(); }
   std::vector<std::string> all_gather(const std::string &text) override {
-    meeting_.texts[rank_] = text;
-    meeting_.barrier.arrive_and_wait();
-    std::vector<std::string> texts = meeting_.texts;
-    meeting_.barrier.arrive_and_wait();
-    return texts;
+    return meeting_.all_gather(rank_, text);
   }
   void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
     begun_.push_back({words, how, who});
   }
   void finish_reductions() override {
     for (const Begun &each : begun_) {
-      meeting_.words[rank_] = each.words;
-      meeting_.barrier.arrive_and_wait();
-      std::vector<std::uint64_t> sum(each.words.begin(), each.words.end());
-      for (const auto &others : meeting_.words) {
-        for (std::size_t i = 0; i < sum.size(); ++i)
-          sum[i] = each.how == Reduction::kOr ? sum[i] | others[i] : std::min(sum[i], others[i]);
-      }
-      meeting_.barrier.arrive_and_wait();
-      if (rank_ == 0 || each.who == Receiver::kAll) std::ranges::copy(sum, each.words.begin());
+      meeting_.reduce(rank_, each.words, each.how == Reduction::kOr, each.who == Receiver::kAll);
     }
     begun_.clear();
   }
@@ -65,7 +45,7 @@ class ThreadTeam : public Team {
     Reduction how;
     Receiver who;
   };
-  Meeting &meeting_;
+  test::ThreadMeeting &meeting_;
   std::uint32_t rank_;
   std::vector<Begun> begun_;
 };
@@ -85,7 +65,7 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Each rank of a team does this with its brick.
   void on_ranks(std::uint32_t size, const RendererOptions &options, const Work &work) {
     const Cuts cuts(blocks_along(volume_.info()), size);
-    Meeting meeting(size);
+    test::ThreadMeeting meeting(size);
     std::vector<std::jthread> threads;
     for (std::uint32_t rank = 0; rank < size; ++rank) {
       threads.emplace_back([&, rank] {

@@ -16,9 +16,8 @@
 ///     /// those lanes. macrocells: x + columns * (y + rows * z).
 ///     void macrocell_bits(const PacketField *field, Ints macrocells, Mask lanes, Ints *low,
 ///                         Ints *high);
-///     /// Lanes come to active blocks (at [3]: x, y, z). Gives them the bits of the cells that
-///     they
-///     /// must look into. Returns the lanes that must wait for their blocks.
+///     /// Lanes come to active blocks (at [3]: x, y, z). Gives them the bits of the cells to look
+///     /// into. Returns the lanes that must wait for their blocks.
 ///     Mask open_blocks(const PacketField *field, const FrameParams *frame, const Ints *at,
 ///                      Mask lanes, Ints *low, Ints *high);
 ///     /// The corners [8] of cells (at [3]: x, y, z) of the blocks that lanes have opened last,

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
+from isowave._placed import Placed
 from isowave._renderer import Camera, Color, Image, camera_of, request_for, size_of
 from isowave._volume import compression_options
 
@@ -58,7 +59,7 @@ class Processes:
         return result
 
 
-class BrickRenderer:
+class BrickRenderer(Placed[_core.BrickRenderer]):
     """Draws a volume that may be larger than one machine: each process has a brick of it.
 
     The pictures have the bits of Renderer's. All processes of the communicator make the same calls
@@ -130,30 +131,6 @@ class BrickRenderer:
 
         self.size, compression, options = self._processes.together(read)
         self._core = _core.BrickRenderer(self._processes, os.fspath(path), compression, options)
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Of the whole volume: (z, y, x)."""
-        x, y, z = self._core.dims
-        return z, y, x
-
-    @property
-    def spacing(self) -> tuple[float, float, float]:
-        """World units between voxels, (z, y, x)."""
-        x, y, z = self._core.spacing
-        return z, y, x
-
-    @property
-    def origin(self) -> tuple[float, float, float]:
-        """World position of voxel (0, 0, 0), (z, y, x)."""
-        x, y, z = self._core.origin
-        return z, y, x
-
-    @property
-    def direction(self) -> npt.NDArray[np.float64]:
-        """3 x 3; column a is the unit world direction (x, y, z) of index axis a, x, y, z."""
-        columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
-        return np.ascontiguousarray(columns.T)
 
     @property
     def device(self) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from isowave import _core
 from isowave._arrays import as_source
 from isowave._levels import Level
 from isowave._mesh import Mesh
+from isowave._placed import Placed
 from isowave._renderer import (
     Camera,
     Image,
@@ -248,7 +249,7 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
             shown.close()
 
 
-class Volume:
+class Volume(Placed[_core.Volume]):
     """A compressed volume. It cannot be changed, and threads may share it.
 
     Made by compress() and open(). It is an array of float32, (z, y, x), that is decoded where it is
@@ -266,33 +267,9 @@ class Volume:
         self._host: _core.HostRenderer | None = None
 
     @property
-    def shape(self) -> tuple[int, int, int]:
-        """Voxels along (z, y, x)."""
-        x, y, z = self._core.dims
-        return z, y, x
-
-    @property
     def size(self) -> int:
         """Voxels."""
         return self.levels[0].size
-
-    @property
-    def spacing(self) -> tuple[float, float, float]:
-        """World units between voxels along (z, y, x)."""
-        x, y, z = self._core.spacing
-        return z, y, x
-
-    @property
-    def origin(self) -> tuple[float, float, float]:
-        """World position of voxel (0, 0, 0), as (z, y, x)."""
-        x, y, z = self._core.origin
-        return z, y, x
-
-    @property
-    def direction(self) -> npt.NDArray[np.float64]:
-        """3 x 3; column a: unit world direction (x, y, z) of index axis a, in the order x, y, z."""
-        columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
-        return np.ascontiguousarray(columns.T)
 
     @property
     def source_dtype(self) -> np.dtype[Any]:

@@ -1,0 +1,59 @@
+"""Where a volume lies: the compiled part's axes x, y, z as z, y, x."""
+
+from __future__ import annotations
+
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+
+class _Grid(Protocol):
+    @property
+    def dims(self) -> list[int]:
+        ...
+
+    @property
+    def spacing(self) -> list[float]:
+        ...
+
+    @property
+    def origin(self) -> list[float]:
+        ...
+
+    @property
+    def direction(self) -> list[list[float]]:
+        ...
+
+
+Core = TypeVar("Core", bound=_Grid)
+
+
+class Placed(Generic[Core]):
+    """What Volume and BrickRenderer, which has a brick of one, both say of the whole volume."""
+
+    _core: Core
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels along (z, y, x)."""
+        x, y, z = self._core.dims
+        return z, y, x
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """World units between voxels along (z, y, x)."""
+        x, y, z = self._core.spacing
+        return z, y, x
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """World position of voxel (0, 0, 0), as (z, y, x)."""
+        x, y, z = self._core.origin
+        return z, y, x
+
+    @property
+    def direction(self) -> npt.NDArray[np.float64]:
+        """3 x 3; column a: unit world direction (x, y, z) of index axis a, in the order x, y, z."""
+        columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
+        return np.ascontiguousarray(columns.T)
