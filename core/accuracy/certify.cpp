@@ -25,18 +25,28 @@ constexpr float kNotCertain = std::numeric_limits<float>::infinity();
 /// its faces, one of the sum, and those of the root (ISO_ROOT_STEP).
 constexpr double kDistanceRounding = 2 * 0x1p-24, kCellRounding = 2 * 0x1p-21;
 
-/// A level's decoded voxels, block by block as they are asked for. Not thread-safe.
+/// A level's decoded voxels, as far as this rank has them, block by block as they are asked for.
+/// Not thread-safe.
 class BlockValues {
  public:
   BlockValues(const CompressedVolume &volume, double voxel_error, const ValueOffset &upper)
       : volume_(volume), bound_(with_fewer_planes(volume.precision, voxel_error)), upper_(upper) {}
 
+  /// Whether the cell is in one of this rank's own blocks; then it has all eight voxels. Cells are
+  /// the whole volume's.
+  bool owns(const glm::ivec3 &cell) const {
+    const BrickOf &brick = volume_.info.brick;
+    const glm::ivec3 block = in_brick(cell) >> 2;
+    return glm::all(glm::greaterThanEqual(block, glm::ivec3(brick.before))) &&
+           glm::all(glm::lessThan(block, glm::ivec3(volume_.num_blocks() - brick.behind)));
+  }
+
   /// Of a dual cell: both bounds of the field, minus the isovalue, as kernels compute them.
   void corners(const glm::ivec3 &cell, float isovalue, std::array<float, 8> &lower,
                std::array<float, 8> &upper) {
-    const glm::uvec3 blocks = volume_.num_blocks();
+    const glm::uvec3 blocks = volume_.num_blocks(), first(in_brick(cell));
     for (std::uint32_t corner = 0; corner < 8; ++corner) {
-      const glm::uvec3 at = glm::uvec3(cell) + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
+      const glm::uvec3 at = first + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
       const std::uint32_t id = at.x / 4 + blocks.x * (at.y / 4 + blocks.y * (at.z / 4));
       const std::uint32_t voxel = at.x % 4 + 4 * (at.y % 4) + 16 * (at.z % 4);
       const float value = decoded(id)[voxel],
@@ -47,6 +57,10 @@ class BlockValues {
   }
 
  private:
+  glm::ivec3 in_brick(const glm::ivec3 &cell) const {
+    return cell - glm::ivec3(volume_.info.brick.first_voxel);
+  }
+
   const std::array<float, 64> &decoded(std::uint32_t id) {
     const auto [entry, is_new] = blocks_.try_emplace(id);
     if (!is_new) return entry->second;
@@ -67,10 +81,14 @@ class BlockValues {
   std::unordered_map<std::uint32_t, std::array<float, 64>> blocks_;
 };
 
-/// Whether a ray begins inside or outside, of both bounds alike; or it misses the volume.
-bool starts_certainly(std::span<const FrameParams> frames, std::span<BlockValues> values,
-                      std::uint32_t pixel) {
-  for (std::size_t level = 0; level < frames.size(); ++level) {
+/// Whether a ray begins between the bounds: inside of one, outside of the other. Not where it
+/// misses the volume, or begins in another rank's block.
+///
+/// frames  of the whole volume's levels
+/// values  of the levels that may be drawn
+bool starts_between(std::span<const FrameParams> frames, std::span<BlockValues> values,
+                    std::uint32_t pixel) {
+  for (std::size_t level = 0; level < values.size(); ++level) {
     const FrameParams &frame = frames[level];
     if (!draws(frame)) continue;
     const Ray ray = make_ray(&frame, pixel);
@@ -80,12 +98,13 @@ bool starts_certainly(std::span<const FrameParams> frames, std::span<BlockValues
     const glm::ivec3 cell(locate(ray.x, 0, enter, 1, 0, last.x - 1),
                           locate(ray.y, 1, enter, 1, 0, last.y - 1),
                           locate(ray.z, 2, enter, 1, 0, last.z - 1));
+    if (!values[level].owns(cell)) return false;
     std::array<float, 8> lower{}, upper{};
     values[level].corners(cell, frame.surface.isovalue, lower, upper);
-    return inside_at(&ray, lower.data(), enter, cell.x, cell.y, cell.z, 0) ==
+    return inside_at(&ray, lower.data(), enter, cell.x, cell.y, cell.z, 0) !=
            inside_at(&ray, upper.data(), enter, cell.x, cell.y, cell.z, 0);
   }
-  return true;
+  return false;
 }
 
 /// From where to where a ray is in the finest level's domain [world units]; empty if it misses it.
@@ -98,36 +117,12 @@ std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel
           double{exit.t.hi} * double{finest.view.t_scale}};
 }
 
-}  // namespace
-
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
-                    std::span<const HitRecord> drawn) {
-  const auto begin = std::chrono::steady_clock::now();
-  if (const Solver solver = renderer.options().solver; !finds_all(solver)) {
-    throw Error(
-        "the error of frames drawn with solver {} has no bound, since it may miss a surface: take "
-        "bernstein",
-        to_string(solver));
-  }
-  renderer.check(request);
-  const ImageSize size = renderer.size_of(request);
-  if (drawn.size() != size.num_rays())
-    throw Error("{} hits are not those of {} rays", drawn.size(), size.num_rays());
-  const Camera &camera = request.camera;
-  Certificate certificate;
-  const auto draw = [&](FieldBound bound) {
-    FrameRequest of_bound = request;
-    of_bound.normals = Normals::kCell;
-    of_bound.bound = bound;
-    of_bound.on_pass = {};
-    for (const PassStats &pass : renderer.render(of_bound).passes)
-      certificate.decoded_blocks += pass.counts.decoded_count;
-    return renderer.hits();
-  };
-  const std::vector<HitRecord> lower = draw(FieldBound::kLower), upper = draw(FieldBound::kUpper);
-
+/// Of each ray a bit: starts_between(), of this rank's blocks.
+std::vector<std::uint64_t> starts_between(const BoundedFrames &of, const FrameRequest &request,
+                                          std::span<const FrameParams> frames) {
+  const CompressedVolume &volume = of.volume();
   const std::vector<const CompressedVolume *> levels =
-      levels_of(volume, renderer.options().with_levels);
+      levels_of(volume, of.renderer().options().with_levels);
   std::vector<ValueOffset> offsets;
   std::vector<double> voxel_errors;
   for (const CompressedVolume *level : levels) {
@@ -136,34 +131,85 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
                                    plane_error(level->precision, voxel_errors.back()),
                                    volume.value_range));
   }
-  const std::vector<FrameParams> frames =
-      make_level_frames(level_infos(volume, renderer.options().with_levels), camera, size,
-                        request.isovalue, request.voxel_pixels);
-  std::size_t coarsest = levels.size() - 1;
-  while (!draws(frames[coarsest])) --coarsest;
-  const glm::dmat3 voxel = levels[coarsest]->info.index_to_world();
-  const double cell_rounding =
-      kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
-  const double pixel_at_1 = 2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / size.height;
-  certificate.bounds.assign(drawn.size(), kNotCertain);
-  constexpr std::uint32_t kRows = 8;  // of rays, that share decoded blocks
-  parallel_for((size.ray_rows() + kRows - 1) / kRows, 0, [&](std::uint64_t part, std::uint32_t) {
+  constexpr std::uint32_t kWords = 128;  // of rays, that share decoded blocks
+  const std::uint32_t num_rays = frames[0].view.width * frames[0].view.height;
+  std::vector<std::uint64_t> bits((num_rays + 63) / 64);
+  parallel_for((bits.size() + kWords - 1) / kWords, 0, [&](std::uint64_t part, std::uint32_t) {
     std::vector<BlockValues> values;
     for (std::size_t i = 0; i < levels.size(); ++i)
       values.emplace_back(*levels[i], voxel_errors[i], offsets[i]);
-    const auto first = static_cast<std::uint32_t>(part * kRows * size.ray_columns());
-    const std::uint32_t end =
-        std::min(first + kRows * size.ray_columns(), static_cast<std::uint32_t>(drawn.size()));
-    for (std::uint32_t pixel = first; pixel < end; ++pixel) {
-      const double t = double{drawn[pixel].t},
-                   first_t = double{std::min(lower[pixel].t, upper[pixel].t)},
-                   last_t = double{std::max(lower[pixel].t, upper[pixel].t)};
-      const std::array<double, 2> way = way_through(frames[0], pixel);
+    const auto first = static_cast<std::uint32_t>(part * kWords * 64),
+               end = std::min(first + kWords * 64, num_rays);
+    for (std::uint32_t ray = first; ray < end; ++ray)
+      bits[ray / 64] |= std::uint64_t{starts_between(frames, values, ray)} << ray % 64;
+  });
+  return bits;
+}
+
+}  // namespace
+
+Certificate certify(BoundedFrames &frames, const FrameRequest &request,
+                    std::span<const float> drawn) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Renderer &renderer = frames.renderer();
+  if (const Solver solver = renderer.options().solver; !finds_all(solver)) {
+    throw Error(
+        "the error of frames drawn with solver {} has no bound, since it may miss a surface: take "
+        "bernstein",
+        to_string(solver));
+  }
+  renderer.check(request);
+  const ImageSize size = renderer.size_of(request);
+  Team &team = frames.team();
+  const bool is_first = team.rank() == 0;
+  together(team, [&] {
+    if (is_first && drawn.size() != size.num_rays())
+      throw Error("{} hits are not those of {} rays", drawn.size(), size.num_rays());
+  });
+  Certificate certificate;
+  std::uint64_t decoded_blocks = 0;
+  const auto draw = [&](FieldBound bound) {
+    FrameRequest of_bound = request;
+    of_bound.normals = Normals::kCell;
+    of_bound.ambient_rays = 0;
+    of_bound.bound = bound;
+    of_bound.on_pass = {};
+    for (const PassStats &pass : frames.draw(of_bound).passes)
+      decoded_blocks += pass.counts.decoded_count;
+    return frames.depth();
+  };
+  const std::vector<float> lower = draw(FieldBound::kLower), upper = draw(FieldBound::kUpper);
+  for (const std::uint64_t of_rank : gather(team, std::vector{decoded_blocks}))
+    certificate.decoded_blocks += of_rank;
+
+  const std::vector<VolumeInfo> &levels = frames.levels();
+  const std::vector<FrameParams> level_frames =
+      make_level_frames(levels, request.camera, size, request.isovalue, request.voxel_pixels);
+  std::vector<std::uint64_t> between;
+  together(team, [&] { between = starts_between(frames, request, level_frames); });
+  team.begin_reduction(between, Reduction::kOr, Receiver::kRank0);
+  team.finish_reductions();
+  if (!is_first) return certificate;
+
+  std::size_t coarsest = levels.size() - 1;
+  while (!draws(level_frames[coarsest])) --coarsest;
+  const glm::dmat3 voxel = levels[coarsest].index_to_world();
+  const double cell_rounding =
+      kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
+  const double pixel_at_1 = 2.0 * std::tan(glm::radians(request.camera.fovy_deg) / 2) / size.height;
+  certificate.bounds.assign(drawn.size(), kNotCertain);
+  parallel_for(size.ray_rows(), 0, [&](std::uint64_t row, std::uint32_t) {
+    const auto first = static_cast<std::uint32_t>(row * size.ray_columns());
+    for (std::uint32_t pixel = first; pixel < first + size.ray_columns(); ++pixel) {
+      const bool starts_certainly = (between[pixel / 64] >> pixel % 64 & 1) == 0;
+      const double t = double{drawn[pixel]}, first_t = double{std::min(lower[pixel], upper[pixel])},
+                   last_t = double{std::max(lower[pixel], upper[pixel])};
+      const std::array<double, 2> way = way_through(level_frames[0], pixel);
       float &bound = certificate.bounds[pixel];
       if (std::isinf(t) && std::isinf(first_t)) {
-        if (way[0] > way[1] || starts_certainly(frames, values, pixel)) bound = 0;
+        if (way[0] > way[1] || starts_certainly) bound = 0;
       } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] &&
-                 last_t <= way[1] && starts_certainly(frames, values, pixel)) {
+                 last_t <= way[1] && starts_certainly) {
         const double rounding = kDistanceRounding * last_t + cell_rounding;
         const double distance = std::max(t - first_t, last_t - t) + rounding;
         bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
@@ -172,6 +218,12 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
   });
   certificate.total_ms = ms_since(begin);
   return certificate;
+}
+
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
+                    std::span<const HitRecord> drawn) {
+  FramesOfOne frames(renderer, volume);
+  return certify(frames, request, depth_of({drawn.begin(), drawn.end()}));
 }
 
 CertificateSummary summarize(const Certificate &certificate, double limit) {

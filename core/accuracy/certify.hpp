@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "core/accuracy/bounded_frames.hpp"
 #include "core/render/renderer.hpp"
 
 namespace isowave::core {
@@ -23,17 +24,20 @@ struct Certificate {
   /// nothing is certain.
   std::vector<float> bounds;
   double total_ms = 0;  ///< wall clock, of both bounds' frames and what the host makes of them
-  std::uint64_t decoded_blocks = 0;  ///< for them
+  std::uint64_t decoded_blocks = 0;  ///< for them, by all ranks
 };
 
 /// Bounds the error of a frame.
 ///
-/// renderer  made with_bounds; the last frame that it draws here is another
-/// volume    what the renderer was made for
-/// request   of the frame
-/// drawn     its hits
-/// Throws    Error: the volume's error is not known; the solver may miss crossings; the hits are
-///           not as many as the rays
+/// frames   of renderers made with_bounds; the last frame that they draw here is another
+/// request  of the frame
+/// drawn    depth of its rays; at rank 0 alone
+/// Returns  at rank 0; at others a certificate without bounds
+/// Throws   Error, at all ranks: the volume's error is not known; the solver may miss crossings;
+///          depths are not as many as the rays
+Certificate certify(BoundedFrames &frames, const FrameRequest &request,
+                    std::span<const float> drawn);
+/// The same of one renderer's frame. volume: what it was made for; drawn: its hits.
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const HitRecord> drawn);
 

@@ -41,16 +41,16 @@ std::vector<double> voxel_errors(const CompressedVolume &volume, double error) {
 
 /// Blocks that frames of levels of detail decode for these hits, against those of the finest level
 /// alone: a pixel covers blocks by the square of its distance, and of each level a quarter as many.
-double blocks_share(std::span<const HitRecord> hits, std::span<const FrameParams> frames) {
+double blocks_share(std::span<const float> depth, std::span<const FrameParams> frames) {
   double with_levels = 0, finest = 0;
-  for (const HitRecord &hit : hits) {
-    if (std::isinf(hit.t)) continue;
+  for (const float t : depth) {
+    if (std::isinf(t)) continue;
     int level = 0;
     for (std::size_t i = 1; i < frames.size(); ++i) {
-      if (draws(frames[i]) && frames[i].band.begin_t * frames[i].view.t_scale <= hit.t)
+      if (draws(frames[i]) && frames[i].band.begin_t * frames[i].view.t_scale <= t)
         level = static_cast<int>(i);
     }
-    const double blocks = double{hit.t} * double{hit.t};
+    const double blocks = double{t} * double{t};
     finest += blocks;
     with_levels += std::ldexp(blocks, -2 * level);
   }
@@ -116,10 +116,13 @@ FrameRequest with_detail(FrameRequest request, const Detail &detail) {
   return request;
 }
 
-DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
-                           const FrameRequest &request, double max_surface_error) {
+DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
+                           double max_surface_error) {
   check_max_surface_error(max_surface_error);
   const auto begin = std::chrono::steady_clock::now();
+  const Renderer &renderer = frames.renderer();
+  const CompressedVolume &volume = frames.volume();
+  Team &team = frames.team();
   renderer.check(request);
   const ImageSize size = renderer.size_of(request);
   const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
@@ -131,18 +134,21 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
   const auto try_out = [&](const Detail &detail) {
     FrameRequest sample = with_detail(request, {detail.voxel_pixels / stride, detail.voxel_error});
     sample.normals = Normals::kCell;
+    sample.ambient_rays = 0;
     sample.size = small;
     sample.on_pass = {};
-    renderer.render(sample);
-    std::vector<HitRecord> hits = renderer.hits();
+    frames.draw(sample);
+    std::vector<float> depth = frames.depth();
     const CertificateSummary summary =
-        summarize(certify(renderer, volume, sample, hits), max_surface_error / stride);
+        of_first(team,
+                 std::vector{summarize(certify(frames, sample, depth), max_surface_error / stride)})
+            .front();
     const double all = std::max<double>(double(summary.num_pixels), 1);
     choice.tries.push_back(
         {detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
-    return std::pair(summary, std::move(hits));
+    return std::pair(summary, std::move(depth));
   };
-  const auto [at_full_detail, finest_hits] = try_out({});
+  const auto [at_full_detail, finest_depth] = try_out({});
   choice.median = stride * at_full_detail.median;
   const double best = choice.tries.front().certified;
   choice.reachable = best >= 0.5;
@@ -153,20 +159,23 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
   };
   // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with
   // any less, too: a bisection.
-  const auto first_to_suffice = [&](const std::vector<double> &numbers, const auto &detail_of) {
+  const auto first_to_suffice = [&](const std::vector<double> &all, const auto &detail_of) {
+    const std::vector<double> numbers = of_first(team, all);
     const auto found = std::ranges::partition_point(
         numbers, [&](double number) { return !suffices(detail_of(number)); });
     return found == numbers.end() ? 0.0 : *found;
   };
-  if (choice.reachable && renderer.options().with_levels) {
+  if (choice.reachable && frames.levels().size() > 1) {
     const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
       return Detail{voxel_pixels, 0};
     });
-    const std::vector<FrameParams> frames = make_level_frames(
-        level_infos(volume, true), request.camera, size, request.isovalue, coarsest);
-    if (blocks_share(finest_hits, frames) <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
+    const std::vector<FrameParams> level_frames =
+        make_level_frames(frames.levels(), request.camera, size, request.isovalue, coarsest);
+    const double share =
+        of_first(team, std::vector{blocks_share(finest_depth, level_frames)}).front();
+    if (share <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
   }
-  if (choice.reachable && volume.rate() > kMinPlaneRate) {
+  if (choice.reachable && frames.rate() > kMinPlaneRate) {
     choice.detail.voxel_error =
         first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
           return Detail{choice.detail.voxel_pixels, voxel_error};
@@ -174,6 +183,12 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
   }
   choice.total_ms = ms_since(begin);
   return choice;
+}
+
+DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
+                           const FrameRequest &request, double max_surface_error) {
+  FramesOfOne frames(renderer, volume);
+  return choose_detail(frames, request, max_surface_error);
 }
 
 }  // namespace isowave::core

@@ -53,8 +53,8 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
 
 /// Chooses the detail of one frame.
 ///
-/// renderer           made with_choices(); the last frame that it draws here is another
-/// volume             what the renderer was made for
+/// frames             of renderers made with_choices(); the last frame that they draw here is
+///                    another
 /// request            of the frame; its own voxel_pixels and voxel_error do not matter
 /// max_surface_error  that most pixels are to keep [pixels], above 0
 ///
@@ -62,7 +62,11 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
 /// choice depends on data, camera and size, never on timings. Levels of detail first, then bit
 /// planes: the coarsest that lose no more than kLostShare; no levels that spare hardly any blocks
 /// (kMaxBlocksShare), nor planes of volumes of few bits (kMinPlaneRate). Full detail, where most
-/// pixels do not keep max_surface_error even so. Throws Error as certify() does.
+/// pixels do not keep max_surface_error even so. All ranks of a team choose alike: what rank 0
+/// finds counts. Throws Error as certify() does.
+DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
+                           double max_surface_error);
+/// The same with one renderer. volume: what it was made for.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
                            const FrameRequest &request, double max_surface_error);
 

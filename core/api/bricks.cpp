@@ -143,7 +143,7 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
   core::together(team, [&] { of_core = core_options(options); });
   of_core.range_thresholds = core::range_thresholds(core::gather(team, samples));
   core::together(team,
-                 [&] { renderer.emplace(device->device, volume, of_core, *cuts, whole, team); });
+                 [&] { renderer.emplace(device->device, volume, of_core, *cuts, levels, team); });
 }
 
 Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {

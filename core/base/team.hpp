@@ -43,6 +43,16 @@ class Team {
   virtual void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received);
 };
 
+/// The team of a process that works alone.
+class TeamOfOne : public Team {
+ public:
+  std::uint32_t rank() const override { return 0; }
+  std::uint32_t size() const override { return 1; }
+  std::vector<std::string> all_gather(const std::string &text) override { return {text}; }
+  void begin_reduction(std::span<std::uint64_t>, Reduction, Receiver) override {}
+  void finish_reductions() override {}
+};
+
 /// Throws Error at every rank if one gives a text: that of the first, with its rank, unless all
 /// give the same.
 void agree_on_error(Team &team, const std::string &error);
@@ -67,6 +77,12 @@ std::vector<Value> gather(Team &team, const std::vector<Value> &values) {
     std::memcpy(all.data() + before, each.data(), each.size());
   }
   return all;
+}
+
+/// Rank 0's values, at all ranks.
+template <class Value>
+std::vector<Value> of_first(Team &team, const std::vector<Value> &values) {
+  return gather(team, team.rank() == 0 ? values : std::vector<Value>());
 }
 
 }  // namespace isowave::core

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/view/detail.hpp"
-#include "core/volume/pyramid.hpp"
 
 namespace isowave::core {
 
@@ -23,14 +23,28 @@ constexpr std::size_t kSlabRays = 1u << 18;
 
 BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume,
                              const RendererOptions &options, const Cuts &cuts,
-                             const VolumeInfo &whole, Team &team)
-    : renderer_(device, volume, options), cuts_(cuts), whole_levels_{whole}, team_(team) {
-  while (options.with_levels && whole_levels_.size() <= volume.coarser_levels.size())
-    whole_levels_.push_back(coarser_level(whole_levels_.back()));
+                             std::vector<VolumeInfo> whole, Team &team)
+    : renderer_(device, volume, options),
+      cuts_(cuts),
+      whole_levels_(std::move(whole)),
+      num_levels_(options.with_levels ? 1 + volume.coarser_levels.size() : 1),
+      team_(team) {}
+
+void BrickRenderer::check_levels(const FrameRequest &request) const {
+  if (request.voxel_pixels == 0 || num_levels_ == whole_levels_.size()) return;
+  const std::vector<FrameParams> frames =
+      make_level_frames(whole_levels_, request.camera, renderer_.size_of(request), request.isovalue,
+                        request.voxel_pixels);
+  if (num_levels_ > 1 &&
+      std::none_of(frames.begin() + std::ptrdiff_t(num_levels_), frames.end(), draws))
+    return;
+  throw Error(
+      "{} bricks can be cut at {} of the {} levels of detail, and with voxels {:.3g} pixels apart "
+      "the frame has coarser ones: start fewer processes, or convert with --levels {}",
+      team_.size(), num_levels_, whole_levels_.size(), request.voxel_pixels, num_levels_);
 }
 
 FrameStats BrickRenderer::render(const FrameRequest &request) {
-  if (request.bound != FieldBound::kNone) throw Error("bricks have no bounds");
   const View view = make_view(whole_levels_.front(), request.camera, renderer_.size_of(request));
   place_ = cuts_.order_from({view.eye_x, view.eye_y, view.eye_z})[team_.rank()];
   own_hits_.clear();
@@ -119,8 +133,9 @@ void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) 
   const std::vector<HitRecord> hits = compose_hits(placed, kHitFields, Receiver::kAll);
   OpenCounts open{std::vector<uchar>(hits.size()), 0};
   together(team_, [&] {
-    const std::vector<FrameParams> frames = make_level_frames(
-        whole_levels_, request.camera, renderer_.size(), request.isovalue, request.voxel_pixels);
+    const std::vector<FrameParams> frames =
+        make_level_frames(std::span(whole_levels_).first(num_levels_), request.camera,
+                          renderer_.size(), request.isovalue, request.voxel_pixels);
     const auto first = std::ranges::find_if(frames, draws);
     const auto end = std::find_if_not(first, frames.end(), draws);
     renderer_.begin_ambient(request, hits,

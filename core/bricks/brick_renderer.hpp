@@ -25,10 +25,11 @@ class BrickRenderer {
   /// cuts    as many bricks as ranks; each rank draws that of its number. As device and team, must
   ///         outlive the renderer
   /// volume  it: see brick_volume.hpp
-  /// whole   the grid of the whole volume
+  /// whole   grids of the whole volume's levels of detail, the finest first: those that the brick
+  ///         has, and others that frames do without
   /// Throws  Error: as Renderer, at the rank that it is about
   BrickRenderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
-                const Cuts &cuts, const VolumeInfo &whole, Team &team);
+                const Cuts &cuts, std::vector<VolumeInfo> whole, Team &team);
 
   /// Draws this rank's brick. Ambient rays go through those of all ranks.
   ///
@@ -36,9 +37,11 @@ class BrickRenderer {
   ///          that any has, be this rank through or not: it may ask for the picture so far, and
   ///          must return the same at all
   /// Returns  what that took; cancelled: where any rank is not through
-  /// Throws   Error at every rank: as Renderer::render(), and what on_pass throws, at one; bounds,
-  ///          which go on in other bricks
+  /// Throws   Error at every rank: as Renderer::render(), and what on_pass throws, at one
   FrameStats render(const FrameRequest &request);
+  /// Throws  Error: one renderer of the whole would draw with levels of detail that bricks do not
+  ///         have, and this one with finer ones
+  void check_levels(const FrameRequest &request) const;
   /// As TimedFrames::render(), by the clock of rank 0.
   TimedFrame render_within(const FrameRequest &request, double budget_ms);
 
@@ -58,6 +61,8 @@ class BrickRenderer {
     return renderer_.surface_box(isovalues);
   }
   const Renderer &renderer() const { return renderer_; }
+  const std::vector<VolumeInfo> &whole_levels() const { return whole_levels_; }
+  Team &team() const { return team_; }
   const CompositionStats &composition() const { return composition_; }
 
  private:
@@ -77,6 +82,7 @@ class BrickRenderer {
   Renderer renderer_;
   const Cuts &cuts_;
   std::vector<VolumeInfo> whole_levels_;
+  std::size_t num_levels_;  ///< of these, that the brick has
   Team &team_;
   std::uint32_t place_ = 0;           ///< of the brick, seen from the frame's eye
   std::vector<HitRecord> own_hits_;   ///< empty: not read yet

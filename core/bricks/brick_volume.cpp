@@ -104,7 +104,7 @@ CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own,
 }
 
 CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own,
-                            std::size_t num_levels) {
+                            std::size_t num_levels, bool with_bounds) {
   const CompressedVolume whole = read_zfp_file_info(path);
   std::vector<BlockBox> own_of, kept;
   std::vector<VolumeInfo> infos;
@@ -113,7 +113,7 @@ CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &o
     own_of.push_back(own_of_level(whole.info, own, infos.back(), i));
     kept.push_back(kept_blocks(blocks_along(infos.back()), own_of.back()));
   }
-  CompressedVolume brick = read_zfp_blocks(path, kept);
+  CompressedVolume brick = read_zfp_blocks(path, kept, with_bounds);
   for (std::size_t i = 0; i < num_levels; ++i)
     (i == 0 ? brick : brick.coarser_levels[i - 1]).info = brick_info(infos[i], own_of[i]);
   return brick;
@@ -126,6 +126,7 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
   CompressOptions options;
   options.rate = storage.rate;
   options.precision = find_precision(open, what, storage);
+  options.measure_error = storage.measure_error;
   options.input = {storage.map_nan, {}, storage.num_threads};
   options.device = options.precision ? nullptr : storage.device;
   CroppedReader reader(std::move(whole), info);
@@ -148,7 +149,7 @@ CompressedVolume load_brick(const std::string &path, const RawOverrides &overrid
                             const BlockBox &own) {
   check_drawable(brick_info(info, own), path);
   if (is_zfp_name(path)) {
-    CompressedVolume volume = read_brick(path, own, num_levels);
+    CompressedVolume volume = read_brick(path, own, num_levels, storage.measure_error);
     set_spacing(volume, info.spacing);
     return volume;
   }

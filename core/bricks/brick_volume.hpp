@@ -45,11 +45,11 @@ CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own,
 
 /// A brick of a `.zfp` file, of which only its blocks are read: see read_zfp_blocks().
 CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own,
-                            std::size_t num_levels = 1);
+                            std::size_t num_levels = 1, bool with_bounds = false);
 
 /// A brick of any other volume, of one level of detail, compressed as the whole would be. Reads the
 /// layers of voxels that the brick has part of; where an error is bounded, before that the whole
-/// volume.
+/// volume. Range of values and measured error are the brick's: see agree_on_voxels().
 ///
 /// Throws  Error as compress_volume()
 CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
@@ -64,7 +64,8 @@ std::vector<VolumeInfo> read_levels(const std::string &path, const RawOverrides 
 /// A brick of such a volume, with so many levels of detail: read, or compressed.
 ///
 /// info    of the finest level, as read_levels() has it
-/// storage its device also makes generated voxels
+/// storage its device also makes generated voxels; with measure_error, bounds of a file's blocks
+///         are read
 /// Throws  Error also on what cannot be drawn
 CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
                             const Storage &storage, const VolumeInfo &info, std::size_t num_levels,

@@ -83,6 +83,34 @@ Cuts cut_by_surfaces(Team &team, const VolumeInfo &whole, std::span<const float>
   return {blocks, team.size(), work, std::max(unit, kWorkUnit)};
 }
 
+double agree_on_voxels(Team &team, CompressedVolume &brick) {
+  struct Voxels {
+    std::array<float, 2> range;
+    double error;                            ///< -1: not known
+    std::uint64_t bits = 0, num_blocks = 0;  ///< of own blocks
+  };
+  Voxels own{brick.value_range, brick.max_voxel_error.value_or(-1)};
+  const glm::u64vec3 kept(brick.num_blocks()), begin(brick.info.brick.before),
+      end = kept - glm::u64vec3(brick.info.brick.behind);
+  for (std::uint64_t z = begin.z; z < end.z; ++z) {
+    for (std::uint64_t y = begin.y; y < end.y; ++y) {
+      const std::uint64_t row = kept.x * (y + kept.y * z);
+      own.bits += brick.block_begin(row + end.x) - brick.block_begin(row + begin.x);
+      own.num_blocks += end.x - begin.x;
+    }
+  }
+  Voxels all{own.range, own.error};
+  for (const Voxels &each : gather(team, std::vector{own})) {
+    all.range = {std::min(all.range[0], each.range[0]), std::max(all.range[1], each.range[1])};
+    all.error = std::max(all.error, each.error);
+    all.bits += each.bits;
+    all.num_blocks += each.num_blocks;
+  }
+  brick.value_range = all.range;
+  if (all.error >= 0) brick.max_voxel_error = all.error;
+  return double(all.bits) / (64.0 * double(all.num_blocks));
+}
+
 std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
                                    const std::optional<BlockBox> &own) {
   std::string text;

@@ -41,6 +41,12 @@ Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &brick
 Cuts cut_by_surfaces(Team &team, const VolumeInfo &whole, std::span<const float> isovalues,
                      int unit, const std::function<CompressedVolume(const BlockBox &)> &load);
 
+/// Gives each rank's brick the range of values and the measured error of the whole volume, which
+/// one that was compressed here does not know.
+///
+/// Returns  bits per voxel of the whole (CompressedVolume::rate())
+double agree_on_voxels(Team &team, CompressedVolume &brick);
+
 /// The box, in the whole volume, around all ranks' boxes.
 ///
 /// brick  the grid of this rank's

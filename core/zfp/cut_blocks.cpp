@@ -1,7 +1,9 @@
 #include "core/zfp/cut_blocks.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <numeric>
+#include <utility>
 
 namespace isowave::core {
 
@@ -50,6 +52,28 @@ CompressedVolume BlockCutter::finish() {
   return std::move(cut_);
 }
 
+BoundsCutter::BoundsCutter(const glm::uvec3 &blocks, const BlockBox &box)
+    : blocks_(blocks), begin_(box.begin), end_(box.end) {}
+
+void BoundsCutter::add(std::span<const std::uint8_t> codes) {
+  for (const std::uint8_t code : codes) {
+    cut_.largest_of_whole = std::max(cut_.largest_of_whole, code);
+    if (glm::all(glm::greaterThanEqual(at_, begin_)) && glm::all(glm::lessThan(at_, end_)))
+      cut_.codes.push_back(code);
+    if (++at_.x < blocks_.x) continue;
+    at_.x = 0;
+    if (++at_.y < blocks_.y) continue;
+    at_.y = 0;
+    ++at_.z;
+  }
+}
+
+BlockBounds BoundsCutter::finish(const BlockBounds &level) {
+  cut_.exponent = level.exponent;
+  cut_.by_place = level.by_place;
+  return std::move(cut_);
+}
+
 CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box) {
   const glm::u64vec3 blocks(whole.num_blocks());
   const glm::u64vec3 begin(box.begin), end(box.end);
@@ -63,7 +87,12 @@ CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box) 
       cutter.add_row(whole.block_begin(row + begin.x), lengths);
     }
   }
-  return cutter.finish();
+  CompressedVolume cut = cutter.finish();
+  if (whole.bounds.codes.empty()) return cut;
+  BoundsCutter bounds(whole.num_blocks(), box);
+  bounds.add(whole.bounds.codes);
+  cut.bounds = bounds.finish(whole.bounds);
+  return cut;
 }
 
 }  // namespace isowave::core

@@ -36,17 +36,34 @@ class BlockCutter {
   std::vector<std::uint64_t> wide_;  ///< ... and in words of 64 bits
 };
 
-/// The blocks of a box, of a volume wherever it is, without levels of detail.
+/// Of the bounds of a level's blocks, those of a box.
+class BoundsCutter {
+ public:
+  /// blocks  of the level, along each axis
+  /// box     not empty, within them
+  BoundsCutter(const glm::uvec3 &blocks, const BlockBox &box);
+  /// The next blocks' codes, in the order of blocks.
+  void add(std::span<const std::uint8_t> codes);
+  /// After the last block. level: exponent and rule of the codes.
+  BlockBounds finish(const BlockBounds &level);
+
+ private:
+  glm::uvec3 blocks_, begin_, end_, at_{0};
+  BlockBounds cut_;
+};
+
+/// The blocks of a box with their bounds, of a volume wherever it is, without levels of detail.
 ///
 /// Throws  Error: a file is shorter than it was
 CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box);
 
 /// The same of a `.zfp` file, a box of each of its first levels of detail. Little else is read:
-/// headers, trailers and the lengths of blocks. So the checksum of the payload is not looked at.
+/// headers, trailers, the lengths of blocks and, with_bounds, the bounds of all. So the checksum of
+/// the payload is not looked at.
 ///
-/// Throws  Error as read_zfp_file_info(); a damaged index; a file of zfp's own tool whose blocks
-///         have lengths of their own, since nobody knows where they begin
-CompressedVolume read_zfp_blocks(const std::filesystem::path &path,
-                                 std::span<const BlockBox> boxes);
+/// Throws  Error as read_zfp_file_info(); a damaged index, damaged bounds; a file of zfp's own tool
+///         whose blocks have lengths of their own, since nobody knows where they begin
+CompressedVolume read_zfp_blocks(const std::filesystem::path &path, std::span<const BlockBox> boxes,
+                                 bool with_bounds);
 
 }  // namespace isowave::core

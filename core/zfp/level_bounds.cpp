@@ -179,7 +179,8 @@ LevelError::LevelError(const CompressedVolume &level, bool finest) {
 
 float largest_bound(const BlockBounds &bounds) {
   if (bounds.codes.empty()) return 0;
-  return std::ldexp(block_bound(std::ranges::max(bounds.codes)), bounds.exponent);
+  const std::uint8_t largest = std::max(std::ranges::max(bounds.codes), bounds.largest_of_whole);
+  return std::ldexp(block_bound(largest), bounds.exponent);
 }
 
 double plane_error(const BlockPrecision &bound, double voxel_error) {

@@ -85,6 +85,7 @@ struct LevelError {
   float unit = 0;                 ///< and of its block's bound besides
   double largest = 0;             ///< of all values
 };
+/// Of the whole level, also where these are a brick's.
 float largest_bound(const BlockBounds &bounds);
 
 /// How far decoded values may be from those of all bit planes where with_fewer_planes(bound,

@@ -70,10 +70,10 @@ class ZfpFileReader {
   }
 
   /// A box of each of the first levels.
-  CompressedVolume take_blocks(std::span<const BlockBox> boxes) {
-    CompressedVolume cut = cut_box(boxes.front());
+  CompressedVolume take_blocks(std::span<const BlockBox> boxes, bool with_bounds) {
+    CompressedVolume cut = cut_box(boxes.front(), with_bounds);
     for (std::size_t i = 1; i < boxes.size(); ++i)
-      cut.coarser_levels.push_back(levels_.at(i - 1).cut_box(boxes[i]));
+      cut.coarser_levels.push_back(levels_.at(i - 1).cut_box(boxes[i], with_bounds));
     return cut;
   }
 
@@ -179,13 +179,18 @@ class ZfpFileReader {
     if (keep) volume_.index = index.finish();
   }
 
-  CompressedVolume cut_box(const BlockBox &box) {
+  CompressedVolume cut_box(const BlockBox &box, bool with_bounds) {
     volume_.file = file_;
     volume_.file_first_bit = 8 * begin_ + header_bits_;
-    if (!volume_.is_indexed()) return cut_blocks(volume_, box);
-    if (!has_trailer_)
+    if (volume_.is_indexed() && !has_trailer_)
       fail("a file of zfp's own tool does not say where its blocks begin: convert it first");
-    return cut_indexed(box);
+    CompressedVolume cut = volume_.is_indexed() ? cut_indexed(box) : cut_blocks(volume_, box);
+    if (with_bounds && layout_.bounds_bytes != 0) {
+      BoundsCutter bounds(volume_.num_blocks(), box);
+      inflate_bounds([&](std::span<const std::uint8_t> some) { bounds.add(some); });
+      if (layout_.counts_casts) cut.bounds = bounds.finish(volume_.bounds);
+    }
+    return cut;
   }
 
   /// Keeps the lengths of a row at a time.
@@ -216,21 +221,29 @@ class ZfpFileReader {
   }
 
   void read_bounds(bool keep) {
-    const std::uint64_t num_blocks = volume_.block_count();
     std::vector<std::uint8_t> &codes = volume_.bounds.codes;
+    inflate_bounds([&](std::span<const std::uint8_t> some) {
+      if (keep) codes.reserve(volume_.block_count());
+      codes.insert(codes.end(), some.begin(), some.end());
+      if (!keep) codes = {std::ranges::max(codes)};
+    });
+    if (!layout_.counts_casts) volume_.bounds = {};
+  }
+
+  /// Calls take(codes) with those of all blocks, some at a time.
+  template <typename Take>
+  void inflate_bounds(const Take &take) const {
+    const std::uint64_t num_blocks = volume_.block_count();
     const FileSource deflated(file_, begin_ + stream_bytes_ + layout_.index_bytes,
                               layout_.bounds_bytes);
     if (num_blocks / kMaxDeflateRatio > layout_.bounds_bytes) refuse_bounds();
-    if (keep) codes.reserve(num_blocks);
     const bool whole =
         inflate_items<std::uint8_t>(deflated, num_blocks, [&](std::span<const std::uint8_t> some) {
-          codes.insert(codes.end(), some.begin(), some.end());
-          if (!keep) codes = {std::ranges::max(codes)};
+          take(some);
           return true;
         });
     const std::int32_t exponent = volume_.bounds.exponent;
     if (!whole || exponent < kMinBoundExponent || exponent > kMaxBoundExponent) refuse_bounds();
-    if (!layout_.counts_casts) volume_.bounds = {};
   }
 
   [[noreturn]] void refuse_bounds() const {
@@ -387,8 +400,9 @@ CompressedVolume check_zfp_file(const fs::path &path) {
 CompressedVolume read_zfp_file_info(const fs::path &path) {
   return ZfpFileReader(path).take_info();
 }
-CompressedVolume read_zfp_blocks(const fs::path &path, std::span<const BlockBox> boxes) {
-  return ZfpFileReader(path).take_blocks(boxes);
+CompressedVolume read_zfp_blocks(const fs::path &path, std::span<const BlockBox> boxes,
+                                 bool with_bounds) {
+  return ZfpFileReader(path).take_blocks(boxes, with_bounds);
 }
 
 }  // namespace isowave::core

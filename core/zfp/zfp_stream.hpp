@@ -57,6 +57,8 @@ struct BlockBounds {
   /// A voxel is off by its share (bound_share()) at most. Only where voxels are compared with the
   /// source's.
   bool by_place = false;
+  /// Of a brick's level: the largest code in all bricks, since what float32 loses goes by that.
+  std::uint8_t largest_of_whole = 0;
 };
 
 /// Words past its last bit that a decoder reads at most.

@@ -121,6 +121,55 @@ nlohmann::ordered_json timed_steps(const TimedFrame &frame, double budget_ms) {
   return {{"budget_ms", budget_ms}, {"complete", frame.complete}, {"steps", steps}};
 }
 
+nlohmann::ordered_json detail_json(const Detail &detail) {
+  return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
+}
+
+/// Prints how far a frame of that size may be off, and writes it to error_map, if that is not
+/// empty.
+nlohmann::ordered_json report_error(double max_surface_error, const DetailChoice &choice,
+                                    const Certificate &certificate, const ImageSize &size,
+                                    const fs::path &error_map) {
+  const CertificateSummary summary = summarize(certificate, max_surface_error);
+  const double certified = summary.num_pixels == 0
+                               ? 100.0
+                               : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
+  fmt::print(
+      "  within {} pixels of the true surface: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
+      "{:.3g}); {} "
+      "uncertain\n"
+      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
+      "bounded in "
+      "{:.0f} ms\n",
+      max_surface_error, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
+      with_commas(summary.num_uncertain), choice.detail.voxel_pixels, choice.detail.voxel_error,
+      choice.total_ms, certificate.total_ms);
+  if (!choice.reachable) {
+    spdlog::warn("most pixels cannot be kept within {} pixels: {}", max_surface_error,
+                 choice.advice);
+  }
+  if (!error_map.empty())
+    write_npy({size.ray_columns(), size.ray_rows(), certificate.bounds}, error_map);
+  nlohmann::ordered_json tries = nlohmann::ordered_json::array();
+  for (const DetailChoice::Try &each : choice.tries) {
+    tries.push_back(detail_json(each.detail));
+    tries.back()["certified"] = each.certified;
+  }
+  return {{"max_surface_error", max_surface_error},
+          {"reachable", choice.reachable},
+          {"chosen", detail_json(choice.detail)},
+          {"tries", tries},
+          {"choice_ms", choice.total_ms},
+          {"pixels", summary.num_pixels},
+          {"certified", summary.num_certified},
+          {"uncertain", summary.num_uncertain},
+          {"median", summary.median},
+          {"p99", summary.p99},
+          {"max", summary.max},
+          {"bound_ms", certificate.total_ms},
+          {"decoded_blocks", certificate.decoded_blocks}};
+}
+
 class DeviceFrames : public FrameSource {
  public:
   DeviceFrames(ocl::Device &device, const Scene &scene, const Appearance &appearance,
@@ -154,7 +203,11 @@ class DeviceFrames : public FrameSource {
   FrameStats refine() override { return renderer_.render(request_); }
   Camera surface_camera(std::span<const float> isovalues) { return renderer_.camera(isovalues); }
   void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
-    if (max_surface_error_) frame["error"] = bound_error(error_map);
+    if (max_surface_error_) {
+      frame["error"] = report_error(*max_surface_error_, choice_,
+                                    certify(renderer_, volume_, request_, renderer_.hits()),
+                                    renderer_.options().size, error_map);
+    }
     if (timed_frames_) frame["time_budget"] = timed_steps(timed_, *time_budget_);
   }
   std::vector<HitRecord> hits() override { return renderer_.hits(); }
@@ -162,8 +215,6 @@ class DeviceFrames : public FrameSource {
   const Renderer &renderer() const { return renderer_; }
 
  private:
-  nlohmann::ordered_json bound_error(const fs::path &error_map);
-
   const CompressedVolume &volume_;
   Renderer renderer_;
   std::optional<TimedFrames> timed_frames_;
@@ -174,54 +225,6 @@ class DeviceFrames : public FrameSource {
   DetailChoice choice_;
   TimedFrame timed_;
 };
-
-nlohmann::ordered_json detail_json(const Detail &detail) {
-  return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
-}
-
-nlohmann::ordered_json DeviceFrames::bound_error(const fs::path &error_map) {
-  const Certificate certificate = certify(renderer_, volume_, request_, renderer_.hits());
-  const CertificateSummary summary = summarize(certificate, *max_surface_error_);
-  const double certified = summary.num_pixels == 0
-                               ? 100.0
-                               : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
-  fmt::print(
-      "  within {} pixels of the true surface: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
-      "{:.3g}); {} "
-      "uncertain\n"
-      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
-      "bounded in "
-      "{:.0f} ms\n",
-      *max_surface_error_, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
-      with_commas(summary.num_uncertain), choice_.detail.voxel_pixels, choice_.detail.voxel_error,
-      choice_.total_ms, certificate.total_ms);
-  if (!choice_.reachable) {
-    spdlog::warn("most pixels cannot be kept within {} pixels: {}", *max_surface_error_,
-                 choice_.advice);
-  }
-  if (!error_map.empty())
-    write_npy({renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(),
-               certificate.bounds},
-              error_map);
-  nlohmann::ordered_json tries = nlohmann::ordered_json::array();
-  for (const DetailChoice::Try &each : choice_.tries) {
-    tries.push_back(detail_json(each.detail));
-    tries.back()["certified"] = each.certified;
-  }
-  return {{"max_surface_error", *max_surface_error_},
-          {"reachable", choice_.reachable},
-          {"chosen", detail_json(choice_.detail)},
-          {"tries", tries},
-          {"choice_ms", choice_.total_ms},
-          {"pixels", summary.num_pixels},
-          {"certified", summary.num_certified},
-          {"uncertain", summary.num_uncertain},
-          {"median", summary.median},
-          {"p99", summary.p99},
-          {"max", summary.max},
-          {"bound_ms", certificate.total_ms},
-          {"decoded_blocks", certificate.decoded_blocks}};
-}
 
 class TwinFrames : public FrameSource {
  public:
@@ -434,6 +437,12 @@ void check_options(const CLI::App &command, const RenderArgs &options) {
   check_choice(options);
 }
 
+/// Whoever chooses has levels of detail to choose from.
+bool chooses_levels(const RenderArgs &options) {
+  return options.max_surface_error ||
+         (options.time_budget && options.renderer_flags.pipeline != "blocks");
+}
+
 /// The view that any device would take. Without a device, of the whole volume.
 Camera reference_camera(const RenderArgs &options, const Scene &scene) {
   if (ocl::list_devices().empty()) return scene.cameras.front();
@@ -466,9 +475,21 @@ void print_picture_name(const RenderArgs &options, std::size_t num_views) {
 
 /// What bricks cannot do, since it goes on in other bricks, or is not put together.
 void check_brick_options(const CLI::App &command, const Team &team) {
-  refuse_options(command,
-                 {"--reference", "--levels", "--max-surface-error", "--error-map", "--verbose"},
+  refuse_options(command, {"--reference", "--verbose"},
                  fmt::format("not of a volume that {} processes draw together", team.size()));
+}
+
+/// Throws Error where one process would make levels of detail. levels: that the volume has.
+void check_brick_levels(const RenderArgs &options, const std::vector<VolumeInfo> &levels) {
+  if (levels.size() > 1 || max_levels(levels.front().dims) == 1) return;
+  const CompressionOptions &compression = options.frame.compression;
+  const bool makes_levels =
+      !is_zfp_name(options.input) &&
+      (compression.levels != 1 || (options.max_surface_error && !says_levels(compression)));
+  if (options.voxel_pixels == 0 && !makes_levels) return;
+  throw Error(
+      "{} has no levels of detail, which bricks cannot make: isowave convert --levels all{}",
+      options.input, options.max_surface_error ? ", or do without them: --levels 1" : "");
 }
 
 /// All ranks: writes what rank 0 has got.
@@ -521,9 +542,10 @@ void write_refined(const RenderArgs &options, const Scene &scene, const Appearan
 }
 
 /// Draws a volume's bricks, one at each rank. frames: of the whole, at rank 0; own: this rank's.
+/// bounded: of --max-surface-error.
 void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appearance &appearance,
-                       BrickRenderer &renderer, Team &team, nlohmann::ordered_json &frames,
-                       nlohmann::ordered_json &own) {
+                       BrickRenderer &renderer, std::optional<FramesOfTeam> &bounded, Team &team,
+                       nlohmann::ordered_json &frames, nlohmann::ordered_json &own) {
   FrameRequest base;
   base.voxel_pixels = options.voxel_pixels;
   base.voxel_error = options.frame.voxel_error;
@@ -538,6 +560,12 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
       request.isovalue = isovalue;
       request.on_pass = progress_writer(
           options, scene, [&] { return renderer.shade(appearance); }, isovalue, view);
+      DetailChoice choice;
+      if (bounded) {
+        choice = choose_detail(*bounded, request, *options.max_surface_error);
+        request = with_detail(request, choice.detail);
+      }
+      renderer.check_levels(request);
       TimedFrame timed;
       if (options.time_budget) {
         timed = within_time(renderer, team, request, *options.time_budget);
@@ -554,6 +582,15 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
                         {"rays_hit", renderer.num_hits()},
                         {"written_ms", ms},
                         {"composition_ms", renderer.composition().ms - composed_before}});
+      if (bounded) {
+        const Certificate certificate = certify(*bounded, request, renderer.depth());
+        together(team, [&] {
+          if (team.rank() != 0) return;
+          frames.back()["error"] = report_error(
+              *options.max_surface_error, choice, certificate, scene.size,
+              frame_path(options.error_map, scene.cameras.size(), options, isovalue, view));
+        });
+      }
       if (options.time_budget)
         frames.back()["time_budget"] = timed_steps(timed, *options.time_budget);
       if (!options.refined.empty())
@@ -585,22 +622,18 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   });
   const VolumeInfo &whole = levels.front();
   agree_on(team, "volume", fingerprint(options.input, whole));
-  const bool may_use_levels = options.time_budget && options.renderer_flags.pipeline != "blocks";
-  if (options.voxel_pixels == 0)
-    levels.resize(may_use_levels ? num_cut_levels(whole, levels.size(), team.size()) : 1);
-  if (options.voxel_pixels > 0 && levels.size() == 1 && max_levels(whole.dims) > 1) {
-    throw Error(
-        "{} has no levels of detail, which bricks cannot make: isowave convert --levels all",
-        options.input);
-  }
-  const auto load = [&](const BlockBox &box, std::size_t num_levels) {
-    return load_brick(options.input, overrides, options.frame.compression, whole, num_levels, box,
-                      device.get());
+  check_brick_levels(options, levels);
+  if (options.voxel_pixels == 0 && !chooses_levels(options)) levels.resize(1);
+  const std::size_t num_levels = num_cut_levels(whole, levels.size(), team.size());
+  const auto load = [&](const BlockBox &box, std::size_t of_detail, bool with_bounds) {
+    CompressionOptions compression = options.frame.compression;
+    compression.measure_error = with_bounds;
+    return load_brick(options.input, overrides, compression, whole, of_detail, box, device.get());
   };
-  const int unit = cut_unit(levels.size());
+  const int unit = cut_unit(num_levels);
   const Cuts cuts = options.bricks == "active"
                         ? cut_by_surfaces(team, whole, options.frame.isovalues, unit,
-                                          [&](const BlockBox &box) { return load(box, 1); })
+                                          [&](const BlockBox &box) { return load(box, 1, false); })
                         : cut_for(team, whole, options.bricks, unit);
   const BlockBox &own = cuts.bricks()[team.rank()];
   Scene scene;
@@ -610,27 +643,32 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
       !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
   wanted.with_kept_picture = options.time_budget.has_value();
   wanted.with_given_rays = options.ambient_rays != 0;
-  wanted.with_levels = levels.size() > 1;
+  wanted.with_bounds = options.max_surface_error.has_value();
+  wanted.with_levels = num_levels > 1;
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
   std::vector<float> samples;
   together(team, [&] {
     scene.cameras = make_cameras(options.input, whole, options.frame, views);
-    scene.volume = load(own, levels.size());
+    scene.volume = load(own, num_levels, wanted.with_bounds);
     outputs.make_folder();
     samples = range_samples(scene.volume, whole);
     options.renderer = to_renderer_options(options.renderer_flags, scene.size);
+    if (num_levels < levels.size()) options.renderer.with_levels = num_levels > 1;
   });
   options.renderer.range_thresholds = range_thresholds(gather(team, samples));
+  const double rate = agree_on_voxels(team, scene.volume);
   std::optional<BrickRenderer> renderer;
   together(team,
-           [&] { renderer.emplace(*device, scene.volume, options.renderer, cuts, whole, team); });
+           [&] { renderer.emplace(*device, scene.volume, options.renderer, cuts, levels, team); });
+  std::optional<FramesOfTeam> bounded;
+  if (wanted.with_bounds) bounded.emplace(*renderer, scene.volume, rate);
   if (options.frame.orbit == 0 && options.frame.cameras.empty()) {
     scene.cameras = {surface_camera(
         whole, gather_box(team, scene.volume.info, renderer->surface_box(options.frame.isovalues)),
         scene.size)};
   }
   nlohmann::ordered_json frames = nlohmann::ordered_json::array(), own_frames = frames;
-  draw_brick_frames(options, scene, appearance, *renderer, team, frames, own_frames);
+  draw_brick_frames(options, scene, appearance, *renderer, bounded, team, frames, own_frames);
   const CompositionStats &composition = renderer->composition();
   const nlohmann::ordered_json of_rank = {{"rank", team.rank()},
                                           {"device", device_json(device->info())},
@@ -692,13 +730,10 @@ void run_render(const CLI::App &command, RenderArgs options) {
   wanted.with_shading =
       !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
-  // Whoever chooses has levels of detail to choose from.
-  const bool chooses_levels = options.max_surface_error ||
-                              (options.time_budget && options.renderer_flags.pipeline != "blocks");
-  if (options.voxel_pixels > 0 || chooses_levels) want_levels(options.frame.compression);
+  if (options.voxel_pixels > 0 || chooses_levels(options)) want_levels(options.frame.compression);
   Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
   outputs.make_folder();
-  wanted.with_levels = chooses_levels && !scene.volume.coarser_levels.empty();
+  wanted.with_levels = chooses_levels(options) && !scene.volume.coarser_levels.empty();
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);
   nlohmann::ordered_json document = {{"program", program_name()},
                                      {"volume", volume_json(options, scene.volume)}};
