@@ -70,6 +70,29 @@ TEST(ApiBricks, DrawWhatOneRendererDraws) {
   EXPECT_GT(expected.statistics.hits, 100u);
 }
 
+/// Also of a volume whose error is known only when it is compressed, brick by brick.
+TEST(ApiBricks, BoundsOfOneRenderer) {
+  const Compression at_rate{.rate = 20, .measure_error = true};
+  FrameRequest request{
+      .isovalue = 40, .size = {48, 32}, .max_surface_error = 2, .want_bounds = true};
+  const RendererOptions options{.largest = {48, 32}, .with_bounds = true};
+  Renderer whole(open_device(), open_volume(kFuel, at_rate), options);
+  request.camera = whole.camera(40);
+  const Frame expected = whole.render(request);
+  EXPECT_GT(expected.detail.value().voxel_error, 0) << "bit planes are left out";
+  in_threads([&](Processes &processes, std::uint32_t rank) {
+    BrickRenderer renderer(processes, kFuel, {.rate = 20}, {}, {.renderer = options});
+    const Frame frame = renderer.render(request);
+    EXPECT_EQ(frame.bounds, rank == 0 ? expected.bounds : std::vector<float>());
+    EXPECT_EQ(frame.picture, rank == 0 ? expected.picture : std::vector<std::uint8_t>());
+    ASSERT_EQ(frame.detail.has_value(), rank == 0);
+    if (rank == 0) {
+      EXPECT_EQ(frame.detail->voxel_error, expected.detail->voxel_error);
+      EXPECT_EQ(frame.detail->voxel_pixels, expected.detail->voxel_pixels);
+    }
+  });
+}
+
 TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
   in_threads([&](Processes &processes, std::uint32_t rank) {
     const auto expect_error = [](const auto &work, const std::string &text) {
@@ -90,13 +113,16 @@ TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
           make(kFuel, {.renderer = {.largest = {16 + rank, 16}}});
         },
         "rank 1 has another request");
-    expect_error([&] { make(kFuel, {.renderer = {.with_bounds = true}}); }, "no bounds");
+    expect_error([&] { make(kFuel, {.renderer = {.with_time_budget = true}}); }, "no time budget");
     BrickRenderer renderer = make(kFuel, small);
     FrameRequest request{.isovalue = 40, .size = {16, 16}};
     request.camera = renderer.camera(40);
     request.want_positions = true;
     expect_error([&] { renderer.render(request); }, "no positions");
     request.want_positions = false;
+    request.want_bounds = true;
+    expect_error([&] { renderer.render(request); }, "made with_bounds");
+    request.want_bounds = false;
     request.isovalue = static_cast<float>(40 + rank);
     expect_error([&] { renderer.render(request); }, "rank 1 has another request");
     request.isovalue = 40;

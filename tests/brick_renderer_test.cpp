@@ -1,5 +1,5 @@
 // Teams of threads that draw a volume's bricks together, each on a device of its own: pictures pass
-// by pass, within a time, with ambient rays; and what they do where one fails.
+// by pass, within a time, within an error, with ambient rays; and what they do where one fails.
 
 #include "core/bricks/brick_renderer.hpp"
 
@@ -10,8 +10,10 @@
 #include <functional>
 #include <thread>
 
+#include "core/accuracy/choose_detail.hpp"
 #include "core/base/error.hpp"
 #include "core/bricks/brick_volume.hpp"
+#include "core/bricks/ranks.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 #include "tests/thread_meeting.hpp"
@@ -235,6 +237,115 @@ TEST_P(BrickTeamOnDevice, PicturesWithinATime) {
     EXPECT_GT(num_drawn(coarse), num_drawn(whole) / 2);
     EXPECT_NE(coarse.pixels, whole.pixels);
   });
+}
+
+/// What a user gets of a frame within an error.
+struct BoundedFrame {
+  DetailChoice choice;
+  std::vector<float> depth;
+  Certificate certificate;
+};
+
+BoundedFrame draw_within(BoundedFrames &frames, FrameRequest request, double max_surface_error) {
+  BoundedFrame frame;
+  frame.choice = choose_detail(frames, request, max_surface_error);
+  request = with_detail(request, frame.choice.detail);
+  frames.draw(request);
+  frame.depth = frames.depth();
+  frame.certificate = certify(frames, request, frame.depth);
+  return frame;
+}
+
+void expect_same_choice(const DetailChoice &got, const DetailChoice &expected) {
+  EXPECT_EQ(got.reachable, expected.reachable);
+  EXPECT_EQ(got.median, expected.median);
+  EXPECT_EQ(got.tolerance, expected.tolerance);
+  EXPECT_EQ(got.advice, expected.advice);
+  ASSERT_EQ(got.tries.size(), expected.tries.size());
+  for (std::size_t i = 0; i <= got.tries.size(); ++i) {
+    const bool is_last = i == got.tries.size();
+    const Detail &detail = is_last ? got.detail : got.tries[i].detail,
+                 &other = is_last ? expected.detail : expected.tries[i].detail;
+    EXPECT_EQ(detail.voxel_pixels, other.voxel_pixels);
+    EXPECT_EQ(detail.voxel_error, other.voxel_error);
+    if (!is_last) {
+      EXPECT_EQ(got.tries[i].certified, expected.tries[i].certified);
+    }
+  }
+}
+
+/// The choice, which may be of coarse levels or few bit planes, the frame and its bounds. In the
+/// whole volume, cells where rays begin are all at hand; a brick has some of them.
+TEST_P(BrickTeamOnDevice, WithinAnError) {
+  const VolumeInfo info = test::grid_info({64, 61, 58}, {1, 1.25, 0.75});
+  const std::vector<float> source = test::sample(info.dims, [&](const glm::dvec3 &at) {
+    return test::sphere_field(info.dims)(at) + 0.01 * std::sin(0.4 * at.x) * std::cos(0.3 * at.z);
+  });
+  Camera far = orbit_cameras(info, 1)[0];
+  far.eye += 0.6 * (far.eye - far.at);
+  const Camera inside = test::camera_along(0.45 * glm::dvec3(info.dims), {1, 0.25, -0.5});
+  struct Case {
+    FrameRequest request;
+    double max_surface_error;
+  };
+  const FrameRequest of_far{.camera = far, .isovalue = 0.5f},
+      of_inside{.camera = inside, .isovalue = 0.5f};
+  const std::vector<Case> cases = {{of_far, 3}, {of_inside, 2}, {of_far, 1e-6}};
+  double most_pixels = 0, most_error = 0;
+  for (const bool is_exact : {false, true}) {
+    ArrayReader reader(info, source);
+    CompressOptions how{.rate = 20, .measure_error = true, .levels = 0};
+    if (is_exact) how.precision = BlockPrecision{.min_exponent = -14};
+    const CompressedVolume volume = compress(reader, how);
+    const std::vector<VolumeInfo> levels = level_infos(volume, true);
+    RendererOptions options{.size = kFrame, .with_levels = true, .with_bounds = true};
+    std::vector<BoundedFrame> expected;
+    {
+      ocl::Device device(GetParam());
+      Renderer renderer(device, volume, options);
+      FramesOfOne frames(renderer, volume);
+      for (const Case &each : cases) {
+        expected.push_back(draw_within(frames, each.request, each.max_surface_error));
+        most_pixels = std::max(most_pixels, expected.back().choice.detail.voxel_pixels);
+        most_error = std::max(most_error, expected.back().choice.detail.voxel_error);
+      }
+      EXPECT_FALSE(expected.back().choice.reachable);
+      EXPECT_GT(summarize(expected[0].certificate, 3).num_certified, 100u);
+    }
+    options.cache_slots = 300;
+    for (const std::uint32_t size : is_exact ? std::vector{3u} : std::vector{2u, 8u}) {
+      SCOPED_TRACE(fmt::format("{} ranks", size));
+      const std::size_t num_levels = num_cut_levels(info, levels.size(), size);
+      const Cuts cuts(blocks_along(info), size, num_blocks, cut_unit(num_levels));
+      test::ThreadMeeting meeting(size);
+      const auto work = [&](std::uint32_t rank) {
+        ThreadTeam team(meeting, rank);
+        ocl::Device device(GetParam());
+        CompressedVolume brick = cut_brick(volume, cuts.bricks()[rank], num_levels);
+        const double rate = agree_on_voxels(team, brick);
+        EXPECT_EQ(rate, volume.rate());
+        BrickRenderer renderer(device, brick, options, cuts, levels, team);
+        FramesOfTeam frames(renderer, brick, rate);
+        for (std::size_t i = 0; i < cases.size(); ++i) {
+          const BoundedFrame frame =
+              draw_within(frames, cases[i].request, cases[i].max_surface_error);
+          expect_same_choice(frame.choice, expected[i].choice);
+          if (rank != 0) continue;
+          EXPECT_EQ(frame.depth, expected[i].depth);
+          EXPECT_EQ(frame.certificate.bounds, expected[i].certificate.bounds);
+        }
+        if (num_levels == levels.size()) return;
+        FrameRequest coarse = of_far;
+        coarse.voxel_pixels = 1000;
+        EXPECT_THAT([&] { frames.draw(coarse); },
+                    testing::ThrowsMessage<Error>(testing::HasSubstr("convert with --levels")));
+      };
+      std::vector<std::jthread> threads;
+      for (std::uint32_t rank = 0; rank < size; ++rank) threads.emplace_back(work, rank);
+    }
+  }
+  EXPECT_GT(most_pixels, 0) << "coarser levels are chosen";
+  EXPECT_GT(most_error, 0) << "bit planes are left out";
 }
 
 }  // namespace

@@ -400,6 +400,43 @@ TEST(Bricks, KeepTheWholesVoxels) {
   }
 }
 
+/// Of each of a brick's blocks, its bound in the whole; and what is known of all voxels.
+TEST(Bricks, KeepTheWholesBounds) {
+  const VolumeInfo info = test::grid_info({41, 37, 33});
+  ArrayReader reader(info, test::sample(info.dims, test::noise_field(6)));
+  constexpr std::size_t kLevels = 3;
+  for (const bool is_bounded : {false, true}) {
+    CompressOptions options{.rate = 8, .measure_error = true, .levels = kLevels};
+    if (is_bounded) options.precision = BlockPrecision{.min_exponent = -5};
+    const CompressedVolume whole = compress(reader, options);
+    const auto path = std::filesystem::path(testing::TempDir()) /
+                      fmt::format("bounds_{}_{}.zfp", int(is_bounded), getpid());
+    write_zfp_file(whole, path);
+    const Cuts cuts(blocks_along(info), 5, num_blocks, cut_unit(kLevels));
+    for (const BlockBox &own : cuts.bricks()) {
+      EXPECT_TRUE(read_brick(path, own, kLevels).bounds.codes.empty());
+      for (const CompressedVolume &brick :
+           {cut_brick(whole, own, kLevels), read_brick(path, own, kLevels, true)}) {
+        EXPECT_EQ(brick.value_range, whole.value_range);
+        EXPECT_EQ(brick.max_voxel_error, whole.max_voxel_error);
+        for (std::size_t i = 0; i < kLevels; ++i) {
+          const CompressedVolume &of_brick = *levels_of(brick, true)[i],
+                                 &of_whole = *levels_of(whole, true)[i];
+          EXPECT_EQ(of_brick.bounds.exponent, of_whole.bounds.exponent);
+          EXPECT_EQ(of_brick.bounds.by_place, i == 0);
+          EXPECT_EQ(largest_bound(of_brick.bounds), largest_bound(of_whole.bounds));
+          ASSERT_EQ(of_brick.bounds.codes.size(), of_brick.block_count());
+          for (std::uint32_t id = 0; id < of_brick.block_count(); ++id) {
+            EXPECT_EQ(of_brick.bounds.codes[id],
+                      of_whole.bounds.codes[whole_id(of_whole.info, of_brick.info, id)]);
+          }
+        }
+      }
+    }
+    std::filesystem::remove(path);
+  }
+}
+
 /// Another spacing moves no brick: see isowave::core::tools::load_brick().
 TEST(Bricks, LevelsKeepTheirPlaces) {
   const VolumeInfo info = test::grid_info({41, 37, 33});

@@ -70,6 +70,29 @@ class CliRanks : public testing::Test {
     EXPECT_TRUE(files() == expected) << arguments << " with " << count << " ranks";
   }
 
+  /// Draws within an error, with one process and with so many: also the map of its bounds, and what
+  /// is said of it in --stats, is the same.
+  void expect_same_within(const std::string &volume, const std::string &options, int count,
+                          const std::string &bricks = "") {
+    const std::string stats = quoted(folder_ / "s.json");
+    const auto errors = [&] {
+      nlohmann::json result;
+      for (const auto &frame : nlohmann::json::parse(read_file(folder_ / "s.json"))["frames"]) {
+        result.push_back(frame["error"]);
+        for (const char *key : {"choice_ms", "bound_ms", "decoded_blocks"})
+          result.back().erase(key);
+      }
+      return result;
+    };
+    const std::string within =
+        options + " --error-map " + quoted(folder_ / "x_map.npy") + " --stats " + stats;
+    ASSERT_EQ(run_isowave("render " + volume + " " + within).status, 0);
+    const nlohmann::json expected = errors();
+    EXPECT_GT(expected[0]["certified"], 0);
+    expect_same(volume, within, count, bricks);
+    EXPECT_EQ(errors(), expected);
+  }
+
   /// A command line must fail with status 1 and one line.
   static void expect_error(const std::string &command, const std::string &text) {
     const ProgramResult result = run_command(command);
@@ -148,6 +171,23 @@ TEST_F(CliRanks, SamplesLevelsAndBricksAsAskedFor) {
 TEST_F(CliRanks, AmbientRays) {
   expect_same(convert("--exact --levels 3"),
               "-i 40 --size 48x32 --voxel-pixels 1.5 --ambient 3 --samples 2", 3);
+}
+
+TEST_F(CliRanks, WithinAnError) {
+  expect_same_within(convert("--exact --levels all"),
+                     "-i 40 -i 90 --size 48x32 --samples 2 --ambient 2 --max-surface-error 2", 3);
+  expect_same_within(kFuel, "--rate 20 --levels 1 -i 40 --size 48x32 --max-surface-error 2", 2,
+                     " --bricks active --progress-dir " + quoted(folder_ / "p"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "p" / "pass0001.png"));
+  const std::string unreachable =
+      "generate:mixing_layer_30x40x24_float32 --rate 6 --levels 1 -i 0.5 --size 48x32 "
+      "--pipeline blocks --max-surface-error 0.001 -o " +
+      quoted(folder_ / "x.png");
+  const ProgramResult one = run_isowave("render " + unreachable),
+                      two = run_command(on_ranks(2, "render " + unreachable));
+  EXPECT_EQ(two.status, 0);
+  EXPECT_NE(one.err.find("a volume converted with --tolerance"), std::string::npos) << one.err;
+  EXPECT_EQ(two.err, one.err);
 }
 
 /// The picture grows from pass to pass, up to what one process draws.
@@ -322,7 +362,13 @@ TEST_F(CliRanks, StatisticsOfEachRank) {
 
 TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   const std::string render = "render " + kFuel + " -i 40 --size 16x16 ";
-  expect_error(on_ranks(2, render + "--max-surface-error 1"), "--max-surface-error");
+  const std::string within = render + "--max-surface-error ";
+  expect_error(on_ranks(2, within + "1"), "convert --levels all, or do without them: --levels 1");
+  expect_error(on_ranks(2, within + "1 --levels 2"), "which bricks cannot make");
+  expect_error(on_ranks(2, within + "0 --levels 1"), "give more than 0");
+  expect_error(on_ranks(2, "render " + convert("--rate 8 --no-verify") +
+                               " -i 40 --size 16x16 --max-surface-error 1"),
+               "the volume's error is not known");
   expect_error(on_ranks(2, render + "--bricks 2x2x1"), "2 processes draw a brick each");
   expect_error(on_ranks(2, render + "--voxel-pixels 1"), "convert --levels all");
   expect_error(on_ranks(2, "info " + kFuel), "only render and convert");

@@ -4,6 +4,9 @@
 
 #include <utility>
 
+#include "core/accuracy/bounded_frames.hpp"
+#include "core/accuracy/certify.hpp"
+#include "core/accuracy/choose_detail.hpp"
 #include "core/api/device_implementation.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
@@ -43,13 +46,12 @@ namespace {
 using core::guarded;
 
 core::RendererOptions core_options(const RendererOptions &options) {
-  if (options.with_bounds || options.with_time_budget)
-    throw core::Error("bricks have no bounds and no time budget");
+  if (options.with_time_budget) throw core::Error("bricks have no time budget");
   core::RendererOptions result;
   result.size = core_size(options.largest);
   result.memory_budget = options.memory_budget;
   result.cache_slots = options.cache_blocks;
-  result.with_levels = options.with_levels;
+  result.with_bounds = options.with_bounds;
   result.with_given_rays = options.with_rays;
   return result;
 }
@@ -67,20 +69,22 @@ std::string text_of(const FrameRequest &request) {
     text += fmt::format("{} {} {} ", v[0], v[1], v[2]);
   for (const std::array<float, 3> &c : {look.surface, look.background})
     text += fmt::format("{} {} {} ", c[0], c[1], c[2]);
-  return text + fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {}", camera.fovy_degrees,
-                            request.isovalue, look.ambient, look.diffuse, look.specular, look.above,
-                            request.voxel_pixels, request.voxel_error,
+  return text + fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+                            camera.fovy_degrees, request.isovalue, look.ambient, look.diffuse,
+                            look.specular, look.above, request.voxel_pixels, request.voxel_error,
+                            request.max_surface_error.has_value(),
+                            request.max_surface_error.value_or(0), static_cast<int>(request.bound),
                             static_cast<int>(request.normals), request.ambient_rays,
-                            request.want_picture, request.want_depth, request.want_normals);
+                            request.want_picture, request.want_depth, request.want_normals,
+                            request.want_bounds);
 }
 
 void check_for_bricks(const FrameRequest &request, const RendererOptions &options) {
-  if (request.want_positions || request.want_hits || request.want_bounds ||
-      request.max_surface_error || request.time_budget_ms || request.on_pass ||
-      request.bound != FieldBound::kNone)
+  if (request.want_positions || request.want_hits || request.time_budget_ms || request.on_pass)
     throw core::Error(
-        "frames of bricks have picture, depth and normals: no positions, hits, bounds, "
-        "max_surface_error, time budget or on_pass");
+        "frames of bricks have picture, depth, normals and bounds: no positions, hits, time "
+        "budget or on_pass");
+  check_bounds(request, options);
   if (request.ambient_rays != 0 && !options.with_rays)
     throw core::Error("ambient rays need a renderer that was made with_rays");
 }
@@ -101,6 +105,7 @@ struct BrickRenderer::Implementation {
   std::optional<core::Cuts> cuts{};
   core::CompressedVolume volume{};
   std::optional<core::BrickRenderer> renderer{};
+  std::optional<core::FramesOfTeam> bounded{};  ///< with bounds
 };
 
 BrickRenderer::Implementation::Implementation(Processes &processes, const std::string &path,
@@ -114,6 +119,7 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
   std::string print;
   core::together(team, [&] {
     storage = storage_for(path, compression);
+    storage.measure_error |= options.with_bounds;
     overrides = to_overrides(raw);
     levels = core::read_levels(path, overrides);
     print = core::fingerprint(path, levels.front());
@@ -121,36 +127,48 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
         core::choose_local_device(wanted.device, processes.local_rank()), DeviceOptions{});
   });
   core::agree_on(team, "volume", print);
-  core::agree_on(team, "request",
-                 fmt::format("{} {} {} {} {} {} {} {} {} {}", text_of(options.largest),
-                             options.with_levels, options.with_rays, wanted.bricks, storage.rate,
-                             storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
-                             storage.exact, storage.levels, storage.map_nan.value_or(0)));
+  core::agree_on(
+      team, "request",
+      fmt::format("{} {} {} {} {} {} {} {} {} {} {}", text_of(options.largest), options.with_levels,
+                  options.with_bounds, options.with_rays, wanted.bricks, storage.rate,
+                  storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
+                  storage.exact, storage.levels, storage.map_nan.value_or(0)));
   whole = levels.front();
   grid = public_grid(whole);
   if (!options.with_levels) levels.resize(1);
   if (compression.levels != 1 || (options.with_levels && levels.size() == 1))
     throw core::Error("{}: bricks have levels of detail that are in a .zfp file: convert it", path);
-  cuts.emplace(core::cut_for(team, whole, wanted.bricks, core::cut_unit(levels.size())));
+  const std::size_t num_levels = core::num_cut_levels(whole, levels.size(), team.size());
+  cuts.emplace(core::cut_for(team, whole, wanted.bricks, core::cut_unit(num_levels)));
   std::vector<float> samples;
   core::together(team, [&] {
     storage.device = &device->device;
-    volume = core::load_brick(path, overrides, storage, whole, levels.size(),
-                              cuts->bricks()[team.rank()]);
+    volume =
+        core::load_brick(path, overrides, storage, whole, num_levels, cuts->bricks()[team.rank()]);
     samples = core::range_samples(volume, whole);
   });
   core::RendererOptions of_core;
   core::together(team, [&] { of_core = core_options(options); });
+  of_core.with_levels = num_levels > 1;
   of_core.range_thresholds = core::range_thresholds(core::gather(team, samples));
+  const double rate = core::agree_on_voxels(team, volume);
   core::together(team,
                  [&] { renderer.emplace(device->device, volume, of_core, *cuts, levels, team); });
+  if (options.with_bounds) bounded.emplace(*renderer, volume, rate);
 }
 
 Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {
   core::agree_on(team, "request", text_of(request));
   check_for_bricks(request, options);
-  const core::FrameRequest wanted = core_request(request);
+  core::FrameRequest wanted = core_request(request);
   Frame frame;
+  if (request.max_surface_error) {
+    const core::DetailChoice choice =
+        core::choose_detail(*bounded, wanted, *request.max_surface_error);
+    wanted = core::with_detail(wanted, choice.detail);
+    if (team.rank() == 0) frame.detail = public_choice(choice);
+  }
+  renderer->check_levels(wanted);
   describe_frame(request, renderer->render(wanted), frame);
   if (request.want_normals) {
     const std::vector<core::HitRecord> hits = renderer->hits();
@@ -162,6 +180,7 @@ Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {
   if (request.want_picture)
     frame.picture = renderer->shade(core_appearance(request.appearance)).pixels;
   if (!request.want_depth) frame.depth.clear();
+  if (request.want_bounds) frame.bounds = core::certify(*bounded, wanted, renderer->depth()).bounds;
   return frame;
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/api/convert.hpp"
+#include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 
@@ -140,6 +141,22 @@ core::FrameRequest core_request(const FrameRequest &request) {
       shows_normals ? static_cast<core::Normals>(request.normals) : core::Normals::kCell;
   if (request.want_picture || request.on_pass) result.ambient_rays = request.ambient_rays;
   return result;
+}
+
+void check_bounds(const FrameRequest &request, const RendererOptions &options) {
+  const bool sets_detail = request.voxel_pixels != 0 || request.voxel_error != 0;
+  if (request.max_surface_error && sets_detail)
+    throw core::Error(
+        "max_surface_error chooses the detail: leave out voxel_pixels and voxel_error");
+  if (!request.max_surface_error && !request.want_bounds) return;
+  if (request.bound != FieldBound::kNone)
+    throw core::Error("the surface of a bound has no error: draw the volume itself");
+  if (!options.with_bounds)
+    throw core::Error("bounds of the error need a renderer that was made with_bounds");
+}
+
+DetailChoice public_choice(const core::DetailChoice &choice) {
+  return {choice.detail.voxel_pixels, choice.detail.voxel_error, choice.reachable, choice.advice};
 }
 
 void describe_frame(const FrameRequest &request, const core::FrameStats &stats, Frame &frame) {

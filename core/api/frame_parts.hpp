@@ -4,11 +4,13 @@
 #include <span>
 #include <vector>
 
+#include "core/accuracy/choose_detail.hpp"
 #include "core/render/frame_request.hpp"
 #include "core/stages/shade.hpp"
 #include "core/view/given_rays.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/frame.hpp"
+#include "isowave/renderer.hpp"
 
 namespace isowave {
 
@@ -17,6 +19,11 @@ Camera public_camera(const core::Camera &camera);
 core::Appearance core_appearance(const Appearance &appearance);
 /// What is drawn, and how precisely; without on_pass.
 core::FrameRequest core_request(const FrameRequest &request);
+
+/// Throws  core::Error: bounds, or a choice of detail, that cannot be had
+void check_bounds(const FrameRequest &request, const RendererOptions &options);
+
+DetailChoice public_choice(const core::DetailChoice &choice);
 
 /// Fills in the frame's size and statistics.
 void describe_frame(const FrameRequest &request, const core::FrameStats &stats, Frame &frame);

@@ -107,16 +107,9 @@ class KernelWatch {
 };
 
 void check(const FrameRequest &request, const RendererOptions &options) {
-  const bool sets_detail = request.voxel_pixels != 0 || request.voxel_error != 0;
-  if (request.max_surface_error && sets_detail)
-    throw core::Error(
-        "max_surface_error chooses the detail: leave out voxel_pixels and voxel_error");
   if (request.max_surface_error && request.time_budget_ms)
     throw core::Error("a frame cannot keep both an error and a time: give one of the two");
-  if ((request.max_surface_error || request.want_bounds) && request.bound != FieldBound::kNone)
-    throw core::Error("the surface of a bound has no error: draw the volume itself");
-  if ((request.max_surface_error || request.want_bounds) && !options.with_bounds)
-    throw core::Error("bounds of the error need a renderer that was made with_bounds");
+  check_bounds(request, options);
   if (request.time_budget_ms && !options.with_time_budget)
     throw core::Error("a time budget needs a renderer that was made with_time_budget");
   if (request.time_budget_ms && request.want_bounds)
@@ -149,10 +142,8 @@ void Renderer::Implementation::draw_hits(const FrameRequest &request, core::Fram
   if (request.max_surface_error) {
     const core::DetailChoice choice = core::choose_detail(renderer, volume->implementation().volume,
                                                           wanted, *request.max_surface_error);
-    wanted.voxel_pixels = choice.detail.voxel_pixels;
-    wanted.voxel_error = choice.detail.voxel_error;
-    frame.detail =
-        DetailChoice{wanted.voxel_pixels, wanted.voxel_error, choice.reachable, choice.advice};
+    wanted = core::with_detail(wanted, choice.detail);
+    frame.detail = public_choice(choice);
   }
   if (request.on_pass) wanted.on_pass = on_pass;
   describe_frame(request, renderer.render(wanted), frame);

@@ -616,6 +616,7 @@ class PyBrickRenderer {
     get("memory_budget", wanted.renderer.memory_budget);
     get("cache_blocks", wanted.renderer.cache_blocks);
     get("with_levels", wanted.renderer.with_levels);
+    get("with_bounds", wanted.renderer.with_bounds);
     get("with_rays", wanted.renderer.with_rays);
     const isowave::Compression how = compression_of(compression);
     processes_.without_gil([&] {

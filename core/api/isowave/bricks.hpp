@@ -42,14 +42,14 @@ class Processes {
 struct BrickOptions {
   std::string device{};        ///< open_device()'s selector; or several with commas, one a process
   std::string bricks{};        ///< XxYxZ, how many along each axis; empty: as fits
-  RendererOptions renderer{};  ///< of each process; without bounds and time budget
+  RendererOptions renderer{};  ///< of each process; without a time budget
 };
 
 /// All processes make the same calls. What goes wrong at one is thrown at all, so that none waits.
 class BrickRenderer {
  public:
   /// Loads this process's brick: of a `.zfp` file, its blocks alone are read; of other volumes, its
-  /// layers, and compressed.
+  /// layers, and compressed. With bounds, the error is measured.
   ///
   /// path, compression, raw  as open_volume()'s
   /// processes               must outlive the renderer
@@ -66,8 +66,8 @@ class BrickRenderer {
   /// Draws a frame. Statistics are this process's, but for hits.
   ///
   /// Returns  at rank 0, the frame of the whole volume; elsewhere one of statistics alone
-  /// Throws   Error: as Renderer::render(); positions, hits, bounds, max_surface_error, a time
-  ///          budget, on_pass
+  /// Throws   Error: as Renderer::render(); positions, hits, a time budget, on_pass; levels of
+  ///          detail so coarse that the bricks cannot be cut at them
   Frame render(const FrameRequest &request);
 
   /// As Renderer's.

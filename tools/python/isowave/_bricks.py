@@ -15,6 +15,7 @@ from isowave._renderer import Camera, Color, Image, camera_of, request_for, size
 from isowave._volume import compression_options
 
 OUTPUTS = ("rgb", "depth", "normals")
+ALL_OUTPUTS = (*OUTPUTS, "bounds")
 
 Result = TypeVar("Result")
 
@@ -77,6 +78,9 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         As Renderer's, of each process; devices with commas between are taken in turn.
     levels
         Frames may use the levels of detail that are in the .zfp file.
+    bounds
+        Frames may ask for `max_error` and bounds. A volume that is compressed here has its error
+        measured then.
     bricks
         How many along x, y and z; None: as fits.
     tolerance, relative_tolerance, rate, exact, map_nan
@@ -100,6 +104,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         memory_budget: int | None = None,
         cache_blocks: int = 0,
         levels: bool = False,
+        bounds: bool = False,
         rays: bool = False,
         bricks: tuple[int, int, int] | None = None,
         tolerance: float | None = None,
@@ -125,6 +130,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
                 "memory_budget": memory_budget,
                 "cache_blocks": cache_blocks,
                 "with_levels": levels,
+                "with_bounds": bounds,
                 "with_rays": rays,
             }
             return (width, height), compression, options
@@ -155,11 +161,15 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         background: Color | None = None,
         normals: str = "smooth",
         outputs: Sequence[str] = OUTPUTS,
+        max_error: float | None = None,
         voxel_pixels: float = 0.0,
         voxel_error: float = 0.0,
         ambient: int = 0,
     ) -> Image | None:
-        """Draws a frame; arguments as Renderer.render(). There are no positions, no bounds.
+        """Draws a frame; arguments as Renderer.render(). There are no positions.
+
+        `max_error` and the output "bounds" need bounds=True; the choice of detail, and the bounds,
+        are those of one Renderer.
 
         Returns
         -------
@@ -179,10 +189,10 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
             camera = self.camera(isovalue, size)
 
         def ask() -> dict[str, Any]:
-            unknown = set(outputs) - {*OUTPUTS}
+            unknown = set(outputs) - {*ALL_OUTPUTS}
             if unknown:
                 listed = ", ".join(sorted(unknown))
-                raise ValueError(f"outputs {listed}: bricks have {', '.join(OUTPUTS)}")
+                raise ValueError(f"outputs {listed}: bricks have {', '.join(ALL_OUTPUTS)}")
             return request_for(
                 isovalue,
                 camera,
@@ -192,6 +202,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
                 background=background,
                 normals=normals,
                 outputs=outputs,
+                max_error=max_error,
                 voxel_pixels=voxel_pixels,
                 voxel_error=voxel_error,
                 ambient=ambient,

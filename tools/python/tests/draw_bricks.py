@@ -19,7 +19,7 @@ def keep(name, image):
     assert (image is None) == (rank != 0)
     if image is not None:
         pictures[name + "_rgb"], pictures[name + "_depth"] = image.rgb, image.depth
-        pictures[name + "_normals"] = image.normals
+        pictures[name + "_normals"], pictures[name + "_bounds"] = image.normals, image.bounds
         pictures[name + "_hits"] = image.statistics["hits"]
 
 
@@ -36,6 +36,11 @@ assert renderer.device["name"]
 finer = isowave.BrickRenderer(levelled, comm, size=(64, 48), levels=True, bricks=(1, 1, size))
 keep("levels", finer.render(40, voxel_pixels=1.5))
 keep("level", finer.render(40, voxel_error=2.0))
+
+bounded = isowave.BrickRenderer(levelled, comm, size=(64, 48), levels=True, bounds=True)
+keep("bounded", bounded.render(40, max_error=0.5, outputs=("rgb", "depth", "bounds")))
+rated = isowave.BrickRenderer(fuel, comm, size=(64, 48), bounds=True, rate=8)
+keep("rated", rated.render(40, voxel_error=2.0, outputs=("bounds", "depth")))
 
 errors = {}
 
@@ -54,6 +59,8 @@ fails("isovalue", lambda: renderer.render(40 + rank))
 fails("camera", lambda: renderer.render(40, camera=camera if rank == 1 else None))
 fails("color", lambda: renderer.render(40, color="blue" if rank == 1 else None))
 fails("outputs", lambda: renderer.render(40, outputs=("position",)))
+fails("max_error", lambda: renderer.render(40, max_error=1.0))
+fails("no error", lambda: bounded.render(40, max_error=0.0))
 fails("too large", lambda: renderer.render(40, size=(960, 640)))
 fails("levels", lambda: isowave.BrickRenderer(fuel, comm, size=(8, 8), levels=True))
 fails("compressed", lambda: isowave.BrickRenderer(levelled, comm, size=(8, 8), rate=8))

@@ -40,7 +40,7 @@ def drawn(tmp_path_factory, levelled):
 
 
 def expect(pictures, name, image):
-    for array in ("rgb", "depth", "normals"):
+    for array in ("rgb", "depth", "normals", "bounds"):
         expected = getattr(image, array)
         if expected is None:
             assert f"{name}_{array}" not in pictures
@@ -74,13 +74,29 @@ def test_levels_of_detail(drawn, levelled):
     expect(pictures, "level", renderer.render(40, voxel_error=2.0, outputs=outputs))
 
 
+def test_bounds_of_the_error(drawn, levelled):
+    pictures, _ = drawn
+    renderer = isowave.open(levelled).renderer(size=(64, 48), levels=True, bounds=True)
+    expect(
+        pictures,
+        "bounded",
+        renderer.render(40, max_error=0.5, outputs=("rgb", "depth", "bounds")),
+    )
+    renderer = isowave.open(FUEL, rate=8).renderer(size=(64, 48), bounds=True)
+    expect(
+        pictures, "rated", renderer.render(40, voxel_error=2.0, outputs=("bounds", "depth"))
+    )
+
+
 @pytest.mark.parametrize(
     ("case", "text"),
     [
         ("isovalue", "rank 1 has another request than rank 0"),
         ("camera", "some processes give a camera"),
         ("color", "color 'blue': give '#rrggbb'"),
-        ("outputs", "outputs position: bricks have rgb, depth, normals"),
+        ("outputs", "outputs position: bricks have rgb, depth, normals, bounds"),
+        ("max_error", "made with_bounds"),
+        ("no error", "an error of 0 pixels cannot be kept"),
         ("too large", "960"),
         ("levels", "bricks have levels of detail that are in a .zfp file"),
         ("compressed", "is compressed already"),
