@@ -2,7 +2,7 @@
 // What certify() and choose_detail() draw: frames of a whole volume, by one renderer, or by a team,
 // of which each rank has a brick. Both ask for the same frames, and find the same.
 
-#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/base/team.hpp"
