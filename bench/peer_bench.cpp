@@ -54,20 +54,6 @@ struct Options {
 
 const std::vector<std::string> kSides = {"host", "rays", "blocks", "mesh_low", "mesh_medium"};
 
-/// VmHWM of /proc/self/status [bytes]: the most memory that the process has had since reset_peak().
-std::uint64_t peak_memory() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmHWM:")) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
-  }
-  return 0;
-}
-
-/// So that loading the volume does not count.
-void reset_peak() {
-  std::ofstream("/proc/self/clear_refs") << "5";
-}
-
 // ---- a child: reads an isovalue a line, and of how many views; answers a line of JSON
 
 std::unique_ptr<PeerSide> make_side(const Options &options, CompressedVolume volume) {
@@ -85,7 +71,7 @@ void serve(const Options &options) {
   CompressedVolume volume = tools::load_volume(options.volume, {}, {.rate = options.rate});
   const VolumeInfo info = volume.info;
   const auto side = make_side(options, std::move(volume));
-  reset_peak();
+  reset_peak_memory();             // loading the volume does not count
   std::cout << "{}" << std::endl;  // ready
   float isovalue = 0;
   for (std::uint32_t views = 0; std::cin >> isovalue >> views;) {

@@ -31,25 +31,17 @@ class ThreadTeam : public Team {
   std::vector<std::string> all_gather(const std::string &text) override {
     return meeting_.all_gather(rank_, text);
   }
-  void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
-    begun_.push_back({words, how, who});
-  }
-  void finish_reductions() override {
-    for (const Begun &each : begun_) {
-      meeting_.reduce(rank_, each.words, each.how == Reduction::kOr, each.who == Receiver::kAll);
-    }
-    begun_.clear();
+  void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+              const TakeWords &take) override {
+    const bool for_all = who == Receiver::kAll;
+    reduce_in_pieces(count, for_all || rank_ == 0, make, take, [&](std::span<std::uint64_t> words) {
+      meeting_.reduce(rank_, words, how == Reduction::kOr, for_all);
+    });
   }
 
  private:
-  struct Begun {
-    std::span<std::uint64_t> words;
-    Reduction how;
-    Receiver who;
-  };
   test::ThreadMeeting &meeting_;
   std::uint32_t rank_;
-  std::vector<Begun> begun_;
 };
 
 constexpr float kIsovalue = 0.2f;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -10,14 +11,24 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 
 namespace isowave::core {
 
 namespace {
 
-/// Rays of a slab.
-constexpr std::size_t kSlabRays = 1u << 18;
+/// Rays that a thread makes words of at once.
+constexpr std::size_t kThreadRays = std::size_t{1} << 14;
+
+/// Calls body(begin, end) for parts of [0, count), from several threads.
+template <class Body>
+void for_parts(std::size_t count, const Body &body) {
+  parallel_for((count + kThreadRays - 1) / kThreadRays, 0, [&](std::uint64_t part, std::uint32_t) {
+    const std::size_t begin = part * kThreadRays;
+    body(begin, std::min(begin + kThreadRays, count));
+  });
+}
 
 }  // namespace
 
@@ -147,10 +158,14 @@ void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) 
     std::vector<std::uint64_t> blocked;
     together(team_,
              [&] { blocked = renderer_.blocked_rays(round, request.ambient_rays, stats.ambient); });
-    const auto begin = std::chrono::steady_clock::now();
-    reduce(blocked, Reduction::kOr, Receiver::kRank0);
-    team_.finish_reductions();
-    composition_.ms += ms_since(begin);
+    reduce(
+        blocked.size(), Reduction::kOr, Receiver::kRank0,
+        [&](std::size_t begin, std::span<std::uint64_t> words) {
+          std::ranges::copy(std::span(blocked).subspan(begin, words.size()), words.begin());
+        },
+        [&](std::size_t begin, std::span<const std::uint64_t> words) {
+          std::ranges::copy(words, blocked.begin() + static_cast<std::ptrdiff_t>(begin));
+        });
     open.num_ambient = round + 1;
     for (std::size_t ray = 0; ray < hits.size(); ++ray) {
       const bool is_open = std::isfinite(hits[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
@@ -172,25 +187,38 @@ std::span<const HitRecord> BrickRenderer::own_hits() {
   return own_hits_;
 }
 
-/// Begins one.
-void BrickRenderer::reduce(std::span<std::uint64_t> words, Reduction how, Receiver who) {
-  team_.begin_reduction(words, how, who);
-  ++composition_.reductions;
-  composition_.bytes += words.size_bytes();
+void BrickRenderer::reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+                           const TakeWords &take) {
+  const auto begin = std::chrono::steady_clock::now();
+  team_.reduce(
+      count, how, who,
+      [&](std::size_t first, std::span<std::uint64_t> words) {
+        make(first, words);
+        ++composition_.reductions;
+        composition_.bytes += words.size_bytes();
+      },
+      take);
+  composition_.ms += ms_since(begin);
 }
 
-void BrickRenderer::compose(const MakeWords &make_words, Receiver who) {
-  const auto begin = std::chrono::steady_clock::now();
-  words_.resize(renderer_.size().num_rays());
-  for (std::size_t first = 0; first < words_.size(); first += kSlabRays) {
-    const auto slab = std::span(words_).subspan(first, std::min(kSlabRays, words_.size() - first));
-    make_words(first, slab);
-    reduce(slab, Reduction::kMin, who);
-  }
-  team_.finish_reductions();
-  num_hits_ = static_cast<std::uint64_t>(
-      std::ranges::count_if(words_, [](std::uint64_t word) { return word >> 32 != kNoPlace; }));
-  composition_.ms += ms_since(begin);
+void BrickRenderer::compose(Receiver who, const MakeWords &make, const TakeWords &take) {
+  std::atomic<std::uint64_t> num_hits = 0;
+  reduce(
+      renderer_.size().num_rays(), Reduction::kMin, who,
+      [&](std::size_t first, std::span<std::uint64_t> words) {
+        for_parts(words.size(), [&](std::size_t begin, std::size_t end) {
+          make(first + begin, words.subspan(begin, end - begin));
+        });
+      },
+      [&](std::size_t first, std::span<const std::uint64_t> words) {
+        for_parts(words.size(), [&](std::size_t begin, std::size_t end) {
+          const auto part = words.subspan(begin, end - begin);
+          take(first + begin, part);
+          num_hits += static_cast<std::uint64_t>(std::ranges::count_if(
+              part, [](std::uint64_t word) { return word >> 32 != kNoPlace; }));
+        });
+      });
+  num_hits_ = num_hits;
 }
 
 std::vector<HitRecord> BrickRenderer::compose_hits(std::span<const HitRecord> own,
@@ -199,11 +227,13 @@ std::vector<HitRecord> BrickRenderer::compose_hits(std::span<const HitRecord> ow
   std::vector<HitRecord> hits(receives ? own.size() : 0, no_hit());
   for (const HitField field : fields) {
     compose(
+        who,
         [&](std::size_t begin, std::span<std::uint64_t> words) {
           field_words(own.subspan(begin, words.size()), field, place_, words);
         },
-        who);
-    set_field(words_, field, hits);
+        [&](std::size_t begin, std::span<const std::uint64_t> words) {
+          set_field(words, field, std::span(hits).subspan(begin, words.size()));
+        });
   }
   return hits;
 }
@@ -224,12 +254,17 @@ Image8 BrickRenderer::shade(const Appearance &appearance) {
     return image;
   }
   const std::vector<std::uint32_t> colors = renderer_.shade_packed(appearance);
+  Image8 image;
+  if (receives) image = {size.width, size.height, 3, std::vector<std::uint8_t>(3 * colors.size())};
   compose(
+      Receiver::kRank0,
       [&](std::size_t begin, std::span<std::uint64_t> words) {
         color_words(std::span(colors).subspan(begin, words.size()), place_, words);
       },
-      Receiver::kRank0);
-  return receives ? image_of(words_, size.width, size.height) : Image8{};
+      [&](std::size_t begin, std::span<const std::uint64_t> words) {
+        set_colors(words, begin, image);
+      });
+  return image;
 }
 
 std::vector<float> BrickRenderer::depth() {

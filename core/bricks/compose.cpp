@@ -38,19 +38,12 @@ void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
   });
 }
 
-Image8 image_of(std::span<const std::uint64_t> words, std::uint32_t width, std::uint32_t height) {
-  Image8 image{width, height, 3, {}};
-  image.pixels.reserve(3 * words.size());
+void set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image) {
+  std::uint8_t *to = image.pixels.data() + 3 * begin;
   for (const std::uint64_t word : words) {
     for (int channel = 0; channel < 3; ++channel)
-      image.pixels.push_back(static_cast<std::uint8_t>(word >> (8 * channel)));
+      *to++ = static_cast<std::uint8_t>(word >> (8 * channel));
   }
-  return image;
-}
-
-void keep_first(std::span<std::uint64_t> words, std::span<const std::uint64_t> others) {
-  std::ranges::transform(words, others, words.begin(),
-                         [](std::uint64_t a, std::uint64_t b) { return std::min(a, b); });
 }
 
 }  // namespace isowave::core

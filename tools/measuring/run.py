@@ -89,13 +89,19 @@ class Run:
         self.commands = []
         self.made = set()
 
-    def run(self, program, *arguments, remember=True, **options):
-        """The program's standard output. Throws Failed with the last line that it said."""
+    def run(self, program, *arguments, remember=True, ranks=None, **options):
+        """The program's standard output. Throws Failed with the last line that it said.
+
+        ranks  started by mpirun, so many times
+        """
         path = self.options.programs / program
+        mpirun = (
+            ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)] if ranks else []
+        )
         if remember:
-            self.remember(program, *arguments, **options)
+            self.remember(program, *arguments, mpirun=mpirun, **options)
         arguments = [*map(str, arguments), *as_arguments(options)]
-        command = [str(path), *arguments]
+        command = [*mpirun, str(path), *arguments]
         done = subprocess.run(command, cwd=self.work, capture_output=True, text=True)
         if done.returncode:
             said = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()
@@ -103,9 +109,9 @@ class Run:
             raise Failed(f"{asked}: status {done.returncode}: {said[-1]}")
         return done.stdout
 
-    def remember(self, program, *arguments, **options):
+    def remember(self, program, *arguments, mpirun=(), **options):
         """As a command that has been run."""
-        words = [pathlib.Path(program).name, *map(str, arguments), *as_arguments(options)]
+        words = [*mpirun, pathlib.Path(program).name, *map(str, arguments), *as_arguments(options)]
         self.commands.append(shlex.join(words))
 
     def read_json(self, name):

@@ -1,6 +1,6 @@
 """The sections that tools/measure knows: name -> function, and what each needs."""
 
-from measuring import accuracy, paper, speed
+from measuring import accuracy, bricks, paper, speed
 
 SECTIONS = {
     section.__name__: section
@@ -21,6 +21,8 @@ SECTIONS = {
         accuracy.stability,
         speed.peer,
         paper.paper,
+        paper.devices,
+        bricks.bricks,
         accuracy.bits,
         accuracy.oracles,
         accuracy.certified,
@@ -31,5 +33,5 @@ SECTIONS = {
     )
 }
 NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto")
-# Built only with -DISOWAVE_BUILD_PEER=ON.
-NEED_PEER = ("peer",)
+# What some need beside isowave, frame_bench and isowave_bench: built only with VTK, or with MPI.
+PROGRAMS = {"peer": "bench/peer_bench", "bricks": "bench/brick_bench"}

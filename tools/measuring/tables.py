@@ -4,7 +4,7 @@ its own, the head first."""
 import pathlib
 import statistics
 
-from measuring import paper
+from measuring import bricks, paper
 
 
 def ms(value):
@@ -456,6 +456,8 @@ TABLES = {
         ("stability", stability, leaks),
         ("peer", peer),
         ("paper", *paper.TABLES),
+        ("devices", paper.by_device),
+        ("bricks", bricks.in_bricks),
         ("bits", bits),
         ("oracles", oracles),
         ("certified", certified),
@@ -466,3 +468,5 @@ TABLES = {
     )
     for table in tables
 }
+# Their rows are (name of the device, rows), of one or more.
+OF_SEVERAL_DEVICES = ("by_device",)
