@@ -83,9 +83,7 @@ def test_bounds_of_the_error(drawn, levelled):
         renderer.render(40, max_error=0.5, outputs=("rgb", "depth", "bounds")),
     )
     renderer = isowave.open(FUEL, rate=8).renderer(size=(64, 48), bounds=True)
-    expect(
-        pictures, "rated", renderer.render(40, voxel_error=2.0, outputs=("bounds", "depth"))
-    )
+    expect(pictures, "rated", renderer.render(40, voxel_error=2.0, outputs=("bounds", "depth")))
 
 
 @pytest.mark.parametrize(
