@@ -231,43 +231,76 @@ TEST_P(BrickTeamOnDevice, PicturesWithinATime) {
   });
 }
 
-/// What a user gets of a frame within an error.
+/// A frame within an error, and what a user gets of it.
+struct BoundedCase {
+  FrameRequest request;
+  double max_surface_error;
+};
 struct BoundedFrame {
   DetailChoice choice;
   std::vector<float> depth;
   Certificate certificate;
 };
 
-BoundedFrame draw_within(BoundedFrames &frames, FrameRequest request, double max_surface_error) {
+BoundedFrame draw_within(BoundedFrames &frames, const BoundedCase &of) {
   BoundedFrame frame;
-  frame.choice = choose_detail(frames, request, max_surface_error);
-  request = with_detail(request, frame.choice.detail);
+  frame.choice = choose_detail(frames, of.request, of.max_surface_error);
+  const FrameRequest request = with_detail(of.request, frame.choice.detail);
   frames.draw(request);
   frame.depth = frames.depth();
   frame.certificate = certify(frames, request, frame.depth);
   return frame;
 }
 
-void expect_same_choice(const DetailChoice &got, const DetailChoice &expected) {
-  EXPECT_EQ(got.reachable, expected.reachable);
-  EXPECT_EQ(got.median, expected.median);
-  EXPECT_EQ(got.tolerance, expected.tolerance);
-  EXPECT_EQ(got.advice, expected.advice);
-  ASSERT_EQ(got.tries.size(), expected.tries.size());
-  for (std::size_t i = 0; i <= got.tries.size(); ++i) {
-    const bool is_last = i == got.tries.size();
-    const Detail &detail = is_last ? got.detail : got.tries[i].detail,
-                 &other = is_last ? expected.detail : expected.tries[i].detail;
-    EXPECT_EQ(detail.voxel_pixels, other.voxel_pixels);
-    EXPECT_EQ(detail.voxel_error, other.voxel_error);
-    if (!is_last) {
-      EXPECT_EQ(got.tries[i].certified, expected.tries[i].certified);
-    }
-  }
+/// All that is known of a choice, but for its time, to the last bit.
+std::string text_of(const DetailChoice &choice) {
+  std::string text =
+      fmt::format("{} {}: reachable {}, median {}, tolerance {}, {}", choice.detail.voxel_pixels,
+                  choice.detail.voxel_error, choice.reachable, choice.median,
+                  choice.tolerance.value_or(0), choice.advice);
+  for (const DetailChoice::Try &each : choice.tries)
+    text += fmt::format("; {} {}: {}", each.detail.voxel_pixels, each.detail.voxel_error,
+                        each.certified);
+  return text;
 }
 
-/// The choice, which may be of coarse levels or few bit planes, the frame and its bounds. In the
-/// whole volume, cells where rays begin are all at hand; a brick has some of them.
+/// Each of a team's ranks must choose what one renderer has chosen; rank 0 has its frame. Where the
+/// bricks cannot be cut at all levels of detail, the coarsest must be refused.
+void expect_by_team(std::uint32_t size, const CompressedVolume &volume,
+                    const RendererOptions &options, const ocl::DeviceInfo &on,
+                    std::span<const BoundedCase> cases, std::span<const BoundedFrame> expected) {
+  SCOPED_TRACE(fmt::format("{} ranks", size));
+  const std::vector<VolumeInfo> levels = level_infos(volume, true);
+  const std::size_t num_levels = num_cut_levels(volume.info, levels.size(), size);
+  const Cuts cuts(blocks_along(volume.info), size, num_blocks, cut_unit(num_levels));
+  test::ThreadMeeting meeting(size);
+  const auto work = [&](std::uint32_t rank) {
+    ThreadTeam team(meeting, rank);
+    ocl::Device device(on);
+    CompressedVolume brick = cut_brick(volume, cuts.bricks()[rank], num_levels);
+    const double rate = agree_on_voxels(team, brick);
+    EXPECT_EQ(rate, volume.rate());
+    BrickRenderer renderer(device, brick, options, cuts, levels, team);
+    FramesOfTeam frames(renderer, brick, rate);
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      const BoundedFrame frame = draw_within(frames, cases[i]);
+      EXPECT_EQ(text_of(frame.choice), text_of(expected[i].choice));
+      EXPECT_EQ(frame.depth, rank == 0 ? expected[i].depth : std::vector<float>());
+      EXPECT_EQ(frame.certificate.bounds,
+                rank == 0 ? expected[i].certificate.bounds : std::vector<float>());
+    }
+    if (num_levels == levels.size()) return;
+    FrameRequest coarse = cases[0].request;
+    coarse.voxel_pixels = 1000;
+    EXPECT_THAT([&] { frames.draw(coarse); },
+                testing::ThrowsMessage<Error>(testing::HasSubstr("convert with --levels")));
+  };
+  std::vector<std::jthread> threads;
+  for (std::uint32_t rank = 0; rank < size; ++rank) threads.emplace_back(work, rank);
+}
+
+/// Coarse levels are chosen, and few bit planes; eyes are far away, and in a brick; and rays begin
+/// between the bounds, where a surface goes through the volume's faces.
 TEST_P(BrickTeamOnDevice, WithinAnError) {
   const VolumeInfo info = test::grid_info({64, 61, 58}, {1, 1.25, 0.75});
   const std::vector<float> source = test::sample(info.dims, [&](const glm::dvec3 &at) {
@@ -275,17 +308,11 @@ TEST_P(BrickTeamOnDevice, WithinAnError) {
   });
   Camera far = orbit_cameras(info, 1)[0];
   far.eye += 0.6 * (far.eye - far.at);
-  const Camera inside = test::camera_along(0.45 * glm::dvec3(info.dims), {1, 0.25, -0.5});
-  struct Case {
-    FrameRequest request;
-    double max_surface_error;
-  };
-  const FrameRequest of_far{.camera = far, .isovalue = 0.5f};
-  // The last surface goes through the volume's faces, where rays begin between the bounds.
-  const Camera rim = test::camera_along({49.5, 37.5, -5}, {0, 0, 1});
-  const std::vector<Case> cases = {{of_far, 3},
-                                   {{.camera = inside, .isovalue = 0.5f}, 2},
-                                   {{.camera = rim, .isovalue = 0.35f}, 1e-6}};
+  const Camera inside = test::camera_along(0.45 * glm::dvec3(info.dims), {1, 0.25, -0.5}),
+               at_face = test::camera_along({49.5, 37.5, -5}, {0, 0, 1});
+  const std::vector<BoundedCase> cases = {{{.camera = far, .isovalue = 0.5f}, 3},
+                                          {{.camera = inside, .isovalue = 0.5f}, 2},
+                                          {{.camera = at_face, .isovalue = 0.35f}, 1e-6}};
   double most_pixels = 0, most_error = 0;
   std::uint64_t num_uncertain = 0;
   for (const bool is_bounded : {false, true}) {
@@ -293,56 +320,27 @@ TEST_P(BrickTeamOnDevice, WithinAnError) {
     CompressOptions how{.rate = 20, .measure_error = true, .levels = 0};
     if (is_bounded) how.precision = BlockPrecision{.min_exponent = -6};
     const CompressedVolume volume = compress(reader, how);
-    const std::vector<VolumeInfo> levels = level_infos(volume, true);
     RendererOptions options{.size = kFrame, .with_levels = true, .with_bounds = true};
     std::vector<BoundedFrame> expected;
     {
       ocl::Device device(GetParam());
       Renderer renderer(device, volume, options);
       FramesOfOne frames(renderer, volume);
-      for (const Case &each : cases) {
-        expected.push_back(draw_within(frames, each.request, each.max_surface_error));
+      for (const BoundedCase &each : cases) {
+        expected.push_back(draw_within(frames, each));
         most_pixels = std::max(most_pixels, expected.back().choice.detail.voxel_pixels);
         most_error = std::max(most_error, expected.back().choice.detail.voxel_error);
       }
-      EXPECT_FALSE(expected.back().choice.reachable);
-      EXPECT_GT(summarize(expected[0].certificate, 3).num_certified, 100u);
-      num_uncertain += summarize(expected[2].certificate, 1).num_uncertain;
     }
+    EXPECT_GT(summarize(expected[0].certificate, 3).num_certified, 100u);
+    EXPECT_FALSE(expected[2].choice.reachable);
+    num_uncertain += summarize(expected[2].certificate, 1).num_uncertain;
     options.cache_slots = 300;
-    for (const std::uint32_t size : is_bounded ? std::vector{3u} : std::vector{2u, 8u}) {
-      SCOPED_TRACE(fmt::format("{} ranks", size));
-      const std::size_t num_levels = num_cut_levels(info, levels.size(), size);
-      const Cuts cuts(blocks_along(info), size, num_blocks, cut_unit(num_levels));
-      test::ThreadMeeting meeting(size);
-      const auto work = [&](std::uint32_t rank) {
-        ThreadTeam team(meeting, rank);
-        ocl::Device device(GetParam());
-        CompressedVolume brick = cut_brick(volume, cuts.bricks()[rank], num_levels);
-        const double rate = agree_on_voxels(team, brick);
-        EXPECT_EQ(rate, volume.rate());
-        BrickRenderer renderer(device, brick, options, cuts, levels, team);
-        FramesOfTeam frames(renderer, brick, rate);
-        for (std::size_t i = 0; i < cases.size(); ++i) {
-          const BoundedFrame frame =
-              draw_within(frames, cases[i].request, cases[i].max_surface_error);
-          expect_same_choice(frame.choice, expected[i].choice);
-          if (rank != 0) continue;
-          EXPECT_EQ(frame.depth, expected[i].depth);
-          EXPECT_EQ(frame.certificate.bounds, expected[i].certificate.bounds);
-        }
-        if (num_levels == levels.size()) return;
-        FrameRequest coarse = of_far;
-        coarse.voxel_pixels = 1000;
-        EXPECT_THAT([&] { frames.draw(coarse); },
-                    testing::ThrowsMessage<Error>(testing::HasSubstr("convert with --levels")));
-      };
-      std::vector<std::jthread> threads;
-      for (std::uint32_t rank = 0; rank < size; ++rank) threads.emplace_back(work, rank);
-    }
+    for (const std::uint32_t size : is_bounded ? std::vector{3u} : std::vector{2u, 8u})
+      expect_by_team(size, volume, options, GetParam(), cases, expected);
   }
-  EXPECT_GT(most_pixels, 0) << "coarser levels are chosen";
-  EXPECT_GT(most_error, 0) << "bit planes are left out";
+  EXPECT_GT(most_pixels, 0);
+  EXPECT_GT(most_error, 0);
   EXPECT_GT(num_uncertain, 5u);
 }
 
