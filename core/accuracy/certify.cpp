@@ -81,13 +81,24 @@ class BlockValues {
   std::unordered_map<std::uint32_t, std::array<float, 64>> blocks_;
 };
 
+/// From where to where a ray is in the finest level's domain [world units]; empty if it misses it.
+std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel) {
+  const Ray ray = make_ray(&finest, pixel);
+  const LastPlanes last = last_planes(&finest), zero{};
+  RayEvent enter = start_event(), exit = border_event(std::numeric_limits<float>::infinity());
+  if (!clip_to_box(&ray, zero, last, &enter, &exit)) return {1, 0};
+  return {double{enter.t.hi} * double{finest.view.t_scale},
+          double{exit.t.hi} * double{finest.view.t_scale}};
+}
+
 /// Whether a ray begins between the bounds: inside of one, outside of the other. Not where it
-/// misses the volume, or begins in another rank's block.
+/// misses the finest level's domain, or begins in another rank's block.
 ///
 /// frames  of the whole volume's levels
 /// values  of the levels that may be drawn
 bool starts_between(std::span<const FrameParams> frames, std::span<BlockValues> values,
                     std::uint32_t pixel) {
+  if (const auto [begin, end] = way_through(frames[0], pixel); begin > end) return false;
   for (std::size_t level = 0; level < values.size(); ++level) {
     const FrameParams &frame = frames[level];
     if (!draws(frame)) continue;
@@ -105,16 +116,6 @@ bool starts_between(std::span<const FrameParams> frames, std::span<BlockValues> 
            inside_at(&ray, upper.data(), enter, cell.x, cell.y, cell.z, 0);
   }
   return false;
-}
-
-/// From where to where a ray is in the finest level's domain [world units]; empty if it misses it.
-std::array<double, 2> way_through(const FrameParams &finest, std::uint32_t pixel) {
-  const Ray ray = make_ray(&finest, pixel);
-  const LastPlanes last = last_planes(&finest), zero{};
-  RayEvent enter = start_event(), exit = border_event(std::numeric_limits<float>::infinity());
-  if (!clip_to_box(&ray, zero, last, &enter, &exit)) return {1, 0};
-  return {double{enter.t.hi} * double{finest.view.t_scale},
-          double{exit.t.hi} * double{finest.view.t_scale}};
 }
 
 /// Of each ray a bit: starts_between(), of this rank's blocks.
@@ -207,15 +208,15 @@ Certificate certify(BoundedFrames &frames, const FrameRequest &request,
   parallel_for(size.ray_rows(), 0, [&](std::uint64_t row, std::uint32_t) {
     const auto first = static_cast<std::uint32_t>(row * size.ray_columns());
     for (std::uint32_t pixel = first; pixel < first + size.ray_columns(); ++pixel) {
-      const bool starts_certainly = (between[pixel / 64] >> pixel % 64 & 1) == 0;
+      if ((between[pixel / 64] >> pixel % 64 & 1) != 0) continue;
       const double t = double{drawn[pixel]}, first_t = double{std::min(lower[pixel], upper[pixel])},
                    last_t = double{std::max(lower[pixel], upper[pixel])};
-      const std::array<double, 2> way = way_through(level_frames[0], pixel);
       float &bound = certificate.bounds[pixel];
       if (std::isinf(t) && std::isinf(first_t)) {
-        if (way[0] > way[1] || starts_certainly) bound = 0;
-      } else if (std::isfinite(t) && std::isfinite(last_t) && first_t >= way[0] &&
-                 last_t <= way[1] && starts_certainly) {
+        bound = 0;
+      } else if (std::isfinite(t) && std::isfinite(last_t)) {
+        const std::array<double, 2> way = way_through(level_frames[0], pixel);
+        if (first_t < way[0] || last_t > way[1]) continue;
         const double rounding = kDistanceRounding * last_t + cell_rounding;
         const double distance = std::max(t - first_t, last_t - t) + rounding;
         bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
@@ -229,7 +230,9 @@ Certificate certify(BoundedFrames &frames, const FrameRequest &request,
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const HitRecord> drawn) {
   FramesOfOne frames(renderer, volume);
-  return certify(frames, request, depth_of({drawn.begin(), drawn.end()}));
+  std::vector<float> depth(drawn.size());
+  std::ranges::transform(drawn, depth.begin(), &HitRecord::t);
+  return certify(frames, request, depth);
 }
 
 CertificateSummary summarize(const Certificate &certificate, double limit) {
