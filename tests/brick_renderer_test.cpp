@@ -87,6 +87,25 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 INSTANTIATE_TEST_SUITE_P(Devices, BrickTeamOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
 
+/// Ids are a brick's own: the whole has 2^42 blocks.
+TEST_P(BrickTeamOnDevice, BrickOfAVolumeWithMoreBlocksThanIds) {
+  const VolumeInfo whole = test::grid_info(glm::uvec3(65536));
+  const BlockBox own{{8000, 9000, 10000}, {8006, 9006, 10006}};
+  const VolumeInfo info = brick_info(whole, own);
+  TestVolume volume(info.dims, test::gyroid_field(9));
+  volume.compressed.info = info;
+  const glm::dvec3 middle = 2.0 * glm::dvec3(own.begin + own.end);
+  const Camera camera = test::camera_along(middle - glm::dvec3(25, 20, 30), {0.5, 0.4, 0.6});
+  const Cuts cuts(blocks_along(whole), 1);
+  test::ThreadMeeting meeting(1);
+  ThreadTeam team(meeting, 0);
+  ocl::Device device(GetParam());
+  BrickRenderer renderer(device, volume.compressed, {.size = kFrame}, cuts, whole, team);
+  renderer.render({.camera = camera, .isovalue = kIsovalue});
+  EXPECT_EQ(renderer.depth(), depth_of(test::twin_hits(volume, camera, kFrame, kIsovalue)));
+  EXPECT_GT(renderer.num_hits(), 200u);
+}
+
 std::size_t num_drawn(const Image8 &image) {
   std::size_t drawn = 0;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)

@@ -30,10 +30,10 @@ enum class Receiver { kRank0, kAll };
 void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> others,
                  Reduction how);
 
-/// One process's part in a reduction, piece by piece from the first word on: it gives its words
-/// from `begin` on.
+/// One process's part in a reduction: it gives its words from `begin` on. Called for parts, in any
+/// order, and from several threads.
 using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
-/// What they have become.
+/// What they have become. Called likewise.
 using TakeWords = std::function<void(std::size_t begin, std::span<const std::uint64_t> words)>;
 
 /// All of them make the same calls in the same order.

@@ -11,26 +11,9 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
-#include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 
 namespace isowave::core {
-
-namespace {
-
-/// Rays that a thread makes words of at once.
-constexpr std::size_t kThreadRays = std::size_t{1} << 14;
-
-/// Calls body(begin, end) for parts of [0, count), from several threads.
-template <class Body>
-void for_parts(std::size_t count, const Body &body) {
-  parallel_for((count + kThreadRays - 1) / kThreadRays, 0, [&](std::uint64_t part, std::uint32_t) {
-    const std::size_t begin = part * kThreadRays;
-    body(begin, std::min(begin + kThreadRays, count));
-  });
-}
-
-}  // namespace
 
 BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume,
                              const RendererOptions &options, const Cuts &cuts,
@@ -190,34 +173,20 @@ std::span<const HitRecord> BrickRenderer::own_hits() {
 void BrickRenderer::reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
                            const TakeWords &take) {
   const auto begin = std::chrono::steady_clock::now();
-  team_.reduce(
-      count, how, who,
-      [&](std::size_t first, std::span<std::uint64_t> words) {
-        make(first, words);
-        ++composition_.reductions;
-        composition_.bytes += words.size_bytes();
-      },
-      take);
+  team_.reduce(count, how, who, make, take);
   composition_.ms += ms_since(begin);
+  ++composition_.reductions;
+  composition_.bytes += count * sizeof(std::uint64_t);
 }
 
 void BrickRenderer::compose(Receiver who, const MakeWords &make, const TakeWords &take) {
   std::atomic<std::uint64_t> num_hits = 0;
-  reduce(
-      renderer_.size().num_rays(), Reduction::kMin, who,
-      [&](std::size_t first, std::span<std::uint64_t> words) {
-        for_parts(words.size(), [&](std::size_t begin, std::size_t end) {
-          make(first + begin, words.subspan(begin, end - begin));
-        });
-      },
-      [&](std::size_t first, std::span<const std::uint64_t> words) {
-        for_parts(words.size(), [&](std::size_t begin, std::size_t end) {
-          const auto part = words.subspan(begin, end - begin);
-          take(first + begin, part);
-          num_hits += static_cast<std::uint64_t>(std::ranges::count_if(
-              part, [](std::uint64_t word) { return word >> 32 != kNoPlace; }));
-        });
-      });
+  reduce(renderer_.size().num_rays(), Reduction::kMin, who, make,
+         [&](std::size_t begin, std::span<const std::uint64_t> words) {
+           take(begin, words);
+           num_hits += static_cast<std::uint64_t>(std::ranges::count_if(
+               words, [](std::uint64_t word) { return word >> 32 != kNoPlace; }));
+         });
   num_hits_ = num_hits;
 }
 

@@ -72,7 +72,7 @@ class BrickRenderer {
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);
-  /// A word of each ray. Several threads make and take them.
+  /// A word of each ray.
   void compose(Receiver who, const MakeWords &make, const TakeWords &take);
   /// Of bricks' hits, those that win.
   std::vector<HitRecord> compose_hits(std::span<const HitRecord> own,

@@ -80,32 +80,51 @@ class HostWords {
   int local_rank() const { return local_rank_; }  ///< among all processes of the host
   bool is_first() const { return rank_ == 0; }
 
-  /// Words that each process has here. All must ask alike: the first time makes them.
+  /// Words that each process has room for here. All must ask alike: the first time makes it.
   std::size_t capacity() {
-    if (segments_.empty()) allocate();
-    return segments_.front().size();
+    if (capacity_ == 0) allocate();
+    return capacity_;
   }
-  /// Of this process.
-  std::span<std::uint64_t> own() const { return segments_[static_cast<std::size_t>(rank_)]; }
-  /// Of the host's first process, where the outcome is.
+  /// Of the host's first process: for those of all.
   std::span<std::uint64_t> first() const { return segments_.front(); }
 
-  /// Of all processes' first `count` words.
-  void reduce(std::size_t count, Reduction how) {
-    wait_for_all();
-    const auto share = [&](int rank) {
-      return count * static_cast<std::size_t>(rank) / static_cast<std::size_t>(size_);
-    };
-    const std::size_t begin = share(rank_), end = share(rank_ + 1);
-    constexpr std::size_t kPart = std::size_t{1} << 14;
-    if (size_ > 1) {
-      parallel_for((end - begin + kPart - 1) / kPart, 0, [&](std::uint64_t part, std::uint32_t) {
-        const std::size_t from = begin + part * kPart, num = std::min(kPart, end - from);
-        for (std::size_t other = 1; other < segments_.size(); ++other)
-          reduce_into(first().subspan(from, num), segments_[other].subspan(from, num), how);
+  /// Reduces words [begin, begin + count), no more than capacity(). use: takes the outcome, at the
+  /// host's first process.
+  void reduce(std::size_t begin, std::size_t count, Reduction how, const MakeWords &make,
+              const TakeWords &use) {
+    if (!is_first()) {
+      const std::span<std::uint64_t> own = segments_[static_cast<std::size_t>(rank_)];
+      for_parts(0, count, [&](std::size_t from, std::size_t size) {
+        make(begin + from, own.subspan(from, size));
       });
     }
     wait_for_all();
+    if (size_ > 2) reduce_others(count, how);
+    if (is_first()) {
+      // While words are in the processor's cache.
+      for_parts(0, count, [&](std::size_t from, std::size_t size) {
+        std::array<std::uint64_t, kPartWords> buffer;
+        const auto words = std::span(buffer).first(size);
+        make(begin + from, words);
+        if (size_ > 1) reduce_into(words, segments_[1].subspan(from, size), how);
+        use(begin + from, words);
+      });
+    }
+    wait_for_all();
+  }
+
+  /// Calls body(from, size) for parts of [begin, end), from several threads.
+  template <class Body>
+  static void for_parts(std::size_t begin, std::size_t end, const Body &body) {
+    // A thread takes several: waking one for less takes longer than the work.
+    constexpr std::size_t kParts = 8, kThreadWords = kParts * kPartWords;
+    parallel_for((end - begin + kThreadWords - 1) / kThreadWords, 0,
+                 [&](std::uint64_t i, std::uint32_t) {
+                   const std::size_t first = begin + i * kThreadWords;
+                   const std::size_t last = std::min(first + kThreadWords, end);
+                   for (std::size_t from = first; from < last; from += kPartWords)
+                     body(from, std::min(kPartWords, last - from));
+                 });
   }
 
   void wait_for_all() {
@@ -118,15 +137,29 @@ class HostWords {
   }
 
  private:
+  static constexpr std::size_t kPartWords = std::size_t{1} << 11;
+
+  /// Of all processes but the first: each reduces its share of the words, into the second's.
+  void reduce_others(std::size_t count, Reduction how) {
+    if (!is_first()) {
+      const auto share = [&](int number) {
+        return count * static_cast<std::size_t>(number) / static_cast<std::size_t>(size_ - 1);
+      };
+      for_parts(share(rank_ - 1), share(rank_), [&](std::size_t from, std::size_t size) {
+        for (std::size_t other = 2; other < segments_.size(); ++other)
+          reduce_into(segments_[1].subspan(from, size), segments_[other].subspan(from, size), how);
+      });
+    }
+    wait_for_all();
+  }
+
   void allocate() {
     // Containers often have but 64 MiB of shared memory.
     constexpr std::size_t kHostWords = std::size_t{1} << 22, kMostWords = std::size_t{1} << 20;
-    const std::size_t count = std::min(kHostWords / static_cast<std::size_t>(size_), kMostWords);
-    if (size_ == 1) {
-      alone_.resize(count);
-      segments_ = {alone_};
-      return;
-    }
+    std::uint64_t count = std::min(kHostWords / static_cast<std::size_t>(size_), kMostWords);
+    // Pieces are the same at all hosts.
+    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_UINT64_T, MPI_MIN, MPI_COMM_WORLD);
+    capacity_ = count;
     std::uint64_t *base = nullptr;
     MPI_Win_allocate_shared(static_cast<MPI_Aint>(count * sizeof(std::uint64_t)),
                             sizeof(std::uint64_t), MPI_INFO_NULL, comm_, &base, &window_);
@@ -142,8 +175,8 @@ class HostWords {
   MPI_Comm comm_ = MPI_COMM_NULL;
   MPI_Win window_ = MPI_WIN_NULL;
   int local_rank_ = 0, rank_ = 0, size_ = 1;
+  std::size_t capacity_ = 0;
   std::vector<std::span<std::uint64_t>> segments_;  ///< by rank
-  std::vector<std::uint64_t> alone_;                ///< of a process that is alone on its host
 };
 
 /// MPI's own handler of errors ends the job.
@@ -197,26 +230,17 @@ class MpiTeam : public Team {
     std::size_t number = 0;
     for (std::size_t begin = 0; begin < count; begin += capacity, ++number) {
       const std::size_t size = std::min(capacity, count - begin);
-      make(begin, host_.own().first(size));
-      host_.reduce(size, how);
-      const std::span<std::uint64_t> outcome = host_.first().first(size);
       if (who == Receiver::kAll) {
-        if (num_hosts_ > 1 && host_.is_first()) {
-          MPI_Request request = MPI_REQUEST_NULL;
-          MPI_Iallreduce(MPI_IN_PLACE, outcome.data(), static_cast<int>(size), MPI_UINT64_T,
-                         to_op(how), hosts_, &request);
-          wait_for({&request, 1});
-        }
-        host_.wait_for_all();
-        take(begin, outcome);
-        host_.wait_for_all();
+        reduce_for_all(begin, size, how, make, take);
       } else if (num_hosts_ == 1) {
-        if (rank_ == 0) take(begin, outcome);
-      } else if (host_.is_first()) {
+        host_.reduce(begin, size, how, make, take);
+      } else {
         Piece &piece = pieces[number % 2];
         finish(piece, take);
         piece.begin = begin;
-        piece.words.assign(outcome.begin(), outcome.end());
+        piece.words.resize(host_.is_first() ? size : 0);
+        host_.reduce(begin, size, how, make, copy_to(piece.words, begin));
+        if (!host_.is_first()) continue;
         MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : piece.words.data(), piece.words.data(),
                     static_cast<int>(size), MPI_UINT64_T, to_op(how), 0, hosts_, &piece.request);
       }
@@ -249,6 +273,30 @@ class MpiTeam : public Team {
     std::vector<std::uint64_t> words;
     MPI_Request request = MPI_REQUEST_NULL;
   };
+
+  /// Words from `begin` on.
+  static TakeWords copy_to(std::span<std::uint64_t> words, std::size_t begin) {
+    return [words, begin](std::size_t from, std::span<const std::uint64_t> part) {
+      std::ranges::copy(part, words.subspan(from - begin, part.size()).begin());
+    };
+  }
+
+  void reduce_for_all(std::size_t begin, std::size_t size, Reduction how, const MakeWords &make,
+                      const TakeWords &take) {
+    const std::span<std::uint64_t> words = host_.first().first(size);
+    host_.reduce(begin, size, how, make, copy_to(words, begin));
+    if (num_hosts_ > 1 && host_.is_first()) {
+      MPI_Request request = MPI_REQUEST_NULL;
+      MPI_Iallreduce(MPI_IN_PLACE, words.data(), static_cast<int>(size), MPI_UINT64_T, to_op(how),
+                     hosts_, &request);
+      wait_for({&request, 1});
+    }
+    host_.wait_for_all();
+    HostWords::for_parts(0, size, [&](std::size_t from, std::size_t count) {
+      take(begin + from, words.subspan(from, count));
+    });
+    host_.wait_for_all();
+  }
 
   static MPI_Op to_op(Reduction how) { return how == Reduction::kMin ? MPI_MIN : MPI_BOR; }
 

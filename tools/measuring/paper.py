@@ -66,10 +66,13 @@ DEVICE_FIELDS = (
 
 def devices(run):
     """One row for each volume: what `isowave bench paper --quick` says, on any device."""
+    options = {"quick": True}
+    if run.options.quick:
+        options |= {"isovalues": 1, "views": 2, "size": "64x48"}
     rows = []
     for field in run.fields() if run.options.quick else DEVICE_FIELDS:
         name, _ = make(run, field)
-        rows.append(measure(run, field, name, {}, (20, 235), {"quick": True}))
+        rows.append(measure(run, field, name, {}, (20, 235), options))
     return rows
 
 
