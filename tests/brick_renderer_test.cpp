@@ -100,7 +100,7 @@ TEST_P(BrickTeamOnDevice, BrickOfAVolumeWithMoreBlocksThanIds) {
   test::ThreadMeeting meeting(1);
   ThreadTeam team(meeting, 0);
   ocl::Device device(GetParam());
-  BrickRenderer renderer(device, volume.compressed, {.size = kFrame}, cuts, whole, team);
+  BrickRenderer renderer(device, volume.compressed, {.size = kFrame}, cuts, {whole}, team);
   renderer.render({.camera = camera, .isovalue = kIsovalue});
   EXPECT_EQ(renderer.depth(), depth_of(test::twin_hits(volume, camera, kFrame, kIsovalue)));
   EXPECT_GT(renderer.num_hits(), 200u);
