@@ -19,6 +19,7 @@ SECTIONS = {
         speed.kernels,
         accuracy.watertight,
         accuracy.stability,
+        speed.cpus,
         speed.peer,
         paper.paper,
         accuracy.bits,
@@ -33,3 +34,5 @@ SECTIONS = {
 NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto")
 # Built only with -DISOWAVE_BUILD_PEER=ON.
 NEED_PEER = ("peer",)
+# With -DISOWAVE_BUILD_TESTS=ON, and PoCL as the device.
+NEED_POCL = ("cpus",)

@@ -299,6 +299,25 @@ def leaks(rows):
         yield row["surface"], f"{row['rays']:,}", *(f"{row['leaks'][name]:,}" for name in solvers)
 
 
+def cpus(rows):
+    """Ratios are those of the machine's own CPU, of the same volume."""
+    kinds = ("cold", "next", "warm")
+    yield "volume", "kernels compiled for", "cold ms", "next", "warm", "of the first row's"
+    own = {}
+    for row in rows:
+        first = own.setdefault(row["volume"], row)
+        ratios = [row[kind]["median"] / first[kind]["median"] for kind in kinds]
+        yield (
+            name_of(row["volume"]),
+            row["device"].removeprefix("pthread-").rsplit("-", 1)[0],
+            *(
+                f"{ms(row[kind]['median'])} ({ms(row[kind]['min'])} to {ms(row[kind]['max'])})"
+                for kind in kinds
+            ),
+            "" if row is first else ", ".join(f"{ratio:.2f}" for ratio in ratios),
+        )
+
+
 def peer(rows):
     sides = {
         "host": "without OpenCL",
@@ -454,6 +473,7 @@ TABLES = {
         ("kernels", kernels),
         ("watertight", watertight),
         ("stability", stability, leaks),
+        ("cpus", cpus),
         ("peer", peer),
         ("paper", *paper.TABLES),
         ("bits", bits),
