@@ -324,6 +324,7 @@ def peer(run):
             },
             "open_ms": measured.get("open_ms"),
             "peak": measured["peak_byte_count"]["max"],
+            "of_files": measured["file_byte_count"]["max"],
             "views": {
                 "count": size["views"]["count"],
                 "total_ms": size["views"]["sides"][side]["total_ms"],

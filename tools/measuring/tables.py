@@ -328,6 +328,7 @@ def peer(rows):
     }
     kinds = ("new", "new_kept", "warm", "next")
     views = next((row["views"]["count"] for row in rows if "views" in row), None)
+    with_files = all("of_files" in row for row in rows)
     yield (
         "volume",
         "side",
@@ -335,7 +336,7 @@ def peer(rows):
         "new isovalue, cache kept",
         "same view",
         "next view",
-        "memory of the process",
+        "memory of the process (of it files)" if with_files else "memory of the process",
         *((f"{views} views from a new isovalue on", "the peer is ahead") if views else ()),
     )
     for row in rows:
@@ -344,7 +345,10 @@ def peer(rows):
             f"{ms(one['median'])} ({ms(one['min'])} to {ms(one['max'])})" if one else ""
             for one in spreads
         ]
-        cells = [name_of(row["volume"]), sides[row["side"]], *times, mebibytes(row["peak"])]
+        memory = mebibytes(row["peak"])
+        if with_files:
+            memory += f" ({mebibytes(row['of_files'])})"
+        cells = [name_of(row["volume"]), sides[row["side"]], *times, memory]
         if views:
             counts = [count for count in row["views"]["overtaken_after"].values() if count]
             is_peer = row["side"].startswith("mesh")
