@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <cstdint>
-#include <cstring>
 #include <string_view>
 
 namespace isowave::core::ocl {
@@ -18,12 +17,17 @@ bool is_compiler(std::string_view path) {
   return name.starts_with("libLLVM") || name.starts_with("libclang-cpp");
 }
 
+/// The loader says where things are by numbers.
+void *at(std::uintptr_t address) {
+  return reinterpret_cast<void *>(address);  // NOLINT(performance-no-int-to-ptr)
+}
+
 /// Whether the loader has written to its code: such pages are not those of the file.
 bool has_changed_code(const dl_phdr_info &library) {
   for (int i = 0; i < library.dlpi_phnum; ++i) {
     if (library.dlpi_phdr[i].p_type != PT_DYNAMIC) continue;
     const auto *entry =
-        reinterpret_cast<const ElfW(Dyn) *>(library.dlpi_addr + library.dlpi_phdr[i].p_vaddr);
+        static_cast<const ElfW(Dyn) *>(at(library.dlpi_addr + library.dlpi_phdr[i].p_vaddr));
     for (; entry->d_tag != DT_NULL; ++entry) {
       if (entry->d_tag == DT_TEXTREL) return true;
       if (entry->d_tag == DT_FLAGS && (entry->d_un.d_val & DF_TEXTREL) != 0) return true;
@@ -43,7 +47,7 @@ int give_back_code(dl_phdr_info *library, std::size_t, void *) {
     const std::uintptr_t begin = library->dlpi_addr + segment.p_vaddr,
                          first = (begin + page - 1) / page * page,
                          last = (begin + segment.p_filesz) / page * page;
-    if (first < last) ::madvise(reinterpret_cast<void *>(first), last - first, MADV_DONTNEED);
+    if (first < last) ::madvise(at(first), last - first, MADV_DONTNEED);
   }
   return 0;
 }
