@@ -23,7 +23,6 @@
 #include <numeric>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -55,20 +54,14 @@ struct Options {
 
 const std::vector<std::string> kSides = {"host", "rays", "blocks", "mesh_low", "mesh_medium"};
 
-/// A line of /proc/self/status [bytes]. VmHWM: the most memory that the process has had since
-/// reset_peak(). RssFile: what it has now of files, as code of libraries.
-std::uint64_t memory(std::string_view name) {
+/// Pages of files in this process's memory, as code of libraries [bytes]: RssFile of
+/// /proc/self/status.
+std::uint64_t memory_of_files() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
-    if (line.starts_with(name))
-      return std::strtoull(line.c_str() + name.size() + 1, nullptr, 10) * 1024;
+    if (line.starts_with("RssFile:")) return std::strtoull(line.c_str() + 8, nullptr, 10) * 1024;
   }
   return 0;
-}
-
-/// So that loading the volume does not count.
-void reset_peak() {
-  std::ofstream("/proc/self/clear_refs") << "5";
 }
 
 // ---- a child: reads an isovalue a line, and of how many views; answers a line of JSON
@@ -88,7 +81,7 @@ void serve(const Options &options) {
   CompressedVolume volume = tools::load_volume(options.volume, {}, {.rate = options.rate});
   const VolumeInfo info = volume.info;
   const auto side = make_side(options, std::move(volume));
-  reset_peak();
+  reset_peak_memory();             // loading the volume does not count
   std::cout << "{}" << std::endl;  // ready
   float isovalue = 0;
   for (std::uint32_t views = 0; std::cin >> isovalue >> views;) {
@@ -98,8 +91,8 @@ void serve(const Options &options) {
       continue;
     }
     Measured measured = side->draw(isovalue);
-    measured["peak_byte_count"] = static_cast<double>(memory("VmHWM"));
-    measured["file_byte_count"] = static_cast<double>(memory("RssFile"));
+    measured["peak_byte_count"] = static_cast<double>(peak_memory());
+    measured["file_byte_count"] = static_cast<double>(memory_of_files());
     std::cout << ordered_json(measured).dump() << std::endl;
   }
 }

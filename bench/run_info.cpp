@@ -1,7 +1,9 @@
 #include "bench/run_info.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <ctime>
+#include <fstream>
 
 namespace isowave::core::bench {
 
@@ -45,6 +47,18 @@ Spread spread_of(const std::vector<double> &values) {
 
 nlohmann::ordered_json spread_json(const Spread &spread) {
   return {{"median", spread.median}, {"min", spread.min}, {"max", spread.max}};
+}
+
+std::uint64_t peak_memory() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
+  }
+  return 0;
+}
+
+void reset_peak_memory() {
+  std::ofstream("/proc/self/clear_refs") << "5";
 }
 
 std::string utc_now() {

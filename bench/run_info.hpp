@@ -1,6 +1,7 @@
 #pragma once
 // What a number was measured on and with: part of every JSON that bench/ writes.
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -25,6 +26,11 @@ struct Spread {
 };
 Spread spread_of(const std::vector<double> &values);
 nlohmann::ordered_json spread_json(const Spread &spread);
+
+/// VmHWM of /proc/self/status [bytes]: the most memory that the process has had since
+/// reset_peak_memory(), or its start; 0 where the system does not say.
+std::uint64_t peak_memory();
+void reset_peak_memory();
 
 /// "2026-11-21T09:30:00Z": now.
 std::string utc_now();

@@ -29,25 +29,17 @@ class ThreadTeam : public Team {
   std::vector<std::string> all_gather(const std::string &text) override {
     return meeting_.all_gather(rank_, text);
   }
-  void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
-    begun_.push_back({words, how, who});
-  }
-  void finish_reductions() override {
-    for (const Begun &each : begun_) {
-      meeting_.reduce(rank_, each.words, each.how == Reduction::kOr, each.who == Receiver::kAll);
-    }
-    begun_.clear();
+  void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+              const TakeWords &take) override {
+    const bool for_all = who == Receiver::kAll;
+    reduce_in_pieces(count, for_all || rank_ == 0, make, take, [&](std::span<std::uint64_t> words) {
+      meeting_.reduce(rank_, words, how == Reduction::kOr, for_all);
+    });
   }
 
  private:
-  struct Begun {
-    std::span<std::uint64_t> words;
-    Reduction how;
-    Receiver who;
-  };
   test::ThreadMeeting &meeting_;
   std::uint32_t rank_;
-  std::vector<Begun> begun_;
 };
 
 constexpr float kIsovalue = 0.2f;
@@ -92,6 +84,25 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 };
 INSTANTIATE_TEST_SUITE_P(Devices, BrickTeamOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
+
+/// Ids are a brick's own: the whole has 2^42 blocks.
+TEST_P(BrickTeamOnDevice, BrickOfAVolumeWithMoreBlocksThanIds) {
+  const VolumeInfo whole = test::grid_info(glm::uvec3(65536));
+  const BlockBox own{{8000, 9000, 10000}, {8006, 9006, 10006}};
+  const VolumeInfo info = brick_info(whole, own);
+  TestVolume volume(info.dims, test::gyroid_field(9));
+  volume.compressed.info = info;
+  const glm::dvec3 middle = 2.0 * glm::dvec3(own.begin + own.end);
+  const Camera camera = test::camera_along(middle - glm::dvec3(25, 20, 30), {0.5, 0.4, 0.6});
+  const Cuts cuts(blocks_along(whole), 1);
+  test::ThreadMeeting meeting(1);
+  ThreadTeam team(meeting, 0);
+  ocl::Device device(GetParam());
+  BrickRenderer renderer(device, volume.compressed, {.size = kFrame}, cuts, whole, team);
+  renderer.render({.camera = camera, .isovalue = kIsovalue});
+  EXPECT_EQ(renderer.depth(), depth_of(test::twin_hits(volume, camera, kFrame, kIsovalue)));
+  EXPECT_GT(renderer.num_hits(), 200u);
+}
 
 std::size_t num_drawn(const Image8 &image) {
   std::size_t drawn = 0;

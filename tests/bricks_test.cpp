@@ -78,9 +78,9 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
           frame.hits[ray] = hit;
         }
         color_words(renderer.shade_packed({}), place, frame.words);
-        keep_first(frame.colors, frame.words);
+        reduce_into(frame.colors, frame.words, Reduction::kMin);
         field_words(hits, HitField::kT, place, frame.words);
-        keep_first(frame.depths, frame.words);
+        reduce_into(frame.depths, frame.words, Reduction::kMin);
       }
     }
     std::uint64_t num_hits = 0;
@@ -98,8 +98,10 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       set_field(frame.depths, HitField::kT, depths);
       EXPECT_EQ(depth_of(depths), depth_of(expected));
       renderer.render({.camera = cameras[view], .isovalue = isovalue});
-      EXPECT_EQ(image_of(frame.colors, options.size.width, options.size.height).pixels,
-                renderer.shade().pixels);
+      Image8 image{options.size.width, options.size.height, 3,
+                   std::vector<std::uint8_t>(3 * num_rays)};
+      set_colors(frame.colors, 0, image);
+      EXPECT_EQ(image.pixels, renderer.shade().pixels);
       num_hits += test::num_hits(expected);
     }
     return num_hits;

@@ -301,6 +301,16 @@ TEST_F(CliRanks, RealVolumes) {
   EXPECT_GE(num_volumes, 1u);
 }
 
+/// Two pieces of words: within a host, between hosts, and both.
+TEST_F(CliRanks, MoreWordsThanHostsShare) {
+  for (const char *host_ranks : {"9", "1", "2"}) {
+    SCOPED_TRACE(host_ranks);
+    ::setenv("ISOWAVE_HOST_RANKS", host_ranks, 1);
+    expect_same(kFuel, "-i 40 --orbit 1 --size 600x480 --samples 2", 3);
+  }
+  ::unsetenv("ISOWAVE_HOST_RANKS");
+}
+
 TEST_F(CliRanks, StatisticsOfEachRank) {
   const ProgramResult result = run_command(
       on_ranks(2, "render " + kFuel + " -i 40 --size 64x48 --stats " + quoted(folder_ / "s.json")));

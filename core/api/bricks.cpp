@@ -25,14 +25,17 @@ class ProcessTeam : public core::Team {
   std::vector<std::string> all_gather(const std::string &text) override {
     return processes_.all_gather(text);
   }
-  void begin_reduction(std::span<std::uint64_t> words, core::Reduction how,
-                       core::Receiver who) override {
-    processes_.reduce(
-        words,
-        how == core::Reduction::kMin ? Processes::Reduction::kMin : Processes::Reduction::kOr,
-        who == core::Receiver::kAll);
+  void reduce(std::size_t count, core::Reduction how, core::Receiver who,
+              const core::MakeWords &make, const core::TakeWords &take) override {
+    const bool for_all = who == core::Receiver::kAll;
+    core::reduce_in_pieces(
+        count, for_all || rank() == 0, make, take, [&](std::span<std::uint64_t> words) {
+          processes_.reduce(
+              words,
+              how == core::Reduction::kMin ? Processes::Reduction::kMin : Processes::Reduction::kOr,
+              for_all);
+        });
   }
-  void finish_reductions() override {}
 
  private:
   Processes &processes_;

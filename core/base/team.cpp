@@ -1,6 +1,7 @@
 #include "core/base/team.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <new>
 #include <stdexcept>
 
@@ -10,6 +11,29 @@ namespace isowave::core {
 
 void Team::exchange(std::span<const Outgoing>, std::span<const Incoming>) {
   throw std::logic_error("this team has no messages");
+}
+
+void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> others,
+                 Reduction how) {
+  if (how == Reduction::kMin) {
+    std::ranges::transform(words, others, words.begin(),
+                           [](std::uint64_t a, std::uint64_t b) { return std::min(a, b); });
+  } else {
+    std::ranges::transform(words, others, words.begin(), std::bit_or<std::uint64_t>());
+  }
+}
+
+void reduce_in_pieces(std::size_t count, bool receives, const MakeWords &make,
+                      const TakeWords &take,
+                      const std::function<void(std::span<std::uint64_t> words)> &reduce_piece) {
+  constexpr std::size_t kPieceWords = std::size_t{1} << 18;
+  std::vector<std::uint64_t> buffer(std::min(count, kPieceWords));
+  for (std::size_t begin = 0; begin < count; begin += kPieceWords) {
+    const auto words = std::span(buffer).first(std::min(kPieceWords, count - begin));
+    make(begin, words);
+    reduce_piece(words);
+    if (receives) take(begin, words);
+  }
 }
 
 void agree_on_error(Team &team, const std::string &error) {

@@ -26,6 +26,16 @@ enum class Reduction {
 };
 enum class Receiver { kRank0, kAll };
 
+/// Makes words of `words`, each with that of others at its place.
+void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> others,
+                 Reduction how);
+
+/// One process's part in a reduction: it gives its words from `begin` on. Called for parts, in any
+/// order, and from several threads.
+using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
+/// What they have become. Called likewise.
+using TakeWords = std::function<void(std::size_t begin, std::span<const std::uint64_t> words)>;
+
 /// All of them make the same calls in the same order.
 class Team {
  public:
@@ -34,14 +44,19 @@ class Team {
   virtual std::uint32_t size() const = 0;
   /// Everybody's text, by rank.
   virtual std::vector<std::string> all_gather(const std::string &text) = 0;
-  /// Begins to make one word of those of all processes at each place, which rank 0 will have in
-  /// `words`, or all. Until finish_reductions() these must not be touched.
-  virtual void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) = 0;
-  virtual void finish_reductions() = 0;
+  /// Makes one word of those of all processes at each of `count` places. `take` is called where the
+  /// outcome is received.
+  virtual void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+                      const TakeWords &take) = 0;
   /// Sends and receives, in order, and is back when both are done; none is of this process. To be
   /// called by those alone that are named. Drawing needs none.
   virtual void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received);
 };
+
+/// A reduction for teams that reduce words where they are: reduce_piece() is called for each piece.
+void reduce_in_pieces(std::size_t count, bool receives, const MakeWords &make,
+                      const TakeWords &take,
+                      const std::function<void(std::span<std::uint64_t> words)> &reduce_piece);
 
 /// Throws Error at every rank if one gives a text: that of the first, with its rank, unless all
 /// give the same.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -13,13 +14,6 @@
 #include "core/volume/pyramid.hpp"
 
 namespace isowave::core {
-
-namespace {
-
-/// Rays of a slab.
-constexpr std::size_t kSlabRays = 1u << 18;
-
-}  // namespace
 
 BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume,
                              const RendererOptions &options, const Cuts &cuts,
@@ -132,10 +126,14 @@ void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) 
     std::vector<std::uint64_t> blocked;
     together(team_,
              [&] { blocked = renderer_.blocked_rays(round, request.ambient_rays, stats.ambient); });
-    const auto begin = std::chrono::steady_clock::now();
-    reduce(blocked, Reduction::kOr, Receiver::kRank0);
-    team_.finish_reductions();
-    composition_.ms += ms_since(begin);
+    reduce(
+        blocked.size(), Reduction::kOr, Receiver::kRank0,
+        [&](std::size_t begin, std::span<std::uint64_t> words) {
+          std::ranges::copy(std::span(blocked).subspan(begin, words.size()), words.begin());
+        },
+        [&](std::size_t begin, std::span<const std::uint64_t> words) {
+          std::ranges::copy(words, blocked.begin() + static_cast<std::ptrdiff_t>(begin));
+        });
     open.num_ambient = round + 1;
     for (std::size_t ray = 0; ray < hits.size(); ++ray) {
       const bool is_open = std::isfinite(hits[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
@@ -157,25 +155,24 @@ std::span<const HitRecord> BrickRenderer::own_hits() {
   return own_hits_;
 }
 
-/// Begins one.
-void BrickRenderer::reduce(std::span<std::uint64_t> words, Reduction how, Receiver who) {
-  team_.begin_reduction(words, how, who);
+void BrickRenderer::reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+                           const TakeWords &take) {
+  const auto begin = std::chrono::steady_clock::now();
+  team_.reduce(count, how, who, make, take);
+  composition_.ms += ms_since(begin);
   ++composition_.reductions;
-  composition_.bytes += words.size_bytes();
+  composition_.bytes += count * sizeof(std::uint64_t);
 }
 
-void BrickRenderer::compose(const MakeWords &make_words, Receiver who) {
-  const auto begin = std::chrono::steady_clock::now();
-  words_.resize(renderer_.size().num_rays());
-  for (std::size_t first = 0; first < words_.size(); first += kSlabRays) {
-    const auto slab = std::span(words_).subspan(first, std::min(kSlabRays, words_.size() - first));
-    make_words(first, slab);
-    reduce(slab, Reduction::kMin, who);
-  }
-  team_.finish_reductions();
-  num_hits_ = static_cast<std::uint64_t>(
-      std::ranges::count_if(words_, [](std::uint64_t word) { return word >> 32 != kNoPlace; }));
-  composition_.ms += ms_since(begin);
+void BrickRenderer::compose(Receiver who, const MakeWords &make, const TakeWords &take) {
+  std::atomic<std::uint64_t> num_hits = 0;
+  reduce(renderer_.size().num_rays(), Reduction::kMin, who, make,
+         [&](std::size_t begin, std::span<const std::uint64_t> words) {
+           take(begin, words);
+           num_hits += static_cast<std::uint64_t>(std::ranges::count_if(
+               words, [](std::uint64_t word) { return word >> 32 != kNoPlace; }));
+         });
+  num_hits_ = num_hits;
 }
 
 std::vector<HitRecord> BrickRenderer::compose_hits(std::span<const HitRecord> own,
@@ -184,11 +181,13 @@ std::vector<HitRecord> BrickRenderer::compose_hits(std::span<const HitRecord> ow
   std::vector<HitRecord> hits(receives ? own.size() : 0, no_hit());
   for (const HitField field : fields) {
     compose(
+        who,
         [&](std::size_t begin, std::span<std::uint64_t> words) {
           field_words(own.subspan(begin, words.size()), field, place_, words);
         },
-        who);
-    set_field(words_, field, hits);
+        [&](std::size_t begin, std::span<const std::uint64_t> words) {
+          set_field(words, field, std::span(hits).subspan(begin, words.size()));
+        });
   }
   return hits;
 }
@@ -209,12 +208,17 @@ Image8 BrickRenderer::shade(const Appearance &appearance) {
     return image;
   }
   const std::vector<std::uint32_t> colors = renderer_.shade_packed(appearance);
+  Image8 image;
+  if (receives) image = {size.width, size.height, 3, std::vector<std::uint8_t>(3 * colors.size())};
   compose(
+      Receiver::kRank0,
       [&](std::size_t begin, std::span<std::uint64_t> words) {
         color_words(std::span(colors).subspan(begin, words.size()), place_, words);
       },
-      Receiver::kRank0);
-  return receives ? image_of(words_, size.width, size.height) : Image8{};
+      [&](std::size_t begin, std::span<const std::uint64_t> words) {
+        set_colors(words, begin, image);
+      });
+  return image;
 }
 
 std::vector<float> BrickRenderer::depth() {

@@ -57,17 +57,18 @@ class BrickRenderer {
   std::optional<BlockBox> surface_box(std::span<const float> isovalues) {
     return renderer_.surface_box(isovalues);
   }
+  /// See Renderer::clear_cache().
+  void clear_cache() { renderer_.clear_cache(); }
   const Renderer &renderer() const { return renderer_; }
   const CompositionStats &composition() const { return composition_; }
 
  private:
-  using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
-
   FrameStats render_in_step(const FrameRequest &request);
   void add_ambient(const FrameRequest &request, FrameStats &stats);
-  void reduce(std::span<std::uint64_t> words, Reduction how, Receiver who);
-  /// In slabs: while one is on its way, the next is made.
-  void compose(const MakeWords &make_words, Receiver who);
+  void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+              const TakeWords &take);
+  /// A word of each ray.
+  void compose(Receiver who, const MakeWords &make, const TakeWords &take);
   /// Of bricks' hits, those that win.
   std::vector<HitRecord> compose_hits(std::span<const HitRecord> own,
                                       std::span<const HitField> fields,
@@ -78,10 +79,9 @@ class BrickRenderer {
   const Cuts &cuts_;
   std::vector<VolumeInfo> whole_levels_;
   Team &team_;
-  std::uint32_t place_ = 0;           ///< of the brick, seen from the frame's eye
-  std::vector<HitRecord> own_hits_;   ///< empty: not read yet
-  bool has_whole_ = false;            ///< the renderer has the hits of all bricks already
-  std::vector<std::uint64_t> words_;  ///< [ray]; at rank 0 the smallest ones
+  std::uint32_t place_ = 0;          ///< of the brick, seen from the frame's eye
+  std::vector<HitRecord> own_hits_;  ///< empty: not read yet
+  bool has_whole_ = false;           ///< the renderer has the hits of all bricks already
   std::uint64_t num_hits_ = 0;
   CompositionStats composition_;
   std::optional<TimedFrames> timed_frames_;

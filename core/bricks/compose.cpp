@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstring>
 
 namespace isowave::core {
 
@@ -38,19 +39,22 @@ void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
   });
 }
 
-Image8 image_of(std::span<const std::uint64_t> words, std::uint32_t width, std::uint32_t height) {
-  Image8 image{width, height, 3, {}};
-  image.pixels.reserve(3 * words.size());
+void set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image) {
+  static_assert(std::endian::native == std::endian::little);
+  std::uint8_t *to = image.pixels.data() + 3 * begin;
+  // Four pixels at once are 12 bytes, of which compilers make two stores.
+  for (; words.size() >= 4; words = words.subspan(4), to += 12) {
+    constexpr std::uint64_t kColor = 0xFFFFFF;
+    const std::uint64_t head =
+        (words[0] & kColor) | (words[1] & kColor) << 24 | (words[2] & 0xFFFF) << 48;
+    const auto tail = static_cast<std::uint32_t>((words[2] & kColor) >> 16 | words[3] << 8);
+    std::memcpy(to, &head, sizeof(head));
+    std::memcpy(to + sizeof(head), &tail, sizeof(tail));
+  }
   for (const std::uint64_t word : words) {
     for (int channel = 0; channel < 3; ++channel)
-      image.pixels.push_back(static_cast<std::uint8_t>(word >> (8 * channel)));
+      *to++ = static_cast<std::uint8_t>(word >> (8 * channel));
   }
-  return image;
-}
-
-void keep_first(std::span<std::uint64_t> words, std::span<const std::uint64_t> others) {
-  std::ranges::transform(words, others, words.begin(),
-                         [](std::uint64_t a, std::uint64_t b) { return std::min(a, b); });
 }
 
 }  // namespace isowave::core

@@ -33,10 +33,7 @@ void set_field(std::span<const std::uint64_t> words, HitField field, std::span<H
 /// words [ray]: a brick's picture, of one ray a pixel, as Renderer::shade_packed() has it.
 void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words);
-/// The picture that won, RGB.
-Image8 image_of(std::span<const std::uint64_t> words, std::uint32_t width, std::uint32_t height);
-
-/// What MPI_MIN does: keeps the smaller of both words of each ray, in `words`.
-void keep_first(std::span<std::uint64_t> words, std::span<const std::uint64_t> others);
+/// Gives an RGB picture's pixels from `begin` on the colours that won.
+void set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image);
 
 }  // namespace isowave::core

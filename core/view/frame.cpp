@@ -84,6 +84,10 @@ void check_drawable(const VolumeInfo &info, std::string_view what) {
   if (const std::uint64_t count = blocks.x * blocks.y * blocks.z; count >= ISO_MAX_BLOCK_IDS)
     throw Error("{}: a volume of {} blocks cannot be drawn: block ids end at {}", what, count,
                 ISO_MAX_BLOCK_IDS);
+  check_distances(info, what);
+}
+
+void check_distances(const VolumeInfo &info, std::string_view what) {
   // t in world units is a float32, and so is the power of two by which the kernels' t is multiplied
   // to become it (below). An eye is at most 1e7 voxels off and dims are at most 2^16, so t is at
   // most 2^25 voxels' longest edges; and nothing that matters is nearer than 2^-24 of the shortest.
@@ -107,7 +111,7 @@ View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size) {
   check_volume_info(info, "the volume");
   check_camera(camera, "the camera");
   check_image_size(size);
-  check_drawable(info, "the volume");
+  check_distances(info, "the volume");
 
   const glm::dmat3 world_to_index = glm::inverse(info.index_to_world());
   const glm::dvec3 eye = world_to_index * (camera.eye - info.origin);

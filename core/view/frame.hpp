@@ -48,6 +48,10 @@ inline std::uint64_t num_macrocells(const BlockGrid &grid) {
 /// what    names the volume
 /// Throws  Error: distances within the volume, or directions, do not fit float32, or its origin is
 ///         so far away that voxels are lost beside it
+void check_distances(const VolumeInfo &info, std::string_view what);
+/// For volumes that one device draws, be it as a brick of a larger one.
+///
+/// Throws  Error: as check_distances(); more blocks than have ids
 void check_drawable(const VolumeInfo &info, std::string_view what);
 
 BlockGrid make_grid(const VolumeInfo &info);
@@ -59,7 +63,7 @@ FrameParams make_grid_params(const VolumeInfo &info);
 /// Computes the camera basis once, in double, and maps it to index space.
 ///
 /// camera  in world space
-/// Throws  Error: a degenerate camera, or one too far away; what check_drawable() or
+/// Throws  Error: a degenerate camera, or one too far away; what check_distances() or
 ///         check_image_size() refuses
 View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size);
 

@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <climits>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +20,7 @@
 #include <thread>
 
 #include "core/base/error.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
@@ -47,20 +49,152 @@ void for_pieces(std::span<Byte> bytes, const Use &use) {
     use(bytes.first(std::min(bytes.size(), kMostBytes)));
 }
 
+/// Words of the processes of one host, in memory that all of them see. So they are reduced without
+/// a copy, by all processes and their threads.
+class HostWords {
+ public:
+  /// With ISOWAVE_HOST_RANKS=N, no more than N processes share memory, as if a host had no more.
+  HostWords() {
+    int world_rank = 0;
+    MPI_Comm_rank(MPI_COMM_WORLD, &world_rank);
+    MPI_Comm host = MPI_COMM_NULL;
+    MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, world_rank, MPI_INFO_NULL, &host);
+    MPI_Comm_rank(host, &local_rank_);
+    const char *most = std::getenv("ISOWAVE_HOST_RANKS");
+    const int most_ranks = most != nullptr ? std::max(std::atoi(most), 1) : INT_MAX;
+    MPI_Comm_split(host, local_rank_ / most_ranks, local_rank_, &comm_);
+    MPI_Comm_free(&host);
+    MPI_Comm_rank(comm_, &rank_);
+    MPI_Comm_size(comm_, &size_);
+  }
+  ~HostWords() {
+    if (window_ != MPI_WIN_NULL) {
+      MPI_Win_unlock_all(window_);
+      MPI_Win_free(&window_);
+    }
+    MPI_Comm_free(&comm_);
+  }
+  HostWords(const HostWords &) = delete;
+  HostWords &operator=(const HostWords &) = delete;
+
+  int local_rank() const { return local_rank_; }  ///< among all processes of the host
+  bool is_first() const { return rank_ == 0; }
+
+  /// Words that each process has room for here. All must ask alike: the first time makes it.
+  std::size_t capacity() {
+    if (capacity_ == 0) allocate();
+    return capacity_;
+  }
+  /// Of the host's first process: for those of all.
+  std::span<std::uint64_t> first() const { return segments_.front(); }
+
+  /// Reduces words [begin, begin + count), no more than capacity(). use: takes the outcome, at the
+  /// host's first process.
+  void reduce(std::size_t begin, std::size_t count, Reduction how, const MakeWords &make,
+              const TakeWords &use) {
+    if (!is_first()) {
+      const std::span<std::uint64_t> own = segments_[static_cast<std::size_t>(rank_)];
+      for_parts(0, count, [&](std::size_t from, std::size_t size) {
+        make(begin + from, own.subspan(from, size));
+      });
+    }
+    wait_for_all();
+    if (size_ > 2) reduce_others(count, how);
+    if (is_first()) {
+      // While words are in the processor's cache.
+      for_parts(0, count, [&](std::size_t from, std::size_t size) {
+        std::array<std::uint64_t, kPartWords> buffer;
+        const auto words = std::span(buffer).first(size);
+        make(begin + from, words);
+        if (size_ > 1) reduce_into(words, segments_[1].subspan(from, size), how);
+        use(begin + from, words);
+      });
+    }
+    wait_for_all();
+  }
+
+  /// Calls body(from, size) for parts of [begin, end), from several threads.
+  template <class Body>
+  static void for_parts(std::size_t begin, std::size_t end, const Body &body) {
+    // A thread takes several: waking one for less takes longer than the work.
+    constexpr std::size_t kParts = 8, kThreadWords = kParts * kPartWords;
+    parallel_for((end - begin + kThreadWords - 1) / kThreadWords, 0,
+                 [&](std::uint64_t i, std::uint32_t) {
+                   const std::size_t first = begin + i * kThreadWords;
+                   const std::size_t last = std::min(first + kThreadWords, end);
+                   for (std::size_t from = first; from < last; from += kPartWords)
+                     body(from, std::min(kPartWords, last - from));
+                 });
+  }
+
+  void wait_for_all() {
+    if (size_ == 1) return;
+    MPI_Request request = MPI_REQUEST_NULL;
+    MPI_Win_sync(window_);
+    MPI_Ibarrier(comm_, &request);
+    wait_for({&request, 1});
+    MPI_Win_sync(window_);
+  }
+
+ private:
+  static constexpr std::size_t kPartWords = std::size_t{1} << 11;
+
+  /// Of all processes but the first: each reduces its share of the words, into the second's.
+  void reduce_others(std::size_t count, Reduction how) {
+    if (!is_first()) {
+      const auto share = [&](int number) {
+        return count * static_cast<std::size_t>(number) / static_cast<std::size_t>(size_ - 1);
+      };
+      for_parts(share(rank_ - 1), share(rank_), [&](std::size_t from, std::size_t size) {
+        for (std::size_t other = 2; other < segments_.size(); ++other)
+          reduce_into(segments_[1].subspan(from, size), segments_[other].subspan(from, size), how);
+      });
+    }
+    wait_for_all();
+  }
+
+  void allocate() {
+    // Containers often have but 64 MiB of shared memory.
+    constexpr std::size_t kHostWords = std::size_t{1} << 22, kMostWords = std::size_t{1} << 20;
+    std::uint64_t count = std::min(kHostWords / static_cast<std::size_t>(size_), kMostWords);
+    // Pieces are the same at all hosts.
+    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_UINT64_T, MPI_MIN, MPI_COMM_WORLD);
+    capacity_ = count;
+    std::uint64_t *base = nullptr;
+    MPI_Win_allocate_shared(static_cast<MPI_Aint>(count * sizeof(std::uint64_t)),
+                            sizeof(std::uint64_t), MPI_INFO_NULL, comm_, &base, &window_);
+    MPI_Win_lock_all(MPI_MODE_NOCHECK, window_);
+    for (int rank = 0; rank < size_; ++rank) {
+      MPI_Aint bytes = 0;
+      int unit = 0;
+      MPI_Win_shared_query(window_, rank, &bytes, &unit, &base);
+      segments_.emplace_back(base, count);
+    }
+  }
+
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  MPI_Win window_ = MPI_WIN_NULL;
+  int local_rank_ = 0, rank_ = 0, size_ = 1;
+  std::size_t capacity_ = 0;
+  std::vector<std::span<std::uint64_t>> segments_;  ///< by rank
+};
+
 /// MPI's own handler of errors ends the job.
 class MpiTeam : public Team {
  public:
   MpiTeam() {
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &size_);
-    MPI_Comm host = MPI_COMM_NULL;
-    MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host);
-    MPI_Comm_rank(host, &local_rank_);
-    MPI_Comm_free(&host);
+    MPI_Comm_split(MPI_COMM_WORLD, host_.is_first() ? 0 : MPI_UNDEFINED, rank_, &hosts_);
+    if (hosts_ != MPI_COMM_NULL) MPI_Comm_size(hosts_, &num_hosts_);
+    MPI_Bcast(&num_hosts_, 1, MPI_INT, 0, MPI_COMM_WORLD);
+  }
+  ~MpiTeam() override {
+    if (hosts_ != MPI_COMM_NULL) MPI_Comm_free(&hosts_);
   }
   std::uint32_t rank() const override { return static_cast<std::uint32_t>(rank_); }
   std::uint32_t size() const override { return static_cast<std::uint32_t>(size_); }
-  std::uint32_t local_rank() const { return static_cast<std::uint32_t>(local_rank_); }
+  std::uint32_t local_rank() const { return static_cast<std::uint32_t>(host_.local_rank()); }
 
   std::vector<std::string> all_gather(const std::string &text) override {
     const auto count = static_cast<std::size_t>(size_);
@@ -87,22 +221,31 @@ class MpiTeam : public Team {
     return texts;
   }
 
-  void begin_reduction(std::span<std::uint64_t> words, Reduction how, Receiver who) override {
-    requests_.push_back(MPI_REQUEST_NULL);
-    const int count = static_cast<int>(words.size());
-    MPI_Op op = how == Reduction::kMin ? MPI_MIN : MPI_BOR;
-    if (who == Receiver::kAll) {
-      MPI_Iallreduce(MPI_IN_PLACE, words.data(), count, MPI_UINT64_T, op, MPI_COMM_WORLD,
-                     &requests_.back());
-    } else {
-      MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : words.data(), words.data(), count, MPI_UINT64_T, op,
-                  0, MPI_COMM_WORLD, &requests_.back());
+  /// Within hosts first, then between their first processes, which work on a piece while the hosts
+  /// make the next one.
+  void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+              const TakeWords &take) override {
+    const std::size_t capacity = host_.capacity();
+    std::array<Piece, 2> pieces;
+    std::size_t number = 0;
+    for (std::size_t begin = 0; begin < count; begin += capacity, ++number) {
+      const std::size_t size = std::min(capacity, count - begin);
+      if (who == Receiver::kAll) {
+        reduce_for_all(begin, size, how, make, take);
+      } else if (num_hosts_ == 1) {
+        host_.reduce(begin, size, how, make, take);
+      } else {
+        Piece &piece = pieces[number % 2];
+        finish(piece, take);
+        piece.begin = begin;
+        piece.words.resize(host_.is_first() ? size : 0);
+        host_.reduce(begin, size, how, make, copy_to(piece.words, begin));
+        if (!host_.is_first()) continue;
+        MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : piece.words.data(), piece.words.data(),
+                    static_cast<int>(size), MPI_UINT64_T, to_op(how), 0, hosts_, &piece.request);
+      }
     }
-  }
-
-  void finish_reductions() override {
-    wait_for(requests_);
-    requests_.clear();
+    for (std::size_t i = 0; i < 2; ++i) finish(pieces[(number + i) % 2], take);
   }
 
   void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received) override {
@@ -125,8 +268,49 @@ class MpiTeam : public Team {
   }
 
  private:
-  int rank_ = 0, size_ = 1, local_rank_ = 0;
-  std::vector<MPI_Request> requests_;
+  struct Piece {
+    std::size_t begin = 0;
+    std::vector<std::uint64_t> words;
+    MPI_Request request = MPI_REQUEST_NULL;
+  };
+
+  /// Words from `begin` on.
+  static TakeWords copy_to(std::span<std::uint64_t> words, std::size_t begin) {
+    return [words, begin](std::size_t from, std::span<const std::uint64_t> part) {
+      std::ranges::copy(part, words.subspan(from - begin, part.size()).begin());
+    };
+  }
+
+  void reduce_for_all(std::size_t begin, std::size_t size, Reduction how, const MakeWords &make,
+                      const TakeWords &take) {
+    const std::span<std::uint64_t> words = host_.first().first(size);
+    host_.reduce(begin, size, how, make, copy_to(words, begin));
+    if (num_hosts_ > 1 && host_.is_first()) {
+      MPI_Request request = MPI_REQUEST_NULL;
+      MPI_Iallreduce(MPI_IN_PLACE, words.data(), static_cast<int>(size), MPI_UINT64_T, to_op(how),
+                     hosts_, &request);
+      wait_for({&request, 1});
+    }
+    host_.wait_for_all();
+    HostWords::for_parts(0, size, [&](std::size_t from, std::size_t count) {
+      take(begin + from, words.subspan(from, count));
+    });
+    host_.wait_for_all();
+  }
+
+  static MPI_Op to_op(Reduction how) { return how == Reduction::kMin ? MPI_MIN : MPI_BOR; }
+
+  void finish(Piece &piece, const TakeWords &take) const {
+    if (piece.words.empty()) return;
+    wait_for({&piece.request, 1});
+    if (rank_ == 0) take(piece.begin, piece.words);
+    piece.words.clear();
+  }
+
+  int rank_ = 0, size_ = 1;
+  HostWords host_;
+  MPI_Comm hosts_ = MPI_COMM_NULL;  ///< the hosts' first processes
+  int num_hosts_ = 1;
 };
 
 std::unique_ptr<MpiTeam> team_of_job;

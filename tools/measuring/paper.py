@@ -57,6 +57,25 @@ def paper(run):
     return rows
 
 
+DEVICE_FIELDS = (
+    "mixing_layer_256x256x256",
+    "shell_512x512x512",
+    "mixing_layer_512x512x512",
+)
+
+
+def devices(run):
+    """One row for each volume: what `isowave bench paper --quick` says, on any device."""
+    options = {"quick": True}
+    if run.options.quick:
+        options |= {"isovalues": 1, "views": 2, "size": "64x48"}
+    rows = []
+    for field in run.fields() if run.options.quick else DEVICE_FIELDS:
+        name, _ = make(run, field)
+        rows.append(measure(run, field, name, {}, (20, 235), options))
+    return rows
+
+
 def make(run, field):
     """The synthetic volume's file, and how many seconds making and compressing it took."""
     name, log = f"{field}.zfp", run.work / f"{field}.seconds"
@@ -196,6 +215,30 @@ def paper_passes(rows):
                 f"{m['n_spec']['median']:.0f}" if m["n_spec"] else "",
                 f"{m['n_spec']['mean']:.1f}" if m["n_spec"] else "",
                 f"{m['utilization_percent']['mean']:.1f} %",
+            )
+
+
+def by_device(measured):
+    """measured: of several devices, (name, rows)."""
+    yield (
+        "device",
+        "volume",
+        "`rays`: cold ms",
+        "next",
+        "`blocks`: cold ms",
+        "next",
+        "BCMC: cold ms",
+        "further frame",
+        "`rays`: MB",
+        "BCMC: MB",
+    )
+    for device, rows in measured:
+        for row in rows:
+            mesh = growing(row)
+            drawn = (of_rays(row, "rays"), of_rays(row, "blocks"), mesh)
+            times = [ms(m[kind]["median"]) for m in drawn for kind in ("cold_ms", "next_ms")]
+            yield device, subject(row), *times, mb(drawn[0]["device_bytes"]), mb(
+                mesh["device_bytes"]
             )
 
 

@@ -92,16 +92,20 @@ class Run:
         self.commands = []
         self.made = set()
 
-    def run(self, program, *arguments, remember=True, environment={}, **options):
+    def run(self, program, *arguments, remember=True, ranks=None, environment={}, **options):
         """The program's standard output. Throws Failed with the last line that it said.
 
+        ranks        started by mpirun, so many times
         environment  variables beside those of this process
         """
         path = self.options.programs / program
+        mpirun = (
+            ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)] if ranks else []
+        )
         if remember:
-            self.remember(program, *arguments, environment=environment, **options)
+            self.remember(program, *arguments, mpirun=mpirun, environment=environment, **options)
         arguments = [*map(str, arguments), *as_arguments(options)]
-        command = [str(path), *arguments]
+        command = [*mpirun, str(path), *arguments]
         variables = os.environ | environment
         done = subprocess.run(command, cwd=self.work, env=variables, capture_output=True, text=True)
         if done.returncode:
@@ -110,10 +114,10 @@ class Run:
             raise Failed(f"{asked}: status {done.returncode}: {said[-1]}")
         return done.stdout
 
-    def remember(self, program, *arguments, environment={}, **options):
+    def remember(self, program, *arguments, mpirun=(), environment={}, **options):
         """As a command that has been run."""
         words = [f"{name}={pathlib.Path(value).name}" for name, value in environment.items()]
-        words += [pathlib.Path(program).name, *map(str, arguments), *as_arguments(options)]
+        words += [*mpirun, pathlib.Path(program).name, *map(str, arguments), *as_arguments(options)]
         self.commands.append(shlex.join(words))
 
     def read_json(self, name):

@@ -1,6 +1,7 @@
 """The sections that tools/measure knows: name -> function, and what each needs."""
 
-from measuring import accuracy, paper, speed
+from measuring import accuracy, bricks, paper, speed
+from measuring.run import AS_CPU
 
 SECTIONS = {
     section.__name__: section
@@ -22,6 +23,8 @@ SECTIONS = {
         speed.cpus,
         speed.peer,
         paper.paper,
+        paper.devices,
+        bricks.bricks,
         accuracy.bits,
         accuracy.oracles,
         accuracy.certified,
@@ -32,7 +35,6 @@ SECTIONS = {
     )
 }
 NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto")
-# Built only with -DISOWAVE_BUILD_PEER=ON.
-NEED_PEER = ("peer",)
-# With -DISOWAVE_BUILD_TESTS=ON, and PoCL as the device.
-NEED_POCL = ("cpus",)
+# What some need beside isowave, frame_bench and isowave_bench: built only with VTK, with MPI, or
+# with tests.
+PROGRAMS = {"peer": "bench/peer_bench", "bricks": "bench/brick_bench", "cpus": AS_CPU}

@@ -4,7 +4,7 @@ its own, the head first."""
 import pathlib
 import statistics
 
-from measuring import paper
+from measuring import bricks, paper
 
 
 def ms(value):
@@ -480,6 +480,8 @@ TABLES = {
         ("cpus", cpus),
         ("peer", peer),
         ("paper", *paper.TABLES),
+        ("devices", paper.by_device),
+        ("bricks", bricks.in_bricks),
         ("bits", bits),
         ("oracles", oracles),
         ("certified", certified),
@@ -490,3 +492,5 @@ TABLES = {
     )
     for table in tables
 }
+# Their rows are (name of the device, rows), of one or more.
+OF_SEVERAL_DEVICES = ("by_device",)

@@ -1,0 +1,210 @@
+// brick_bench: whole frames of a volume in bricks, one for each process that mpirun starts.
+//
+//   mpirun -n 2 brick_bench generate:mixing_layer_2048x2048x3840_uint8 -i 128 --json bricks.json
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <optional>
+
+#include "bench/run_info.hpp"
+#include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
+#include "core/bricks/brick_renderer.hpp"
+#include "core/bricks/brick_volume.hpp"
+#include "core/bricks/ranks.hpp"
+#include "core/volume/range_thresholds.hpp"
+#include "tools/isowave/mpi_team.hpp"
+#include "tools/isowave/outputs.hpp"
+#include "tools/isowave/program.hpp"
+#include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/renderer_options.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::core::bench {
+
+namespace {
+
+using nlohmann::ordered_json;
+using std::chrono::steady_clock;
+
+struct Options {
+  std::string volume, device, json;
+  tools::VolumeOptions volume_options;
+  float isovalue = 128;
+  tools::CompressionOptions compression{.rate = 4};
+  std::uint32_t orbit = 10, rounds = 3;
+  std::vector<std::uint32_t> size = {1280, 720};
+  tools::RendererFlags renderer;
+};
+
+/// The only process there is.
+class TeamOfOne : public Team {
+ public:
+  std::uint32_t rank() const override { return 0; }
+  std::uint32_t size() const override { return 1; }
+  std::vector<std::string> all_gather(const std::string &text) override { return {text}; }
+  void reduce(std::size_t count, Reduction, Receiver, const MakeWords &make,
+              const TakeWords &take) override {
+    reduce_in_pieces(count, true, make, take, [](std::span<std::uint64_t>) {});
+  }
+};
+
+/// ms of the frames of one kind.
+struct Times {
+  std::vector<double> frame;        ///< wall clock: until the slowest process is through
+  std::vector<double> own;          ///< until this one is
+  std::vector<double> composition;  ///< of the picture, by processes that begin at once
+  std::vector<double> passes;       ///< of this process
+};
+
+/// How far a view is from those of the orbit [degrees around the volume].
+Camera turned(const VolumeInfo &whole, std::uint32_t views, std::uint32_t view, bool is_next) {
+  constexpr std::uint32_t kDegrees = 360;
+  return orbit_cameras(whole, kDegrees)[(view * kDegrees / views + is_next) % kDegrees];
+}
+
+void draw(BrickRenderer &renderer, Team &team, const FrameRequest &request, Times &times) {
+  team.all_gather("");
+  const auto begin = steady_clock::now();
+  const FrameStats stats = renderer.render(request);
+  times.frame.push_back(ms_since(begin));
+  times.own.push_back(stats.total_ms);
+  times.passes.push_back(static_cast<double>(stats.passes.size()));
+  const double before = renderer.composition().ms;
+  renderer.shade({});
+  times.composition.push_back(renderer.composition().ms - before);
+}
+
+std::map<std::string, Times> measure_frames(BrickRenderer &renderer, Team &team,
+                                            const VolumeInfo &whole, const Options &options) {
+  const auto request_of = [&](std::uint32_t view, bool is_next) {
+    FrameRequest request;
+    request.camera = turned(whole, options.orbit, view, is_next);
+    request.isovalue = options.isovalue;
+    return request;
+  };
+  std::map<std::string, Times> kinds;
+  Times unused;
+  for (int i = 0; i < 2; ++i) draw(renderer, team, request_of(0, false), unused);
+  for (std::uint32_t round = 0; round < options.rounds; ++round) {
+    for (std::uint32_t view = 0; view < options.orbit; ++view) {
+      renderer.clear_cache();
+      draw(renderer, team, request_of(view, false), kinds["cold"]);
+      draw(renderer, team, request_of(view, false), kinds["warm"]);
+      draw(renderer, team, request_of(view, true), kinds["next"]);
+    }
+  }
+  return kinds;
+}
+
+/// One row of numbers for each process, of all of which rank 0 makes the report.
+void report(const Options &options, const std::string &command, ocl::Device &device,
+            const std::map<std::string, Times> &kinds, const ordered_json &of_rank, Team &team) {
+  ordered_json own = of_rank;
+  for (const auto &[kind, times] : kinds) {
+    own["frames"][kind] = {{"own_ms", spread_json(spread_of(times.own))},
+                           {"passes", median(times.passes)}};
+  }
+  own["memory"] = tools::memory_json(device.ledger());
+  own["host_peak"] = peak_memory();
+  const std::vector<std::string> all = team.all_gather(own.dump());
+  if (team.rank() != 0) return;
+  ordered_json json = {
+      {"program", "brick_bench"}, {"command", command}, {"date", utc_now()}, {"context", {}}};
+  for (const auto &[name, value] : run_info(device)) json["context"][name] = value;
+  json["volume"] = options.volume;
+  json["isovalue"] = options.isovalue;
+  json["size"] = options.size;
+  fmt::print("{}, {} bricks, ms: median (range)\n", options.volume, team.size());
+  for (const auto &[kind, times] : kinds) {
+    const Spread frame = spread_of(times.frame), composition = spread_of(times.composition);
+    json["frames"][kind] = {{"frame_ms", spread_json(frame)},
+                            {"composition_ms", spread_json(composition)}};
+    fmt::print("{:<6} {:8.2f} ({:.2f} to {:.2f}), composition {:.2f} ({:.2f} to {:.2f})\n", kind,
+               frame.median, frame.min, frame.max, composition.median, composition.min,
+               composition.max);
+  }
+  for (const std::string &text : all) json["ranks"].push_back(ordered_json::parse(text));
+  if (!options.json.empty()) tools::write_json(json, options.json);
+}
+
+void measure(const Options &options, const std::string &command, Team &team) {
+  const RawOverrides overrides = tools::to_overrides(options.volume_options);
+  std::optional<ocl::Device> device;
+  VolumeInfo whole;
+  CompressedVolume volume;
+  double load_ms = 0;
+  std::optional<Cuts> cuts;
+  std::vector<float> samples;
+  together(team, [&] {
+    tools::Outputs outputs;
+    outputs.read_volume(options.volume);
+    if (team.rank() == 0) outputs.write("--json", options.json);
+    device.emplace(choose_local_device(options.device, tools::MpiJob::local_rank()));
+    whole = read_levels(options.volume, overrides).front();
+  });
+  cuts.emplace(cut_for(team, whole, "", 1));
+  const BlockBox own = cuts->bricks()[team.rank()];
+  RendererOptions renderer_options =
+      tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1)});
+  together(team, [&] {
+    const auto begin = steady_clock::now();
+    volume =
+        tools::load_brick(options.volume, overrides, options.compression, whole, 1, own, &*device);
+    load_ms = ms_since(begin);
+    samples = range_samples(volume, whole);
+  });
+  renderer_options.range_thresholds = range_thresholds(gather(team, samples));
+  std::optional<BrickRenderer> renderer;
+  together(team, [&] { renderer.emplace(*device, volume, renderer_options, *cuts, whole, team); });
+  const auto kinds = measure_frames(*renderer, team, whole, options);
+  const ordered_json of_rank = {{"brick",
+                                 {{"begin", {own.begin.x, own.begin.y, own.begin.z}},
+                                  {"end", {own.end.x, own.end.y, own.end.z}}}},
+                                {"load_ms", load_ms},
+                                {"setup_ms", renderer->renderer().setup_ms()},
+                                {"stream_bytes", 4 * volume.words.size()}};
+  report(options, command, *device, kinds, of_rank, team);
+}
+
+void add_options(CLI::App &app, Options &options) {
+  app.add_option("VOLUME", options.volume, "a .zfp file, or " + std::string(tools::kVolumeHelp))
+      ->required();
+  tools::add_volume_options(app, options.volume_options);
+  app.add_option("--isovalue,-i", options.isovalue)->capture_default_str();
+  tools::add_compression_options(app, options.compression);
+  app.add_option("--size", options.size, "picture size WxH [1280x720]")
+      ->delimiter('x')
+      ->expected(2);
+  app.add_option("--orbit", options.orbit, "views around the volume")
+      ->check(CLI::Range(1u, 360u))
+      ->capture_default_str();
+  app.add_option("--rounds", options.rounds, "times that every view is drawn")
+      ->check(CLI::Range(1u, 100000u))
+      ->capture_default_str();
+  app.add_option("--device", options.device, "of the first process of a host: see isowave render");
+  tools::add_renderer_options(app, options.renderer);
+  app.add_option("--json", options.json, "also write everything to this file");
+}
+
+}  // namespace
+
+}  // namespace isowave::core::bench
+
+int main(int argc, char **argv) {
+  using namespace isowave::core;
+  tools::MpiJob job(&argc, &argv);
+  CLI::App app("Times whole frames of a volume in bricks, one for each process of mpirun.",
+               "brick_bench");
+  bench::Options options;
+  bench::add_options(app, options);
+  app.callback([&] {
+    bench::TeamOfOne alone;
+    Team *team = tools::MpiJob::team();
+    bench::measure(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
+                   team != nullptr ? *team : alone);
+  });
+  return job.finish(tools::run_program(app, argc, argv));
+}
