@@ -22,12 +22,12 @@ results=$work/top/results/a.json
 measured() { # OPTION...: into the results
   measure -o "$results" "$@" > "$work/out" || fail "$(cat "$work/out")"
 }
-measured --only frames,normals,error,time,stability,sweep,paper,devices
+measured --only frames,normals,error,time,stability,sweep,paper,devices,cpus
 measured --only storage,sizes,detail,solvers,pareto --volumes "$top/tests/data"
-tables=(front frames normals error time stability leaks storage sizes detail solvers solver_frames
-  pareto pareto_times paper_claims paper_stand_ins paper_passes paper_times paper_progress
-  paper_utilisation paper_scanned paper_limits paper_working_set paper_memory paper_blocks
-  paper_scaling by_device)
+tables=(front frames normals error time cpus stability leaks storage sizes detail solvers
+  solver_frames pareto pareto_times paper_claims paper_stand_ins paper_passes paper_times
+  paper_progress paper_utilisation paper_scanned paper_limits paper_working_set paper_memory
+  paper_blocks paper_scaling by_device)
 if [ -x "$programs/bench/peer_bench" ]; then
   measured --only peer
   tables+=(peer)

@@ -1,11 +1,15 @@
 #include "core/ocl/buffer.hpp"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <memory>
 #include <stdexcept>
 
 #include "core/base/error.hpp"
+#include "core/ocl/in_process.hpp"
 
 namespace isowave::core::ocl {
 
@@ -76,6 +80,40 @@ void enqueue_fill(Device &device, const cl::Buffer &mem, const void *pattern,
   }
 }
 
+/// Smaller ones take their bytes of a heap.
+constexpr std::size_t kLeastBytesInPages = 1u << 16;
+
+struct Pages {
+  std::size_t bytes;
+  void operator()(void *begin) const { ::munmap(begin, bytes); }
+};
+
+/// In pages of this process, all zero, which the system provides where they are written to.
+cl::Buffer make_in_pages(const cl::Context &context, std::size_t bytes) {
+  void *begin = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (begin == MAP_FAILED) throw cl::Error(CL_MEM_OBJECT_ALLOCATION_FAILURE, "mmap");
+  using Owner = std::unique_ptr<void, Pages>;
+  auto pages = std::make_unique<Owner>(begin, Pages{bytes});
+  cl::Buffer mem(context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, bytes, begin);
+  // Commands that are under way keep the buffer, and with it the pages.
+  mem.setDestructorCallback([](cl_mem, void *owner) { delete static_cast<Owner *>(owner); },
+                            pages.get());
+  static_cast<void>(pages.release());  // the buffer's now
+  return mem;
+}
+
+/// In the device's memory, all zero and really there. Waits.
+cl::Buffer make_filled(Device &device, std::size_t bytes) {
+  cl::Buffer mem(device.context(), CL_MEM_READ_WRITE, bytes);
+  // Not through the timer: allocating belongs to no stage. Wide patterns are faster where they
+  // fit.
+  constexpr std::array<std::byte, 4> kZero{};
+  const std::size_t pattern_bytes = bytes % kZero.size() == 0 ? kZero.size() : 1;
+  enqueue_fill(device, mem, kZero.data(), pattern_bytes, bytes, 0, nullptr);
+  device.queue().finish();
+  return mem;
+}
+
 }  // namespace
 
 RawBuffer::RawBuffer(Device &device, std::string name, std::size_t bytes)
@@ -87,13 +125,9 @@ RawBuffer::RawBuffer(Device &device, std::string name, std::size_t bytes)
                 name_, mebibytes(allocated), device.info().name, mebibytes(largest));
   }
   try {
-    cl::Buffer mem(device.context(), CL_MEM_READ_WRITE, allocated);
-    // Not through the timer: allocating belongs to no stage. Wide patterns are faster where they
-    // fit.
-    constexpr std::array<std::byte, 4> kZero{};
-    const std::size_t pattern_bytes = allocated % kZero.size() == 0 ? kZero.size() : 1;
-    enqueue_fill(device, mem, kZero.data(), pattern_bytes, allocated, 0, nullptr);
-    device.queue().finish();
+    const bool in_pages = allocated >= kLeastBytesInPages && is_in_process(device.info());
+    cl::Buffer mem =
+        in_pages ? make_in_pages(device.context(), allocated) : make_filled(device, allocated);
     device.ledger().add(name_, allocated);
     mem_ = std::move(mem);
     bytes_ = bytes;

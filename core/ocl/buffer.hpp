@@ -19,8 +19,8 @@ namespace isowave::core::ocl {
 /// A moved-from buffer holds nothing: size 0, no memory, not in the ledger.
 class RawBuffer {
  public:
-  /// Allocates `bytes` (at least 1 is allocated for 0), sets them to zero and waits: drivers
-  /// allocate lazily, and a budget counts only what is really there.
+  /// Allocates `bytes` (1 for 0), all zero, and waits: a budget counts what is really there. Where
+  /// the device is_in_process(), pages take no memory until they are written to.
   ///
   /// Throws  Error: the device cannot
   RawBuffer(Device &device, std::string name, std::size_t bytes);

@@ -9,6 +9,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/ocl/in_process.hpp"
 #include "core/render/stall_guard.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
@@ -272,6 +273,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
   compile_kernels();
   device.timer().collect();  // what was launched so far belongs to no frame; waits
   device.finish();
+  ocl::give_back_compiler(device.info());
   setup_ms_ = ms_since(setup_begin_) - (device.compile_ms() - compile_ms_before_);
 }
 

@@ -1,6 +1,7 @@
 """Runs the programs of a build for tools/measure, and knows which volumes are drawn."""
 
 import json
+import os
 import pathlib
 import re
 import shlex
@@ -13,6 +14,8 @@ GPU_VOLUMES = (
     "shell_1024x1024x1024",
     "mixing_layer_2048x2048x1920",
 )
+# tests/pocl_as_cpu.cpp, in the folder of the programs.
+AS_CPU = "tests/libpocl_as_cpu.so"
 CPU_VOLUMES = ("mixing_layer_256x256x256", "mixing_layer_512x512x512")
 QUICK_VOLUMES = ("mixing_layer_32x32x32", "shell_32x32x32")
 # Isovalues are those of tools/test-volumes.
@@ -89,29 +92,32 @@ class Run:
         self.commands = []
         self.made = set()
 
-    def run(self, program, *arguments, remember=True, ranks=None, **options):
+    def run(self, program, *arguments, remember=True, ranks=None, environment={}, **options):
         """The program's standard output. Throws Failed with the last line that it said.
 
-        ranks  started by mpirun, so many times
+        ranks        started by mpirun, so many times
+        environment  variables beside those of this process
         """
         path = self.options.programs / program
         mpirun = (
             ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)] if ranks else []
         )
         if remember:
-            self.remember(program, *arguments, mpirun=mpirun, **options)
+            self.remember(program, *arguments, mpirun=mpirun, environment=environment, **options)
         arguments = [*map(str, arguments), *as_arguments(options)]
         command = [*mpirun, str(path), *arguments]
-        done = subprocess.run(command, cwd=self.work, capture_output=True, text=True)
+        variables = os.environ | environment
+        done = subprocess.run(command, cwd=self.work, env=variables, capture_output=True, text=True)
         if done.returncode:
             said = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()
             asked = shlex.join([program, *arguments])
             raise Failed(f"{asked}: status {done.returncode}: {said[-1]}")
         return done.stdout
 
-    def remember(self, program, *arguments, mpirun=(), **options):
+    def remember(self, program, *arguments, mpirun=(), environment={}, **options):
         """As a command that has been run."""
-        words = [*mpirun, pathlib.Path(program).name, *map(str, arguments), *as_arguments(options)]
+        words = [f"{name}={pathlib.Path(value).name}" for name, value in environment.items()]
+        words += [*mpirun, pathlib.Path(program).name, *map(str, arguments), *as_arguments(options)]
         self.commands.append(shlex.join(words))
 
     def read_json(self, name):

@@ -1,6 +1,7 @@
 """The sections that tools/measure knows: name -> function, and what each needs."""
 
 from measuring import accuracy, bricks, paper, speed
+from measuring.run import AS_CPU
 
 SECTIONS = {
     section.__name__: section
@@ -19,6 +20,7 @@ SECTIONS = {
         speed.kernels,
         accuracy.watertight,
         accuracy.stability,
+        speed.cpus,
         speed.peer,
         paper.paper,
         paper.devices,
@@ -33,5 +35,6 @@ SECTIONS = {
     )
 }
 NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto")
-# What some need beside isowave, frame_bench and isowave_bench: built only with VTK, or with MPI.
-PROGRAMS = {"peer": "bench/peer_bench", "bricks": "bench/brick_bench"}
+# What some need beside isowave, frame_bench and isowave_bench: built only with VTK, with MPI, or
+# with tests.
+PROGRAMS = {"peer": "bench/peer_bench", "bricks": "bench/brick_bench", "cpus": AS_CPU}

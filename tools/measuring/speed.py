@@ -4,17 +4,23 @@ import re
 import statistics
 
 from measuring.run import (
+    AS_CPU,
     CPU_VOLUMES,
     GPU_VOLUMES,
     QUICK_VOLUMES,
+    Failed,
     as_arguments,
     voxels_of,
     what_was_measured,
 )
 
 
-def frame_row(run, field, storage=(), rounds=3, resident=False, **options):
-    """One row: what frame_bench says of an orbit around the volume. resident: with the floor."""
+def frame_row(run, field, storage=(), rounds=3, resident=False, environment={}, **options):
+    """One row: what frame_bench says of an orbit around the volume.
+
+    resident     with the floor
+    environment  of frame_bench, see Run.run()
+    """
     quick = run.options.quick
     volume = run.volume(field, *storage)
     if not resident:
@@ -27,6 +33,7 @@ def frame_row(run, field, storage=(), rounds=3, resident=False, **options):
         device=run.options.device,
         rounds=1 if quick else rounds,
         orbit=2 if quick else None,
+        environment=environment,
         **options,
         json="f.json",
     )
@@ -252,6 +259,43 @@ def kernels(run):
     return rows
 
 
+# As tests/pocl_as_cpu.cpp knows them; None: the machine's own.
+CPUS = (None, "haswell", "athlon64")
+
+
+def cpus(run):
+    """PoCL told to compile for CPUs that can do less than this one, in turns."""
+    turns = {}
+    for field in run.fields():
+        for cpu in 3 * (CPUS[:1] if run.options.quick else CPUS):
+            environment = {}
+            if cpu:
+                environment["LD_PRELOAD"] = str(run.options.programs / AS_CPU)
+                environment["POCL_AS_CPU"] = cpu
+                environment["POCL_CACHE_DIR"] = str(run.work / f"kernels_as_{cpu}")
+            row = frame_row(run, field, rounds=1, environment=environment)
+            device = run.read_json("f.json")["context"]["device"]
+            if cpu and not device.startswith(f"pthread-{cpu}-"):
+                raise Failed(f"PoCL does not compile for {cpu}: its device is {device}")
+            turns.setdefault((field, cpu, device), []).append(row)
+    return [
+        {
+            "volume": field,
+            "told": cpu,
+            "device": device,
+            **{
+                kind: {
+                    "median": statistics.median(row[kind]["median"] for row in rows),
+                    "min": min(row[kind]["min"] for row in rows),
+                    "max": max(row[kind]["max"] for row in rows),
+                }
+                for kind in ("cold", "next", "warm")
+            },
+        }
+        for (field, cpu, device), rows in turns.items()
+    ]
+
+
 def peer(run):
     quick = run.options.quick
     run.run(
@@ -280,6 +324,7 @@ def peer(run):
             },
             "open_ms": measured.get("open_ms"),
             "peak": measured["peak_byte_count"]["max"],
+            "of_files": measured["file_byte_count"]["max"],
             "views": {
                 "count": size["views"]["count"],
                 "total_ms": size["views"]["sides"][side]["total_ms"],

@@ -299,6 +299,25 @@ def leaks(rows):
         yield row["surface"], f"{row['rays']:,}", *(f"{row['leaks'][name]:,}" for name in solvers)
 
 
+def cpus(rows):
+    """Ratios are those of the machine's own CPU, of the same volume."""
+    kinds = ("cold", "next", "warm")
+    yield "volume", "kernels compiled for", "cold ms", "next", "warm", "of the first row's"
+    own = {}
+    for row in rows:
+        first = own.setdefault(row["volume"], row)
+        ratios = [row[kind]["median"] / first[kind]["median"] for kind in kinds]
+        yield (
+            name_of(row["volume"]),
+            row["device"].removeprefix("pthread-").rsplit("-", 1)[0],
+            *(
+                f"{ms(row[kind]['median'])} ({ms(row[kind]['min'])} to {ms(row[kind]['max'])})"
+                for kind in kinds
+            ),
+            "" if row is first else ", ".join(f"{ratio:.2f}" for ratio in ratios),
+        )
+
+
 def peer(rows):
     sides = {
         "host": "without OpenCL",
@@ -309,6 +328,7 @@ def peer(rows):
     }
     kinds = ("new", "new_kept", "warm", "next")
     views = next((row["views"]["count"] for row in rows if "views" in row), None)
+    with_files = all("of_files" in row for row in rows)
     yield (
         "volume",
         "side",
@@ -316,7 +336,7 @@ def peer(rows):
         "new isovalue, cache kept",
         "same view",
         "next view",
-        "memory of the process",
+        "memory of the process (of it files)" if with_files else "memory of the process",
         *((f"{views} views from a new isovalue on", "the peer is ahead") if views else ()),
     )
     for row in rows:
@@ -325,7 +345,10 @@ def peer(rows):
             f"{ms(one['median'])} ({ms(one['min'])} to {ms(one['max'])})" if one else ""
             for one in spreads
         ]
-        cells = [name_of(row["volume"]), sides[row["side"]], *times, mebibytes(row["peak"])]
+        memory = mebibytes(row["peak"])
+        if with_files:
+            memory += f" ({mebibytes(row['of_files'])})"
+        cells = [name_of(row["volume"]), sides[row["side"]], *times, memory]
         if views:
             counts = [count for count in row["views"]["overtaken_after"].values() if count]
             is_peer = row["side"].startswith("mesh")
@@ -454,6 +477,7 @@ TABLES = {
         ("kernels", kernels),
         ("watertight", watertight),
         ("stability", stability, leaks),
+        ("cpus", cpus),
         ("peer", peer),
         ("paper", *paper.TABLES),
         ("devices", paper.by_device),
