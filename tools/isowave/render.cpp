@@ -2,7 +2,6 @@
 // scalar twin.
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <charconv>
@@ -196,8 +195,8 @@ nlohmann::ordered_json DeviceFrames::bound_error(const fs::path &error_map) {
       with_commas(summary.num_uncertain), choice_.detail.voxel_pixels, choice_.detail.voxel_error,
       choice_.total_ms, certificate.total_ms);
   if (!choice_.reachable) {
-    spdlog::warn("most pixels cannot be kept within {} pixels: {}", *max_surface_error_,
-                 choice_.advice);
+    warn(fmt::format("most pixels cannot be kept within {} pixels: {}", *max_surface_error_,
+                     choice_.advice));
   }
   if (!error_map.empty())
     write_npy({renderer_.options().size.ray_columns(), renderer_.options().size.ray_rows(),
@@ -368,11 +367,10 @@ std::unique_ptr<ocl::Device> open_device(const RenderArgs &options, const ocl::D
   fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
              info.name, info.platform);
   if (!info.capabilities.correctly_rounded_divide) {
-    spdlog::warn(
-        "{} does not promise correctly rounded division: pictures may differ from other devices' "
-        "in last "
-        "bits",
-        info.name);
+    warn(
+        fmt::format("{} does not promise correctly rounded division: pictures may differ from "
+                    "other devices' in last bits",
+                    info.name));
   }
   return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
 }
