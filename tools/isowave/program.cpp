@@ -2,8 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -95,8 +93,8 @@ std::string command_name(const CLI::App &app) {
   return name;
 }
 
-void print_line(const CLI::App &app, const std::string &text) {
-  const std::string line = fmt::format("{}: {}\n", app.get_name(), one_line(text));
+void print_line(const std::string &name, const std::string &text) {
+  const std::string line = fmt::format("{}: {}\n", name, one_line(text));
   std::fwrite(line.data(), 1, line.size(), stderr);  // nobody can be told where that fails
 }
 
@@ -105,9 +103,6 @@ void print_line(const CLI::App &app, const std::string &text) {
 int run_program(CLI::App &app, int argc, char **argv) {
   open_standard_streams();
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow further is an error like any other
-  // Standard output is for results.
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
-      "", std::make_shared<spdlog::sinks::stderr_color_sink_mt>()));
   std::optional<std::string> message;
   int status = 1;
   try {
@@ -128,12 +123,16 @@ int run_program(CLI::App &app, int argc, char **argv) {
   }
   if (const auto failure = finish_output()) message = failure;
   if (message) {
-    print_line(app, *message);
+    print_line(app.get_name(), *message);
     return 1;
   }
   if (const std::string notice = ocl::cache_notice(); status == 0 && !notice.empty())
-    print_line(app, notice);
+    print_line(app.get_name(), notice);
   return status;
+}
+
+void warn(const std::string &text) {
+  print_line("isowave", "warning: " + text);
 }
 
 std::string program_name() {

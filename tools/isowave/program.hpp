@@ -20,6 +20,9 @@ inline constexpr std::pair<int, const char *> kExitStatuses[] = {
     {1, "wrong input, a failure (one line on standard error says which), or a check that failed"},
     {130, "interrupted (Ctrl-C): no output is left half-written"}};
 
+/// Prints "isowave: warning: TEXT" on standard error, where results are not.
+void warn(const std::string &text);
+
 /// "isowave 0.1.0"
 std::string program_name();
 

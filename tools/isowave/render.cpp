@@ -2,7 +2,6 @@
 // scalar twin.
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <charconv>
@@ -145,8 +144,8 @@ nlohmann::ordered_json report_error(double max_surface_error, const DetailChoice
       with_commas(summary.num_uncertain), choice.detail.voxel_pixels, choice.detail.voxel_error,
       choice.total_ms, certificate.total_ms);
   if (!choice.reachable) {
-    spdlog::warn("most pixels cannot be kept within {} pixels: {}", max_surface_error,
-                 choice.advice);
+    warn(fmt::format("most pixels cannot be kept within {} pixels: {}", max_surface_error,
+                     choice.advice));
   }
   if (!error_map.empty())
     write_npy({size.ray_columns(), size.ray_rows(), certificate.bounds}, error_map);
@@ -371,11 +370,10 @@ std::unique_ptr<ocl::Device> open_device(const RenderArgs &options, const ocl::D
   fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
              info.name, info.platform);
   if (!info.capabilities.correctly_rounded_divide) {
-    spdlog::warn(
-        "{} does not promise correctly rounded division: pictures may differ from other devices' "
-        "in last "
-        "bits",
-        info.name);
+    warn(
+        fmt::format("{} does not promise correctly rounded division: pictures may differ from "
+                    "other devices' in last bits",
+                    info.name));
   }
   return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
 }
