@@ -4,9 +4,11 @@
 
 #include <fcntl.h>
 #include <mpi.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <climits>
@@ -15,6 +17,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 #include <thread>
@@ -53,38 +56,38 @@ void for_pieces(std::span<Byte> bytes, const Use &use) {
 /// a copy, by all processes and their threads.
 class HostWords {
  public:
-  /// With ISOWAVE_HOST_RANKS=N, no more than N processes share memory, as if a host had no more.
+  /// All processes make one. With ISOWAVE_HOST_RANKS=N, no more than N share memory, as if a host
+  /// had no more; and each is alone where the host has no shared memory to give.
   HostWords() {
     int world_rank = 0;
     MPI_Comm_rank(MPI_COMM_WORLD, &world_rank);
     MPI_Comm host = MPI_COMM_NULL;
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, world_rank, MPI_INFO_NULL, &host);
-    MPI_Comm_rank(host, &local_rank_);
+    int local_rank = 0;
+    MPI_Comm_rank(host, &local_rank);
     const char *most = std::getenv("ISOWAVE_HOST_RANKS");
     const int most_ranks = most != nullptr ? std::max(std::atoi(most), 1) : INT_MAX;
-    MPI_Comm_split(host, local_rank_ / most_ranks, local_rank_, &comm_);
+    share(host, local_rank / most_ranks, local_rank);
+    if (size_ > 1 && !allocate()) share(host, local_rank, local_rank);
     MPI_Comm_free(&host);
-    MPI_Comm_rank(comm_, &rank_);
-    MPI_Comm_size(comm_, &size_);
+    capacity_ = num_words();
+    // Pieces are the same at all hosts.
+    MPI_Allreduce(MPI_IN_PLACE, &capacity_, 1, MPI_UINT64_T, MPI_MIN, MPI_COMM_WORLD);
+    if (size_ > 1) return;
+    alone_.resize(capacity_);
+    segments_ = {alone_};
   }
   ~HostWords() {
-    if (window_ != MPI_WIN_NULL) {
-      MPI_Win_unlock_all(window_);
-      MPI_Win_free(&window_);
-    }
+    if (memory_ != MAP_FAILED) ::munmap(memory_, num_bytes());
     MPI_Comm_free(&comm_);
   }
   HostWords(const HostWords &) = delete;
   HostWords &operator=(const HostWords &) = delete;
 
-  int local_rank() const { return local_rank_; }  ///< among all processes of the host
   bool is_first() const { return rank_ == 0; }
 
-  /// Words that each process has room for here. All must ask alike: the first time makes it.
-  std::size_t capacity() {
-    if (capacity_ == 0) allocate();
-    return capacity_;
-  }
+  /// Words that each process has room for here.
+  std::size_t capacity() const { return capacity_; }
   /// Of the host's first process: for those of all.
   std::span<std::uint64_t> first() const { return segments_.front(); }
 
@@ -130,14 +133,17 @@ class HostWords {
   void wait_for_all() {
     if (size_ == 1) return;
     MPI_Request request = MPI_REQUEST_NULL;
-    MPI_Win_sync(window_);
+    std::atomic_thread_fence(std::memory_order_seq_cst);
     MPI_Ibarrier(comm_, &request);
     wait_for({&request, 1});
-    MPI_Win_sync(window_);
+    std::atomic_thread_fence(std::memory_order_seq_cst);
   }
 
  private:
   static constexpr std::size_t kPartWords = std::size_t{1} << 11;
+  // Containers often have but 64 MiB of shared memory.
+  static constexpr std::size_t kHostWords = std::size_t{1} << 22;
+  static constexpr std::size_t kMostWords = std::size_t{1} << 20;  ///< of each process
 
   /// Of all processes but the first: each reduces its share of the words, into the second's.
   void reduce_others(std::size_t count, Reduction how) {
@@ -153,30 +159,57 @@ class HostWords {
     wait_for_all();
   }
 
-  void allocate() {
-    // Containers often have but 64 MiB of shared memory.
-    constexpr std::size_t kHostWords = std::size_t{1} << 22, kMostWords = std::size_t{1} << 20;
-    std::uint64_t count = std::min(kHostWords / static_cast<std::size_t>(size_), kMostWords);
-    // Pieces are the same at all hosts.
-    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_UINT64_T, MPI_MIN, MPI_COMM_WORLD);
-    capacity_ = count;
-    std::uint64_t *base = nullptr;
-    MPI_Win_allocate_shared(static_cast<MPI_Aint>(count * sizeof(std::uint64_t)),
-                            sizeof(std::uint64_t), MPI_INFO_NULL, comm_, &base, &window_);
-    MPI_Win_lock_all(MPI_MODE_NOCHECK, window_);
-    for (int rank = 0; rank < size_; ++rank) {
-      MPI_Aint bytes = 0;
-      int unit = 0;
-      MPI_Win_shared_query(window_, rank, &bytes, &unit, &base);
-      segments_.emplace_back(base, count);
+  void share(MPI_Comm host, int color, int local_rank) {
+    if (comm_ != MPI_COMM_NULL) MPI_Comm_free(&comm_);
+    MPI_Comm_split(host, color, local_rank, &comm_);
+    MPI_Comm_rank(comm_, &rank_);
+    MPI_Comm_size(comm_, &size_);
+  }
+
+  std::size_t num_words() const {
+    return std::min(kHostWords / static_cast<std::size_t>(size_), kMostWords);
+  }
+  std::size_t num_bytes() const {
+    return static_cast<std::size_t>(size_) * num_words() * sizeof(std::uint64_t);
+  }
+
+  /// False, at all processes, where one cannot. MPI's own shared memory leaves them waiting for
+  /// each other then.
+  bool allocate() {
+    std::array<char, 64> name{};
+    int file = -1;
+    if (is_first()) {
+      fmt::format_to_n(name.data(), name.size() - 1, "/isowave.{}", ::getpid());
+      file = ::shm_open(name.data(), O_CREAT | O_EXCL | O_RDWR, 0600);
+      if (file >= 0 && ::posix_fallocate(file, 0, static_cast<off_t>(num_bytes())) != 0) {
+        ::close(file);
+        file = -1;
+      }
     }
+    MPI_Bcast(name.data(), static_cast<int>(name.size()), MPI_CHAR, 0, comm_);
+    int is_there = file >= 0 ? 1 : 0;
+    MPI_Bcast(&is_there, 1, MPI_INT, 0, comm_);
+    if (is_there != 0 && !is_first()) file = ::shm_open(name.data(), O_RDWR, 0);
+    if (file >= 0) {
+      memory_ = ::mmap(nullptr, num_bytes(), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+      ::close(file);
+    }
+    is_there = memory_ != MAP_FAILED ? 1 : 0;
+    MPI_Allreduce(MPI_IN_PLACE, &is_there, 1, MPI_INT, MPI_LAND, comm_);
+    if (is_first()) ::shm_unlink(name.data());
+    if (is_there == 0) return false;
+    const std::span words(static_cast<std::uint64_t *>(memory_), num_bytes() / 8);
+    for (std::size_t begin = 0; begin < words.size(); begin += num_words())
+      segments_.push_back(words.subspan(begin, num_words()));
+    return true;
   }
 
   MPI_Comm comm_ = MPI_COMM_NULL;
-  MPI_Win window_ = MPI_WIN_NULL;
-  int local_rank_ = 0, rank_ = 0, size_ = 1;
-  std::size_t capacity_ = 0;
+  void *memory_ = MAP_FAILED;
+  int rank_ = 0, size_ = 1;
+  std::uint64_t capacity_ = 0;
   std::vector<std::span<std::uint64_t>> segments_;  ///< by rank
+  std::vector<std::uint64_t> alone_;                ///< of a process that shares with none
 };
 
 /// MPI's own handler of errors ends the job.
@@ -185,16 +218,17 @@ class MpiTeam : public Team {
   MpiTeam() {
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &size_);
-    MPI_Comm_split(MPI_COMM_WORLD, host_.is_first() ? 0 : MPI_UNDEFINED, rank_, &hosts_);
-    if (hosts_ != MPI_COMM_NULL) MPI_Comm_size(hosts_, &num_hosts_);
-    MPI_Bcast(&num_hosts_, 1, MPI_INT, 0, MPI_COMM_WORLD);
+    MPI_Comm host = MPI_COMM_NULL;
+    MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host);
+    MPI_Comm_rank(host, &local_rank_);
+    MPI_Comm_free(&host);
   }
   ~MpiTeam() override {
     if (hosts_ != MPI_COMM_NULL) MPI_Comm_free(&hosts_);
   }
   std::uint32_t rank() const override { return static_cast<std::uint32_t>(rank_); }
   std::uint32_t size() const override { return static_cast<std::uint32_t>(size_); }
-  std::uint32_t local_rank() const { return static_cast<std::uint32_t>(host_.local_rank()); }
+  std::uint32_t local_rank() const { return static_cast<std::uint32_t>(local_rank_); }
 
   std::vector<std::string> all_gather(const std::string &text) override {
     const auto count = static_cast<std::size_t>(size_);
@@ -225,7 +259,8 @@ class MpiTeam : public Team {
   /// make the next one.
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take) override {
-    const std::size_t capacity = host_.capacity();
+    if (!host_) meet_hosts();
+    const std::size_t capacity = host_->capacity();
     std::array<Piece, 2> pieces;
     std::size_t number = 0;
     for (std::size_t begin = 0; begin < count; begin += capacity, ++number) {
@@ -233,14 +268,14 @@ class MpiTeam : public Team {
       if (who == Receiver::kAll) {
         reduce_for_all(begin, size, how, make, take);
       } else if (num_hosts_ == 1) {
-        host_.reduce(begin, size, how, make, take);
+        host_->reduce(begin, size, how, make, take);
       } else {
         Piece &piece = pieces[number % 2];
         finish(piece, take);
         piece.begin = begin;
-        piece.words.resize(host_.is_first() ? size : 0);
-        host_.reduce(begin, size, how, make, copy_to(piece.words, begin));
-        if (!host_.is_first()) continue;
+        piece.words.resize(host_->is_first() ? size : 0);
+        host_->reduce(begin, size, how, make, copy_to(piece.words, begin));
+        if (!host_->is_first()) continue;
         MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : piece.words.data(), piece.words.data(),
                     static_cast<int>(size), MPI_UINT64_T, to_op(how), 0, hosts_, &piece.request);
       }
@@ -283,19 +318,19 @@ class MpiTeam : public Team {
 
   void reduce_for_all(std::size_t begin, std::size_t size, Reduction how, const MakeWords &make,
                       const TakeWords &take) {
-    const std::span<std::uint64_t> words = host_.first().first(size);
-    host_.reduce(begin, size, how, make, copy_to(words, begin));
-    if (num_hosts_ > 1 && host_.is_first()) {
+    const std::span<std::uint64_t> words = host_->first().first(size);
+    host_->reduce(begin, size, how, make, copy_to(words, begin));
+    if (num_hosts_ > 1 && host_->is_first()) {
       MPI_Request request = MPI_REQUEST_NULL;
       MPI_Iallreduce(MPI_IN_PLACE, words.data(), static_cast<int>(size), MPI_UINT64_T, to_op(how),
                      hosts_, &request);
       wait_for({&request, 1});
     }
-    host_.wait_for_all();
+    host_->wait_for_all();
     HostWords::for_parts(0, size, [&](std::size_t from, std::size_t count) {
       take(begin + from, words.subspan(from, count));
     });
-    host_.wait_for_all();
+    host_->wait_for_all();
   }
 
   static MPI_Op to_op(Reduction how) { return how == Reduction::kMin ? MPI_MIN : MPI_BOR; }
@@ -307,8 +342,16 @@ class MpiTeam : public Team {
     piece.words.clear();
   }
 
-  int rank_ = 0, size_ = 1;
-  HostWords host_;
+  /// Before the first reduction: not every job has one.
+  void meet_hosts() {
+    host_.emplace();
+    MPI_Comm_split(MPI_COMM_WORLD, host_->is_first() ? 0 : MPI_UNDEFINED, rank_, &hosts_);
+    if (hosts_ != MPI_COMM_NULL) MPI_Comm_size(hosts_, &num_hosts_);
+    MPI_Bcast(&num_hosts_, 1, MPI_INT, 0, MPI_COMM_WORLD);
+  }
+
+  int rank_ = 0, size_ = 1, local_rank_ = 0;
+  std::optional<HostWords> host_;
   MPI_Comm hosts_ = MPI_COMM_NULL;  ///< the hosts' first processes
   int num_hosts_ = 1;
 };
