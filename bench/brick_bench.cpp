@@ -39,18 +39,6 @@ struct Options {
   tools::RendererFlags renderer;
 };
 
-/// The only process there is.
-class TeamOfOne : public Team {
- public:
-  std::uint32_t rank() const override { return 0; }
-  std::uint32_t size() const override { return 1; }
-  std::vector<std::string> all_gather(const std::string &text) override { return {text}; }
-  void reduce(std::size_t count, Reduction, Receiver, const MakeWords &make,
-              const TakeWords &take) override {
-    reduce_in_pieces(count, true, make, take, [](std::span<std::uint64_t>) {});
-  }
-};
-
 /// ms of the frames of one kind.
 struct Times {
   std::vector<double> frame;        ///< wall clock: until the slowest process is through
@@ -203,7 +191,7 @@ int main(int argc, char **argv) {
   bench::Options options;
   bench::add_options(app, options);
   app.callback([&] {
-    bench::TeamOfOne alone;
+    TeamOfOne alone;
     Team *team = tools::MpiJob::team();
     bench::measure(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
                    team != nullptr ? *team : alone);
