@@ -3,9 +3,8 @@
 //
 //   LD_PRELOAD=libpocl_as_cpu.so POCL_AS_CPU=haswell PROGRAM
 //
-// POCL_AS_CPU  haswell (AVX2, no AVX-512) or athlon64 (SSE2 alone): names that PoCL gives such
-// CPUs,
-//              and its device then. Any other ends the process.
+// POCL_AS_CPU is haswell (AVX2, no AVX-512) or athlon64 (SSE2 alone), as PoCL calls such CPUs, and
+// its device then. Any other ends the process.
 //
 // A PoCL that has LLVM within itself, as that of Python's packages, does not ask: its device keeps
 // its name.
