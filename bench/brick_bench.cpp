@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 
+#include "bench/frame_measure.hpp"
 #include "bench/run_info.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
@@ -43,15 +44,9 @@ struct Options {
 struct Times {
   std::vector<double> frame;        ///< wall clock: until the slowest process is through
   std::vector<double> own;          ///< until this one is
-  std::vector<double> composition;  ///< of the picture, by processes that begin at once
+  std::vector<double> composition;  ///< of the picture, with the wait for other processes
   std::vector<double> passes;       ///< of this process
 };
-
-/// How far a view is from those of the orbit [degrees around the volume].
-Camera turned(const VolumeInfo &whole, std::uint32_t views, std::uint32_t view, bool is_next) {
-  constexpr std::uint32_t kDegrees = 360;
-  return orbit_cameras(whole, kDegrees)[(view * kDegrees / views + is_next) % kDegrees];
-}
 
 void draw(BrickRenderer &renderer, Team &team, const FrameRequest &request, Times &times) {
   team.all_gather("");
@@ -67,9 +62,10 @@ void draw(BrickRenderer &renderer, Team &team, const FrameRequest &request, Time
 
 std::map<std::string, Times> measure_frames(BrickRenderer &renderer, Team &team,
                                             const VolumeInfo &whole, const Options &options) {
+  const std::vector<Camera> cameras = orbit_cameras(whole, options.orbit);
   const auto request_of = [&](std::uint32_t view, bool is_next) {
     FrameRequest request;
-    request.camera = turned(whole, options.orbit, view, is_next);
+    request.camera = is_next ? turned(cameras[view]) : cameras[view];
     request.isovalue = options.isovalue;
     return request;
   };
