@@ -26,7 +26,12 @@ class ThreadProcess : public Processes {
     return meeting_.all_gather(rank_, bytes);
   }
   void reduce(std::span<std::uint64_t> words, Reduction how, bool for_all) override {
-    meeting_.reduce(rank_, words, how == Reduction::kOr, for_all);
+    using Of = core::Reduction;
+    meeting_.reduce(rank_, words,
+                    how == Reduction::kMin           ? Of::kMin
+                    : how == Reduction::kMinOfHalves ? Of::kMinOfHalves
+                                                     : Of::kOr,
+                    for_all);
   }
 
  private:

@@ -21,6 +21,7 @@
 namespace isowave::core {
 namespace {
 
+using test::camera_along;
 using test::TestVolume;
 
 class ThreadTeam : public Team {
@@ -35,7 +36,7 @@ class ThreadTeam : public Team {
               const TakeWords &take) override {
     const bool for_all = who == Receiver::kAll;
     reduce_in_pieces(count, for_all || rank_ == 0, make, take, [&](std::span<std::uint64_t> words) {
-      meeting_.reduce(rank_, words, how == Reduction::kOr, for_all);
+      meeting_.reduce(rank_, words, how, for_all);
     });
   }
 
@@ -105,6 +106,35 @@ TEST_P(BrickTeamOnDevice, BrickOfAVolumeWithMoreBlocksThanIds) {
   renderer.render({.camera = camera, .isovalue = kIsovalue});
   EXPECT_EQ(renderer.depth(), depth_of(test::twin_hits(volume, camera, kFrame, kIsovalue)));
   EXPECT_GT(renderer.num_hits(), 200u);
+}
+
+/// Half a word has not room for the places of so many.
+class FirstOfMany : public TeamOfOne {
+ public:
+  explicit FirstOfMany(std::uint32_t size) : size_(size) {}
+  std::uint32_t size() const override { return size_; }
+
+ private:
+  std::uint32_t size_;
+};
+
+TEST_P(BrickTeamOnDevice, AWordForEachColourOfManyBricks) {
+  for (const std::uint32_t size : {255u, 256u}) {
+    const Cuts cuts(blocks_along(volume_.info()), size);
+    const CompressedVolume brick = cut_brick(volume_.compressed, cuts.bricks().front());
+    FirstOfMany team(size);
+    ocl::Device device(GetParam());
+    FrameRequest request = request_;
+    request.camera = camera_along({-20, -18, -16}, {0.6, 0.5, 0.5});
+    Renderer alone(device, brick, {.size = kFrame});
+    alone.render(request);
+    BrickRenderer renderer(device, brick, {.size = kFrame}, cuts, {volume_.info()}, team);
+    renderer.render(request);
+    EXPECT_EQ(renderer.shade({}).pixels, alone.shade().pixels);
+    EXPECT_GT(renderer.num_hits(), 0u);
+    const std::uint64_t rays = kFrame.num_rays();
+    EXPECT_EQ(renderer.composition().bytes, size == 255 ? 8 * ((rays + 1) / 2) : 8 * rays);
+  }
 }
 
 std::size_t num_drawn(const Image8 &image) {

@@ -294,8 +294,8 @@ TEST_F(CliRanks, RefusedVoxelsAreCountedOnce) {
   EXPECT_EQ(folder_.num_files(), 1u);
 }
 
-/// Of 64 ranks each gives one word for each ray of a picture, whatever it has drawn.
-TEST_F(CliRanks, ManyRanksGiveOneWordForEachRay) {
+/// Of 64 ranks each gives half a word for each ray of a picture, whatever it has drawn.
+TEST_F(CliRanks, ManyRanksGiveHalfAWordForEachRay) {
   skip_unless_long();
   if (IsSkipped()) return;
   expect_same(kFuel, "-i 40 --size 32x24", 64);
@@ -308,7 +308,7 @@ TEST_F(CliRanks, ManyRanksGiveOneWordForEachRay) {
   ASSERT_EQ(stats["ranks"].size(), 64u);
   for (const auto &rank : stats["ranks"]) {
     EXPECT_EQ(rank["composition"]["reductions"], 3);
-    EXPECT_EQ(rank["composition"]["bytes"], 3 * 32 * 24 * 8);
+    EXPECT_EQ(rank["composition"]["bytes"], 3 * 32 * 24 * 4);
   }
 }
 

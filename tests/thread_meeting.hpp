@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/team.hpp"
+
 namespace isowave::core::test {
 
 /// All threads make the same calls in the same order.
@@ -25,16 +27,12 @@ class ThreadMeeting {
     return texts;
   }
 
-  /// Makes one word of all threads' at each place: their bits together, or the smallest. Rank 0 has
-  /// them then, or all.
-  void reduce(std::uint32_t rank, std::span<std::uint64_t> words, bool is_or, bool for_all) {
+  /// Makes one word of all threads' at each place. Rank 0 has them then, or all.
+  void reduce(std::uint32_t rank, std::span<std::uint64_t> words, Reduction how, bool for_all) {
     words_[rank] = words;
     barrier_.arrive_and_wait();
     std::vector<std::uint64_t> result(words.begin(), words.end());
-    for (const std::span<std::uint64_t> others : words_) {
-      for (std::size_t i = 0; i < result.size(); ++i)
-        result[i] = is_or ? result[i] | others[i] : std::min(result[i], others[i]);
-    }
+    for (const std::span<std::uint64_t> others : words_) reduce_into(result, others, how);
     barrier_.arrive_and_wait();
     if (rank == 0 || for_all) std::ranges::copy(result, words.begin());
   }

@@ -188,14 +188,8 @@ Certificate certify(BoundedFrames &frames, const FrameRequest &request,
       make_level_frames(levels, request.camera, size, request.isovalue, request.voxel_pixels);
   std::vector<std::uint64_t> between;
   together(team, [&] { between = starts_between(frames, request, level_frames); });
-  team.reduce(
-      between.size(), Reduction::kOr, Receiver::kRank0,
-      [&](std::size_t first, std::span<std::uint64_t> words) {
-        std::ranges::copy(std::span(between).subspan(first, words.size()), words.begin());
-      },
-      [&](std::size_t first, std::span<const std::uint64_t> words) {
-        std::ranges::copy(words, between.begin() + static_cast<std::ptrdiff_t>(first));
-      });
+  const auto [make, take] = in_place(between);
+  team.reduce(between.size(), Reduction::kOr, Receiver::kRank0, make, take);
   if (!is_first) return certificate;
 
   std::size_t coarsest = levels.size() - 1;

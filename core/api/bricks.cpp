@@ -31,16 +31,25 @@ class ProcessTeam : public core::Team {
   void reduce(std::size_t count, core::Reduction how, core::Receiver who,
               const core::MakeWords &make, const core::TakeWords &take) override {
     const bool for_all = who == core::Receiver::kAll;
-    core::reduce_in_pieces(
-        count, for_all || rank() == 0, make, take, [&](std::span<std::uint64_t> words) {
-          processes_.reduce(
-              words,
-              how == core::Reduction::kMin ? Processes::Reduction::kMin : Processes::Reduction::kOr,
-              for_all);
-        });
+    core::reduce_in_pieces(count, for_all || rank() == 0, make, take,
+                           [&](std::span<std::uint64_t> words) {
+                             processes_.reduce(words, to_reduction(how), for_all);
+                           });
   }
 
  private:
+  static Processes::Reduction to_reduction(core::Reduction how) {
+    switch (how) {
+      case core::Reduction::kMin:
+        return Processes::Reduction::kMin;
+      case core::Reduction::kMinOfHalves:
+        return Processes::Reduction::kMinOfHalves;
+      case core::Reduction::kOr:
+        break;
+    }
+    return Processes::Reduction::kOr;
+  }
+
   Processes &processes_;
 };
 

@@ -15,12 +15,31 @@ void Team::exchange(std::span<const Outgoing>, std::span<const Incoming>) {
 
 void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> others,
                  Reduction how) {
-  if (how == Reduction::kMin) {
-    std::ranges::transform(words, others, words.begin(),
-                           [](std::uint64_t a, std::uint64_t b) { return std::min(a, b); });
-  } else {
-    std::ranges::transform(words, others, words.begin(), std::bit_or<std::uint64_t>());
+  const auto with = [&](const auto &of_two) {
+    std::ranges::transform(words, others, words.begin(), of_two);
+  };
+  switch (how) {
+    case Reduction::kMin:
+      with([](std::uint64_t a, std::uint64_t b) { return std::min(a, b); });
+      break;
+    case Reduction::kMinOfHalves:
+      with([](std::uint64_t a, std::uint64_t b) {
+        const auto low = std::min(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
+        return std::min(a >> 32, b >> 32) << 32 | low;
+      });
+      break;
+    case Reduction::kOr:
+      with(std::bit_or<std::uint64_t>());
   }
+}
+
+WordsInPlace in_place(std::span<std::uint64_t> words) {
+  return {[words](std::size_t begin, std::span<std::uint64_t> part) {
+            std::ranges::copy(words.subspan(begin, part.size()), part.begin());
+          },
+          [words](std::size_t begin, std::span<const std::uint64_t> part) {
+            std::ranges::copy(part, words.subspan(begin).begin());
+          }};
 }
 
 void reduce_in_pieces(std::size_t count, bool receives, const MakeWords &make,

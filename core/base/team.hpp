@@ -21,8 +21,9 @@ using Outgoing = Message<const std::byte>;
 using Incoming = Message<std::byte>;
 
 enum class Reduction {
-  kMin,  ///< the smallest word
-  kOr    ///< the bits of all
+  kMin,          ///< the smallest word
+  kMinOfHalves,  ///< of the upper 32 bits and of the lower ones, each by itself
+  kOr            ///< the bits of all
 };
 enum class Receiver { kRank0, kAll };
 
@@ -35,6 +36,13 @@ void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> 
 using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
 /// What they have become. Called likewise.
 using TakeWords = std::function<void(std::size_t begin, std::span<const std::uint64_t> words)>;
+
+/// A part in a reduction of words in memory, which become the outcome where it is received.
+struct WordsInPlace {
+  MakeWords make;
+  TakeWords take;
+};
+WordsInPlace in_place(std::span<std::uint64_t> words);
 
 /// All of them make the same calls in the same order.
 class Team {

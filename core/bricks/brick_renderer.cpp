@@ -141,14 +141,8 @@ void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) 
     std::vector<std::uint64_t> blocked;
     together(team_,
              [&] { blocked = renderer_.blocked_rays(round, request.ambient_rays, stats.ambient); });
-    reduce(
-        blocked.size(), Reduction::kOr, Receiver::kRank0,
-        [&](std::size_t begin, std::span<std::uint64_t> words) {
-          std::ranges::copy(std::span(blocked).subspan(begin, words.size()), words.begin());
-        },
-        [&](std::size_t begin, std::span<const std::uint64_t> words) {
-          std::ranges::copy(words, blocked.begin() + static_cast<std::ptrdiff_t>(begin));
-        });
+    const auto [make, take] = in_place(blocked);
+    reduce(blocked.size(), Reduction::kOr, Receiver::kRank0, make, take);
     open.num_ambient = round + 1;
     for (std::size_t ray = 0; ray < hits.size(); ++ray) {
       const bool is_open = std::isfinite(hits[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
@@ -177,6 +171,24 @@ void BrickRenderer::reduce(std::size_t count, Reduction how, Receiver who, const
   composition_.ms += ms_since(begin);
   ++composition_.reductions;
   composition_.bytes += count * sizeof(std::uint64_t);
+}
+
+void BrickRenderer::compose_colors(std::span<const std::uint32_t> colors, Image8 &image) {
+  const bool in_halves = team_.size() <= kMostHalfWordBricks;
+  const std::size_t per_word = in_halves ? 2 : 1;
+  std::atomic<std::uint64_t> num_hits = 0;
+  reduce((colors.size() + per_word - 1) / per_word,
+         in_halves ? Reduction::kMinOfHalves : Reduction::kMin, Receiver::kRank0,
+         [&](std::size_t begin, std::span<std::uint64_t> words) {
+           const std::size_t first = per_word * begin;
+           const auto own =
+               colors.subspan(first, std::min(per_word * words.size(), colors.size() - first));
+           (in_halves ? color_halves : color_words)(own, place_, words);
+         },
+         [&](std::size_t begin, std::span<const std::uint64_t> words) {
+           num_hits += (in_halves ? set_half_colors : set_colors)(words, per_word * begin, image);
+         });
+  num_hits_ = num_hits;
 }
 
 void BrickRenderer::compose(Receiver who, const MakeWords &make, const TakeWords &take) {
@@ -225,14 +237,7 @@ Image8 BrickRenderer::shade(const Appearance &appearance) {
   const std::vector<std::uint32_t> colors = renderer_.shade_packed(appearance);
   Image8 image;
   if (receives) image = {size.width, size.height, 3, std::vector<std::uint8_t>(3 * colors.size())};
-  compose(
-      Receiver::kRank0,
-      [&](std::size_t begin, std::span<std::uint64_t> words) {
-        color_words(std::span(colors).subspan(begin, words.size()), place_, words);
-      },
-      [&](std::size_t begin, std::span<const std::uint64_t> words) {
-        set_colors(words, begin, image);
-      });
+  compose_colors(colors, image);
   return image;
 }
 

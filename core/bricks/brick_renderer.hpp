@@ -72,6 +72,8 @@ class BrickRenderer {
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);
+  /// image: rank 0's, black.
+  void compose_colors(std::span<const std::uint32_t> colors, Image8 &image);
   /// A word of each ray.
   void compose(Receiver who, const MakeWords &make, const TakeWords &take);
   /// Of bricks' hits, those that win.

@@ -15,6 +15,16 @@ std::uint64_t make_word(const HitRecord &hit, std::uint32_t place, std::uint32_t
   return std::uint64_t{hit.block_id == ISO_INVALID_ID ? kNoPlace : place} << 32 | what;
 }
 
+/// As kNoPlace, in half a word.
+constexpr std::uint32_t kNoHalfPlace = 0xFF;
+constexpr std::uint32_t kColor = 0xFFFFFF;
+
+std::uint8_t *write_color(std::uint32_t color, std::uint8_t *to) {
+  for (int channel = 0; channel < 3; ++channel)
+    *to++ = static_cast<std::uint8_t>(color >> (8 * channel));
+  return to;
+}
+
 }  // namespace
 
 void field_words(std::span<const HitRecord> hits, HitField field, std::uint32_t place,
@@ -39,22 +49,53 @@ void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
   });
 }
 
-void set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image) {
-  static_assert(std::endian::native == std::endian::little);
+std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image) {
   std::uint8_t *to = image.pixels.data() + 3 * begin;
+  std::size_t num_hits = 0;
+  for (const std::uint64_t word : words) {
+    num_hits += word >> 32 != kNoPlace;
+    to = write_color(static_cast<std::uint32_t>(word), to);
+  }
+  return num_hits;
+}
+
+void color_halves(std::span<const std::uint32_t> colors, std::uint32_t place,
+                  std::span<std::uint64_t> words) {
+  const auto half = [place](std::uint32_t color) {
+    return (color >> 24 == 0 ? kNoHalfPlace : place) << 24 | (color & kColor);
+  };
+  for (std::size_t i = 0; i < colors.size() / 2; ++i)
+    words[i] = half(colors[2 * i]) | std::uint64_t{half(colors[2 * i + 1])} << 32;
+  if (colors.size() % 2 != 0) words[colors.size() / 2] = half(colors.back());
+}
+
+std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t begin,
+                            Image8 &image) {
+  static_assert(std::endian::native == std::endian::little);
+  const auto hits_of = [](std::uint64_t word) {
+    return std::size_t{word >> 56 != kNoHalfPlace} + ((word >> 24 & 0xFF) != kNoHalfPlace);
+  };
+  std::uint8_t *to = image.pixels.data() + 3 * begin;
+  std::size_t num_hits = 0;
   // Four pixels at once are 12 bytes, of which compilers make two stores.
-  for (; words.size() >= 4; words = words.subspan(4), to += 12) {
-    constexpr std::uint64_t kColor = 0xFFFFFF;
+  const std::uint8_t *end = image.pixels.data() + image.pixels.size();
+  for (; words.size() >= 2 && end - to >= 12; words = words.subspan(2), to += 12) {
     const std::uint64_t head =
-        (words[0] & kColor) | (words[1] & kColor) << 24 | (words[2] & 0xFFFF) << 48;
-    const auto tail = static_cast<std::uint32_t>((words[2] & kColor) >> 16 | words[3] << 8);
+        (words[0] & kColor) | (words[0] >> 32 & kColor) << 24 | (words[1] & 0xFFFF) << 48;
+    const auto tail = static_cast<std::uint32_t>((words[1] & kColor) >> 16 | words[1] >> 32 << 8);
     std::memcpy(to, &head, sizeof(head));
     std::memcpy(to + sizeof(head), &tail, sizeof(tail));
+    num_hits += hits_of(words[0]) + hits_of(words[1]);
   }
   for (const std::uint64_t word : words) {
-    for (int channel = 0; channel < 3; ++channel)
-      *to++ = static_cast<std::uint8_t>(word >> (8 * channel));
+    for (const auto half :
+         {static_cast<std::uint32_t>(word), static_cast<std::uint32_t>(word >> 32)}) {
+      if (to == end) break;
+      num_hits += half >> 24 != kNoHalfPlace;
+      to = write_color(half, to);
+    }
   }
+  return num_hits;
 }
 
 }  // namespace isowave::core

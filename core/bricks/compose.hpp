@@ -4,7 +4,8 @@
 //
 // What is put together is a word of 64 bits for each ray: above, the place of the brick in that
 // order, below, 32 bits of what its ray has hit. So the smallest word wins, which is what
-// MPI_MIN finds.
+// MPI_MIN finds. Of colours, where there are few bricks, it is a half of a word: 8 bits for the
+// place, and 24 for the colour.
 
 #include <cstdint>
 #include <span>
@@ -34,6 +35,16 @@ void set_field(std::span<const std::uint64_t> words, HitField field, std::span<H
 void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words);
 /// Gives an RGB picture's pixels from `begin` on the colours that won.
-void set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image);
+///
+/// Returns  of how many a brick has a hit
+std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image);
+
+/// Bricks that half a word is enough for.
+inline constexpr std::uint32_t kMostHalfWordBricks = 0xFF;
+/// words [(rays + 1) / 2]: as color_words(), two rays in each, the first in its lower half.
+void color_halves(std::span<const std::uint32_t> colors, std::uint32_t place,
+                  std::span<std::uint64_t> words);
+/// As set_colors(). begin: even.
+std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image);
 
 }  // namespace isowave::core

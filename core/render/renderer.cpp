@@ -113,10 +113,13 @@ FrameStats Renderer::render(const FrameRequest &request) {
   stats.first_level = state_.drawing.first;
   stats.last_level = state_.drawing.end - 1;
   StallGuard guard(state_.levels[0].info.dims);
-  // Normals that begin right behind the pass that the last frame was through with need not wait for
-  // the host. Should this frame need more, they have touched nothing.
+  const std::pair view(request.camera, request.isovalue);
+  bool &took_one_pass = took_one_pass_[last_view_ == view];
+  last_view_ = view;
+  // Normals that begin right behind the pass that the last such frame was through with need not
+  // wait for the host. Should this frame need more, they have touched nothing.
   bool has_begun_normals = false,
-       may_begin_normals = is_smooth && is_one_pass_ && !in_step(on_pass);
+       may_begin_normals = is_smooth && took_one_pass && !in_step(on_pass);
   for (bool finished = false; !finished && !stats.cancelled;) {
     pipeline_->enqueue_pass();
     has_picture_ = true;  // the hits of the frame before are gone, at the latest now
@@ -141,7 +144,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
     }
   }
   state_.counts_touched = false;
-  is_one_pass_ = stats.passes.size() == 1;
+  took_one_pass = stats.passes.size() == 1;
   // The hits are complete. A pass that is enqueued beyond the last finds no rays, and nobody waits
   // for it.
   if (stats.passes.back().counts.next_active_count == 0) pipeline_->end_frame();

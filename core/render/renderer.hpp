@@ -206,8 +206,12 @@ class Renderer {
   ImageSize size_;                         ///< of the frame at work, or the last
   bool has_picture_ = false;               ///< the hit buffer has the frame's hits so far
   std::optional<float>
-      cached_isovalue_;       ///< of the cache's bits of voxels inside; none: it is empty
-  bool is_one_pass_ = false;  ///< the last frame was: it found all blocks that it needed
+      cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty
+  /// Of the last frame: camera and isovalue.
+  std::optional<std::pair<Camera, float>> last_view_;
+  /// Whether the last frame took a single pass, since it found all blocks that it needed: of those
+  /// of another view than the frame before theirs [0], and of the same [1].
+  std::array<bool, 2> took_one_pass_{};
   /// Of rays that wait for their normals, or are not those of the camera.
   std::optional<LevelRange> open_requests_;
   std::unique_ptr<Pipeline> pipeline_;

@@ -15,6 +15,8 @@ namespace isowave::core {
 struct Camera {
   glm::dvec3 eye{0.0}, at{0.0, 0.0, -1.0}, up{0.0, 1.0, 0.0};
   double fovy_deg = 60.0;
+
+  friend bool operator==(const Camera &, const Camera &) = default;
 };
 
 /// A camera file (JSON): `{"dims":[..],"spacing":[..],"width":W,"height":H,"fovy_deg":F,

@@ -31,16 +31,28 @@ namespace isowave::core::tools {
 
 namespace {
 
-/// MPI itself waits as fast as a processor can, which takes that from whoever draws on it.
-void wait_for(std::span<MPI_Request> requests) {
-  constexpr std::chrono::milliseconds kFast{1};
-  constexpr std::chrono::microseconds kNap{50};
-  const auto begin = std::chrono::steady_clock::now();
-  for (int done = 0; done == 0;) {
-    MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
-    if (done == 0 && std::chrono::steady_clock::now() - begin > kFast)
-      std::this_thread::sleep_for(kNap);
+/// Waits as fast as a processor can at first, then with naps: others may draw on that processor.
+class Wait {
+ public:
+  template <class IsDone>
+  void operator()(const IsDone &is_done) const {
+    constexpr std::chrono::milliseconds kFast{1};
+    constexpr std::chrono::microseconds kNap{50};
+    while (!is_done()) {
+      if (std::chrono::steady_clock::now() - begin_ > kFast) std::this_thread::sleep_for(kNap);
+    }
   }
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+void wait_for(std::span<MPI_Request> requests) {
+  Wait()([&] {
+    int done = 0;
+    MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
+    return done != 0;
+  });
 }
 
 /// MPI counts bytes by an int.
@@ -91,37 +103,45 @@ class HostWords {
   /// Of the host's first process: for those of all.
   std::span<std::uint64_t> first() const { return segments_.front(); }
 
-  /// Reduces words [begin, begin + count), no more than capacity(). use: takes the outcome, at the
-  /// host's first process.
+  /// Reduces words [begin, begin + count), no more than capacity(), part by part: what one process
+  /// has made of a part is taken on while it makes the next. use: takes the outcome, at the host's
+  /// first process.
   void reduce(std::size_t begin, std::size_t count, Reduction how, const MakeWords &make,
               const TakeWords &use) {
+    ++number_;
+    const Wait wait;
     if (!is_first()) {
       const std::span<std::uint64_t> own = segments_[static_cast<std::size_t>(rank_)];
       for_parts(0, count, [&](std::size_t from, std::size_t size) {
         make(begin + from, own.subspan(from, size));
+        set_ready(rank_, from);
       });
-    }
-    wait_for_all();
-    if (size_ > 2) reduce_others(count, how);
-    if (is_first()) {
+      if (size_ > 2) reduce_others(count, how, wait);
+    } else {
       // While words are in the processor's cache.
       for_parts(0, count, [&](std::size_t from, std::size_t size) {
         std::array<std::uint64_t, kPartWords> buffer;
         const auto words = std::span(buffer).first(size);
         make(begin + from, words);
-        if (size_ > 1) reduce_into(words, segments_[1].subspan(from, size), how);
+        if (size_ > 1) {
+          wait([&] { return is_ready(size_ == 2 ? 1 : kOthers, from); });
+          reduce_into(words, segments_[1].subspan(from, size), how);
+        }
         use(begin + from, words);
       });
     }
     wait_for_all();
   }
 
-  /// Calls body(from, size) for parts of [begin, end), from several threads.
+  /// Calls body(from, size) for parts of [begin, end), from several threads. begin: of a part.
   template <class Body>
-  static void for_parts(std::size_t begin, std::size_t end, const Body &body) {
+  void for_parts(std::size_t begin, std::size_t end, const Body &body) const {
     // A thread takes several: waking one for less takes longer than the work.
-    constexpr std::size_t kParts = 8, kThreadWords = kParts * kPartWords;
-    parallel_for((end - begin + kThreadWords - 1) / kThreadWords, 0,
+    constexpr std::size_t kParts = 4, kThreadWords = kParts * kPartWords;
+    // All processes of the host work at the same time.
+    const std::uint32_t num_threads =
+        std::max(thread_count(0) / static_cast<std::uint32_t>(size_), 1u);
+    parallel_for((end - begin + kThreadWords - 1) / kThreadWords, num_threads,
                  [&](std::uint64_t i, std::uint32_t) {
                    const std::size_t first = begin + i * kThreadWords;
                    const std::size_t last = std::min(first + kThreadWords, end);
@@ -144,19 +164,38 @@ class HostWords {
   // Containers often have but 64 MiB of shared memory.
   static constexpr std::size_t kHostWords = std::size_t{1} << 22;
   static constexpr std::size_t kMostWords = std::size_t{1} << 20;  ///< of each process
+  /// In place of a rank: all but the first, put together. The first says nothing of its own words.
+  static constexpr int kOthers = 0;
 
-  /// Of all processes but the first: each reduces its share of the words, into the second's.
-  void reduce_others(std::size_t count, Reduction how) {
-    if (!is_first()) {
-      const auto share = [&](int number) {
-        return count * static_cast<std::size_t>(number) / static_cast<std::size_t>(size_ - 1);
-      };
-      for_parts(share(rank_ - 1), share(rank_), [&](std::size_t from, std::size_t size) {
-        for (std::size_t other = 2; other < segments_.size(); ++other)
-          reduce_into(segments_[1].subspan(from, size), segments_[other].subspan(from, size), how);
-      });
-    }
-    wait_for_all();
+  /// Of all processes but the first: each reduces its share of the parts, into the second's.
+  void reduce_others(std::size_t count, Reduction how, const Wait &wait) {
+    const std::size_t num_parts = (count + kPartWords - 1) / kPartWords;
+    const auto share = [&](int number) {
+      const auto parts =
+          num_parts * static_cast<std::size_t>(number) / static_cast<std::size_t>(size_ - 1);
+      return std::min(parts * kPartWords, count);
+    };
+    for_parts(share(rank_ - 1), share(rank_), [&](std::size_t from, std::size_t size) {
+      for (int other = 1; other < size_; ++other) {
+        wait([&] { return is_ready(other, from); });
+        if (other == 1) continue;
+        reduce_into(segments_[1].subspan(from, size),
+                    segments_[static_cast<std::size_t>(other)].subspan(from, size), how);
+      }
+      set_ready(kOthers, from);
+    });
+  }
+
+  /// Which part the words from `from` on are, of a process, or of kOthers.
+  std::atomic_ref<std::uint32_t> part_number(int rank, std::size_t from) const {
+    return std::atomic_ref(
+        part_numbers_[static_cast<std::size_t>(rank) * num_parts() + from / kPartWords]);
+  }
+  void set_ready(int rank, std::size_t from) const {
+    part_number(rank, from).store(number_, std::memory_order_release);
+  }
+  bool is_ready(int rank, std::size_t from) const {
+    return part_number(rank, from).load(std::memory_order_acquire) == number_;
   }
 
   void share(MPI_Comm host, int color, int local_rank) {
@@ -169,8 +208,10 @@ class HostWords {
   std::size_t num_words() const {
     return std::min(kHostWords / static_cast<std::size_t>(size_), kMostWords);
   }
+  std::size_t num_parts() const { return (num_words() + kPartWords - 1) / kPartWords; }
   std::size_t num_bytes() const {
-    return static_cast<std::size_t>(size_) * num_words() * sizeof(std::uint64_t);
+    return static_cast<std::size_t>(size_) *
+           (num_words() * sizeof(std::uint64_t) + num_parts() * sizeof(std::uint32_t));
   }
 
   /// False, at all processes, where one cannot. MPI's own shared memory leaves them waiting for
@@ -198,9 +239,10 @@ class HostWords {
     MPI_Allreduce(MPI_IN_PLACE, &is_there, 1, MPI_INT, MPI_LAND, comm_);
     if (is_first()) ::shm_unlink(name.data());
     if (is_there == 0) return false;
-    const std::span words(static_cast<std::uint64_t *>(memory_), num_bytes() / 8);
-    for (std::size_t begin = 0; begin < words.size(); begin += num_words())
-      segments_.push_back(words.subspan(begin, num_words()));
+    auto *words = static_cast<std::uint64_t *>(memory_);
+    for (int rank = 0; rank < size_; ++rank, words += num_words())
+      segments_.emplace_back(words, num_words());
+    part_numbers_ = reinterpret_cast<std::uint32_t *>(words);
     return true;
   }
 
@@ -209,7 +251,10 @@ class HostWords {
   int rank_ = 0, size_ = 1;
   std::uint64_t capacity_ = 0;
   std::vector<std::span<std::uint64_t>> segments_;  ///< by rank
-  std::vector<std::uint64_t> alone_;                ///< of a process that shares with none
+  /// By rank and part, in the same memory: the reduction that the words there are of.
+  std::uint32_t *part_numbers_ = nullptr;
+  std::uint32_t number_ = 0;          ///< of the reduction at work
+  std::vector<std::uint64_t> alone_;  ///< of a process that shares with none
 };
 
 /// MPI's own handler of errors ends the job.
@@ -277,7 +322,7 @@ class MpiTeam : public Team {
         host_->reduce(begin, size, how, make, copy_to(piece.words, begin));
         if (!host_->is_first()) continue;
         MPI_Ireduce(rank_ == 0 ? MPI_IN_PLACE : piece.words.data(), piece.words.data(),
-                    static_cast<int>(size), MPI_UINT64_T, to_op(how), 0, hosts_, &piece.request);
+                    to_count(size, how), to_type(how), to_op(how), 0, hosts_, &piece.request);
       }
     }
     for (std::size_t i = 0; i < 2; ++i) finish(pieces[(number + i) % 2], take);
@@ -322,18 +367,24 @@ class MpiTeam : public Team {
     host_->reduce(begin, size, how, make, copy_to(words, begin));
     if (num_hosts_ > 1 && host_->is_first()) {
       MPI_Request request = MPI_REQUEST_NULL;
-      MPI_Iallreduce(MPI_IN_PLACE, words.data(), static_cast<int>(size), MPI_UINT64_T, to_op(how),
+      MPI_Iallreduce(MPI_IN_PLACE, words.data(), to_count(size, how), to_type(how), to_op(how),
                      hosts_, &request);
       wait_for({&request, 1});
     }
     host_->wait_for_all();
-    HostWords::for_parts(0, size, [&](std::size_t from, std::size_t count) {
+    host_->for_parts(0, size, [&](std::size_t from, std::size_t count) {
       take(begin + from, words.subspan(from, count));
     });
     host_->wait_for_all();
   }
 
-  static MPI_Op to_op(Reduction how) { return how == Reduction::kMin ? MPI_MIN : MPI_BOR; }
+  static MPI_Op to_op(Reduction how) { return how == Reduction::kOr ? MPI_BOR : MPI_MIN; }
+  static MPI_Datatype to_type(Reduction how) {
+    return how == Reduction::kMinOfHalves ? MPI_UINT32_T : MPI_UINT64_T;
+  }
+  static int to_count(std::size_t words, Reduction how) {
+    return static_cast<int>(how == Reduction::kMinOfHalves ? 2 * words : words);
+  }
 
   void finish(Piece &piece, const TakeWords &take) const {
     if (piece.words.empty()) return;

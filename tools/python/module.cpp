@@ -577,8 +577,11 @@ class PyProcesses : public isowave::Processes {
   }
   void reduce(std::span<std::uint64_t> words, Reduction how, bool for_all) override {
     call([&] {
-      const nb::ndarray<nb::numpy, std::uint64_t> array(words.data(), {words.size()}, nb::handle());
-      object_.attr("reduce")(nb::cast(array, nb::rv_policy::reference), how == Reduction::kMin,
+      const bool in_halves = how == Reduction::kMinOfHalves;
+      const nb::ndarray<nb::numpy> array(
+          words.data(), {(in_halves ? 2 : 1) * words.size()}, nb::handle(), {},
+          in_halves ? nb::dtype<std::uint32_t>() : nb::dtype<std::uint64_t>());
+      object_.attr("reduce")(nb::cast(array, nb::rv_policy::reference), how != Reduction::kOr,
                              for_all);
     });
   }

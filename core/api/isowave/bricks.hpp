@@ -31,8 +31,9 @@ class Processes {
   virtual std::vector<std::string> all_gather(const std::string &bytes) = 0;
 
   enum class Reduction {
-    kMin,  ///< MPI_MIN: the smallest word
-    kOr    ///< MPI_BOR: the bits of all
+    kMin,          ///< MPI_MIN: the smallest word
+    kMinOfHalves,  ///< MPI_MIN of twice as many MPI_UINT32_T
+    kOr            ///< MPI_BOR: the bits of all
   };
   /// Makes one word of those of all processes at each place, which rank 0 then has in `words`, or
   /// all have.

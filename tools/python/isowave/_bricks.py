@@ -35,7 +35,9 @@ class Processes:
     def all_gather(self, data: bytes) -> list[bytes]:
         return list(self._comm.allgather(data))
 
-    def reduce(self, words: npt.NDArray[np.uint64], smallest: bool, for_all: bool) -> None:
+    def reduce(
+        self, words: npt.NDArray[np.uint64] | npt.NDArray[np.uint32], smallest: bool, for_all: bool
+    ) -> None:
         operation = self._mpi.MIN if smallest else self._mpi.BOR
         if for_all:
             self._comm.Allreduce(self._mpi.IN_PLACE, words, operation)

@@ -1,7 +1,9 @@
-"""The widget: its kernel's side through a fake front end, and all of it in JupyterLab."""
+"""The widget: its kernel's side through a fake front end, and all of it in JupyterLab
+and Voila."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -161,24 +163,24 @@ view(FakeVolume(), isovalue=80, title="ball", height=420,
 """
 
 
-@pytest.fixture
-def lab(tmp_path: Path) -> Iterator[str]:
-    """A JupyterLab with a notebook that shows the widget; its URL."""
+@contextlib.contextmanager
+def served(folder: Path, path: str) -> Iterator[str]:
+    """The URL of a notebook that shows the widget, at that path of a JupyterLab."""
     paths = [str(Path(__file__).parent), str(Path(isowave.__file__).parents[1])]
     cell = NOTEBOOK_CELL.format(paths=paths)
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
     notebook = {"nbformat": 4, "nbformat_minor": 5, "metadata": kernel, "cells": [
         {"cell_type": "code", "id": "a", "metadata": {}, "source": cell, "outputs": [],
          "execution_count": None}]}  # fmt: skip
-    (tmp_path / "ball.ipynb").write_text(json.dumps(notebook))
+    (folder / "ball.ipynb").write_text(json.dumps(notebook))
     token = secrets.token_hex(16)
     folders = ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR")
-    environment = {**os.environ, **{name: str(tmp_path / name) for name in folders}}
+    environment = {**os.environ, **{name: str(folder / name) for name in folders}}
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ip=127.0.0.1"]
-    command += ["--port=0", f"--IdentityProvider.token={token}", f"--ServerApp.root_dir={tmp_path}"]
+    command += ["--port=0", f"--IdentityProvider.token={token}", f"--ServerApp.root_dir={folder}"]
     command += ["--LabApp.news_url=", "--LabApp.check_for_updates_class="]
     command[-1] += "jupyterlab.NeverCheckForUpdate"
-    log = tmp_path / "lab.log"
+    log = folder / "server.log"
     with log.open("w") as output:
         process = subprocess.Popen(command, stderr=output, stdout=output, env=environment)
     try:
@@ -189,47 +191,70 @@ def lab(tmp_path: Path) -> Iterator[str]:
                 break
             threading.Event().wait(0.1)
         assert url, log.read_text()
-        yield f"http://127.0.0.1:{url[1]}/lab/tree/ball.ipynb?token={token}"
+        yield f"http://127.0.0.1:{url[1]}/{path}?token={token}"
     finally:
         process.terminate()
         process.wait(TIMEOUT)
 
 
-@pytest.mark.skipif(
-    not (os.environ.get("ISOWAVE_CHROMIUM") or shutil.which("chromium")), reason="no Chromium"
-)
-def test_in_jupyterlab(lab: str) -> None:
+@contextlib.contextmanager
+def page_at(url: str) -> Iterator[Any]:
+    """In Chromium."""
     playwright = pytest.importorskip("playwright.sync_api")
-    pytest.importorskip("jupyterlab")
     chromium = os.environ.get("ISOWAVE_CHROMIUM") or shutil.which("chromium")
+    if not chromium:
+        pytest.skip("no Chromium")
     with playwright.sync_playwright() as started:
         browser = started.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.set_default_timeout(1000 * TIMEOUT)
-        page.goto(lab)
+        page.goto(url)
+        yield page
+        browser.close()
+
+
+def drag(page: Any) -> None:
+    """Waits for the first whole picture, and for that of the view after."""
+    view = page.locator("[data-stage=lossless]")
+    view.wait_for()
+    box = page.get_by_role("application").bounding_box()
+    before = view.get_attribute("data-shown")
+    page.mouse.move(box["x"] + 200, box["y"] + 150)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 300, box["y"] + 180, steps=5)
+    page.mouse.up()
+    page.wait_for_function(
+        f"""() => {{ const {{ wish, shown, stage }} =
+        document.querySelector("[data-lm-suppress-shortcuts][data-stage]").dataset;
+        return Number(shown) > {before} && wish === shown && stage === "lossless"; }}"""
+    )
+
+
+def keep_screenshot(page: Any, name: str) -> None:
+    if os.environ.get("ISOWAVE_SCREENSHOTS"):
+        page.screenshot(path=f"{os.environ['ISOWAVE_SCREENSHOTS']}/{name}.png")
+
+
+def test_in_jupyterlab(tmp_path: Path) -> None:
+    pytest.importorskip("jupyterlab")
+    with served(tmp_path, "lab/tree/ball.ipynb") as url, page_at(url) as page:
         page.get_by_text("| Idle").wait_for()  # the kernel's status; before, keys are lost
         page.locator(".jp-Notebook .cm-content").first.click()
         page.keyboard.press("Shift+Enter")
-        view = page.locator("[data-stage=lossless]")
-        view.wait_for()
-        picture = page.get_by_role("application")
-        box = picture.bounding_box()
-        before = view.get_attribute("data-shown")
-        page.mouse.move(box["x"] + 200, box["y"] + 150)
-        page.mouse.down()
-        page.mouse.move(box["x"] + 300, box["y"] + 180, steps=5)
-        page.mouse.up()
-        page.wait_for_function(
-            f"""() => {{ const {{ wish, shown, stage }} =
-            document.querySelector("[data-lm-suppress-shortcuts][data-stage]").dataset;
-            return Number(shown) > {before} && wish === shown && stage === "lossless"; }}"""
-        )
+        drag(page)
         # Keys are the picture's, not the notebook's: 0 0 would restart the kernel.
-        picture.focus()
+        page.get_by_role("application").focus()
         page.keyboard.press("0")
         page.keyboard.press("0")
         page.keyboard.press("ArrowLeft")
         assert page.get_by_role("dialog").count() == 0
-        if os.environ.get("ISOWAVE_SCREENSHOTS"):
-            page.screenshot(path=f"{os.environ['ISOWAVE_SCREENSHOTS']}/jupyterlab.png")
-        browser.close()
+        keep_screenshot(page, "jupyterlab")
+
+
+def test_in_voila(tmp_path: Path) -> None:
+    """A page without a notebook: widgets are shown by ipywidgets' own manager for HTML pages, as in
+    Visual Studio Code and Colab."""
+    pytest.importorskip("voila")
+    with served(tmp_path, "voila/render/ball.ipynb") as url, page_at(url) as page:
+        drag(page)
+        keep_screenshot(page, "voila")

@@ -1,0 +1,90 @@
+// Words of pictures put together: of whole words and of halves, for any number of rays.
+
+#include "core/bricks/compose.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "core/base/team.hpp"
+
+namespace isowave::core {
+namespace {
+
+TEST(Compose, TheSmallestWordsAndHalves) {
+  const std::vector<std::uint64_t> a{0x0000000500000009, 0xFFFFFFFF00000000, 3};
+  const std::vector<std::uint64_t> b{0x0000000700000001, 0x00000001FFFFFFFF, 12};
+  const auto reduced = [&](Reduction how) {
+    std::vector<std::uint64_t> words = a;
+    reduce_into(words, b, how);
+    return words;
+  };
+  EXPECT_EQ(reduced(Reduction::kMin),
+            (std::vector<std::uint64_t>{0x0000000500000009, 0x00000001FFFFFFFF, 3}));
+  EXPECT_EQ(reduced(Reduction::kMinOfHalves),
+            (std::vector<std::uint64_t>{0x0000000500000001, 0x0000000100000000, 3}));
+  EXPECT_EQ(reduced(Reduction::kOr),
+            (std::vector<std::uint64_t>{0x0000000700000009, 0xFFFFFFFFFFFFFFFF, 15}));
+}
+
+/// A brick's picture as Renderer::shade_packed() has it.
+std::vector<std::uint32_t> random_colors(std::size_t num_rays, std::mt19937 &rng) {
+  constexpr std::uint32_t kBackground = 0x123456;
+  std::vector<std::uint32_t> colors(num_rays);
+  for (std::uint32_t &color : colors)
+    color = rng() % 2 == 0 ? kBackground : 1u << 24 | (rng() & 0xFFFFFF);
+  return colors;
+}
+
+/// Rays' colours by the definition: of the first brick in order that has a hit.
+struct Expected {
+  std::vector<std::uint8_t> pixels;
+  std::size_t num_hits = 0;
+};
+Expected compose_one_by_one(const std::vector<std::vector<std::uint32_t>> &by_place) {
+  Expected expected;
+  for (std::size_t ray = 0; ray < by_place.front().size(); ++ray) {
+    const auto first =
+        std::ranges::find_if(by_place, [&](const auto &colors) { return colors[ray] >> 24 != 0; });
+    expected.num_hits += first != by_place.end();
+    const std::uint32_t color = (first == by_place.end() ? by_place.front() : *first)[ray];
+    for (const int shift : {0, 8, 16})
+      expected.pixels.push_back(static_cast<std::uint8_t>(color >> shift));
+  }
+  return expected;
+}
+
+TEST(Compose, ColoursOfTheFirstBrickThatIsHit) {
+  std::mt19937 rng(1);
+  for (const std::size_t num_rays : {1u, 2u, 3u, 4u, 5u, 7u, 64u, 65u, 66u, 67u, 1001u}) {
+    SCOPED_TRACE(num_rays);
+    std::vector<std::vector<std::uint32_t>> by_place;
+    for (int brick = 0; brick < 3; ++brick) by_place.push_back(random_colors(num_rays, rng));
+    const Expected expected = compose_one_by_one(by_place);
+
+    const auto composed = [&](Reduction how, std::size_t rays_per_word, const auto &make,
+                              const auto &take) {
+      const std::size_t num_words = (num_rays + rays_per_word - 1) / rays_per_word;
+      std::vector<std::uint64_t> words(num_words, ~std::uint64_t{0}), own(num_words);
+      const std::uint32_t places[] = {0, 100, 254};
+      for (const std::size_t brick : {1u, 2u, 0u}) {
+        make(by_place[brick], places[brick], own);
+        reduce_into(words, own, how);
+      }
+      // In two parts, as threads take them.
+      Image8 image{std::uint32_t(num_rays), 1, 3, std::vector<std::uint8_t>(3 * num_rays)};
+      const std::span all = words;
+      const std::size_t part = num_words / 2;
+      const std::size_t num_hits =
+          take(all.first(part), 0, image) + take(all.subspan(part), rays_per_word * part, image);
+      EXPECT_EQ(image.pixels, expected.pixels);
+      EXPECT_EQ(num_hits, expected.num_hits);
+    };
+    composed(Reduction::kMin, 1, color_words, set_colors);
+    composed(Reduction::kMinOfHalves, 2, color_halves, set_half_colors);
+  }
+}
+
+}  // namespace
+}  // namespace isowave::core
