@@ -137,7 +137,7 @@ class HostWords {
   template <class Body>
   void for_parts(std::size_t begin, std::size_t end, const Body &body) const {
     // A thread takes several: waking one for less takes longer than the work.
-    constexpr std::size_t kParts = 4, kThreadWords = kParts * kPartWords;
+    constexpr std::size_t kParts = 2, kThreadWords = kParts * kPartWords;
     // All processes of the host work at the same time.
     const std::uint32_t num_threads =
         std::max(thread_count(0) / static_cast<std::uint32_t>(size_), 1u);

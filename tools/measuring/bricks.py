@@ -54,6 +54,7 @@ def in_bricks(rows):
         "warm",
         "slowest brick alone, cold ms",
         "picture put together, ms",
+        "with the wait",
         "device memory of one",
         "host memory of one",
     )
@@ -67,7 +68,8 @@ def in_bricks(rows):
             f"{max(rank['load_ms'] for rank in ranks) / 1e3:.1f} s",
             *(ms(frames[kind]["frame_ms"]["median"]) for kind in ("cold", "next", "warm")),
             ms(max(rank["frames"]["cold"]["own_ms"]["median"] for rank in ranks)),
-            f"{frames['warm']['composition_ms']['median']:.2f}",
+            f"{frames['cold']['composition_ms']['median']:.2f}",
+            f"{frames['cold']['composition_and_wait_ms']['median']:.2f}",
             mebibytes(max(rank["memory"] for rank in ranks)),
             mebibytes(max(rank["host_peak"] for rank in ranks)),
         )
