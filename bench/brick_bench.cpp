@@ -5,8 +5,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cstring>
 #include <map>
 #include <optional>
 
@@ -46,7 +44,7 @@ struct Options {
 struct Times {
   std::vector<double> frame;        ///< wall clock: until the slowest process is through
   std::vector<double> own;          ///< until this one is
-  std::vector<double> composition;  ///< of the picture, with this one's wait for others
+  std::vector<double> composition;  ///< of the picture, with the wait for others
   std::vector<double> passes;       ///< of this process
 };
 
@@ -85,25 +83,11 @@ std::map<std::string, Times> measure_frames(BrickRenderer &renderer, Team &team,
   return kinds;
 }
 
-/// By frame: what composition took from when the last process began with it. All end together.
-std::vector<double> without_wait(Team &team, const std::vector<double> &composition) {
-  std::string own(composition.size() * sizeof(double), '\0');
-  std::memcpy(own.data(), composition.data(), own.size());
-  std::vector<double> shortest = composition, of_rank = composition;
-  for (const std::string &bytes : team.all_gather(own)) {
-    std::memcpy(of_rank.data(), bytes.data(), bytes.size());
-    std::ranges::transform(shortest, of_rank, shortest.begin(), std::ranges::min);
-  }
-  return shortest;
-}
-
 /// One row of numbers for each process, of all of which rank 0 makes the report.
 void report(const Options &options, const std::string &command, ocl::Device &device,
             const std::map<std::string, Times> &kinds, const ordered_json &of_rank, Team &team) {
   ordered_json own = of_rank;
-  std::map<std::string, Spread> composed;
   for (const auto &[kind, times] : kinds) {
-    composed[kind] = spread_of(without_wait(team, times.composition));
     own["frames"][kind] = {{"own_ms", spread_json(spread_of(times.own))},
                            {"passes", median(times.passes)}};
   }
@@ -119,10 +103,9 @@ void report(const Options &options, const std::string &command, ocl::Device &dev
   json["size"] = options.size;
   fmt::print("{}, {} bricks, ms: median (range)\n", options.volume, team.size());
   for (const auto &[kind, times] : kinds) {
-    const Spread frame = spread_of(times.frame), composition = composed[kind];
+    const Spread frame = spread_of(times.frame), composition = spread_of(times.composition);
     json["frames"][kind] = {{"frame_ms", spread_json(frame)},
-                            {"composition_ms", spread_json(composition)},
-                            {"composition_and_wait_ms", spread_json(spread_of(times.composition))}};
+                            {"composition_ms", spread_json(composition)}};
     fmt::print("{:<6} {:8.2f} ({:.2f} to {:.2f}), composition {:.2f} ({:.2f} to {:.2f})\n", kind,
                frame.median, frame.min, frame.max, composition.median, composition.min,
                composition.max);

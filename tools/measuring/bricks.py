@@ -54,7 +54,6 @@ def in_bricks(rows):
         "warm",
         "slowest brick alone, cold ms",
         "picture put together, ms",
-        "with the wait",
         "device memory of one",
         "host memory of one",
     )
@@ -69,7 +68,6 @@ def in_bricks(rows):
             *(ms(frames[kind]["frame_ms"]["median"]) for kind in ("cold", "next", "warm")),
             ms(max(rank["frames"]["cold"]["own_ms"]["median"] for rank in ranks)),
             f"{frames['cold']['composition_ms']['median']:.2f}",
-            f"{frames['cold']['composition_and_wait_ms']['median']:.2f}",
             mebibytes(max(rank["memory"] for rank in ranks)),
             mebibytes(max(rank["host_peak"] for rank in ranks)),
         )

@@ -252,8 +252,7 @@ def test_in_jupyterlab(tmp_path: Path) -> None:
 
 
 def test_in_voila(tmp_path: Path) -> None:
-    """A page without a notebook: widgets are shown by ipywidgets' own manager for HTML pages, as in
-    Visual Studio Code and Colab."""
+    """A page without JupyterLab's front end."""
     pytest.importorskip("voila")
     with served(tmp_path, "voila/render/ball.ipynb") as url, page_at(url) as page:
         drag(page)
