@@ -1,6 +1,7 @@
 """The section `bricks` of tools/measure, and its table: volumes drawn by one process, and by two
 with a device each."""
 
+from measuring.cells import mebibytes, ms, name_of
 from measuring.run import what_was_measured
 
 # Volume, processes, what is compared with what.
@@ -42,8 +43,6 @@ def bricks(run):
 
 def in_bricks(rows):
     """Times are medians; memory is that of the process that needs most."""
-    from measuring.tables import mebibytes, ms, name_of
-
     yield (
         "volume",
         "voxels",

@@ -5,6 +5,7 @@ import json
 import shutil
 import time
 
+from measuring.cells import ms, name_of
 from measuring.run import short_name
 
 # What was published, by dims; times in ms. `paper`: their article, an RTX 3080. `code`: their
@@ -121,12 +122,8 @@ def measure(run, name, volume, storage, among, options):
 
 def subject(row):
     """Such as "mixing layer 512^3", "bonsai"; synthetic ones are stand-ins."""
-    name, sides = row["volume"], "x".join(map(str, row["dims"]))
-    if name.endswith(sides):
-        cube = len(set(row["dims"])) == 1
-        sides = f"{row['dims'][0]}^3" if cube else " x ".join(map(str, row["dims"]))
-        return f"{name.rsplit('_', 1)[0].replace('_', ' ')} {sides}"
-    return name
+    name = row["volume"]
+    return name_of(name) if name.endswith("x".join(map(str, row["dims"]))) else name
 
 
 def paper_stand_ins(rows):
@@ -141,10 +138,6 @@ def paper_stand_ins(rows):
             f"{x * y * z / 1e6:,.0f}",
             f"{row['made_s']:.1f} s",
         )
-
-
-def ms(value):
-    return f"{value:.2f}" if value < 20 else f"{value:,.0f}"
 
 
 def mb(count):
