@@ -348,6 +348,7 @@ TEST_F(CliRanks, MoreWordsThanHostsShare) {
     SCOPED_TRACE(host_ranks);
     ::setenv("ISOWAVE_HOST_RANKS", host_ranks, 1);
     expect_same(kFuel, "-i 40 --orbit 1 --size 600x480 --samples 2", 3);
+    expect_same(kFuel, "-i 40 --orbit 1 --size 1920x1200", 3);  // half words
   }
   ::unsetenv("ISOWAVE_HOST_RANKS");
 }
