@@ -108,7 +108,7 @@ TEST_P(BrickTeamOnDevice, BrickOfAVolumeWithMoreBlocksThanIds) {
   EXPECT_GT(renderer.num_hits(), 200u);
 }
 
-/// Half a word has not room for the places of so many.
+/// Rank 0 of a team whose others have drawn nothing.
 class FirstOfMany : public TeamOfOne {
  public:
   explicit FirstOfMany(std::uint32_t size) : size_(size) {}
@@ -118,6 +118,7 @@ class FirstOfMany : public TeamOfOne {
   std::uint32_t size_;
 };
 
+/// Half a word has room for the places of 255 bricks.
 TEST_P(BrickTeamOnDevice, AWordForEachColourOfManyBricks) {
   for (const std::uint32_t size : {255u, 256u}) {
     const Cuts cuts(blocks_along(volume_.info()), size);

@@ -77,8 +77,8 @@ MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
 
 /// Slots with which a cache begins that may grow: for the blocks that a frame needs in most volumes
 /// and as many again, so that the next frame finds free ones. Twice that with rays of any origin:
-/// those of hits come to blocks that the camera's do not, and cannot make a cache grow, since each
-/// round of them counts as a frame.
+/// ambient rays come to blocks that the camera's do not. Each round of them counts as a frame, so a
+/// cache does not grow for what rounds take from each other.
 std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
                                 bool with_given_rays = false);
 

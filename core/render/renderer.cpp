@@ -116,8 +116,8 @@ FrameStats Renderer::render(const FrameRequest &request) {
   const std::pair view(request.camera, request.isovalue);
   bool &took_one_pass = took_one_pass_[last_view_ == view];
   last_view_ = view;
-  // Normals that begin right behind the pass that the last such frame was through with need not
-  // wait for the host. Should this frame need more, they have touched nothing.
+  // Where a single pass was enough for the last such frame, normals begin right behind the first,
+  // without waiting for the host. Should this frame need more, they have touched nothing.
   bool has_begun_normals = false,
        may_begin_normals = is_smooth && took_one_pass && !in_step(on_pass);
   for (bool finished = false; !finished && !stats.cancelled;) {

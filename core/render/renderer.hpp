@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/render/frame_request.hpp"
@@ -209,8 +210,8 @@ class Renderer {
       cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty
   /// Of the last frame: camera and isovalue.
   std::optional<std::pair<Camera, float>> last_view_;
-  /// Whether the last frame took a single pass, since it found all blocks that it needed: of those
-  /// of another view than the frame before theirs [0], and of the same [1].
+  /// Whether a single pass was enough: for the last frame that showed a new view [0], and for the
+  /// last that showed the same view again [1].
   std::array<bool, 2> took_one_pass_{};
   /// Of rays that wait for their normals, or are not those of the camera.
   std::optional<LevelRange> open_requests_;
