@@ -50,12 +50,12 @@ ISO_INLINE uint edge_steps(local const uint *slots, global const float *values, 
                     (float)lz + (axis == 2 ? t : 0.0f));
 }
 
-/// Entries [begin, end) of the list, a work-group each: work-item v has cell v.
+/// Entries [begin, end) of the list, a work-group each, in rows of a work-item for each cell.
 ///
 /// offsets  prefix sums of the counts: of entry i at i - first
 /// Out      vertices [3 * triangles]: triangle offsets[i - first] + k - skipped for the k-th of
 ///          entry i, counter-clockwise seen from where values are lower
-/// Launch   groups of 64, which stride over entries
+/// Launch   groups of up to 64, which stride over entries
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void block_triangles_write(
     const FrameParams frame_params, uint begin, uint end, uint first, uint skipped,
     global const uint *block_ids, global const BlockEntry *table, global const float *cache_values,
@@ -66,29 +66,32 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void block_tr
   local uint slots[8], sums[ISO_GROUP_SIZE];
   local ulong of_blocks[8];
   const uint item = get_local_id(0);
-  const uint x = item & 3, y = item >> 2 & 3, z = item >> 4;
   for (uint i = begin + get_group_id(0); i < end; i += get_num_groups(0)) {
     const uint block_id = block_ids[i];
     const BlockCoords b = block_coords(frame, block_id);
     barrier(CLK_LOCAL_MEM_FENCE); /* all are through with the block before */
-    if (item < 8) {
-      slots[item] = ISO_BLOCK_ABSENT;
-      if (dual_grid_block(frame, b, item) != ISO_INVALID_ID)
-        slots[item] =
-            cached_slot(frame, table, b.x + (item & 1), b.y + (item >> 1 & 1), b.z + (item >> 2));
-      of_blocks[item] = slots[item] == ISO_BLOCK_ABSENT ? 0 : inside[slots[item]];
+    for (uint n = item; n < 8; n += ISO_GROUP_SIZE) {
+      slots[n] = ISO_BLOCK_ABSENT;
+      if (dual_grid_block(frame, b, n) != ISO_INVALID_ID)
+        slots[n] = cached_slot(frame, table, b.x + (n & 1), b.y + (n >> 1 & 1), b.z + (n >> 2));
+      of_blocks[n] = slots[n] == ISO_BLOCK_ABSENT ? 0 : inside[slots[n]];
     }
     barrier(CLK_LOCAL_MEM_FENCE);
 
-    uint total;
-    const uint signs = signs_of_cell(&grid, b, of_blocks, x, y, z);
-    global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
-    const uint num_triangles = own_triangles[0];
-    const uint place = offsets[i - first] - skipped + group_scan(sums, num_triangles, &total);
-    for (uint k = 0; k < 3 * num_triangles; ++k) {
-      vertices[3 * place + k].steps =
-          edge_steps(slots, cache_values, frame->surface.isovalue, x, y, z, own_triangles[1 + k]);
-      vertices[3 * place + k].block_id = block_id;
+    uint before = offsets[i - first] - skipped; /* triangles of the rows before */
+    for (uint row = 0; row < ISO_BLOCK_VOXELS; row += ISO_GROUP_SIZE) {
+      const uint cell = row + item, x = cell & 3, y = cell >> 2 & 3, z = cell >> 4;
+      uint total;
+      const uint signs = signs_of_cell(&grid, b, of_blocks, x, y, z);
+      global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
+      const uint num_triangles = own_triangles[0];
+      const uint place = before + group_scan(sums, num_triangles, &total);
+      for (uint k = 0; k < 3 * num_triangles; ++k) {
+        vertices[3 * place + k].steps =
+            edge_steps(slots, cache_values, frame->surface.isovalue, x, y, z, own_triangles[1 + k]);
+        vertices[3 * place + k].block_id = block_id;
+      }
+      before += total;
     }
   }
 }

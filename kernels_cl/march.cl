@@ -14,20 +14,20 @@
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
 /// behind the border.
 ///
-/// frame_params, frames, num_frames, given, ranges  as start_rays
+/// frame_params, frames, num_frames, parts, given, ranges  as start_rays
 /// macrocell_masks                           as traverse
 /// In      active_ray_ids [prev->next_active_count]; ray_block_ids [pixel]: the active block that a
 ///         ray goes on from
 /// Out     hits [pixel]; next_active_ray_ids [counts->next_active_count] of the rays that wait, and
 ///         in ray_block_ids the block they wait at; *next_counts, opened; slot_stamps of the blocks
 ///         that were read
-/// Launch  groups of ISO_GROUP_SIZE, which stride over the rays
+/// Launch  groups of ISO_GROUP_SIZE, which stride over the rays, in parts as start_rays
 ///
 /// In rounds: find the next blocks, walk their cells. When rays are so few that a device would wait
 /// for the longest of them, each has more work-items, up to one for each block of a round; the
 /// first block in which anything happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
     global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
     global BlockEntry *table, global const ulong *inside, global const float *cache_values,
     global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
@@ -47,8 +47,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   }
   if (item == 0) counters[0] = group_hits = group_blocks = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays * lanes;
-       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+  for (uint begin = get_global_id(0) - item; begin < num_rays * lanes;
+       begin += parts * get_global_size(0)) {
     const uint i = (begin + item) / lanes, lane = item % lanes;
     const int is_ray = i < num_rays;
     const RayEntry entry = unpack_entry(is_ray ? active_ray_ids[i] : 0);

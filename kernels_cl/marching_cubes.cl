@@ -62,7 +62,8 @@ ISO_INLINE void voxel_gradient(const BlockGrid *grid, const Neighbourhood *n, Bl
                                  voxel_near(n, x, y, z + (pz < last_z)), pz, last_z);
 }
 
-/// Entries [begin, end) of the list, a work-group each: work-item v has voxel and cell v.
+/// Entries [begin, end) of the list, a work-group each, in rows of a work-item for each voxel and
+/// its cell.
 ///
 /// listed_masks, listed_offsets  of active_blocks.cl
 /// edges                         [list] of marching_cubes_count
@@ -70,7 +71,7 @@ ISO_INLINE void voxel_gradient(const BlockGrid *grid, const Neighbourhood *n, Bl
 /// with_gradients                0: gradients are not written
 /// Out     from the first vertex and triangle of entry `begin` on: vertices, gradients (x, y, z of
 ///         each), triangles, which name vertices by their number among those of the whole list
-/// Launch  groups of 64, which stride over entries
+/// Launch  groups of up to 64, which stride over entries
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching_cubes_write(
     const FrameParams frame_params, uint begin, uint end, uint with_gradients,
     global const uint *block_ids, global const uint *listed_masks,
@@ -84,21 +85,20 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
   local uint slots[27], first_vertex[8], sums[ISO_GROUP_SIZE];
   local ulong edges_x[8], edges_y[8], edges_z[8], of_blocks[8];
   const uint item = get_local_id(0);
-  const int x = item & 3, y = item >> 2 & 3, z = item >> 4;
   const Neighbourhood near_block = {slots, cache_values};
   for (uint i = begin + get_group_id(0); i < end; i += get_num_groups(0)) {
     const BlockCoords b = block_coords(frame, block_ids[i]);
     barrier(CLK_LOCAL_MEM_FENCE); /* all are through with the block before */
-    if (item < 27) {
-      const uint nx = b.x + item % 3 - 1, ny = b.y + item / 3 % 3 - 1, nz = b.z + item / 9 - 1;
-      slots[item] = nx < grid.blocks_x && ny < grid.blocks_y && nz < grid.blocks_z
-                        ? cached_slot(frame, table, nx, ny, nz)
-                        : ISO_BLOCK_ABSENT;
+    for (uint n = item; n < 27; n += ISO_GROUP_SIZE) {
+      const uint nx = b.x + n % 3 - 1, ny = b.y + n / 3 % 3 - 1, nz = b.z + n / 9 - 1;
+      slots[n] = nx < grid.blocks_x && ny < grid.blocks_y && nz < grid.blocks_z
+                     ? cached_slot(frame, table, nx, ny, nz)
+                     : ISO_BLOCK_ABSENT;
     }
-    if (item < 8) {
-      const uint nx = b.x + (item & 1), ny = b.y + (item >> 1 & 1), nz = b.z + (item >> 2);
+    for (uint n = item; n < 8; n += ISO_GROUP_SIZE) {
+      const uint nx = b.x + (n & 1), ny = b.y + (n >> 1 & 1), nz = b.z + (n >> 2);
       uint entry = ISO_INVALID_ID, slot = ISO_BLOCK_ABSENT;
-      if (dual_grid_block(frame, b, item) != ISO_INVALID_ID) {
+      if (dual_grid_block(frame, b, n) != ISO_INVALID_ID) {
         const uint coarse_x = (grid.blocks_x + 3) / 4, coarse_y = (grid.blocks_y + 3) / 4;
         const uint coarse = nx / 4 + coarse_x * (ny / 4 + coarse_y * (nz / 4));
         const uint bit = (nx & 3) + 4 * (ny & 3) + 16 * (nz & 3);
@@ -107,57 +107,62 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
           entry = listed_offsets[coarse] + count_bits(mask & (((ulong)1 << bit) - 1));
         slot = cached_slot(frame, table, nx, ny, nz);
       }
-      of_blocks[item] = slot == ISO_BLOCK_ABSENT ? 0 : inside[slot];
-      first_vertex[item] = entry == ISO_INVALID_ID ? 0 : vertex_offsets[entry];
-      edges_x[item] = entry == ISO_INVALID_ID ? 0 : edges[entry].x;
-      edges_y[item] = entry == ISO_INVALID_ID ? 0 : edges[entry].y;
-      edges_z[item] = entry == ISO_INVALID_ID ? 0 : edges[entry].z;
+      of_blocks[n] = slot == ISO_BLOCK_ABSENT ? 0 : inside[slot];
+      first_vertex[n] = entry == ISO_INVALID_ID ? 0 : vertex_offsets[entry];
+      edges_x[n] = entry == ISO_INVALID_ID ? 0 : edges[entry].x;
+      edges_y[n] = entry == ISO_INVALID_ID ? 0 : edges[entry].y;
+      edges_z[n] = entry == ISO_INVALID_ID ? 0 : edges[entry].z;
     }
     barrier(CLK_LOCAL_MEM_FENCE);
 
     const uint first_of_batch = vertex_offsets[begin];
-    for (uint axis = 0; axis < 3; ++axis) {
-      const ulong own = axis == 0 ? edges_x[0] : axis == 1 ? edges_y[0] : edges_z[0];
-      if ((own >> item & 1) != 0) {
-        const uint place = first_vertex[0] - first_of_batch +
-                           vertex_rank(edges_x[0], edges_y[0], edges_z[0], axis, item);
-        const int ux = x + (axis == 0), uy = y + (axis == 1), uz = z + (axis == 2);
-        const float lower = voxel_near(&near_block, x, y, z),
-                    upper = voxel_near(&near_block, ux, uy, uz);
-        const float t = edge_crossing(lower, upper, frame->surface.isovalue);
-        vertices[place].edge = (i - begin) << ISO_VERTEX_BLOCK_SHIFT | axis << 6 | item;
-        vertices[place].t = t;
-        if (with_gradients != 0) {
-          float at_lower[3], at_upper[3];
-          voxel_gradient(&grid, &near_block, b, x, y, z, at_lower);
-          voxel_gradient(&grid, &near_block, b, ux, uy, uz, at_upper);
-          const Gradient g = vertex_gradient(at_lower, at_upper, t, axis, upper - lower);
-          gradients[3 * place] = g.x;
-          gradients[3 * place + 1] = g.y;
-          gradients[3 * place + 2] = g.z;
+    uint before = triangle_offsets[i] - triangle_offsets[begin]; /* triangles of the rows before */
+    for (uint row = 0; row < ISO_BLOCK_VOXELS; row += ISO_GROUP_SIZE) {
+      const uint voxel = row + item;
+      const int x = voxel & 3, y = voxel >> 2 & 3, z = voxel >> 4;
+      for (uint axis = 0; axis < 3; ++axis) {
+        const ulong own = axis == 0 ? edges_x[0] : axis == 1 ? edges_y[0] : edges_z[0];
+        if ((own >> voxel & 1) != 0) {
+          const uint place = first_vertex[0] - first_of_batch +
+                             vertex_rank(edges_x[0], edges_y[0], edges_z[0], axis, voxel);
+          const int ux = x + (axis == 0), uy = y + (axis == 1), uz = z + (axis == 2);
+          const float lower = voxel_near(&near_block, x, y, z),
+                      upper = voxel_near(&near_block, ux, uy, uz);
+          const float t = edge_crossing(lower, upper, frame->surface.isovalue);
+          vertices[place].edge = (i - begin) << ISO_VERTEX_BLOCK_SHIFT | axis << 6 | voxel;
+          vertices[place].t = t;
+          if (with_gradients != 0) {
+            float at_lower[3], at_upper[3];
+            voxel_gradient(&grid, &near_block, b, x, y, z, at_lower);
+            voxel_gradient(&grid, &near_block, b, ux, uy, uz, at_upper);
+            const Gradient g = vertex_gradient(at_lower, at_upper, t, axis, upper - lower);
+            gradients[3 * place] = g.x;
+            gradients[3 * place + 1] = g.y;
+            gradients[3 * place + 2] = g.z;
+          }
         }
       }
-    }
 
-    uint total;
-    const uint signs = signs_of_cell(&grid, b, of_blocks, (uint)x, (uint)y, (uint)z);
-    global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
-    const uint num_triangles = own_triangles[0];
-    const uint place =
-        triangle_offsets[i] - triangle_offsets[begin] + group_scan(sums, num_triangles, &total);
-    for (uint triangle = 0; triangle < num_triangles; ++triangle) {
-      uint numbers[3];
-      for (uint k = 0; k < 3; ++k) {
-        const uint edge = own_triangles[1 + 3 * triangle + k], corner = edge_corner(edge);
-        const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
-        const uint block = (cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2);
-        numbers[k] = first_vertex[block] + vertex_rank(edges_x[block], edges_y[block],
-                                                       edges_z[block], edge_axis(edge),
-                                                       (cx & 3) + 4 * (cy & 3) + 16 * (cz & 3));
+      uint total;
+      const uint signs = signs_of_cell(&grid, b, of_blocks, (uint)x, (uint)y, (uint)z);
+      global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
+      const uint num_triangles = own_triangles[0];
+      const uint place = before + group_scan(sums, num_triangles, &total);
+      for (uint triangle = 0; triangle < num_triangles; ++triangle) {
+        uint numbers[3];
+        for (uint k = 0; k < 3; ++k) {
+          const uint edge = own_triangles[1 + 3 * triangle + k], corner = edge_corner(edge);
+          const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
+          const uint block = (cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2);
+          numbers[k] = first_vertex[block] + vertex_rank(edges_x[block], edges_y[block],
+                                                         edges_z[block], edge_axis(edge),
+                                                         (cx & 3) + 4 * (cy & 3) + 16 * (cz & 3));
+        }
+        triangles[place + triangle].a = numbers[0];
+        triangles[place + triangle].b = numbers[1];
+        triangles[place + triangle].c = numbers[2];
       }
-      triangles[place + triangle].a = numbers[0];
-      triangles[place + triangle].b = numbers[1];
-      triangles[place + triangle].c = numbers[2];
+      before += total;
     }
   }
 }

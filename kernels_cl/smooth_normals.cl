@@ -98,7 +98,7 @@ ISO_INLINE void stamp_stencil(global uint *slot_stamps, uint stamp, BlockCoords 
   }
 }
 
-/// frame_params, frames, num_frames  as start_rays
+/// frame_params, frames, num_frames, parts  as start_rays
 /// begins  1: all hits; nothing happens where prev->next_active_count rays are still on their way
 ///         to one. 0: those of the list
 /// prev    counts of the pass before
@@ -107,14 +107,15 @@ ISO_INLINE void stamp_stencil(global uint *slot_stamps, uint stamp, BlockCoords 
 ///         that wait, of which the first counts->window_count ask for blocks: request_block_ids
 ///         [counts->requested_count, at most capacity]; slot_stamps of the blocks that were read,
 ///         or are needed; *next_counts, opened
-/// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box, or the list
+/// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box, or the list,
+///         in parts as start_rays
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_normals(
-    const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint begins,
-    global const BlockEntry *table, global const float *cache_values, global const PassCounts *prev,
-    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
-    global uint *next_active_ray_ids, global HitRecord *hits, global uint *slot_stamps,
-    global uint *requested_bits, global uint *request_block_ids, uint capacity,
-    global CacheState *cache) {
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
+    uint begins, global const BlockEntry *table, global const float *cache_values,
+    global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
+    global const uint *active_ray_ids, global uint *next_active_ray_ids, global HitRecord *hits,
+    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids,
+    uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint slots[8 * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin, counters[2], num_waiting;
@@ -137,8 +138,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
   }
   if (item == 0) num_staged = counters[0] = num_waiting = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_rays;
-       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+  for (uint begin = get_global_id(0) - item; begin < num_rays;
+       begin += parts * get_global_size(0)) {
     const uint i = begin + item;
     uint pixel = ISO_INVALID_ID, block_id = ISO_INVALID_ID, touched = 0, missing = 0;
     BlockCoords base = {0, 0, 0};

@@ -42,9 +42,10 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 /// Out     hit_words: hits [pixel], seen as words, all none; next_active_ray_ids
 ///         [counts->next_active_count]: of the frame's screen box, the pixels whose rays meet an
 ///         active block; ray_block_ids [pixel]: that block
-/// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box
+/// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box; in as many
+///         parts, one after the other, as `parts` says (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
-    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
     global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
     global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
     global uint *ray_block_ids, global uint *hit_words) {
@@ -57,8 +58,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
     next->last_frame_pass = counts->frame_pass;
     next->frame_pass = next->pass;
   }
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < frame_rays(frame);
-       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+  for (uint begin = get_global_id(0) - item; begin < frame_rays(frame);
+       begin += parts * get_global_size(0)) {
     clear_hits(hit_words + begin * ISO_HIT_WORDS,
                min((uint)ISO_GROUP_SIZE, frame_rays(frame) - begin));
     barrier(CLK_LOCAL_MEM_FENCE); /* or each of a CPU's work-items, one by one, would go through all
@@ -66,8 +67,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
   }
   if (item == 0) counters[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint begin = get_group_id(0) * ISO_GROUP_SIZE; begin < num_tiled;
-       begin += get_num_groups(0) * ISO_GROUP_SIZE) {
+  for (uint begin = get_global_id(0) - item; begin < num_tiled;
+       begin += parts * get_global_size(0)) {
     const uint pixel =
         begin + item < num_tiled ? tiled_pixel(frame, box, begin + item) : ISO_INVALID_ID;
     uint stand = ISO_INVALID_ID, log_ahead = ISO_FIRST_LOG_AHEAD;

@@ -17,6 +17,7 @@ namespace isowave::core {
 namespace {
 
 using test::TestVolume;
+using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr float kIsovalue = 0.8f;
@@ -195,6 +196,27 @@ INSTANTIATE_TEST_SUITE_P(Devices, MemoryPlanOfLevelsOnDevice,
 
 /// Where scratch for the ranges of the last level is what the most memory is taken with, nothing
 /// but what is needed by then is there.
+TEST_P(MemoryPlanOnDevice, SmallDefaultsStayWithinTheLargestBuffer) {
+  const TestVolume volume({30, 27, 33}, test::gyroid_field(10), 8);
+  ocl::DeviceInfo info = GetParam().device;
+  const auto plan = [&](std::uint64_t largest) {
+    info.capabilities.largest_allocation = largest;
+    const ocl::Device device(info);
+    return make_plan(device, volume.compressed,
+                     checked(GetParam().with({.size = size_}), volume.compressed, device));
+  };
+  const std::uint32_t all = plan(1 << 30).most_slots;
+  for (const std::uint64_t largest : {120'000u, 60'000u}) {
+    const MemoryPlan small = plan(largest);
+    EXPECT_LT(small.most_slots, all);
+    EXPECT_GE(small.most_slots, kMinCacheSlots);
+    for (const ocl::BufferSize &buffer : resized(small, small.most_slots).buffers)
+      EXPECT_LE(buffer.bytes(), largest) << buffer.name;
+  }
+  EXPECT_THAT(refusal([&] { plan(1000); }), AllOf(HasSubstr("bytes, and device '"),
+                                                  HasSubstr("gives at most 1000 to one buffer")));
+}
+
 TEST_P(MemoryPlanOfLevelsOnDevice, PeakOfSetupIsPlanned) {
   const glm::uvec3 dims(128, 128, 8);
   ArrayReader reader(test::grid_info(dims), test::sample(dims, test::noise_field(3)));

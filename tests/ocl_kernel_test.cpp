@@ -56,6 +56,25 @@ TEST_P(OclKernelOnDevice, ScalesAtAwkwardCounts) {
   }
 }
 
+TEST_P(OclKernelOnDevice, SmallGroupsOfDevicesThatGiveNoLargerOnes) {
+  ocl::DeviceInfo info = GetParam();
+  info.capabilities.max_work_group_size = 6;
+  ocl::Device device(info);
+  ScaleKernel scale(device, "launch_probe", "scale_values");
+  std::vector<uint> values(1000);
+  std::iota(values.begin(), values.end(), 1u);
+  const ocl::Buffer<uint> input(device, "input", values);
+  ocl::Buffer<uint> output(device, "output", values.size());
+  scale(Range::covering(values.size(), 64), input, 1000, 3, output);
+  for (uint &value : values) value *= 3;
+  EXPECT_EQ(output.read(), values);
+  // Built for groups of 4 instead of 64, of which one stands for all.
+  ocl::Kernel<Out<uint>> sizes(device, "launch_probe", "group_sizes", {{"ISO_GROUP_SIZE", "64u"}});
+  ocl::Buffer<uint> seen(device, "seen", 3);
+  sizes(Range::groups(1, 64), seen);
+  EXPECT_THAT(seen.read(), testing::ElementsAre(4u, 16u, 1u));
+}
+
 TEST_P(OclKernelOnDevice, SmallLocalMemoryAndGroups) {
   constexpr std::size_t kGroupSize = 32, kNumGroups = 5;
   std::vector<uint> values(kGroupSize * kNumGroups);

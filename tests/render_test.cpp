@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <memory>
+
 #include "core/base/error.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/render/renderer.hpp"
@@ -29,7 +32,7 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                       RendererOptions options = {}) {
     std::uint64_t hits = 0;
     options.size = size;
-    Renderer renderer(device_, volume.compressed, options);
+    Renderer renderer(*device_, volume.compressed, options);
     for (const float isovalue : isovalues) {
       for (std::size_t view = 0; view < cameras.size(); ++view) {
         SCOPED_TRACE(fmt::format("isovalue {}, view {}", isovalue, view));
@@ -51,10 +54,17 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     return check(volume, orbit_cameras(volume.info(), 2), isovalues, size);
   }
 
-  /// What the simulator can afford where a case draws many frames.
-  ImageSize small_size() const { return is_simulator(device_.info()) ? kTiny : kSmall; }
+  /// Becomes the same device with other abilities.
+  void pretend(const std::function<void(ocl::Capabilities &)> &change) {
+    ocl::DeviceInfo info = GetParam();
+    change(info.capabilities);
+    device_ = std::make_unique<ocl::Device>(info);
+  }
 
-  ocl::Device device_{GetParam()};
+  /// What the simulator can afford where a case draws many frames.
+  ImageSize small_size() const { return is_simulator(device_->info()) ? kTiny : kSmall; }
+
+  std::unique_ptr<ocl::Device> device_ = std::make_unique<ocl::Device>(GetParam());
 };
 INSTANTIATE_TEST_SUITE_P(Devices, RenderOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
@@ -86,6 +96,26 @@ TEST_P(RenderOnDevice, SmallOneCellOneBlockAndThinVolumes) {
 TEST_P(RenderOnDevice, SmallEyeInside) {
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
   EXPECT_GT(check(volume, {camera_along({4, 4.5, 5}, {1, 0.25, -0.5})}, {0.1f}, kSmall), 20u);
+}
+
+/// Rays in many launches, ray by ray: start_rays, march and smooth_normals.
+TEST_P(RenderOnDevice, SmallLaunchesOfFewRays) {
+  pretend([](ocl::Capabilities &can) { can.elements_per_launch = 7; });
+  const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
+  EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, kSmall,
+                  {.packets = RayPackets::kOff}),
+            20u);
+}
+
+TEST_P(RenderOnDevice, SmallGroupsOfTwo) {
+  if (is_llvmpipe(GetParam()) && !long_tests()) return;  // it compiles march for minutes, again
+  pretend([](ocl::Capabilities &can) { can.max_work_group_size = 3; });
+  const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
+  for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+    EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, small_size(),
+                    {.pipeline = pipeline, .packets = RayPackets::kOff}),
+              5u);
+  }
 }
 
 TEST_P(RenderOnDevice, SmallNothingToHit) {
@@ -135,7 +165,7 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
   const ImageSize size = small_size();
   for (const TestVolume &volume :
        {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
-    Renderer renderer(device_, volume.compressed, {.size = size});
+    Renderer renderer(*device_, volume.compressed, {.size = size});
     for (const double voxel_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
       SCOPED_TRACE(fmt::format("{} bits per block, value error {}",
                                volume.compressed.bits_per_block, voxel_error));
@@ -158,7 +188,7 @@ TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
   std::vector<float> source(open()->info().num_voxels());
   open()->read_layers(0, open()->info().dims.z, source);
   const TestVolume volume(open()->info(), source, ErrorGoal{0, true});
-  Renderer renderer(device_, volume.compressed, {.size = kMedium});
+  Renderer renderer(*device_, volume.compressed, {.size = kMedium});
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   for (const double voxel_error : {0.5, 4.0, 64.0}) {
     const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
@@ -383,7 +413,7 @@ TEST_P(RenderOnDevice, BadOptionsAreErrors) {
 TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed, {.size = kSmall});
+  Renderer renderer(*device_, volume.compressed, {.size = kSmall});
   EXPECT_THROW(renderer.render({camera, NAN}), Error);
   for (const Camera &bad :
        {Camera{camera.eye, camera.eye, camera.up}, Camera{camera.eye, camera.at, {0, 0, 0}},

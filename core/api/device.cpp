@@ -31,6 +31,10 @@ const DeviceInfo &Device::info() const {
   return implementation_->info;
 }
 
+const std::string &Device::notice() const {
+  return implementation_->device.notice();
+}
+
 double Device::compile_ms() const {
   const std::lock_guard lock(implementation_->mutex);
   return implementation_->device.compile_ms();

@@ -8,6 +8,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/ocl/arithmetic.hpp"
 #include "core/ocl/build_log.hpp"
 #include "core/ocl/device_list.hpp"
 #include "core/ocl/kernel_sources.hpp"
@@ -60,6 +61,15 @@ std::string build_options(const DeviceInfo &device, Defines defines) {
   return options;
 }
 
+/// What OpenCL's embedded profile leaves out and kernels need, or nothing.
+std::string lacking(const cl::Device &device, const Capabilities &can) {
+  if (device.getInfo<CL_DEVICE_PROFILE>().starts_with("EMBEDDED_PROFILE") &&
+      !has_word(device.getInfo<CL_DEVICE_EXTENSIONS>(), "cles_khr_int64"))
+    return "OpenCL's embedded profile without 64-bit integers";
+  if (!can.rounds_to_nearest) return "float32 arithmetic that does not round to nearest";
+  return {};
+}
+
 }  // namespace
 
 Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(device_handle(info)) {
@@ -67,6 +77,9 @@ Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(de
   try {
     if (!device_.getInfo<CL_DEVICE_COMPILER_AVAILABLE>()) {
       throw Error("device '{}' has no OpenCL C compiler: choose another with --device", info_.name);
+    }
+    if (const std::string lack = lacking(device_, can); !lack.empty()) {
+      throw Error("device '{}' has {}: choose another with --device", info_.name, lack);
     }
     if (can.local_memory < kNeededLocalMemory) {
       throw Error(
@@ -86,6 +99,7 @@ Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(de
     throw Error("cannot open device '{}' ({}): {}: {}", info_.name, info_.platform, error.what(),
                 error_name(error.err()));
   }
+  notice_ = arithmetic_notice(*this);
 }
 
 cl::CommandQueue &Device::transfer_queue() {
@@ -105,13 +119,17 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
   auto key = std::make_pair(std::string(stem), defines);
   if (draws_bricks_) key.second.emplace("ISO_BRICKS", "1");
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
+  cl::Program program = build(stem, key.second);
+  return programs_.emplace(std::move(key), std::move(program)).first->second;
+}
 
-  const std::string options = build_options(info_, key.second);
+cl::Program Device::build(std::string_view stem, const Defines &defines) {
+  const std::string options = build_options(info_, defines);
   const Compiling now = compiling();
   try {
     cl::Program program(context_, kernel_text(stem));
     program.build(device_, options.c_str());
-    return programs_.emplace(std::move(key), std::move(program)).first->second;
+    return program;
   } catch (const cl::BuildError &error) {
     std::string log;
     for (const auto &[device, said] : error.getBuildLog())

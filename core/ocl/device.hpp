@@ -32,11 +32,14 @@ struct Capabilities {
   bool sub_groups = false;                ///< cl_khr_subgroups or OpenCL 2.1+ with sub-groups > 0
   bool correctly_rounded_divide = false;  ///< accepts -cl-fp32-correctly-rounded-divide-sqrt
   bool denormals = false;                 ///< float32 denormals kept
+  bool rounds_to_nearest = false;         ///< float32 results, as OpenCL's full profile does
   std::uint64_t global_memory = 0;        ///< bytes
   std::uint64_t largest_allocation = 0;   ///< bytes in one buffer
   std::uint64_t local_memory = 0;         ///< bytes per work-group
-  std::uint32_t max_work_group_size = 0;
+  std::uint32_t max_work_group_size = 0;  ///< of any kernel; a kernel's own may be lower
   std::uint32_t compute_units = 0;
+  /// Rays, or the like, that a launch may have so that no watchdog of a desktop ends it.
+  std::uint64_t elements_per_launch = UINT64_MAX;
   std::uint32_t native_float_width = 0;  ///< floats in a vector of its processors
 };
 
@@ -68,13 +71,16 @@ class Device {
  public:
   /// profiling  record events so that StageTimer reports; costs about 10 us a launch on GPUs
   /// Throws     Error: the device lacks what core needs: OpenCL 1.2, a compiler, 32 KiB of local
-  ///            memory
+  ///            memory, 64-bit integers, arithmetic that rounds to nearest
   explicit Device(const DeviceInfo &info, bool profiling = false);
   Device(const Device &) = delete;
   Device &operator=(const Device &) = delete;
 
   const DeviceInfo &info() const { return info_; }
   const Capabilities &capabilities() const { return info_.capabilities; }
+  /// One line on what the device computes otherwise than the host, so that pictures may differ in
+  /// last bits; empty: nothing. From a self-test at opening (core/ocl/arithmetic.hpp).
+  const std::string &notice() const { return notice_; }
   const cl::Context &context() const { return context_; }
   cl::CommandQueue &queue() { return queue_; }
   /// A second in-order queue, made when it is first asked for: for transfers that overlap with the
@@ -90,6 +96,11 @@ class Device {
   ///
   /// Throws  BuildError: it does not build
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
+
+  /// A program of its own, which the device does not keep.
+  ///
+  /// Throws  as program()
+  cl::Program build(std::string_view stem, const Defines &defines);
 
   /// From now on programs are built that know of bricks (ISO_BRICKS), which take 1 to 2 % longer.
   /// They draw whole volumes, too.
@@ -141,6 +152,7 @@ class Device {
   StageTimer timer_;
   std::map<std::pair<std::string, Defines>, cl::Program> programs_;
   std::function<void(std::string_view)> on_new_kernel_;
+  std::string notice_;
   double compile_ms_ = 0;
   bool draws_bricks_ = false;
   int compiling_depth_ = 0;

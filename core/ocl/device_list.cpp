@@ -66,6 +66,28 @@ bool probe_sub_groups(const cl::Device &device, std::string_view extensions,
   return count > 0;
 }
 
+/// Whether the system ends launches that take seconds, as those with a desktop do. NVIDIA says so;
+/// of other GPUs it is assumed.
+bool has_watchdog(const cl::Device &device, std::string_view extensions) {
+  if ((device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU) == 0) return false;
+  if (!has_word(extensions, "cl_nv_device_attribute_query")) return true;
+  constexpr cl_device_info kKernelExecTimeout = 0x4005;  // CL_DEVICE_KERNEL_EXEC_TIMEOUT_NV
+  cl_bool times_out = CL_TRUE;
+  try {
+    device.getInfo(kKernelExecTimeout, &times_out);
+  } catch (const cl::Error &) {
+    return true;
+  }
+  return times_out == CL_TRUE;
+}
+
+/// A slow GPU of 3 units at 1400 MHz takes about 0.1 us for a ray, and ten times that for a long
+/// one: launches of 67,000 rays stay below a tenth of a second.
+std::uint64_t elements_before_watchdog(std::uint32_t units, std::uint32_t megahertz) {
+  constexpr std::uint64_t kElementsPerUnitMegahertz = 16, kLeast = 1u << 16;
+  return std::max(kLeast, kElementsPerUnitMegahertz * units * megahertz);
+}
+
 Capabilities probe(const cl::Device &device, std::uint32_t version) {
   const std::string extensions = device.getInfo<CL_DEVICE_EXTENSIONS>();
   const cl_device_fp_config floats = device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>();
@@ -77,12 +99,18 @@ Capabilities probe(const cl::Device &device, std::uint32_t version) {
   result.sub_groups = probe_sub_groups(device, extensions, version);
   result.correctly_rounded_divide = (floats & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
   result.denormals = (floats & CL_FP_DENORM) != 0;
+  result.rounds_to_nearest = (floats & CL_FP_ROUND_TO_NEAREST) != 0;
   result.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
   result.largest_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
   result.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
+  const std::vector<std::size_t> edges = device.getInfo<CL_DEVICE_MAX_WORK_ITEM_SIZES>();
   result.max_work_group_size =
-      static_cast<std::uint32_t>(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
+      static_cast<std::uint32_t>(std::min(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>(),
+                                          edges.empty() ? std::size_t{1} : edges.front()));
   result.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+  if (has_watchdog(device, extensions))
+    result.elements_per_launch = elements_before_watchdog(
+        result.compute_units, device.getInfo<CL_DEVICE_MAX_CLOCK_FREQUENCY>());
   result.native_float_width = device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>();
   return result;
 }

@@ -1,6 +1,7 @@
 #include "core/ocl/kernel.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <stdexcept>
 #include <utility>
 
@@ -16,17 +17,47 @@ Range Range::strided(std::size_t max_count, std::size_t group_size, const Device
   return range;
 }
 
+Range Range::in_parts(std::uint64_t count, const Device &device) const {
+  const std::uint64_t most = device.capabilities().elements_per_launch;
+  Range range = *this;
+  range.parts =
+      static_cast<std::uint32_t>(std::max<std::uint64_t>(1, count / most + (count % most != 0)));
+  return range;
+}
+
 void RawKernel::make(std::size_t num_params) {
   if (kernel_() != nullptr) return;
   device_->announce_kernel(name_);
-  const cl::Program &program = device_->program(stem_, defines_);
+  max_group_size_ = std::bit_floor(std::size_t{device_->capabilities().max_work_group_size});
+  Defines defines = defines_;
+  cl::Kernel kernel;
+  if (const auto known = defines.find("ISO_GROUP_SIZE"); known != defines.end()) {
+    const std::size_t wanted = std::stoul(known->second);
+    for (std::size_t size = 0; size != std::min(wanted, max_group_size_);) {
+      size = std::min(wanted, max_group_size_);
+      known->second = fmt::format("{}u", size);
+      if (size < wanted) defines["ISO_GROUP_SHARE"] = fmt::format("{}u", wanted / size);
+      kernel = build(defines, num_params);
+    }
+  } else {
+    kernel = build(defines, num_params);
+  }
+  kernel_ = std::move(kernel);
+  is_new_ = true;
+}
+
+cl::Kernel RawKernel::build(const Defines &defines, std::size_t num_params) {
+  const cl::Program &program = device_->program(stem_, defines);
   const Device::Compiling compiling = device_->compiling();  // Mesa compiles some of it here
   std::size_t num_args = 0;
+  cl::Kernel kernel;
   try {
-    cl::Kernel kernel(program, name_.c_str());
+    kernel = cl::Kernel(program, name_.c_str());
     num_args = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
-    if (num_args == num_params) kernel_ = std::move(kernel);
-    is_new_ = true;
+    // Its registers may leave room for fewer work-items than the device has for other kernels.
+    const std::size_t limit = kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(
+        program.getInfo<CL_PROGRAM_DEVICES>()[0]);
+    max_group_size_ = std::min(max_group_size_, std::max<std::size_t>(std::bit_floor(limit), 1));
   } catch (const cl::Error &error) {
     throw Error("{}.cl gives no kernel '{}': {}: {}", stem_, name_, error.what(),
                 error_name(error.err()));
@@ -35,6 +66,7 @@ void RawKernel::make(std::size_t num_params) {
     throw std::invalid_argument(fmt::format("kernel '{}' takes {} arguments, its C++ type names {}",
                                             name_, num_args, num_params));
   }
+  return kernel;
 }
 
 void RawKernel::launch(const Range &range) {
@@ -42,13 +74,23 @@ void RawKernel::launch(const Range &range) {
     const Device::Compiling compiling = device_->compiling();
     return launch(range);
   }
+  const std::size_t group_size = std::min(range.group_size, max_group_size_);
+  const std::size_t num_groups =
+      range.keeps_groups
+          ? range.num_groups
+          : Range::covering(range.num_groups * range.group_size, group_size).num_groups;
+  const std::size_t num_items = num_groups * group_size;
   try {
-    device_->queue().enqueueNDRangeKernel(
-        kernel_, cl::NullRange, cl::NDRange(range.num_groups * range.group_size),
-        cl::NDRange(range.group_size), nullptr, device_->timer().next_event());
+    for (std::size_t part = 0; part < range.parts; ++part) {
+      const cl::NDRange begin = part == 0 ? cl::NDRange() : cl::NDRange(part * num_items);
+      device_->queue().enqueueNDRangeKernel(kernel_, begin, cl::NDRange(num_items),
+                                            cl::NDRange(group_size), nullptr,
+                                            device_->timer().next_event());
+      if (range.parts > 1) device_->queue().flush();  // or a driver may put them together
+    }
   } catch (const cl::Error &error) {
-    throw Error("kernel '{}' does not start with {} groups of {}: {}: {}", name_, range.num_groups,
-                range.group_size, error.what(), error_name(error.err()));
+    throw Error("kernel '{}' does not start with {} groups of {}: {}: {}", name_, num_groups,
+                group_size, error.what(), error_name(error.err()));
   }
   if (device_->is_compiling()) device_->finish();
 }

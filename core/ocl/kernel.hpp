@@ -8,6 +8,7 @@
 // times launches does one before that has nothing to do.
 
 #include <CL/opencl.hpp>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -39,18 +40,31 @@ struct Local {
   std::size_t count;
 };
 
-/// Work-items of a work-group where a stage leaves no choice.
+/// Work-items of a work-group that stages ask for unless they are told otherwise.
 inline constexpr std::uint32_t kGroupSize = 64;
 
-/// The one-dimensional shape of a launch: num_groups work-groups of group_size work-items.
+/// The one-dimensional shape of a launch: num_groups work-groups of group_size work-items. A kernel
+/// whose own limit on this device is lower is launched with more and smaller groups.
 struct Range {
   std::size_t num_groups = 0;
   std::size_t group_size = 1;
+  /// Each group has work of its own, which is not shared out among more of them.
+  bool keeps_groups = false;
+  /// Launches that share the work, one after the other: the kernel's work-items go on by `parts`
+  /// times get_global_size(0), from get_global_id(0) on.
+  std::uint32_t parts = 1;
 
+  /// As many groups as there are, whatever their size: one, for kernels that scan a table.
+  static Range groups(std::size_t num_groups, std::size_t group_size) {
+    return {num_groups, group_size, true};
+  }
   /// One work-item per element, rounded up to whole groups.
   static Range covering(std::size_t count, std::size_t group_size) {
     return {(count + group_size - 1) / group_size, group_size};
   }
+  /// In as many parts as it takes that no launch has more elements than the device gets through
+  /// before a watchdog takes it for hung.
+  Range in_parts(std::uint64_t count, const Device &device) const;
   /// For grid-stride kernels: as covering(), but never more groups than keep the device busy.
   /// oversubscribe: this many times as many, for kernels so lean that a device holds more groups
   /// than of others.
@@ -64,7 +78,8 @@ class RawKernel {
       : device_(&device), stem_(stem), name_(kernel_name), defines_(defines) {}
 
  protected:
-  /// Makes the kernel, unless that has been done; its program, too.
+  /// Makes the kernel, unless that has been done; its program, too. If the device gives the kernel
+  /// no groups of ISO_GROUP_SIZE work-items, the kernel is built for smaller ones.
   ///
   /// Throws  Error: there is none of that name; std::invalid_argument: it has another number of
   ///         parameters
@@ -92,12 +107,15 @@ class RawKernel {
  private:
   void set_mem(cl_uint index, const cl::Buffer &mem);
   void set_bytes(cl_uint index, std::size_t bytes, const void *data);
+  /// The kernel, built with these macros. Asks the device how large its groups may be.
+  cl::Kernel build(const Defines &defines, std::size_t num_params);
 
   Device *device_;
   std::string stem_, name_;
   Defines defines_;
   cl::Kernel kernel_;
-  bool is_new_ = false;  ///< never launched
+  std::size_t max_group_size_ = 0;  ///< a power of two: what the device gives this kernel
+  bool is_new_ = false;             ///< never launched
 };
 
 /// Params are In<T>, Out<T>, Local<T> or plain scalars, in the order of the kernel's signature. The

@@ -99,6 +99,10 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
           .kept_rays = request.kept_rays};
 }
 
+const ocl::BufferSize &largest_of(const ocl::BufferSizes &buffers) {
+  return *std::ranges::max_element(buffers, {}, &ocl::BufferSize::bytes);
+}
+
 bool fits_parts(const CompressedVolume &volume, const MemoryRequest &request) {
   return request.largest_stream_part == 0 ||
          split_stream(volume, request.largest_stream_part).num_parts != 0;
@@ -198,8 +202,8 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
                        std::uint32_t max_slots) {
   const std::uint64_t largest = device.capabilities().largest_allocation;
   const auto fits = [&](std::uint32_t slots, StreamPlace place) {
-    return plan_memory(volume, with_stream(request, place), slots).peak() <= budget &&
-           ISO_BLOCK_VOXELS * sizeof(float) * std::uint64_t{slots} <= largest;
+    const MemoryPlan plan = plan_memory(volume, with_stream(request, place), slots);
+    return plan.peak() <= budget && largest_of(plan.buffers).bytes() <= largest;
   };
   const auto most_slots = [&](StreamPlace place) -> std::optional<MemoryPlan> {
     if (!fits(kMinCacheSlots, place)) return {};
@@ -239,6 +243,12 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
     if (!(place == StreamPlace::kHost ? may_be_on_host : may_be_on_device)) continue;
     MemoryPlan smallest = plan_memory(volume, with_stream(request, place), kMinCacheSlots);
     if (!least || smallest.peak() < least->peak()) least = std::move(smallest);
+  }
+  if (const ocl::BufferSize &buffer = largest_of(least->buffers); buffer.bytes() > largest) {
+    throw Error(
+        "buffer '{}' takes {} bytes, and device '{}' gives at most {} to one buffer: draw a "
+        "smaller picture or volume, or choose another device",
+        buffer.name, buffer.bytes(), device.info().name, largest);
   }
   throw Error(
       "a memory budget of {} bytes is too small: {} would do, {} of them for the compressed volume",

@@ -33,11 +33,10 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   if (options.scanned_pairs && options.pipeline != PipelineKind::kBlocks)
     throw Error("scanned speculation is pipeline blocks's: leave it out, or give that pipeline");
   if (options.scanned_pairs) options.per_ray_speculation = false;
-  const std::uint32_t largest = std::min(256u, device.capabilities().max_work_group_size);
   if (!std::has_single_bit(options.group_size) || options.group_size < 8 ||
-      options.group_size > largest) {
-    throw Error("a work-group size of {} cannot be used on {}: a power of two from 8 to {} can",
-                options.group_size, device.info().name, largest);
+      options.group_size > 256) {
+    throw Error("a work-group size of {} cannot be used: a power of two from 8 to 256 can",
+                options.group_size);
   }
   if (options.first_slots != 0 && options.first_slots < kMinCacheSlots) {
     throw Error("a cache cannot begin with {} slots: {} (one dual grid) and more can",

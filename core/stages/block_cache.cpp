@@ -139,8 +139,8 @@ void BlockCache::request(Wavefront &rays) {
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
   rank_(slots_range_, rays.frame, asked, num_slots, capacity, state, table, slot_block_ids,
         slot_stamps, slot_ranks_, slot_changing_, rank_histogram_);
-  select_({1, group_size_}, rays.frame, asked, num_slots, table, slot_stamps, requested_bits,
-          request_block_ids, capacity, rank_histogram_, state);
+  select_(ocl::Range::groups(1, group_size_), rays.frame, asked, num_slots, table, slot_stamps,
+          requested_bits, request_block_ids, capacity, rank_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, slot_ranks_,
          table, state, free_slots);
   rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_changing_, state,

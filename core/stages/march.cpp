@@ -15,15 +15,15 @@ ocl::Defines march_defines(std::uint32_t group_size, Solver solver) {
 March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
              bool levels, RaySource source)
     : source_(source),
-      range_(ocl::Range::strided(num_pixels, group_size, device)),
+      range_(ocl::Range::strided(num_pixels, group_size, device).in_parts(num_pixels, device)),
       kernel_(device, "march", with_source(march_defines(group_size, solver), source), levels) {}
 
 void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
-  kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, rays.given,
-                   macrocells.masks(), macrocells.ranges(), cache.table, cache.inside, cache.values,
-                   rays.previous_counts, rays.counts, rays.next_counts, rays.active_ray_ids,
-                   rays.next_active_ray_ids, rays.ray_block_ids, rays.hits_of(source_),
-                   cache.slot_stamps, cache.state);
+  kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, range_.parts,
+                   rays.given, macrocells.masks(), macrocells.ranges(), cache.table, cache.inside,
+                   cache.values, rays.previous_counts, rays.counts, rays.next_counts,
+                   rays.active_ray_ids, rays.next_active_ray_ids, rays.ray_block_ids,
+                   rays.hits_of(source_), cache.slot_stamps, cache.state);
 }
 
 }  // namespace isowave::core

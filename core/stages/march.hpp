@@ -26,7 +26,7 @@ class March {
  private:
   RaySource source_;
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<GivenRay>, ocl::In<uint>,
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, ocl::In<GivenRay>, ocl::In<uint>,
                  ocl::In<cl_ushort>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
                  ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
                  ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>,

@@ -28,7 +28,7 @@ void PrefixSum::operator()(ocl::Buffer<uint> &values, std::uint32_t count) {
   const ocl::Range tiles = ocl::Range::strided(
       (std::uint64_t{count} + ISO_SCAN_ITEMS - 1) / ISO_SCAN_ITEMS, group_size_, device_);
   tile_sums_kernel_(tiles, values, count, tile_sums_);
-  tile_offsets_kernel_({1, group_size_}, count, tile_sums_, values);
+  tile_offsets_kernel_(ocl::Range::groups(1, group_size_), count, tile_sums_, values);
   tiles_kernel_(tiles, values, count, tile_sums_);
 }
 

@@ -65,7 +65,8 @@ void RadixSort::operator()(ocl::Buffer<uint> &keys, ocl::Buffer<uint> &values, C
   for (uint shift = 0; passes_left != 0; --passes_left) {
     const uint bits = (key_bits - shift + passes_left - 1) / passes_left;
     histogram_(tiles_range_, keys, counts, count_field, shift, bits, table_);
-    scan_({std::size_t{1} << bits, group_size_}, counts, count_field, bits, table_);
+    scan_(ocl::Range::groups(std::size_t{1} << bits, group_size_), counts, count_field, bits,
+          table_);
     scatter_(tiles_range_, keys, values, counts, count_field, shift, bits, table_, other_keys_,
              other_values_);
     std::swap(keys, other_keys_);

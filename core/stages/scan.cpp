@@ -10,8 +10,7 @@ namespace {
 /// idle.
 std::uint32_t scan_group_size(const ocl::Device &device, std::uint32_t group_size) {
   const bool gpu = device.info().type == ocl::DeviceType::kGpu;
-  return gpu ? std::max(group_size, std::min(256u, device.capabilities().max_work_group_size))
-             : group_size;
+  return gpu ? std::max(group_size, 256u) : group_size;
 }
 
 }  // namespace
@@ -22,7 +21,7 @@ ExclusiveScan::ExclusiveScan(ocl::Device &device, std::uint32_t group_size)
 
 void ExclusiveScan::operator()(ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field,
                                uint divisor, uint total_field) {
-  scan_({1, group_size_}, values, counts, count_field, divisor, total_field);
+  scan_(ocl::Range::groups(1, group_size_), values, counts, count_field, divisor, total_field);
 }
 
 ocl::BufferSizes Compaction::sizes(std::uint64_t max_count, std::uint32_t group_size) {

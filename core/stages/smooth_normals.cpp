@@ -17,15 +17,15 @@ Normals normals_from_string(std::string_view name) {
 
 SmoothNormals::SmoothNormals(ocl::Device &device, std::uint64_t num_pixels,
                              std::uint32_t group_size, bool levels)
-    : range_(ocl::Range::strided(num_pixels, group_size, device, 4)),
+    : range_(ocl::Range::strided(num_pixels, group_size, device, 4).in_parts(num_pixels, device)),
       kernel_(device, "smooth_normals", group_defines(group_size), levels) {}
 
 void SmoothNormals::operator()(BlockCache &cache, Wavefront &rays, bool begins, RaySource of) {
-  kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, begins ? 1u : 0u,
-                   cache.table, cache.values, rays.previous_counts, rays.counts, rays.next_counts,
-                   rays.active_ray_ids, rays.next_active_ray_ids, rays.hits_of(of),
-                   cache.slot_stamps, cache.requested_bits, cache.request_block_ids, cache.capacity,
-                   cache.state);
+  kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, range_.parts,
+                   begins ? 1u : 0u, cache.table, cache.values, rays.previous_counts, rays.counts,
+                   rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids,
+                   rays.hits_of(of), cache.slot_stamps, cache.requested_bits,
+                   cache.request_block_ids, cache.capacity, cache.state);
 }
 
 }  // namespace isowave::core

@@ -6,13 +6,14 @@ StartRays::StartRays(ocl::Device &device, std::uint64_t num_pixels, std::uint32_
                      bool levels, RaySource source)
     : source_(source),
       // H100, 512^3: 0.07 ms instead of 0.09.
-      range_(ocl::Range::strided(num_pixels, group_size, device, 4)),
+      range_(ocl::Range::strided(num_pixels, group_size, device, 4).in_parts(num_pixels, device)),
       kernel_(device, "start_rays", with_source(group_defines(group_size), source), levels) {}
 
 void StartRays::operator()(const Macrocells &macrocells, Wavefront &rays) {
-  kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, rays.given,
-                   macrocells.masks(), macrocells.ranges(), rays.counts, rays.next_counts,
-                   rays.next_active_ray_ids, rays.ray_block_ids, rays.hits_of(source_));
+  kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, range_.parts,
+                   rays.given, macrocells.masks(), macrocells.ranges(), rays.counts,
+                   rays.next_counts, rays.next_active_ray_ids, rays.ray_block_ids,
+                   rays.hits_of(source_));
 }
 
 }  // namespace isowave::core

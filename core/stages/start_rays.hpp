@@ -26,7 +26,7 @@ class StartRays {
  private:
   RaySource source_;
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<GivenRay>, ocl::In<uint>,
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, ocl::In<GivenRay>, ocl::In<uint>,
                  ocl::In<cl_ushort>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
                  ocl::Out<uint>, ocl::Out<HitRecord>>
       kernel_;

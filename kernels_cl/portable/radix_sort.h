@@ -9,7 +9,7 @@
 /// groups of 256.
 #define ISO_RADIX_BITS 6u
 #define ISO_RADIX_DIGITS (1u << ISO_RADIX_BITS)
-#define ISO_RADIX_ITEMS 16u   ///< pairs per work-item and tile: a power of two from 4
+#define ISO_RADIX_ITEMS (16u * ISO_GROUP_SHARE)  ///< pairs per work-item and tile: a power of two
 #define ISO_RADIX_ROUND 128u  ///< pairs that a work-group ranks together: a power of two from 32
 
 #endif

@@ -54,8 +54,13 @@ inline uint popcount(uint x) {
 #define ISO_MAX_SPECULATION 64u      ///< cap of N_spec (Sec. 4)
 #define ISO_MACROCELL_BLOCKS 4       ///< blocks along the edge of a coarse macrocell: 16 voxels
 #define ISO_DUAL_GRID_VERTICES 125u  ///< 5^3
-#define ISO_SCAN_ITEMS 8u            ///< entries per work-item and tile in scan.cl
-#define ISO_GROUP_ITEMS 4u           ///< pairs per work-item and tile in group.cl
+/// Work-items that each one stands for, if a device gives a kernel smaller groups than its stage
+/// asks for: a tile keeps its length, and each of the fewer work-items has more of it.
+#ifndef ISO_GROUP_SHARE
+#define ISO_GROUP_SHARE 1u
+#endif
+#define ISO_SCAN_ITEMS (8u * ISO_GROUP_SHARE)   ///< entries per work-item and tile in scan.cl
+#define ISO_GROUP_ITEMS (4u * ISO_GROUP_SHARE)  ///< pairs per work-item and tile in group.cl
 #define ISO_EVICTION_RANKS 256u  ///< orders of eviction that the cache tells apart (slot_stamps.h)
 
 #ifndef ISO_CHECK_RACES /* by -D, from tests/run_under_oclgrind.sh */

@@ -23,3 +23,12 @@ kernel void reverse_groups(global uint *values, local uint *scratch) {
 kernel void store_pair_hit(PairHit hit, global PairHit *stored) {
   stored[0] = hit;
 }
+
+/// seen [3]: work-items of a group, of how many each stands for one, and groups.
+kernel void group_sizes(global uint *seen) {
+  if (get_global_id(0) == 0) {
+    seen[0] = get_local_size(0);
+    seen[1] = ISO_GROUP_SHARE;
+    seen[2] = get_num_groups(0);
+  }
+}

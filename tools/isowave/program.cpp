@@ -19,6 +19,7 @@
 
 #include "core/api/guarded.hpp"
 #include "core/base/error.hpp"
+#include "core/ocl/arithmetic.hpp"
 #include "core/ocl/device.hpp"
 #include "core/ocl/pocl_environment.hpp"
 #include "isowave/version.hpp"
@@ -126,6 +127,7 @@ int run_program(CLI::App &app, int argc, char **argv) {
     print_line(app.get_name(), *message);
     return 1;
   }
+  for (const std::string &notice : ocl::arithmetic_notices()) warn(notice);
   if (const std::string notice = ocl::cache_notice(); status == 0 && !notice.empty())
     print_line(app.get_name(), notice);
   return status;

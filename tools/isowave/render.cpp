@@ -369,12 +369,6 @@ Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
 std::unique_ptr<ocl::Device> open_device(const RenderArgs &options, const ocl::DeviceInfo &info) {
   fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
              info.name, info.platform);
-  if (!info.capabilities.correctly_rounded_divide) {
-    warn(
-        fmt::format("{} does not promise correctly rounded division: pictures may differ from "
-                    "other devices' in last bits",
-                    info.name));
-  }
   return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
 }
 

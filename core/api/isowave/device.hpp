@@ -35,6 +35,9 @@ class Device {
   Device &operator=(const Device &) = delete;
 
   const DeviceInfo &info() const;
+  /// One line on the operations that this device computes otherwise than the host, so that pictures
+  /// may differ from other devices' in last bits; empty: it computes all alike.
+  const std::string &notice() const;
   /// Wall clock spent on compiling kernels so far. Once per machine, where the driver keeps them.
   double compile_ms() const;
   /// Bytes of all buffers on the device.
