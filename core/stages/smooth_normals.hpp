@@ -42,9 +42,9 @@ class SmoothNormals {
 
  private:
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, uint, ocl::In<BlockEntry>, ocl::In<float>,
-                 ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
-                 ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
+  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, uint, ocl::In<BlockEntry>,
+                 ocl::In<float>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>,
+                 ocl::In<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
                  ocl::Out<uint>, uint, ocl::Out<CacheState>>
       kernel_;
 };
