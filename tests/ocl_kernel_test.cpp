@@ -144,12 +144,16 @@ TEST_P(OclKernelOnDevice, MovedFromBufferIsAnInvalidArgument) {
 }
 
 TEST_P(OclKernelOnDevice, LaunchErrorsNameKernelAndCode) {
-  ocl::Kernel<> empty(device_, "launch_probe", "launch_empty");
+  ocl::Kernel<In<uint>, uint, Out<uint>> sums(device_, "prefix_sum", "prefix_tile_sums",
+                                              {{"ISO_GROUP_SIZE", "4u"}});
+  const ocl::Buffer<uint> input(device_, "input", 1);
+  ocl::Buffer<uint> output(device_, "output", 1);
   try {
-    empty({1, std::size_t(device_.capabilities().max_work_group_size) * 2});
-    FAIL() << "a group twice too large was started";
+    sums({1, 3}, input, 1, output);
+    FAIL() << "a group of another size than the kernel's was started";
   } catch (const Error &error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("'launch_empty'"), HasSubstr("CL_INVALID_WORK_")));
+    EXPECT_THAT(error.what(),
+                AllOf(HasSubstr("'prefix_tile_sums'"), HasSubstr("CL_INVALID_WORK_")));
   }
 }
 

@@ -375,7 +375,7 @@ TEST_P(RenderOnDevice, TinyAndHugeValues) {
 TEST_P(RenderOnDevice, BadOptionsAreErrors) {
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
   const auto refused = [&](RendererOptions options) {
-    EXPECT_THROW(Renderer(device_, volume.compressed, options), Error);
+    EXPECT_THROW(Renderer(*device_, volume.compressed, options), Error);
   };
   const RendererOptions good{.size = kSmall};
   for (const std::uint32_t slots : {1u, 7u, 0x40000001u, 0xFFFFFFFFu}) {
@@ -407,7 +407,7 @@ TEST_P(RenderOnDevice, BadOptionsAreErrors) {
     SCOPED_TRACE(fmt::format("{}x{}, {} samples", size.width, size.height, size.samples));
     refused({.size = size});
   }
-  EXPECT_EQ(device_.ledger().current(), 0u) << "nothing is left behind";
+  EXPECT_EQ(device_->ledger().current(), 0u) << "nothing is left behind";
 }
 
 TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
