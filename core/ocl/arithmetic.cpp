@@ -115,8 +115,11 @@ std::vector<Results> compute_on(Device &device, std::span<const Operands> operan
     const cl::CommandQueue &queue = device.queue();
     queue.enqueueWriteBuffer(given, CL_TRUE, 0, operands.size_bytes(), operands.data());
     // PoCL 3.1 ends the process if it is to choose a size and has groups of one work-item alone.
-    const std::size_t group_size =
-        std::bit_floor(std::clamp<std::size_t>(device.capabilities().max_work_group_size, 1, 64));
+    const std::size_t limit =
+        std::min<std::size_t>(device.capabilities().max_work_group_size,
+                              kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(
+                                  device.context().getInfo<CL_CONTEXT_DEVICES>().front()));
+    const std::size_t group_size = std::bit_floor(std::clamp<std::size_t>(limit, 1, 64));
     queue.enqueueNDRangeKernel(
         kernel, cl::NullRange,
         cl::NDRange((operands.size() + group_size - 1) / group_size * group_size),
