@@ -1,6 +1,7 @@
 #include "core/io/atomic_file.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
@@ -71,6 +72,75 @@ TEST(AtomicFile, LongNamesAndDanglingLinks) {
   EXPECT_EQ(read_file(folder / "b"), "2");
   std::filesystem::create_symlink("circle", folder / "circle");
   EXPECT_THROW(AtomicFile(folder / "circle"), Error);
+}
+
+void write_and_commit(const std::filesystem::path &path, std::string_view text) {
+  AtomicFile file(path);
+  file.write(text);
+  file.commit();
+}
+
+TEST(OutputGroup, FilesAppearTogether) {
+  const TemporaryFolder folder;
+  write_file(folder / "a", std::string_view("old"));
+  {
+    OutputGroup group;
+    write_and_commit(folder / "a", "new");
+    write_and_commit(folder / "b", "2");
+    EXPECT_EQ(group.bytes_of(folder / "a"), 3u);
+    EXPECT_EQ(group.bytes_of(folder / "b"), 1u);
+    EXPECT_EQ(read_file(folder / "a"), "old");
+    EXPECT_EQ(folder.num_files(), 1u);
+    group.commit();
+    EXPECT_EQ(group.bytes_of(folder / "a"), 3u);
+  }
+  EXPECT_EQ(read_file(folder / "a"), "new");
+  EXPECT_EQ(read_file(folder / "b"), "2");
+  EXPECT_EQ(folder.num_files(), 2u);
+  write_and_commit(folder / "c", "3");
+  EXPECT_EQ(folder.num_files(), 3u) << "without a group, at once";
+}
+
+TEST(OutputGroup, LeavesNothingWithoutCommit) {
+  const TemporaryFolder folder;
+  {
+    OutputGroup group;
+    group.make_folders(folder / "new" / "er");
+    write_and_commit(folder / "new" / "er" / "a", "1");
+    write_and_commit(folder / "b", "2");
+  }
+  EXPECT_EQ(folder.num_files(), 0u);
+}
+
+/// The third of three cannot take its place, since a folder has come there.
+TEST(OutputGroup, PutsBackWhatItHasReplaced) {
+  const TemporaryFolder folder;
+  write_file(folder / "a", std::string_view("old"));
+  {
+    OutputGroup group;
+    for (const char *name : {"a", "b", "c", "d"}) write_and_commit(folder / name, "new");
+    std::filesystem::create_directory(folder / "c");
+    EXPECT_THROW(group.commit(), Error);
+    EXPECT_EQ(read_file(folder / "a"), "old");
+  }
+  EXPECT_EQ(read_file(folder / "a"), "old");
+  EXPECT_EQ(folder.num_files(), 2u);
+}
+
+/// Files keep their descriptors for as long as there are some.
+TEST(OutputGroup, FewDescriptorsAreEnough) {
+  const TemporaryFolder folder;
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  OutputGroup group;
+  rlimit few{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &few), 0);
+  few.rlim_cur = 128;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
+  for (int i = 0; i < 300; ++i) write_and_commit(folder / std::to_string(i), "1");
+  group.commit();
+  EXPECT_EQ(folder.num_files(), 300u);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
 }
 
 TEST(AtomicFile, RefusesTargetsItCannotReplace) {

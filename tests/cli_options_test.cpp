@@ -250,6 +250,25 @@ TEST(CliOptions, OutOfMemoryIsOneLine) {
   EXPECT_EQ(result.err.find("bad_alloc"), std::string::npos) << result.err;
 }
 
+/// Drivers that find no address space are not to be installed once more.
+TEST(CliOptions, NoRoomForDriversIsOutOfMemory) {
+  const TemporaryFolder folder;
+  const std::string volume = "generate:gyroid_8x8x8_uint8 -i 128 ";
+  for (const char *limit : {"ulimit -v 200000; ", "ulimit -v 300000; "}) {
+    for (const std::string &arguments :
+         {std::string("devices"), "extract " + volume + "-o " + quoted(folder / "a.ply")}) {
+      const auto result = run_command(limit + isowave_program() + " " + arguments);
+      EXPECT_EQ(result.status, 1) << limit << arguments;
+      EXPECT_TRUE(result.err.starts_with("isowave: out of memory: an OpenCL driver")) << result.err;
+      EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    }
+    const auto reference = run_command(limit + isowave_program() + " render " + volume +
+                                       "--size 8x8 --reference -o " + quoted(folder / "a.png"));
+    EXPECT_EQ(reference.status, 0) << limit << reference.err;
+  }
+  EXPECT_EQ(folder.num_files(), 1u);
+}
+
 /// A limit on open files stands in for a compiler that fails.
 TEST(CliOptions, KernelsThatDoNotBuildAreOneLineAndALog) {
   const TemporaryFolder folder;

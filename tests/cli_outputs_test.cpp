@@ -156,6 +156,24 @@ TEST_F(CliOutputs, FilesThatMayNotGrowAreAnErrorLikeOthers) {
   }
 }
 
+TEST_F(CliOutputs, ACommandThatFailsLeavesNoneOfItsFiles) {
+  test::write_file(folder_ / "old.json", std::string_view("old"));
+  const std::size_t before = folder_.num_files();
+  const std::string picture = " -o " + name("a.png") + " --depth " + name("a.npy");
+  for (const auto &arguments :
+       {render(raw()) + "-i 41 --orbit 2" + picture + " --stats " + name("old.json"),
+        "render " + raw() + " -i 40 --size 16x12 " + picture + " --progress-dir " + name("new/er"),
+        "extract " + raw() + " -i 40 -o " + name("a.ply") + " --stats " + name("old.json"),
+        "convert " + raw() + " -o " + name("a.zfp"),
+        "generate gyroid --dims 8 -o " + name("a.raw")}) {
+    const auto result =
+        test::run_command(test::isowave_program() + " " + arguments + " > /dev/full");
+    EXPECT_EQ(result.status, 1) << arguments;
+    EXPECT_EQ(folder_.num_files(), before) << arguments;
+    EXPECT_EQ(test::read_file(folder_ / "old.json"), "old") << arguments;
+  }
+}
+
 TEST_F(CliOutputs, NamesMayBeAsLongAsTheSystemAllows) {
   const std::string longest(255, 'n'), longer(256, 'n');
   ASSERT_EQ(run_isowave(render(raw()) + "--depth " + name(longest)).status, 0);

@@ -1,12 +1,15 @@
 #include "core/io/atomic_file.hpp"
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <ranges>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -84,6 +87,16 @@ int AtomicFile::open_temporary() {
   }
 }
 
+AtomicFile::AtomicFile(AtomicFile &&other) noexcept
+    : target_(std::move(other.target_)),
+      temporary_(std::move(other.temporary_)),
+      old_(std::move(other.old_)),
+      file_(std::exchange(other.file_, nullptr)),
+      nameless_(other.nameless_),
+      in_place_(other.in_place_) {
+  other.temporary_.clear();
+}
+
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr) std::fclose(file_);
   if (!nameless_ && !temporary_.empty()) ::unlink(temporary_.c_str());
@@ -107,19 +120,132 @@ void AtomicFile::read_back(const std::function<void(std::span<const std::byte>)>
 void AtomicFile::commit() {
   errno = 0;
   if (std::ferror(file_) != 0 || std::fflush(file_) != 0) fail(target_, errno != 0 ? errno : EIO);
-  if (nameless_) {
-    const std::string self = fmt::format("/proc/self/fd/{}", ::fileno(file_));
-    int failed = 0;
-    do {
-      choose_temporary_name();
-      failed = ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW);
-    } while (failed != 0 && errno == EEXIST);
-    if (failed != 0) fail(target_, errno);
-    nameless_ = false;
-  }
+  if (OutputGroup *group = OutputGroup::current()) return group->take(std::move(*this));
+  close();
+  replace_target(false);
+}
+
+fs::path AtomicFile::name_on_this_system() const {
+  return fmt::format("/proc/{}/fd/{}", ::getpid(), ::fileno(file_));
+}
+
+fs::path AtomicFile::name_anywhere() {
+  give_name();
+  return fs::absolute(temporary_);
+}
+
+void AtomicFile::give_name() {
+  if (!nameless_) return;
+  const std::string self = name_on_this_system().string();
+  int failed = 0;
+  do {
+    choose_temporary_name();
+    failed = ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW);
+  } while (failed != 0 && errno == EEXIST);
+  if (failed != 0) fail(target_, errno);
+  nameless_ = false;
+}
+
+void AtomicFile::close() {
+  if (file_ == nullptr) return;
+  give_name();
   if (std::fclose(std::exchange(file_, nullptr)) != 0) fail(target_, errno);
+}
+
+void AtomicFile::replace_target(bool keep_old) {
+  struct stat status {};
+  if (keep_old && ::stat(target_.c_str(), &status) == 0 && S_ISREG(status.st_mode)) {
+    // By a second name, so that the first shows a whole file at any time. Some file systems give no
+    // file two names.
+    fs::path old = temporary_.string() + ".old";
+    if (::link(target_.c_str(), old.c_str()) != 0 && std::rename(target_.c_str(), old.c_str()) != 0)
+      fail(target_, errno);
+    old_ = std::move(old);
+  }
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, errno);
   temporary_.clear();
+  in_place_ = true;
+}
+
+void AtomicFile::put_back() noexcept {
+  if (!old_.empty()) {
+    std::rename(old_.c_str(), target_.c_str());
+    ::unlink(old_.c_str());  // rename() leaves two names of one file as they are
+    old_.clear();
+  } else if (in_place_) {
+    ::unlink(target_.c_str());
+  }
+  in_place_ = false;
+}
+
+void AtomicFile::remove_old() noexcept {
+  if (!old_.empty()) ::unlink(old_.c_str());
+  old_.clear();
+}
+
+OutputGroup *OutputGroup::current_ = nullptr;
+
+OutputGroup::OutputGroup() {
+  if (current_ != nullptr) throw std::logic_error("there is an OutputGroup already");
+  current_ = this;
+  // Every file without a name keeps its descriptor.
+  rlimit descriptors{};
+  if (::getrlimit(RLIMIT_NOFILE, &descriptors) != 0) return;
+  descriptors.rlim_cur = descriptors.rlim_max;
+  ::setrlimit(RLIMIT_NOFILE, &descriptors);
+}
+
+OutputGroup::~OutputGroup() {
+  current_ = nullptr;
+  files_.clear();
+  for (const fs::path &folder : std::views::reverse(folders_)) ::rmdir(folder.c_str());
+}
+
+void OutputGroup::make_folders(const fs::path &folder) {
+  fs::path made;
+  for (const fs::path &part : folder) {
+    made /= part;
+    std::error_code failure;
+    if (fs::exists(made, failure)) continue;
+    folders_.push_back(made);
+    if (!fs::create_directory(made, failure)) folders_.pop_back();
+    if (failure) throw Error("cannot make the folder {}: {}", folder.string(), failure.message());
+  }
+}
+
+void OutputGroup::take(AtomicFile &&file) {
+  files_.push_back(std::unique_ptr<AtomicFile>(new AtomicFile(std::move(file))));
+  // Of a system with few descriptors, some are left for the files at work.
+  constexpr rlim_t kSpared = 64;
+  rlimit descriptors{};
+  if (::getrlimit(RLIMIT_NOFILE, &descriptors) == 0 &&
+      rlim_t(::fileno(files_.back()->file_)) + kSpared > descriptors.rlim_cur)
+    files_.back()->close();
+}
+
+void OutputGroup::commit() {
+  for (const auto &file : files_) file->close();
+  try {
+    const bool alone = files_.size() == 1;
+    for (const auto &file : files_) file->replace_target(!alone);
+  } catch (...) {
+    for (const auto &file : std::views::reverse(files_)) file->put_back();
+    throw;
+  }
+  for (const auto &file : files_) file->remove_old();
+  files_.clear();
+  folders_.clear();
+}
+
+std::uint64_t OutputGroup::bytes_of(const fs::path &path) const {
+  for (const auto &file : files_) {
+    if (file->target_ != follow_links(path)) continue;
+    struct stat status {};
+    const bool known = file->file_ != nullptr ? ::fstat(::fileno(file->file_), &status) == 0
+                                              : ::stat(file->temporary_.c_str(), &status) == 0;
+    if (known) return static_cast<std::uint64_t>(status.st_size);
+  }
+  return fs::file_size(path);
 }
 
 }  // namespace isowave::core

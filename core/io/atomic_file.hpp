@@ -2,11 +2,14 @@
 // Output files that appear whole or not at all.
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace isowave::core {
 
@@ -42,22 +45,77 @@ class AtomicFile {
   /// Hands over all that was written, piece by piece. Nothing may follow.
   void read_back(const std::function<void(std::span<const std::byte>)> &take);
 
-  /// Flushes, closes and renames. Call once, nothing may follow.
+  /// Flushes, closes and renames. While an OutputGroup lives, the group renames. Call once, nothing
+  /// may follow.
   ///
   /// Throws  Error if any write failed
   void commit();
 
   const std::filesystem::path &target() const { return target_; }
 
+  /// A name by which other processes can open the file before commit(). Processes of this system
+  /// alone can use the name of an open file, which ends with this process.
+  std::filesystem::path name_on_this_system() const;
+  /// A name for processes of any system: the temporary one, which a killed process leaves behind.
+  std::filesystem::path name_anywhere();
+
  private:
+  friend class OutputGroup;
+  AtomicFile(AtomicFile &&) noexcept;
+
   void choose_temporary_name();
   /// Returns the descriptor, or -1 and errno.
   int open_temporary();
+  /// Gives the file its temporary name, if it has none.
+  void give_name();
+  /// As give_name(), and closes the file.
+  void close();
+  /// Renames the file over its target. keep_old: a target that exists stays under another name.
+  void replace_target(bool keep_old);
+  /// Undoes replace_target(true).
+  void put_back() noexcept;
+  void remove_old() noexcept;
 
   std::filesystem::path target_, temporary_;
+  std::filesystem::path old_;  ///< other name of the file that the target was before
   std::FILE *file_ = nullptr;
   bool nameless_ =
-      false;  ///< the file has no name yet; temporary_ is the one that commit() will give it
+      false;  ///< the file has no name yet; temporary_ is the one that close() will give it
+  bool in_place_ = false;
+};
+
+/// The files that a command writes: they appear together, or none does. While a group lives, every
+/// AtomicFile::commit() of the process leaves the renaming to the group's commit(). Destroyed
+/// without commit(), the group removes its files and folders. There is one group at a time, of one
+/// thread. If the process is killed within commit(), some files may have appeared.
+class OutputGroup {
+ public:
+  OutputGroup();
+  ~OutputGroup();
+  OutputGroup(const OutputGroup &) = delete;
+  OutputGroup &operator=(const OutputGroup &) = delete;
+
+  /// None, or the one that lives.
+  static OutputGroup *current() { return current_; }
+
+  /// Bytes of a file that was committed, whether or not the group has renamed it yet.
+  std::uint64_t bytes_of(const std::filesystem::path &path) const;
+  /// Makes a folder, and those that it is to lie in.
+  ///
+  /// Throws  Error
+  void make_folders(const std::filesystem::path &folder);
+  /// Renames all files. If one cannot be renamed, all targets become again what they were.
+  ///
+  /// Throws  Error
+  void commit();
+
+ private:
+  friend class AtomicFile;
+  void take(AtomicFile &&file);
+
+  static OutputGroup *current_;
+  std::vector<std::unique_ptr<AtomicFile>> files_;
+  std::vector<std::filesystem::path> folders_;  ///< made by make_folders(), outermost first
 };
 
 }  // namespace isowave::core

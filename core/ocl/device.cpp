@@ -188,4 +188,13 @@ void Device::finish() {
   }
 }
 
+bool Device::settle() noexcept {
+  try {
+    finish();
+    return true;
+  } catch (...) {
+    return false;
+  }
+}
+
 }  // namespace isowave::core::ocl

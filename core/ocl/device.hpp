@@ -141,7 +141,11 @@ class Device {
   std::uint32_t max_resident_groups() const;
 
   /// Waits for everything enqueued, on both queues.
+  ///
+  /// Throws  Error: the device failed
   void finish();
+  /// Waits as finish(). False: the device failed, and commands may still be at work.
+  bool settle() noexcept;
 
  private:
   DeviceInfo info_;

@@ -2,11 +2,14 @@
 
 #include "core/ocl/device_list.hpp"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <optional>
 
 #include "core/base/error.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/base/text.hpp"
 #include "core/ocl/pocl_environment.hpp"
 
@@ -137,7 +140,24 @@ void append_devices(const cl::Platform &platform, std::vector<ListedDevice> &res
   }
 }
 
+/// Address space that PoCL maps with LLVM, and for the stack of a thread for each processor.
+std::size_t bytes_of_driver() {
+  return (std::size_t{256} << 20) + thread_count(0) * (std::size_t{8} << 20);
+}
+
+/// Whether there was room for a driver before any was loaded. Without room, OpenCL's loader passes
+/// over drivers without a word, and PoCL 3.1 may end the process.
+bool has_room_for_driver() {
+  static const bool has_room = [] {
+    void *room = ::mmap(nullptr, bytes_of_driver(), PROT_NONE,
+                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    return room != MAP_FAILED && ::munmap(room, bytes_of_driver()) == 0;
+  }();
+  return has_room;
+}
+
 std::vector<ListedDevice> enumerate() {
+  if (!has_room_for_driver()) return {};
   std::vector<cl::Platform> platforms;
   prepare_for_pocl();  // before a driver is loaded
   try {
@@ -218,6 +238,13 @@ cl::Device device_handle(const DeviceInfo &info) {
 
 const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
                               std::string_view environment) {
+  if (devices.empty() && !has_room_for_driver()) {
+    throw Error(
+        "out of memory: an OpenCL driver needs {} MiB of address space, and this process cannot "
+        "get "
+        "as much: raise its limit (ulimit -v)",
+        bytes_of_driver() >> 20);
+  }
   if (devices.empty()) {
     throw Error(
         "no OpenCL 1.2 device found: install a driver, for the CPU PoCL (apt install "

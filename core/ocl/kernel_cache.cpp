@@ -1,9 +1,11 @@
 #include "core/ocl/kernel_cache.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <system_error>
 
+#include "core/base/names_in.hpp"
 #include "core/ocl/environment.hpp"
 
 namespace isowave::core::ocl {
@@ -71,16 +73,18 @@ KernelCache::KernelCache(const DeviceInfo &device)
       begin_(fs::file_time_type::clock::now() - std::chrono::milliseconds(10)) {}
 
 bool KernelCache::has_new_kernels() const {
-  if (!folder_) return false;
-  std::error_code failure;
-  for (fs::recursive_directory_iterator file(*folder_, failure), end; !failure && file != end;
-       file.increment(failure)) {
+  return folder_ && has_new_kernels(*folder_);
+}
+
+bool KernelCache::has_new_kernels(const fs::path &folder) const {
+  return std::ranges::any_of(names_in(folder), [&](const std::string &name) {
+    const fs::path path = folder / name;
     std::error_code gone;  // drivers make temporary files there
-    const auto time = file->last_write_time(gone);
-    if (!gone && time >= begin_ && file->is_regular_file(gone) && holds_kernels(file->path()))
-      return true;
-  }
-  return false;
+    const fs::file_type type = fs::symlink_status(path, gone).type();
+    if (type == fs::file_type::directory) return has_new_kernels(path);
+    const auto time = fs::last_write_time(path, gone);
+    return !gone && type == fs::file_type::regular && time >= begin_ && holds_kernels(path);
+  });
 }
 
 }  // namespace isowave::core::ocl

@@ -20,6 +20,8 @@ class KernelCache {
   bool has_new_kernels() const;
 
  private:
+  bool has_new_kernels(const std::filesystem::path &folder) const;
+
   std::optional<std::filesystem::path> folder_;
   std::filesystem::file_time_type begin_;
 };

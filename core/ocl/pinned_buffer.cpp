@@ -27,10 +27,14 @@ PinnedBuffer::PinnedBuffer(Device &device, const BufferSize &size)
 
 PinnedBuffer::~PinnedBuffer() {
   device_.ledger().remove(name_, words_.size_bytes());
+  if (!device_.settle()) {
+    mem_() = nullptr;  // not released
+    return;
+  }
   try {
     device_.queue().enqueueUnmapMemObject(mem_, words_.data());
     device_.queue().finish();
-  } catch (...) {  // a lost device: its memory is gone too
+  } catch (...) {  // the device has failed since; no command uses the words
   }
 }
 

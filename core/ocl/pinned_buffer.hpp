@@ -21,7 +21,8 @@ class PinnedBuffer {
   ///
   /// Throws  Error: there is no such memory; std::invalid_argument: elements of another size
   PinnedBuffer(Device &device, const BufferSize &size);
-  /// No transfer from or to the words may be under way.
+  /// Waits for all commands. If the device fails to say that they are done, the words are never
+  /// freed, since a transfer may still be under way.
   ~PinnedBuffer();
   PinnedBuffer(const PinnedBuffer &) = delete;
   PinnedBuffer &operator=(const PinnedBuffer &) = delete;

@@ -256,6 +256,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       options_(checked(options, volume, device)),
       plan_(make_plan(device, volume, options_)),
       state_(make_state(device, volume, options_, plan_)),
+      level_frames_(device),
       value_range_(volume.value_range),
       size_(options_.size),
       pipeline_(make_pipeline(options_.pipeline, state_, plan_.limits.pairs, options_.solver,
@@ -263,6 +264,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
       smooth_normals_(device, state_.rays.num_rays, options_.group_size, state_.levels.size() > 1),
       shade_(device, options_.size.num_rays()),
       readback_(device) {
+  level_frames_->reserve(state_.levels.size());  // they never move while they are written
   if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
   if (options_.with_given_rays) {
     given_pipeline_ = make_given_pipeline(state_, options_.group_size, options_.solver);
@@ -414,10 +416,10 @@ void Renderer::open_frame(std::vector<FrameParams> frames, const std::vector<Dec
     }
     level.frame = frame;
   }
-  level_frames_.assign(first, end);
-  state_.rays.frame = level_frames_.front();
-  state_.rays.num_level_frames = static_cast<std::uint32_t>(level_frames_.size());
-  if (state_.levels.size() > 1) state_.rays.level_frames.write_async(level_frames_);
+  level_frames_->assign(first, end);
+  state_.rays.frame = level_frames_->front();
+  state_.rays.num_level_frames = static_cast<std::uint32_t>(level_frames_->size());
+  if (state_.levels.size() > 1) state_.rays.level_frames.write_async(*level_frames_);
   if (cached_isovalue_.value_or(isovalue) != isovalue) {
     const auto stage = device_.timer().stage("macrocells");
     state_.cache.classify(state_.rays);
@@ -600,13 +602,14 @@ OpenCounts Renderer::open() const {
 
 std::vector<HitRecord> Renderer::placed_hits() const {
   std::vector<HitRecord> hits = this->hits();
-  const bool has_level_ids = level_frames_.size() > 1 || level_frames_.front().place.begin_z != 0;
+  const bool has_level_ids = level_frames_->size() > 1 || level_frames_->front().place.begin_z != 0;
   for (HitRecord &hit : hits) {
     if (hit.t == std::numeric_limits<float>::infinity()) continue;
     std::size_t level = 0;
-    while (has_level_ids && level_block_of(&level_frames_[level], hit.block_id) == ISO_INVALID_ID)
+    while (has_level_ids &&
+           level_block_of(&(*level_frames_)[level], hit.block_id) == ISO_INVALID_ID)
       ++level;
-    const FrameParams &frame = level_frames_[level];
+    const FrameParams &frame = (*level_frames_)[level];
     if (has_level_ids) hit.block_id = level_block_of(&frame, hit.block_id);
     hit = placed_hit(&frame, static_cast<uint>(state_.drawing.first + level), hit);
   }
@@ -636,7 +639,7 @@ void Renderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord>
 std::vector<std::uint64_t> Renderer::blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
                                                   LaterPasses &stats) {
   const auto begin = std::chrono::steady_clock::now();
-  state_.rays.frame = level_frames_.front();
+  state_.rays.frame = level_frames_->front();
   ambient_->begin(state_.levels[state_.drawing.first].info, num_rounds);
   LaterPasses passes;
   {

@@ -202,10 +202,11 @@ class Renderer {
   std::uint32_t wanted_slots_ = 0;  ///< of the cache from the next frame on
   bool is_small_cache_ = false;     ///< slots may run out within one pass
   FrameState state_;
-  std::vector<FrameParams> level_frames_;  ///< of the levels of detail that draw the frame at work
-  std::array<float, 2> value_range_;       ///< of the volume before compression
-  ImageSize size_;                         ///< of the frame at work, or the last
-  bool has_picture_ = false;               ///< the hit buffer has the frame's hits so far
+  /// Parameters of the levels of detail that draw the frame at work.
+  ocl::InFlight<std::vector<FrameParams>> level_frames_;
+  std::array<float, 2> value_range_;  ///< of the volume before compression
+  ImageSize size_;                    ///< of the frame at work, or the last
+  bool has_picture_ = false;          ///< the hit buffer has the frame's hits so far
   std::optional<float>
       cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty
   /// Of the last frame: camera and isovalue.

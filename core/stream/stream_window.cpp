@@ -59,7 +59,8 @@ StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume,
       volume_(volume),
       window_blocks_(window_blocks),
       halves_{Half{{device, sizes["stream window"]}, {device, sizes["stream staging"]}, {}, {}},
-              Half{{device, sizes["stream window"]}, {device, sizes["stream staging"]}, {}, {}}} {}
+              Half{{device, sizes["stream window"]}, {device, sizes["stream staging"]}, {}, {}}},
+      granted_(device) {}
 
 StreamWindow::StreamWindow(ocl::Device &device, const CompressedVolume &volume,
                            std::uint32_t window_blocks, std::uint64_t max_copy)
@@ -82,13 +83,6 @@ void StreamWindow::copy_payload(std::uint64_t max_copy) {
 
 std::uint64_t StreamWindow::default_max_copy() {
   return host_memory() / 4;
-}
-
-StreamWindow::~StreamWindow() {
-  try {
-    for (const Half &half : halves_) wait(half.uploaded);
-  } catch (...) {  // a device error is reported by whoever waits next
-  }
 }
 
 std::uint64_t StreamWindow::words_per_block(const CompressedVolume &volume) {
@@ -175,18 +169,22 @@ std::span<uint> StreamWindow::read_granted(const ocl::Buffer<PassCounts> &counts
                                            const ocl::Buffer<uint> &block_ids) {
   const cl::Event reached = mark(device_);
   cl::Event counts_read, ids_read;
-  granted_.resize(block_ids.size());
-  const std::size_t at_once = std::min(kIdsAtOnce, granted_.size());
-  counts.download({&counts_, 1}, 0, reached, counts_read);
-  block_ids.download(std::span(granted_).first(at_once), 0, reached, ids_read);
+  if (granted_->block_ids.size() != block_ids.size()) {
+    device_.finish();  // a download that failed may still write to the old list
+    granted_->block_ids.resize(block_ids.size());
+  }
+  const std::span<uint> ids = granted_->block_ids;
+  const std::size_t at_once = std::min(kIdsAtOnce, ids.size());
+  counts.download({&granted_->counts, 1}, 0, reached, counts_read);
+  block_ids.download(ids.first(at_once), 0, reached, ids_read);
   wait(counts_read);
   wait(ids_read);
-  if (counts_.decoded_count > at_once) {
-    block_ids.download(std::span(granted_).subspan(at_once, counts_.decoded_count - at_once),
-                       at_once, reached, ids_read);
+  const std::uint32_t count = granted_->counts.decoded_count;
+  if (count > at_once) {
+    block_ids.download(ids.subspan(at_once, count - at_once), at_once, reached, ids_read);
     wait(ids_read);
   }
-  return std::span(granted_).first(counts_.decoded_count);
+  return ids.first(count);
 }
 
 }  // namespace isowave::core

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/ocl/buffer.hpp"
+#include "core/ocl/in_flight.hpp"
 #include "core/ocl/pinned_buffer.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "kernels_cl/portable/shared_types.h"
@@ -25,8 +26,6 @@ class StreamWindow {
                std::uint64_t max_copy = default_max_copy());
   /// A quarter of the host's memory.
   static std::uint64_t default_max_copy();
-  /// Waits for uploads under way.
-  ~StreamWindow();
   StreamWindow(const StreamWindow &) = delete;
   StreamWindow &operator=(const StreamWindow &) = delete;
 
@@ -80,8 +79,11 @@ class StreamWindow {
   std::array<Half, 2> halves_;
   std::size_t next_half_ = 0;
   std::uint64_t uploaded_blocks_ = 0, uploaded_bytes_ = 0;
-  PassCounts counts_{};        ///< read_granted() reads them here,
-  std::vector<uint> granted_;  ///< and the list here
+  struct Granted {
+    PassCounts counts{};
+    std::vector<uint> block_ids;
+  };
+  ocl::InFlight<Granted> granted_;  ///< what read_granted() reads
 };
 
 }  // namespace isowave::core

@@ -7,8 +7,16 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
+#include <new>
 
 namespace isowave::core {
+
+/// What libzfp has made; it makes nothing without memory.
+template <class T>
+T *or_bad_alloc(T *made) {
+  if (made == nullptr) throw std::bad_alloc();
+  return made;
+}
 
 using ZfpField = std::unique_ptr<zfp_field, decltype(&zfp_field_free)>;
 using ZfpStream = std::unique_ptr<zfp_stream, decltype(&zfp_stream_close)>;

@@ -38,11 +38,11 @@ class FixedRateCoder : public LevelCoder {
     const std::span<std::uint64_t> words =
         std::span(words_).subspan(row.index * row_words(), row_words());
     const ZfpStream stream = make_zfp_stream(64 * options_.rate);
-    const ZfpBits bits(stream_open(words.data(), words.size_bytes()), &stream_close);
+    const ZfpBits bits(or_bad_alloc(stream_open(words.data(), words.size_bytes())), &stream_close);
     zfp_stream_set_bit_stream(stream.get(), bits.get());
-    const ZfpField field(
-        zfp_field_3d(const_cast<float *>(row.voxels), zfp_type_float, dims_.x, row.ny, row.nz),
-        &zfp_field_free);
+    const ZfpField field(or_bad_alloc(zfp_field_3d(const_cast<float *>(row.voxels), zfp_type_float,
+                                                   dims_.x, row.ny, row.nz)),
+                         &zfp_field_free);
     zfp_field_set_stride_3d(field.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
     if (zfp_compress(stream.get(), field.get()) != words.size_bytes()) {
       throw std::logic_error("zfp: a row of blocks has not its fixed size");
@@ -50,8 +50,9 @@ class FixedRateCoder : public LevelCoder {
     if (!options_.measure_error) return;
 
     float *decoded = decoded_.data() + (row.voxels - chunk_.data());
-    const ZfpField copy(zfp_field_3d(decoded, zfp_type_float, dims_.x, row.ny, row.nz),
-                        &zfp_field_free);
+    const ZfpField copy(
+        or_bad_alloc(zfp_field_3d(decoded, zfp_type_float, dims_.x, row.ny, row.nz)),
+        &zfp_field_free);
     zfp_field_set_stride_3d(copy.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
     zfp_stream_rewind(stream.get());
     if (zfp_decompress(stream.get(), copy.get()) == 0)

@@ -24,7 +24,7 @@ class BlockCodec {
  public:
   explicit BlockCodec(std::int32_t min_exponent)
       : stream_(make_zfp_stream(0, min_exponent)),
-        bits_(stream_open(words_.data(), sizeof(words_)), &stream_close) {
+        bits_(or_bad_alloc(stream_open(words_.data(), sizeof(words_))), &stream_close) {
     zfp_stream_set_bit_stream(stream_.get(), bits_.get());
   }
 
@@ -335,8 +335,9 @@ void find_block_lengths(const CompressedVolume &volume, const std::string &what,
   for (std::uint64_t begin = 0, block = 0; block < num_blocks;) {
     volume.read_words(begin, words);  // with zeros behind its end, which libzfp does not know of
     const ZfpStream stream = make_zfp_stream(0, volume.precision.min_exponent);
-    const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)),
-                       &stream_close);
+    const ZfpBits bits(
+        or_bad_alloc(stream_open(words.data(), words.size() * sizeof(std::uint32_t))),
+        &stream_close);
     zfp_stream_set_bit_stream(stream.get(), bits.get());
     std::uint64_t at = 0;
     while (at < kChunkBits && block < num_blocks) {

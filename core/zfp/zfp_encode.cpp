@@ -106,15 +106,10 @@ LayerEncoder::LayerEncoder(ocl::Device &device, const glm::uvec3 &dims,
       zfp_encode_(device),
       voxels_(device, own_sizes()["voxels to encode"]),
       words_(device, own_sizes()["encoded words"]),
-      device_errors_(device, own_sizes()["encoding errors"]) {
+      device_errors_(device, own_sizes()["encoding errors"]),
+      current_(device),
+      previous_(device) {
   zfp_encode_.compile(voxels_, words_, measure_error ? &device_errors_ : nullptr);
-}
-
-LayerEncoder::~LayerEncoder() {
-  try {
-    if (in_flight_) device_.finish();  // what is being read goes to memory that dies here
-  } catch (...) {                      // a device error is reported by whoever waits next
-  }
 }
 
 void LayerEncoder::encode(std::span<const float> voxels, std::uint32_t num_layers,
@@ -137,29 +132,29 @@ void LayerEncoder::encode(std::span<const float> voxels, std::uint32_t num_layer
         }
       }
       const bool has_previous = std::exchange(in_flight_, true);
-      std::swap(current_, previous_);
+      std::swap(*current_, *previous_);
       enqueue_piece(dims);
-      if (has_previous) hand_over(previous_, sink);
+      if (has_previous) hand_over(*previous_, sink);
     }
   }
 }
 
 void LayerEncoder::finish(const Sink &sink) {
   if (!std::exchange(in_flight_, false)) return;
-  hand_over(current_, sink);
+  hand_over(*current_, sink);
 }
 
 void LayerEncoder::enqueue_piece(const glm::uvec3 &dims) {
   const auto stage = device_.timer().stage("zfp_encode");
   const std::uint64_t num_blocks = block_count(dims);
   zfp_encode_(voxels_, dims, bits_per_block_, words_);
-  current_.words.resize(num_blocks * (bits_per_block_ / 32));
+  current_->words.resize(num_blocks * (bits_per_block_ / 32));
   if (measure_error_) {
     zfp_encode_.measure_errors(voxels_, dims, bits_per_block_, words_, device_errors_);
-    current_.errors.resize(ZfpEncode::kErrorsPerBlock * num_blocks);
-    device_errors_.read_async(current_.errors, current_.done);
+    current_->errors.resize(ZfpEncode::kErrorsPerBlock * num_blocks);
+    device_errors_.read_async(current_->errors, current_->done);
   }
-  words_.read_async(current_.words, current_.done);
+  words_.read_async(current_->words, current_->done);
 }
 
 void LayerEncoder::hand_over(const Result &result, const Sink &sink) {

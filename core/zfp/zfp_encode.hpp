@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/ocl/in_flight.hpp"
 #include "core/ocl/kernel.hpp"
 #include "core/volume/block_errors.hpp"
 #include "kernels_cl/portable/shared_types.h"
@@ -63,7 +64,6 @@ class LayerEncoder {
   /// dims: of the whole volume. bits_per_block: a multiple of 64.
   LayerEncoder(ocl::Device &device, const glm::uvec3 &dims, std::uint32_t bits_per_block,
                bool measure_error, BlockErrors errors = BlockErrors(false));
-  ~LayerEncoder();
   LayerEncoder(const LayerEncoder &) = delete;
   LayerEncoder &operator=(const LayerEncoder &) = delete;
 
@@ -98,8 +98,9 @@ class LayerEncoder {
   ocl::Buffer<float> voxels_;
   ocl::Buffer<uint> words_;
   ocl::Buffer<float> device_errors_;
-  Result current_, previous_;  ///< of the piece at work, and of the one before it
-  bool in_flight_ = false;     ///< current_ is to come
+  /// Of the piece at work, and of the one before it.
+  ocl::InFlight<Result> current_, previous_;
+  bool in_flight_ = false;  ///< current_ is to come
 };
 
 }  // namespace isowave::core

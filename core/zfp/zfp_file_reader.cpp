@@ -255,9 +255,9 @@ class ZfpFileReader {
     const std::size_t available = std::min<std::uint64_t>(file_size_, ZFP_HEADER_MAX_BITS / 8 + 1);
     read_at(0, std::as_writable_bytes(std::span(buffer)).first(available));
 
-    const ZfpBits bits(stream_open(buffer.data(), sizeof(buffer)), &stream_close);
-    const ZfpStream stream(zfp_stream_open(bits.get()), &zfp_stream_close);
-    const ZfpField field(zfp_field_alloc(), &zfp_field_free);
+    const ZfpBits bits(or_bad_alloc(stream_open(buffer.data(), sizeof(buffer))), &stream_close);
+    const ZfpStream stream(or_bad_alloc(zfp_stream_open(bits.get())), &zfp_stream_close);
+    const ZfpField field(or_bad_alloc(zfp_field_alloc()), &zfp_field_free);
     header_bits_ = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL);
     if (header_bits_ == 0 || header_bits_ > available * 8) {
       fail("not a zfp file: no full zfp header (as `zfp -h` writes it)");

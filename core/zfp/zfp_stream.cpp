@@ -144,7 +144,7 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double vox
   const glm::uvec3 dims = volume.info.dims, blocks = volume.num_blocks();
   const BlockPrecision bound = with_fewer_planes(volume.precision, voxel_error);
   const ZfpStream stream = make_zfp_stream(volume.bits_per_block, bound.min_exponent);
-  const ZfpBits bits(stream_open(words.data(), words.size() * sizeof(std::uint32_t)),
+  const ZfpBits bits(or_bad_alloc(stream_open(words.data(), words.size() * sizeof(std::uint32_t))),
                      &stream_close);
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   std::vector<float> voxels(volume.info.num_voxels());

@@ -37,6 +37,7 @@
 #include <random>
 
 #include "core/base/error.hpp"
+#include "core/base/names_in.hpp"
 #include "core/base/text.hpp"
 #include "core/io/input_file.hpp"
 #include "tools/isowave/bench_paper_runs.hpp"
@@ -105,9 +106,9 @@ FoundVolumes find_volumes(const std::vector<std::string> &inputs, const RawOverr
       continue;
     }
     std::vector<std::string> names;
-    for (const auto &file : fs::directory_iterator(input, error)) {
-      if (file.is_regular_file(error) && is_volume_name(file.path()))
-        names.push_back(file.path().string());
+    for (const std::string &name : names_in(input)) {
+      const fs::path file = fs::path(input) / name;
+      if (fs::is_regular_file(file, error) && is_volume_name(file)) names.push_back(file.string());
     }
     std::ranges::sort(names);
     const std::size_t before = found.paths.size();

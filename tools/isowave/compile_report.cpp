@@ -26,7 +26,7 @@ CompileReport::CompileReport(ocl::Device &device) : device_(device), cache_(devi
 
 CompileReport::~CompileReport() {
   device_.on_new_kernel({});
-  if (num_kernels_ != 0) fmt::print(stderr, "\r\x1b[K");  // after an error
+  if (num_kernels_ != 0) std::fputs("\r\x1b[K", stderr);  // after an error
 }
 
 void CompileReport::finish() {

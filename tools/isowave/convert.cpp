@@ -11,6 +11,7 @@
 #include "core/base/printed_bound.hpp"
 #include "core/bricks/compress_together.hpp"
 #include "core/bricks/ranks.hpp"
+#include "core/io/atomic_file.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
@@ -86,7 +87,7 @@ CompressedVolume convert_alone(const ConvertArgs &options, const RawOverrides &o
 void print_summary(const ConvertArgs &options, const CompressedVolume &volume) {
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);
-  const std::uint64_t bytes_out = std::filesystem::file_size(options.output);
+  const std::uint64_t bytes_out = OutputGroup::current()->bytes_of(options.output);
   fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output),
              dims.x, dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in),
              with_commas(bytes_out), volume.rate(),

@@ -10,6 +10,7 @@
 #include "core/base/error.hpp"
 #include "core/extract/extractor.hpp"
 #include "core/extract/mesh_file.hpp"
+#include "core/io/atomic_file.hpp"
 #include "core/view/detail.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
@@ -97,7 +98,7 @@ void run_extract(ExtractArgs options) {
              with_commas(stats.size.num_triangles), with_commas(stats.decoded_blocks),
              stats.total_ms);
   fmt::print("wrote {}: {} bytes; device memory: peak {:.1f} MiB{}\n", one_line(options.output),
-             with_commas(std::filesystem::file_size(options.output)),
+             with_commas(OutputGroup::current()->bytes_of(options.output)),
              double(device.ledger().peak()) / (1 << 20),
              names_output ? "; --output names another file" : "");
   if (!options.stats.empty())

@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "core/base/error.hpp"
+#include "core/io/atomic_file.hpp"
 #include "core/io/raw_reader.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -75,7 +76,7 @@ void run_generate(const CLI::App &command, const GenerateArgs &options) {
       generate_to_file(generate, options.output, make_progress_bar("generating"));
   fmt::print("{}: {}x{}x{} {}, {} bytes\n", one_line(path.string()), generate.dims.x,
              generate.dims.y, generate.dims.z, to_string(generate.type),
-             with_commas(std::filesystem::file_size(path)));
+             with_commas(OutputGroup::current()->bytes_of(path)));
   fmt::print("draw it: isowave render {}{} -i {}\n", one_line(path.string()),
              raw_options(generate, path), middle_of(generate.type));
 }

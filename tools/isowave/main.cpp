@@ -18,9 +18,7 @@ namespace {
       isowave::core::tools::MpiJob::team()->size(), command.get_name());
 }
 
-}  // namespace
-
-int main(int argc, char **argv) {
+int run(int argc, char **argv) {
   using namespace isowave::core::tools;
   MpiJob job(&argc, &argv);
   CLI::App app{
@@ -53,4 +51,10 @@ int main(int argc, char **argv) {
     }
   }
   return job.finish(run_program(app, argc, argv));
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  return isowave::core::tools::run_main([&] { return run(argc, argv); });
 }

@@ -5,8 +5,10 @@
 #include <fcntl.h>
 #include <mpi.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -16,6 +18,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -409,8 +412,9 @@ class MpiTeam : public Team {
 
 std::unique_ptr<MpiTeam> team_of_job;
 
-/// What is to be removed where this process ends before its time: where one dies, mpirun ends the
-/// others, by a signal, or MPI itself does.
+/// A file of several hosts' processes, which each of them removes if it ends before its time: where
+/// one dies, mpirun ends the others, by a signal, or MPI itself does. If all are killed at once,
+/// the file stays.
 std::array<char, 4096> unfinished_file;
 constexpr int kEndingSignals[] = {SIGTERM, SIGINT, SIGHUP, SIGABRT};
 
@@ -430,11 +434,6 @@ void remove_at_end(const std::string &name) {
   if (name.size() >= unfinished_file.size()) return;
   std::strcpy(unfinished_file.data(), name.c_str());
   for (const int number : kEndingSignals) std::signal(number, remove_unfinished_by_signal);
-}
-
-void forget_unfinished() {
-  for (const int number : kEndingSignals) std::signal(number, SIG_DFL);
-  unfinished_file.front() = '\0';
 }
 
 /// Open MPI prints a line of its own where a write fails. Silent as long as this lives.
@@ -458,29 +457,44 @@ class Hushed {
   int stderr_, nowhere_;
 };
 
-/// Each process opens it by itself, so that one that cannot leaves no other waiting.
+/// The same text at processes that see the same file by that name; empty if there is none.
+std::string identity_of(const std::string &name) {
+  struct stat status {};
+  std::string system;
+  std::ifstream("/proc/sys/kernel/random/boot_id") >> system;
+  if (system.empty() || ::stat(name.c_str(), &status) != 0) return {};
+  return fmt::format("{} {} {}", system, status.st_dev, status.st_ino);
+}
+
+/// Rank 0 has an AtomicFile, which each process opens by itself, so that one that cannot leaves no
+/// other waiting. On one host, the file has no name before its commit: whatever ends the processes,
+/// nothing is left. Several hosts need a name.
 class MpiFile : public SharedFile {
  public:
-  MpiFile(Team &team, const std::filesystem::path &target) : team_(team) {
-    std::string name;
+  MpiFile(Team &team, const std::filesystem::path &target) : team_(team), target_(target.string()) {
     together(team, [&] {
-      if (is_first()) name = create(target);
+      if (is_first()) own_.emplace(target);
     });
-    name_ = team.all_gather(name).front();
-    target_ = target.string();
+    std::string name = of_first(own_ ? own_->name_on_this_system().string() : "");
+    if (!is_seen_by_all(name)) {
+      together(team, [&] {
+        if (is_first()) name = own_->name_anywhere().string();
+      });
+      name = of_first(name);
+      remove_at_end(name);
+    }
     try {
       together(team, [&] {
         check([&] {
-          return MPI_File_open(MPI_COMM_SELF, name_.c_str(), MPI_MODE_WRONLY, MPI_INFO_NULL,
-                               &file_);
+          return MPI_File_open(MPI_COMM_SELF, name.c_str(), MPI_MODE_WRONLY, MPI_INFO_NULL, &file_);
         });
       });
     } catch (...) {
-      remove();
+      close();
       throw;
     }
   }
-  ~MpiFile() override { remove(); }
+  ~MpiFile() override { close(); }
   MpiFile(const MpiFile &) = delete;
   MpiFile &operator=(const MpiFile &) = delete;
 
@@ -508,11 +522,8 @@ class MpiFile : public SharedFile {
       check([&] { return MPI_File_close(&file_); });
     });
     together(team_, [&] {
-      if (is_first() && std::rename(name_.c_str(), follow_links(target_).c_str()) != 0)
-        fail(std::strerror(errno));
+      if (is_first()) own_->commit();
     });
-    name_.clear();
-    if (is_first()) forget_unfinished();
   }
 
  private:
@@ -531,30 +542,21 @@ class MpiFile : public SharedFile {
     MPI_Error_string(result, text.data(), &length);
     fail(text.data());
   }
-  /// Returns its name, which is the same from any folder.
-  std::string create(const std::filesystem::path &target) {
-    target_ = target.string();
-    const std::filesystem::path folder =
-        std::filesystem::absolute(follow_links(target)).parent_path();
-    for (unsigned id = 0;; ++id) {
-      std::string name = (folder / fmt::format(".isowave.{}.mpi{}.tmp", ::getpid(), id)).string();
-      remove_at_end(name);
-      const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-      if (file < 0 && errno == EEXIST) continue;
-      if (file < 0) fail(std::strerror(errno));
-      ::close(file);
-      return name;
-    }
+  std::string of_first(const std::string &text) { return team_.all_gather(text).front(); }
+  /// ISOWAVE_HOST_RANKS: as if there were several hosts.
+  bool is_seen_by_all(const std::string &name) {
+    const bool may_be = std::getenv("ISOWAVE_HOST_RANKS") == nullptr;
+    const std::vector<std::string> seen = team_.all_gather(may_be ? identity_of(name) : "");
+    return !seen.front().empty() && std::ranges::count(seen, seen.front()) == std::ssize(seen);
   }
-  void remove() {
+  void close() {
     if (file_ != MPI_FILE_NULL) MPI_File_close(&file_);
-    if (!is_first() || name_.empty()) return;
-    ::unlink(name_.c_str());
-    forget_unfinished();
+    own_.reset();
   }
 
   Team &team_;
-  std::string target_, name_;  ///< as asked for; of the file until commit()
+  std::string target_;             ///< as asked for
+  std::optional<AtomicFile> own_;  ///< rank 0's
   MPI_File file_ = MPI_FILE_NULL;
 };
 

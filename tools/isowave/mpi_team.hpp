@@ -36,8 +36,8 @@ class MpiJob {
   static std::string command_line();
   /// Number of this process among those of its host.
   static std::uint32_t local_rank();
-  /// Of a team, all processes: a file that they write by MPI-IO, under another name until its
-  /// commit(). The target is a regular file, or none.
+  /// Of a team, all processes: a file that they write by MPI-IO. It has no name before its
+  /// commit(), or a temporary one. The target is a regular file, or none.
   ///
   /// Throws  Error at all of them
   static std::unique_ptr<SharedFile> create_file(const std::filesystem::path &target);

@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "core/base/error.hpp"
+#include "core/base/names_in.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/volume/volume.hpp"
@@ -89,11 +90,10 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder,
   }
   struct stat status {};
   if (::stat(folder.c_str(), &status) != 0) return;
-  for (const auto &entry : fs::directory_iterator(folder, failure)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with(prefix) || !name.ends_with(".png") || !fs::exists(entry.path(), failure))
+  for (const std::string &name : names_in(folder)) {
+    if (!name.starts_with(prefix) || !name.ends_with(".png") || !fs::exists(folder / name, failure))
       continue;
-    if (const auto user = users_.find(key_of(entry.path())); user != users_.end())
+    if (const auto user = users_.find(key_of(folder / name)); user != users_.end())
       throw Error("{} {}: {} could take the place of {}", option, folder.string(), name,
                   user->second);
   }
@@ -105,10 +105,7 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder,
 }
 
 void Outputs::make_folder() const {
-  std::error_code failure;
-  if (!new_folder_.empty()) fs::create_directories(new_folder_, failure);
-  if (failure)
-    throw Error("cannot make the folder {}: {}", new_folder_.string(), failure.message());
+  if (!new_folder_.empty()) OutputGroup::current()->make_folders(new_folder_);
 }
 
 }  // namespace isowave::core::tools

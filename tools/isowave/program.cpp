@@ -15,11 +15,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <system_error>
 
 #include "core/api/guarded.hpp"
 #include "core/base/error.hpp"
 #include "core/ocl/arithmetic.hpp"
+#include "core/io/atomic_file.hpp"
 #include "core/ocl/device.hpp"
 #include "core/ocl/pocl_environment.hpp"
 #include "isowave/version.hpp"
@@ -99,11 +101,36 @@ void print_line(const std::string &name, const std::string &text) {
   std::fwrite(line.data(), 1, line.size(), stderr);  // nobody can be told where that fails
 }
 
+/// Takes no memory.
+void print_out_of_memory() {
+  constexpr std::string_view kLine = "isowave: out of memory\n";
+  static_cast<void>(!::write(STDERR_FILENO, kLine.data(), kLine.size()));
+}
+
+/// For exceptions that nothing can catch: of objects that are made before main() begins, and of
+/// functions of libraries that must not throw and yet need memory (CLI11, libstdc++).
+[[gnu::constructor(101)]] void end_without_memory() {
+  std::set_terminate([] {
+    print_out_of_memory();
+    std::_Exit(1);
+  });
+}
+
 }  // namespace
+
+int run_main(const std::function<int()> &work) {
+  try {
+    return work();
+  } catch (...) {
+    print_out_of_memory();
+    return 1;
+  }
+}
 
 int run_program(CLI::App &app, int argc, char **argv) {
   open_standard_streams();
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow further is an error like any other
+  OutputGroup outputs;
   std::optional<std::string> message;
   int status = 1;
   try {
@@ -123,6 +150,11 @@ int run_program(CLI::App &app, int argc, char **argv) {
     message = text_of_failure(command_name(app));
   }
   if (const auto failure = finish_output()) message = failure;
+  try {
+    if (!message) outputs.commit();
+  } catch (...) {
+    message = text_of_failure(command_name(app));
+  }
   if (message) {
     print_line(app.get_name(), *message);
     return 1;
