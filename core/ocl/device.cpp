@@ -10,8 +10,8 @@
 #include "core/base/ms_since.hpp"
 #include "core/ocl/build_log.hpp"
 #include "core/ocl/device_list.hpp"
+#include "core/ocl/driver_environment.hpp"
 #include "core/ocl/kernel_sources.hpp"
-#include "core/ocl/pocl_environment.hpp"
 
 namespace isowave::core::ocl {
 

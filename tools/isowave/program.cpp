@@ -20,7 +20,7 @@
 #include "core/api/guarded.hpp"
 #include "core/base/error.hpp"
 #include "core/ocl/device.hpp"
-#include "core/ocl/pocl_environment.hpp"
+#include "core/ocl/driver_environment.hpp"
 #include "isowave/version.hpp"
 #include "tools/isowave/strict_options.hpp"
 
