@@ -1,7 +1,10 @@
 #include "core/io/atomic_file.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/base/error.hpp"
 #include "tests/run_program.hpp"
@@ -141,6 +144,64 @@ TEST(OutputGroup, FewDescriptorsAreEnough) {
   group.commit();
   EXPECT_EQ(folder.num_files(), 300u);
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+}
+
+mode_t mode_of(const std::filesystem::path &path) {
+  struct stat status {};
+  EXPECT_EQ(::stat(path.c_str(), &status), 0);
+  return status.st_mode & 07777;
+}
+
+TEST(AtomicFile, KeepsTheModeOfWhatItReplaces) {
+  const TemporaryFolder folder;
+  for (const mode_t mode : {0600u, 0640u, 0666u, 0755u, 0200u}) {
+    write_file(folder / "a", std::string_view("old"));
+    ASSERT_EQ(::chmod((folder / "a").c_str(), mode), 0);
+    { AtomicFile dropped(folder / "a"); }
+    EXPECT_EQ(mode_of(folder / "a"), mode);
+    AtomicFile file(folder / "a");
+    file.write("new");
+    file.commit();
+    EXPECT_EQ(mode_of(folder / "a"), mode);
+    std::filesystem::remove(folder / "a");
+  }
+  const mode_t mask = ::umask(027);
+  AtomicFile fresh(folder / "fresh");
+  fresh.commit();
+  ::umask(mask);
+  EXPECT_EQ(mode_of(folder / "fresh"), 0640u) << "a new file has the mode that others have";
+}
+
+TEST(AtomicFile, KeepsTheOwnerIfItCan) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give files away";
+  const TemporaryFolder folder;
+  write_file(folder / "a", std::string_view("old"));
+  ASSERT_EQ(::chown((folder / "a").c_str(), 65534, 65534), 0);
+  ASSERT_EQ(::chmod((folder / "a").c_str(), 0640), 0);
+  AtomicFile file(folder / "a");
+  file.commit();
+  struct stat status {};
+  ASSERT_EQ(::stat((folder / "a").c_str(), &status), 0);
+  EXPECT_EQ(status.st_uid, 65534u);
+  EXPECT_EQ(status.st_gid, 65534u);
+  EXPECT_EQ(mode_of(folder / "a"), 0640u);
+}
+
+TEST(AtomicFile, OpensNoFileThatIsThere) {
+  const TemporaryFolder folder;
+  write_file(folder / "victim", std::string_view("old"));
+  const auto planted = [&](int id) {
+    return folder.path() / fmt::format(".isowave.{}.{}.tmp", ::getpid(), id);
+  };
+  constexpr int kNumPlanted = 1000;  // more than the other tests make files
+  for (int id = 0; id < kNumPlanted; ++id) std::filesystem::create_symlink("victim", planted(id));
+  AtomicFile file(folder / "a");
+  file.write("new");
+  file.commit();
+  EXPECT_EQ(read_file(folder / "victim"), "old");
+  EXPECT_EQ(read_file(folder / "a"), "new");
+  EXPECT_FALSE(std::filesystem::is_symlink(folder / "a"));
+  for (int id = 0; id < kNumPlanted; ++id) EXPECT_TRUE(std::filesystem::is_symlink(planted(id)));
 }
 
 TEST(AtomicFile, RefusesTargetsItCannotReplace) {

@@ -304,7 +304,12 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
   if (run_isowave("devices").out.find("Portable Computing Language") == std::string::npos)
     GTEST_SKIP() << "no PoCL";
   for (const fs::path &path : {folder.path(), temporary.path()})
-    fs::permissions(path, fs::perms::all);
+    fs::permissions(path, fs::perms::all | fs::perms::sticky_bit);
+  const fs::path home = folder / "home";
+  fs::create_directory(home);
+  if (::geteuid() == 0) {
+    ASSERT_EQ(::chown(home.c_str(), 65534, 65534), 0);
+  }
   write_file(folder / "file", std::string_view(""));
   const std::string as_user =
       ::geteuid() == 0 ? "setpriv --reuid 65534 --regid 65534 --clear-groups " : "";
@@ -329,11 +334,96 @@ TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
       isowave_program() + " convert generate:gyroid_8x8x8_uint8 --rate 4 --device cpu -o " +
       quoted(folder / "of_root.zfp"));
   EXPECT_EQ(no_path.status, 0) << no_path.err;
-  const auto given = compress("HOME=" + quoted(folder.path()));
+  const auto given = compress("HOME=" + quoted(home));
   EXPECT_EQ(given.status, 0) << given.err;
   EXPECT_EQ(given.err, "") << "nothing is said where it works as usual";
   expect_failure(compress("POCL_CACHE_DIR=" + quoted(folder / "file")),
                  "set POCL_CACHE_DIR to another folder");
+}
+
+/// Another user, 65534, has made folders and files where drivers keep compiled kernels.
+class KernelsOfAnotherUser : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (::geteuid() != 0) GTEST_SKIP() << "only root can give files to another user";
+    fs::permissions(temporary_.path(), fs::perms::all | fs::perms::sticky_bit);
+  }
+  void give_away(const fs::path &path) {
+    ASSERT_EQ(::lchown(path.c_str(), 65534, 65534), 0);
+    if (!fs::is_symlink(path)) fs::permissions(path, fs::perms::all);
+  }
+  /// A folder in the way of the cache below `cache`.
+  fs::path plant(const fs::path &cache) {
+    fs::create_directories(cache / "pocl" / "kcache");
+    give_away(cache / "pocl");
+    give_away(cache / "pocl" / "kcache");
+    return cache / "pocl" / "kcache";
+  }
+  test::ProgramResult compress(const std::string &driver, const std::string &environment) {
+    return run_command("env -u HOME -u XDG_CACHE_HOME -u POCL_CACHE_DIR OCL_ICD_VENDORS=" + driver +
+                       " TMPDIR=" + quoted(temporary_.path()) + " " + environment + " " +
+                       isowave_program() +
+                       " convert generate:gyroid_8x8x8_uint8 --rate 4 --device cpu -o " +
+                       quoted(folder_ / "volume.zfp"));
+  }
+  static bool has(const std::string &vendor) {
+    return run_command("env OCL_ICD_VENDORS=" + vendor + " " + isowave_program() + " devices")
+               .status == 0;
+  }
+  void expect_kernels_in(const fs::path &own, const std::string &environment,
+                         const std::string &reason) {
+    const auto run = compress("pocl.icd", environment);
+    EXPECT_EQ(run.status, 0) << environment << run.err;
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+    EXPECT_NE(run.err.find(reason), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("compiled kernels go to " + own.string()), std::string::npos) << run.err;
+    EXPECT_FALSE(fs::is_empty(own));
+    fs::remove_all(own);
+  }
+
+  const TemporaryFolder folder_, temporary_;
+};
+
+TEST_F(KernelsOfAnotherUser, AreNotRunByPocl) {
+  if (!has("pocl.icd")) GTEST_SKIP() << "no PoCL";
+  const fs::path own = temporary_ / "isowave-kernels-0/pocl";
+  expect_kernels_in(own, "", "neither HOME nor XDG_CACHE_HOME is set");
+  const fs::path planted = plant(folder_ / "planted");
+  expect_kernels_in(own, "XDG_CACHE_HOME=" + quoted(folder_ / "planted"),
+                    planted.parent_path().string() + " belongs to another user");
+  fs::create_symlink(folder_.path(), temporary_ / "link");
+  give_away(temporary_ / "link");
+  expect_kernels_in(own, "HOME=" + quoted(temporary_ / "link"), "belongs to another user");
+  EXPECT_TRUE(fs::is_empty(planted));
+  EXPECT_FALSE(fs::exists(folder_ / ".cache"));
+
+  fs::remove_all(own.parent_path());
+  fs::create_directory(own.parent_path());
+  give_away(own.parent_path());  // other users know isowave's name, too
+  const auto fresh = compress("pocl.icd", "");
+  EXPECT_EQ(fresh.status, 0) << fresh.err;
+  EXPECT_NE(fresh.err.find(own.parent_path().string() + "."), std::string::npos) << fresh.err;
+  EXPECT_TRUE(fs::is_empty(own.parent_path()));
+}
+
+TEST_F(KernelsOfAnotherUser, AreRefusedWhereTheUserNamesTheFolder) {
+  const std::string advice = "to a folder that only you can write to";
+  const fs::path planted = plant(folder_ / "planted"), own = folder_ / "own";
+  fs::create_directories(own / "AB" / "f");
+  write_file(own / "AB" / "f" / "f.so", std::string_view("code"));
+  give_away(own / "AB" / "f" / "f.so");
+  fs::create_directory(folder_ / "open");
+  fs::permissions(folder_ / "open", fs::perms::all);
+  for (const auto &[driver, variable] :
+       {std::pair("pocl.icd", "POCL_CACHE_DIR"),
+        std::pair("rusticl.icd", "RUSTICL_ENABLE=llvmpipe MESA_SHADER_CACHE_DIR")}) {
+    if (!has(driver)) continue;
+    for (const fs::path &path : {planted, own, folder_ / "open", folder_ / "open" / "new"}) {
+      if (path == own && driver != std::string_view("pocl.icd")) continue;
+      expect_failure(compress(driver, variable + ("=" + quoted(path))), advice);
+    }
+  }
+  EXPECT_TRUE(fs::is_empty(planted));
 }
 
 }  // namespace

@@ -143,6 +143,80 @@ TEST_F(CliOutputs, NeverTakeEachOthersPlace) {
   EXPECT_EQ(run_isowave(render(raw()) + "-i 41 -o " + one + " --depth " + name("a.npy")).status, 0);
 }
 
+TEST_F(CliOutputs, AreNoStandardOutput) {
+  const std::string in_folder = "cd " + name("") + " && " + test::isowave_program() + " ";
+  for (const std::string &arguments :
+       {render(raw()) + "-o -", render(raw()) + "--depth -", render(raw()) + "--stats -",
+        "render " + raw() + " -i 40 --max-surface-error 1 --error-map -",
+        "render " + raw() + " -i 40 --time-budget 9 --refined -",
+        "render " + raw() + " -i 40 --progress-dir -", "extract " + raw() + " -i 40 -o -",
+        "extract " + raw() + " -i 40 -o a.ply --stats -", "convert " + raw() + " -o -",
+        std::string("generate gyroid --dims 8 -o -"),
+        "verify " + raw() + " -i 40 --size 16x12 --json -",
+        "bench solvers " + raw() + ":40 --json -", "bench pareto " + raw() + " -i 40 --json -",
+        "bench paper " + raw() + " --json -", "bench paper " + raw() + ":40 --pictures -",
+        "bench solvers " + raw() + ":40 --pictures -"}) {
+    const std::size_t before = folder_.num_files();
+    const auto run = test::run_command(in_folder + arguments);
+    EXPECT_EQ(run.status, 1) << arguments;
+    EXPECT_EQ(run.out, "") << arguments;
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << arguments << run.err;
+    EXPECT_TRUE(run.err.starts_with("isowave: ")) << run.err;
+    EXPECT_EQ(folder_.num_files(), before) << arguments;
+  }
+}
+
+TEST_F(CliOutputs, HaveNamesThatFitWhatIsInThem) {
+  for (const char *ending : {"jpg", "JPEG", "npy", "tif", "bmp", "pngx", "1"}) {
+    const std::string file = name("a." + std::string(ending));
+    expect_refused(render(raw()) + "-o " + file,
+                   "pictures are written as PNG: end the name in .png");
+    expect_refused(render(raw()) + "-i 41 -o " + file, "written as PNG");
+    expect_refused("render " + raw() + " -i 40 --time-budget 9 --refined " + file,
+                   "written as PNG");
+  }
+  for (const char *ending : {"png", "npz", "txt"}) {
+    const std::string file = name("a." + std::string(ending));
+    expect_refused(render(raw()) + "--depth " + file, "end the name in .npy");
+    expect_refused("render " + raw() + " -i 40 --max-surface-error 1 --error-map " + file,
+                   "end the name in .npy");
+  }
+  for (const char *ending : {"png", "npy", "csv"}) {
+    const std::string file = name("a." + std::string(ending));
+    for (const std::string &arguments :
+         {render(raw()) + "--stats ",
+          "extract " + raw() + " -i 40 -o " + name("a.ply") + " --stats ",
+          "verify " + raw() + " -i 40 --size 16x12 --json ",
+          "bench solvers " + raw() + ":40 --json ", "bench pareto " + raw() + " -i 40 --json ",
+          "bench paper " + raw() + " --json "})
+      expect_refused(arguments + file, "end the name in .json");
+  }
+  expect_refused("extract " + raw() + " -i 40 -o " + name("a.png"), "a.png");
+  expect_refused("convert " + raw() + " -o " + name("a.png"), ".zfp");
+  for (const std::string &arguments :
+       {"-o " + name("a.PNG"), "-o " + name("plain"), "-i 40.5 -o " + name("several"),
+        "--stats " + name("a.log"), "--stats " + name("b.json")})
+    EXPECT_EQ(run_isowave(render(raw()) + arguments).status, 0) << arguments;
+}
+
+TEST_F(CliOutputs, KeepTheModeOfTheFileThatTheyReplace) {
+  for (const char *file : {"a.png", "a.npy", "a.json", "v2.zfp", "a.raw"}) {
+    write_file(folder_ / file, std::string_view("old"));
+    fs::permissions(folder_ / file, fs::perms::owner_read | fs::perms::owner_write);
+  }
+  for (const std::string &arguments : {render(raw()) + "-o " + name("a.png") + " --depth " +
+                                           name("a.npy") + " --stats " + name("a.json"),
+                                       "convert " + raw() + " -o " + name("v2.zfp"),
+                                       "generate gyroid --dims 8 -o " + name("a.raw")})
+    EXPECT_EQ(run_isowave(arguments).status, 0) << arguments;
+  for (const char *file : {"a.png", "a.npy", "a.json", "v2.zfp", "a.raw"}) {
+    EXPECT_NE(read_file(folder_ / file), "old") << file;
+    EXPECT_EQ(fs::status(folder_ / file).permissions(),
+              fs::perms::owner_read | fs::perms::owner_write)
+        << file;
+  }
+}
+
 TEST_F(CliOutputs, FilesThatMayNotGrowAreAnErrorLikeOthers) {
   const std::size_t before = folder_.num_files();
   for (const auto &arguments : {"convert generate:gyroid_64x64x64_uint8 -o " + name("a.zfp"),

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pwd.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <map>
@@ -177,14 +179,17 @@ INSTANTIATE_TEST_SUITE_P(Devices, CompileOnDevice, testing::ValuesIn(devices_und
 
 TEST(KernelCache, FolderIsTheDrivers) {
   const test::Setting home("HOME", "/home/someone"), cache("XDG_CACHE_HOME", ""),
-      pocl("POCL_CACHE_DIR", ""), mesa("MESA_SHADER_CACHE_DIR", ""), nvidia("CUDA_CACHE_PATH", "");
+      pocl("POCL_CACHE_DIR", ""), mesa("MESA_SHADER_CACHE_DIR", "");
+  ::unsetenv("CUDA_CACHE_PATH");
   const auto folder = [](const char *platform) {
     ocl::DeviceInfo info;
     info.platform = platform;
     return ocl::KernelCache(info).folder();
   };
   EXPECT_EQ(folder("Portable Computing Language"), "/home/someone/.cache/pocl/kcache");
-  EXPECT_EQ(folder("rusticl"), "/home/someone/.cache/mesa_shader_cache");
+  const passwd *user = ::getpwuid(::getuid());
+  ASSERT_NE(user, nullptr);
+  EXPECT_EQ(folder("rusticl"), fs::path(user->pw_dir) / ".cache/mesa_shader_cache");
   EXPECT_EQ(folder("NVIDIA CUDA"), "/home/someone/.nv/ComputeCache");
   EXPECT_EQ(folder("Some other platform"), std::nullopt);
   const test::Setting own("POCL_CACHE_DIR", "/elsewhere"), none("CUDA_CACHE_DISABLE", "1"),
@@ -192,6 +197,11 @@ TEST(KernelCache, FolderIsTheDrivers) {
   EXPECT_EQ(folder("Portable Computing Language"), "/elsewhere");
   EXPECT_EQ(folder("rusticl"), "/x/mesa_shader_cache");
   EXPECT_EQ(folder("NVIDIA CUDA"), std::nullopt);
+  {
+    const test::Setting on("CUDA_CACHE_DISABLE", "0"), empty("CUDA_CACHE_PATH", "");
+    EXPECT_EQ(folder("NVIDIA CUDA"), std::nullopt) << "an empty name has the driver keep none";
+  }
+  ::unsetenv("CUDA_CACHE_PATH");
 }
 
 TEST(KernelCache, NewFilesAreNewKernelsButForBookkeeping) {

@@ -60,8 +60,7 @@ print(isowave.Report())
 END
 cat > "$work/hidden.sh" << 'END'
 mount -t tmpfs none /etc/OpenCL
-: > /tmp/not_a_loader
-mount --bind /tmp/not_a_loader "$1"
+mount --bind "$0" "$1"  # no loader
 shift
 exec "$@"
 END

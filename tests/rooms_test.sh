@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # rooms_test.sh <source folder>: the table of core/README.md names every room of core/, and no room
 # includes a header of a room below it in the table. kernels_cl/portable includes nothing but
-# itself.
+# itself. The tests that core/README.md names are there.
 set -euo pipefail
 cd "$1"
 
@@ -37,4 +37,11 @@ while IFS=: read -r file include; do
 done < <(grep -rnoE '^#include "kernels_cl/(device|probes)?/?[a-z_]*\.[a-z]*"' \
   core reference tests tools bench --include=*.?pp |
   grep -v 'kernels_cl/portable/' | sed 's/:[0-9]*:/:/')
+while IFS=. read -r suite name; do
+  grep -qE "^TEST(_F|_P)?\\($suite, $name\\)" tests/*_test.cpp ||
+    fail "core/README.md: there is no test $suite.$name"
+done < <(grep -oE '`[A-Z][A-Za-z]+\.[A-Z][A-Za-z]+`' core/README.md | tr -d '\`')
+while read -r name; do
+  grep -qr "^def $name(" tools/python/tests || fail "core/README.md: there is no test $name"
+done < <(grep -oE '`test_[a-z_]+`' core/README.md | tr -d '\`')
 exit "$failed"

@@ -287,9 +287,11 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
                  R"(its data file '\x1b[1m\xff.raw': no such file)");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: Sch\u00e4del.raw\n"),
                  "its data file 'Sch\u00e4del.raw': no such file");
-  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: slice%03d.raw 1 5 1\n"),
-                 "several files");
-  expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: LIST\na.raw\n"), "is neither a field");
+  for (const char *names :
+       {"data file: slice%03d.raw 1 5 1\n", "data file: LIST\na.raw\nb.raw\n",
+        "data file: LIST 2\na.raw\n", "data file:  LIST \t\n\na.raw\n", "datafile: LIST\na.raw\n",
+        "DATA FILE: LIST\r\na.raw\r\n", "data file: LIST"})
+    expect_refused("a.nhdr", nrrd("encoding: raw\n" + std::string(names)), "several files");
   std::string meta = meta_image("");
   for (const char *name : {"LIST", "slice%03d.raw 1 5 1"}) {
     expect_refused("a.mhd", meta.substr(0, meta.size() - 6) + name + "\n", "several files");

@@ -14,6 +14,7 @@
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
+#include "core/io/file_name.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/time_budget.hpp"
 
@@ -250,6 +251,7 @@ double Renderer::setup_ms() const {
 
 void save_png(const Frame &frame, const std::filesystem::path &path) {
   guarded("saving a picture", [&] {
+    core::check_png_name(path);
     if (frame.picture.empty()) throw core::Error("{}: the frame has no picture", path.string());
     core::write_png({frame.size.width, frame.size.height, 3, frame.picture}, path);
   });

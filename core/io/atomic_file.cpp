@@ -3,8 +3,10 @@
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -39,6 +41,25 @@ fs::path follow_links(const fs::path &path) {
   fail(path, ELOOP);
 }
 
+void keep_permissions(const fs::path &replaced, int file) {
+  struct stat old {
+  }, made{};
+  if (::stat(replaced.c_str(), &old) != 0 || ::fstat(file, &made) != 0) return;
+  mode_t mode = old.st_mode & 0777;
+  constexpr auto kSameUser = static_cast<uid_t>(-1);
+  constexpr auto kSameGroup = static_cast<gid_t>(-1);
+  if (old.st_gid != made.st_gid && ::fchown(file, kSameUser, old.st_gid) != 0)
+    mode &= ~static_cast<mode_t>(S_IRWXG);  // they would be the rights of another group
+  // Only root can give a file away: an ordinary user becomes the owner.
+  if (old.st_uid != made.st_uid && ::fchown(file, old.st_uid, kSameGroup) != 0) errno = 0;
+  // Before the mode, which then also limits what the list grants.
+  constexpr const char *kAccessList = "system.posix_acl_access";
+  std::array<char, 1 << 12> list{};
+  const ssize_t length = ::getxattr(replaced.c_str(), kAccessList, list.data(), list.size());
+  if (length > 0) ::fsetxattr(file, kAccessList, list.data(), static_cast<std::size_t>(length), 0);
+  ::fchmod(file, mode);
+}
+
 AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {
   if (target_.filename().empty()) throw Error("'{}': cannot write: no file name", target.string());
   struct stat status {};
@@ -54,6 +75,7 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {
   }
   const int fd = open_temporary();
   if (fd < 0) fail(target_, errno);
+  keep_permissions(target_, fd);
   file_ = ::fdopen(fd, "w+b");
   if (file_ == nullptr) {
     const int error_number = errno;

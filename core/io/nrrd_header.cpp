@@ -74,6 +74,16 @@ void check_nrrd_magic(HeaderLines &lines, const std::string &what) {
   }
 }
 
+/// Whether the format takes the name for a pattern or a list of files.
+bool names_several_files(std::string_view name) {
+  if (name.starts_with("LIST")) return true;
+  for (std::size_t at = name.find('%'); at != name.npos; at = name.find('%', at + 1)) {
+    const std::size_t end = name.find_first_not_of("0123456789", at + 1);
+    if (end != name.npos && name[end] == 'd') return true;
+  }
+  return false;
+}
+
 /// Reads up to the empty line after which voxels begin, or to the end of the file. Returns whether
 /// the line was there.
 bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields &fields) {
@@ -87,7 +97,13 @@ bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields 
         colon == line.npos ? std::string_view() : field_name(line.substr(0, colon));
     if (!name.empty()) {
       if (lines.is_cut()) throw Error("{}: broken header: '{}' is too long", what, name);
-      fields.add(name, trim(line.substr(colon + 2)));
+      const std::string_view value = trim(line.substr(colon + 2));
+      if (name == "data file" && names_several_files(value)) {  // a list goes on to the file's end
+        throw Error(
+            "{}: its voxels lie in several files, which is not supported: convert it to one file",
+            what);
+      }
+      fields.add(name, value);
     } else if (line.find(":=") == line.npos) {
       throw Error("{}: broken header: line {}, {}, is neither a field of NRRD nor a key/value pair",
                   what, lines.number(), quote(line));
@@ -357,16 +373,6 @@ void set_nrrd_byte_order(const HeaderFields &fields, VoxelLayout &voxels) {
   }
 }
 
-/// Whether the format takes the name for a pattern or a list of files.
-bool names_several_files(std::string_view name) {
-  if (name.starts_with("LIST")) return true;
-  for (std::size_t at = name.find('%'); at != name.npos; at = name.find('%', at + 1)) {
-    const std::size_t end = name.find_first_not_of("0123456789", at + 1);
-    if (end != name.npos && name[end] == 'd') return true;
-  }
-  return false;
-}
-
 void check_other_nrrd_fields(const HeaderFields &fields, const VolumeInfo &info) {
   for (const std::string_view name : {"min", "max", "old min", "old max"}) {
     if (fields.has(name)) fields.numbers(name, 1, HeaderFields::Nan::kUnknown);
@@ -401,11 +407,6 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   set_nrrd_byte_order(fields, voxels);
   set_nrrd_skips(fields, voxels);
   if (fields.has("data file")) {
-    if (names_several_files(fields["data file"])) {
-      throw Error(
-          "{}: its voxels lie in several files, which is not supported: convert it to one file",
-          what);
-    }
     voxels.file = open_data_file(*file, fields["data file"]);
   } else {
     if (!has_end)

@@ -11,8 +11,8 @@
 #include "core/ocl/arithmetic.hpp"
 #include "core/ocl/build_log.hpp"
 #include "core/ocl/device_list.hpp"
+#include "core/ocl/driver_environment.hpp"
 #include "core/ocl/kernel_sources.hpp"
-#include "core/ocl/pocl_environment.hpp"
 
 namespace isowave::core::ocl {
 

@@ -11,7 +11,7 @@
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/base/text.hpp"
-#include "core/ocl/pocl_environment.hpp"
+#include "core/ocl/driver_environment.hpp"
 
 namespace isowave::core::ocl {
 
@@ -132,7 +132,6 @@ void append_devices(const cl::Platform &platform, std::vector<ListedDevice> &res
     info.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
     info.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
     info.platform = platform_name;
-    if (platform_name == "Portable Computing Language") note_pocl();
     info.driver_version = trimmed(device.getInfo<CL_DRIVER_VERSION>());
     info.type = device_type(device.getInfo<CL_DEVICE_TYPE>());
     info.capabilities = probe(device, version);
@@ -159,7 +158,7 @@ bool has_room_for_driver() {
 std::vector<ListedDevice> enumerate() {
   if (!has_room_for_driver()) return {};
   std::vector<cl::Platform> platforms;
-  prepare_for_pocl();  // before a driver is loaded
+  prepare_for_drivers();  // before a driver is loaded
   try {
     cl::Platform::get(&platforms);
   } catch (const cl::Error &) {
@@ -226,6 +225,7 @@ std::vector<DeviceInfo> list_devices() {
 }
 
 cl::Device device_handle(const DeviceInfo &info) {
+  demand_private_kernels(info.platform);
   for (const ListedDevice &device : enumerate()) {
     if (device.info.index == info.index && device.info.name == info.name &&
         device.info.platform == info.platform) {

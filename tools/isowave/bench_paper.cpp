@@ -39,6 +39,7 @@
 #include "core/base/error.hpp"
 #include "core/base/names_in.hpp"
 #include "core/base/text.hpp"
+#include "core/io/file_name.hpp"
 #include "core/io/input_file.hpp"
 #include "tools/isowave/bench_paper_runs.hpp"
 #include "tools/isowave/frame_options.hpp"
@@ -255,6 +256,7 @@ void run_bench_paper(const BenchPaperArgs &options) {
   Outputs outputs;
   for (const std::string &volume : volumes) outputs.read_volume(volume);
   outputs.write("--json", options.json);
+  check_json_name(options.json);
   if (!options.pictures.empty()) outputs.write_pictures("--pictures", options.pictures, "paper");
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);

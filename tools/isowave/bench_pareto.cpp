@@ -18,6 +18,7 @@
 #include "core/accuracy/flip.hpp"
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/io/file_name.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/render/renderer.hpp"
 #include "reference/accuracy.hpp"
@@ -438,6 +439,7 @@ void run_bench_pareto(BenchParetoArgs options) {
   Outputs outputs;
   outputs.read_volume(options.input);
   outputs.write("--json", options.json);
+  check_json_name(options.json);
   for (const std::string &solver : options.solvers) solver_from_string(solver);
   if (is_zfp_name(options.input))
     throw Error("{}: is compressed already: give the volume that is to be compressed",

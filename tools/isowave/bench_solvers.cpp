@@ -16,6 +16,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/io/file_name.hpp"
 #include "core/io/png.hpp"
 #include "core/render/renderer.hpp"
 #include "core/stages/solve_cells.hpp"
@@ -88,6 +89,7 @@ void check_outputs(const BenchSolversArgs &options) {
   for (const std::string &argument : options.volumes)
     outputs.read_volume(parse_subject(argument).first);
   outputs.write("--json", options.json);
+  check_json_name(options.json);
   if (options.pictures.empty()) return;
   if (!std::filesystem::is_directory(options.pictures))
     throw Error("cannot write pictures: {} is no folder", options.pictures);

@@ -11,6 +11,7 @@
 #include "core/extract/extractor.hpp"
 #include "core/extract/mesh_file.hpp"
 #include "core/io/atomic_file.hpp"
+#include "core/io/file_name.hpp"
 #include "core/view/detail.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
@@ -75,6 +76,7 @@ void run_extract(ExtractArgs options) {
   outputs.read_volume(options.input);
   outputs.write("--output", options.output);
   outputs.write("--stats", options.stats);
+  check_json_name(options.stats);
   options.extractor.with_normals = options.normals == "smooth";
   options.extractor.stream = stream_place_from_string(options.stream);
   if (options.level > 0) want_levels(options.compression);
@@ -97,6 +99,7 @@ void run_extract(ExtractArgs options) {
              options.isovalue, with_commas(stats.size.num_vertices),
              with_commas(stats.size.num_triangles), with_commas(stats.decoded_blocks),
              stats.total_ms);
+  print_if_outside(volume, options.isovalue);
   fmt::print("wrote {}: {} bytes; device memory: peak {:.1f} MiB{}\n", one_line(options.output),
              with_commas(OutputGroup::current()->bytes_of(options.output)),
              double(device.ledger().peak()) / (1 << 20),

@@ -223,8 +223,11 @@ class HostWords {
     std::array<char, 64> name{};
     int file = -1;
     if (is_first()) {
-      fmt::format_to_n(name.data(), name.size() - 1, "/isowave.{}", ::getpid());
-      file = ::shm_open(name.data(), O_CREAT | O_EXCL | O_RDWR, 0600);
+      unsigned id = 0;
+      do {  // another user may have taken a name
+        fmt::format_to_n(name.data(), name.size() - 1, "/isowave.{}.{}", ::getpid(), id++);
+        file = ::shm_open(name.data(), O_CREAT | O_EXCL | O_RDWR, 0600);
+      } while (file < 0 && errno == EEXIST);
       if (file >= 0 && ::posix_fallocate(file, 0, static_cast<off_t>(num_bytes())) != 0) {
         ::close(file);
         file = -1;

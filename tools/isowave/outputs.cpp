@@ -37,6 +37,12 @@ std::string key_of(const fs::path &path) {
   throw Error("{}: cannot write: {}", path.string(), std::strerror(reason));
 }
 
+/// Standard output has the command's messages.
+void refuse_standard_output(const std::string &option, const fs::path &path) {
+  if (path == "-")
+    throw Error("{} -: cannot write to standard output: give a name, ./- for a file '-'", option);
+}
+
 }  // namespace
 
 void Outputs::read(const fs::path &path) {
@@ -55,6 +61,7 @@ void Outputs::read_volume(const std::string &path) {
 
 void Outputs::write(const std::string &option, const fs::path &path) {
   if (path.empty()) return;
+  refuse_standard_output(option, path);
   const fs::path folder = follow_links(path).parent_path();
   std::error_code failure;
   if (!folder.empty() && !fs::is_directory(folder, failure))
@@ -71,6 +78,7 @@ void Outputs::write(const std::string &option, const fs::path &path) {
 void Outputs::write_pictures(const std::string &option, const fs::path &folder,
                              const std::string &prefix) {
   if (folder.empty()) return;
+  refuse_standard_output(option, folder);
   std::error_code failure;
   fs::path existing = folder,
            made;  // the deepest folder that is there, and the one that will be made in it

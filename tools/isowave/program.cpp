@@ -23,7 +23,7 @@
 #include "core/ocl/arithmetic.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/ocl/device.hpp"
-#include "core/ocl/pocl_environment.hpp"
+#include "core/ocl/driver_environment.hpp"
 #include "isowave/version.hpp"
 #include "tools/isowave/strict_options.hpp"
 

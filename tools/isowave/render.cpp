@@ -17,6 +17,7 @@
 #include "core/bricks/brick_renderer.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
+#include "core/io/file_name.hpp"
 #include "core/io/npy.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/surface_camera.hpp"
@@ -301,6 +302,7 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
       write_outputs(options, scene, frames, isovalue, view);
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
+      print_if_outside(scene.volume, isovalue);
       result.push_back(frame_json(isovalue, view, camera, stats));
       frames.report(frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
                     result.back());
@@ -363,6 +365,9 @@ Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
     }
   }
   outputs.write_pictures("--progress-dir", options.progress_dir, "pass");
+  for (const std::string &name : {options.image, options.refined}) check_png_name(name);
+  for (const std::string &name : {options.depth, options.error_map}) check_npy_name(name);
+  check_json_name(options.stats);
   return outputs;
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.hpp"
+#include "core/io/file_name.hpp"
 #include "core/render/renderer.hpp"
 #include "reference/stability_suite.hpp"
 #include "reference/watertight.hpp"
@@ -133,6 +134,7 @@ void check_options(const CLI::App &command, const VerifyArgs &options) {
   outputs.read_volume(options.frames.input);
   if (!options.frames.frame.cameras.empty()) outputs.read(options.frames.frame.cameras);
   outputs.write("--json", options.json);
+  check_json_name(options.json);
 }
 
 void run_verify(const CLI::App &command, VerifyArgs options) {

@@ -1,5 +1,6 @@
 #include "tools/isowave/volume_options.hpp"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -136,6 +137,13 @@ CompressedVolume load_brick(const std::string &path, const RawOverrides &overrid
   Storage storage = to_storage(compression);
   storage.device = device;
   return core::load_brick(path, overrides, storage, info, num_levels, own);
+}
+
+void print_if_outside(const CompressedVolume &volume, float isovalue) {
+  const auto [least, most] = volume.value_range;
+  if (!std::isfinite(least) || !std::isfinite(most) || (least <= isovalue && isovalue <= most))
+    return;
+  fmt::print("  isovalue {} is outside the volume's values, {} to {}\n", isovalue, least, most);
 }
 
 std::string volume_stem(const std::string &path) {

@@ -61,6 +61,9 @@ std::optional<BlockPrecision> find_precision(const std::string &path, const RawO
 /// generator without the word "generate".
 std::string volume_stem(const std::string &path);
 
+/// Prints the range of the volume's values, if it is known and the isovalue is outside.
+void print_if_outside(const CompressedVolume &volume, float isovalue);
+
 /// The help text of an argument that open_any_volume() takes.
 inline constexpr const char *kVolumeHelp =
     "a volume: .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz, or "

@@ -141,7 +141,7 @@ struct Frame {
 
 /// Writes frame.picture.
 ///
-/// Throws  Error: no picture, or it cannot be written
+/// Throws  Error: no picture, a name that ends in something else than .png, or it cannot be written
 void save_png(const Frame &frame, const std::filesystem::path &path);
 /// The bytes of such a file.
 ///

@@ -17,6 +17,7 @@ import importlib.util
 import os
 import pathlib
 import shutil
+import stat
 import tempfile
 import warnings
 
@@ -88,21 +89,83 @@ def unregistered(drivers: dict[str, str]) -> dict[str, str]:
     return added
 
 
+def trusted_users() -> set[int]:
+    """This user and root, also in a container that maps this user alone and shows root as 65534."""
+    try:
+        with open("/proc/self/uid_map", encoding="ascii") as file:
+            mapped = [int(line.split()[0]) for line in file]
+    except (OSError, ValueError):
+        mapped = [0]
+    return {os.geteuid(), 0 if 0 in mapped else 65534, 0}
+
+
+def is_private(folder: pathlib.Path) -> bool:
+    """Whether no other user can change what is in the folder, nor what leads there.
+
+    core/base/private_folder.cpp has the same rules; it cannot be called before there is OpenCL.
+    """
+    trusted, most_links = trusted_users(), 40
+    rest = list(folder.absolute().parts[1:])
+    path = pathlib.Path("/")
+    while True:
+        status = path.lstat()
+        is_open = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+        if status.st_uid not in trusted:
+            return False
+        if is_open and not (rest and status.st_mode & stat.S_ISVTX):
+            return False
+        if not rest:
+            return all(entry.lstat().st_uid in trusted for entry in path.iterdir())
+        part = rest.pop(0)
+        if part == "..":
+            path = path.parent
+        elif (path / part).is_symlink():
+            most_links -= 1
+            if (path / part).lstat().st_uid not in trusted or most_links < 0:
+                return False
+            target = pathlib.Path(os.readlink(path / part)).parts
+            if target[0] == "/":
+                path, target = pathlib.Path("/"), target[1:]
+            rest[:0] = target
+        else:
+            path /= part
+
+
+def registration_folder(name: str) -> pathlib.Path | None:
+    """A folder of this user's alone: drivers that others register would run as this user."""
+    home = os.path.expanduser("~")  # stays as it is if there is none
+    cache = os.environ.get("XDG_CACHE_HOME") or (home != "~" and os.path.join(home, ".cache"))
+    places = [pathlib.Path(cache) / "isowave"] if cache else []
+    places.append(pathlib.Path(tempfile.gettempdir()) / f"isowave-{os.geteuid()}")
+    for place in places:
+        folder = place / name
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            for made in (place, folder):
+                made.mkdir(mode=0o700, exist_ok=True)
+            if is_private(folder) and os.access(folder, os.W_OK):
+                return folder.resolve()
+        except OSError:  # a home that cannot be written to
+            continue
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="isowave_opencl_"))
+    if is_private(folder):
+        return folder.resolve()
+    folder.rmdir()
+    return None
+
+
 def register(drivers: dict[str, str]) -> None:
     """Points the loader at a folder with these registrations.
 
     It stays for the next process, since programs that this one starts may outlive it.
     """
     text = "".join(f"{name} {driver}\n" for name, driver in drivers.items())
-    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    name = "opencl-" + hashlib.sha256(text.encode()).hexdigest()[:16]
-    folder = pathlib.Path(cache) / "isowave" / name
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_registrations(folder, drivers)
-    except OSError:  # a home that cannot be written to
-        folder = pathlib.Path(tempfile.mkdtemp(prefix="isowave_opencl_"))
-        write_registrations(folder, drivers)
+    folder = registration_folder("opencl-" + hashlib.sha256(text.encode()).hexdigest()[:16])
+    if folder is None:
+        where = f"other users can write to {tempfile.gettempdir()}: set TMPDIR to another folder"
+        warnings.warn(f"isowave cannot register OpenCL drivers, since {where}", stacklevel=3)
+        return
+    write_registrations(folder, drivers)
     os.environ["OCL_ICD_VENDORS"] = f"{folder}/"
 
 

@@ -151,7 +151,7 @@ class Image:
         return _core.encode_png(self._rgb())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a PNG file; whole, or not at all."""
+        """Writes a .png file; whole, or not at all."""
         _core.save_png(self._rgb(), os.fspath(path))
 
     def __repr__(self) -> str:

@@ -133,3 +133,76 @@ def test_what_linking_takes(tmp_path, monkeypatch):
         (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / file).touch(mode=0o755)
     assert loader.can_link(tmp_path)
+
+
+def plant(folder):
+    """Gives a folder to another user."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can give files away")
+    folder.mkdir(parents=True)
+    os.chown(folder, 65534, 65534)
+    folder.chmod(0o777)
+    return folder
+
+
+def test_folders_that_other_users_can_change_are_not_private(tmp_path):
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "link").symlink_to("../own")
+    (own / "circle").symlink_to("circle")
+    assert loader.is_private(own)
+    assert loader.is_private(own / "link" / ".." / "own")
+    assert not loader.is_private(own / "circle")
+    (own / "open").mkdir()
+    (own / "open").chmod(0o777)
+    (own / "open" / "own").mkdir()
+    assert not loader.is_private(own / "open")
+    assert not loader.is_private(own / "open" / "own")
+    (own / "open").chmod(0o1777)  # as /tmp
+    assert loader.is_private(own / "open" / "own")
+    (own / "to_open").symlink_to("open")
+    assert not loader.is_private(own / "to_open")
+
+
+def test_what_another_user_made_is_not_private(tmp_path):
+    planted = plant(tmp_path / "planted")
+    (tmp_path / "link").symlink_to(tmp_path)
+    os.chown(tmp_path / "link", 65534, 65534, follow_symlinks=False)
+    assert not loader.is_private(planted)
+    assert not loader.is_private(tmp_path / "link")
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "evil.icd").touch()
+    assert loader.is_private(tmp_path / "own")
+    os.chown(tmp_path / "own" / "evil.icd", 65534, 65534)
+    assert not loader.is_private(tmp_path / "own")
+
+
+def test_drivers_are_registered_where_only_this_user_can(tmp_path, monkeypatch):
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    monkeypatch.setattr(loader.tempfile, "tempdir", str(temporary))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("OCL_ICD_VENDORS", "")
+
+    def registered_in():
+        monkeypatch.delenv("OCL_ICD_VENDORS", raising=False)
+        loader.register({"a.icd": "liba.so"})
+        folder = pathlib.Path(os.environ["OCL_ICD_VENDORS"])
+        assert loader.registered(folder) == {"a.icd": "liba.so"}
+        return folder
+
+    usual = registered_in()
+    assert usual.parent == tmp_path / "cache" / "isowave"
+    assert registered_in() == usual
+    monkeypatch.setenv("XDG_CACHE_HOME", str(plant(tmp_path / "planted")))
+    mine = registered_in()
+    assert mine.parent == temporary / f"isowave-{os.geteuid()}"
+    assert registered_in() == mine
+    os.chown(mine.parent, 65534, 65534)
+    fresh = registered_in()
+    assert fresh.parent == temporary and fresh.name.startswith("isowave_opencl_")
+    temporary.chmod(0o777)
+    monkeypatch.delenv("OCL_ICD_VENDORS", raising=False)
+    with pytest.warns(UserWarning, match="cannot register OpenCL drivers"):
+        loader.register({"a.icd": "liba.so"})
+    assert "OCL_ICD_VENDORS" not in os.environ

@@ -112,6 +112,20 @@ def test_picture_has_the_programs_bits(program, tmp_path):
     assert np.array_equal(image.depth, depth)
 
 
+def test_saved_files_keep_the_mode_of_what_they_replace(tmp_path):
+    volume = isowave.open(FUEL, exact=True)
+    image = volume.render(10, size=SIZE)
+    saves = {"a.png": image.save, "a.zfp": volume.save, "a.ply": volume.extract(10).save}
+    for name, save in saves.items():
+        (tmp_path / name).touch(mode=0o600)
+        save(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 0
+        assert (tmp_path / name).stat().st_mode & 0o777 == 0o600
+    with pytest.raises(isowave.Error, match="pictures are written as PNG"):
+        image.save(tmp_path / "a.jpg")
+    assert not (tmp_path / "a.jpg").exists()
+
+
 def test_orbit_is_the_programs(program, tmp_path):
     volume = isowave.open(FUEL, exact=True)
     program("render", FUEL, "-i", 10, "--exact", "--size", "64x48", "--orbit", 3, "-o",
