@@ -69,6 +69,24 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
   }
 }
 
+/// Widens the range of all values by those of some blocks. -0 is below 0.
+///
+/// partials  [num_blocks * 8], see macrocell_partials
+/// Out       extremes [2]: bits of the least and of the largest value; those of negative values are
+///           flipped but for the sign, so that they are ordered as values are
+/// Launch    grid-stride over blocks; few work-items, as each has atomics
+kernel void macrocell_extremes(uint num_blocks, global const ValueRange *partials,
+                               global int *extremes) {
+  ValueRange range;
+  range.min = INFINITY;
+  range.max = -INFINITY;
+  for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0))
+    range = join(range, partials[8 * i]);
+  const int low = as_int(range.min), high = as_int(range.max);
+  atomic_min(&extremes[0], low < 0 ? low ^ 0x7FFFFFFF : low);
+  atomic_max(&extremes[1], high < 0 ? high ^ 0x7FFFFFFF : high);
+}
+
 /// Makes the 8-bit ranges of the blocks of one layer in z.
 ///
 /// below, above  [blocks_x * blocks_y * 8] the partials of this layer and the next; above is not

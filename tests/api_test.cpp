@@ -334,6 +334,7 @@ TEST_P(ApiOnDevice, FramesKeepErrorsAndTimes) {
   ASSERT_TRUE(bounded.detail);
   EXPECT_TRUE(bounded.detail->reachable);
   ASSERT_EQ(bounded.bounds.size(), bounded.depth.size());
+  EXPECT_FALSE(bounded.statistics.errors_are_stated);
   request.max_surface_error.reset();
   request.want_bounds = false;
   const std::vector<float> depth = renderer.render(request).depth;

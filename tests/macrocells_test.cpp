@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -75,9 +76,13 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                              volume.bits_per_block));
     FrameParams params = grid_frame(dims);
     const DeviceStream stream(device_, volume);
-    Macrocells macrocells(device_, params, stream);
-    const std::vector<Range> expected = dual_cell_ranges(dims, decode_with_libzfp(volume));
+    std::array<float, 2> extremes{};
+    Macrocells macrocells(device_, params, stream, {}, {}, &extremes);
+    const std::vector<float> voxels = decode_with_libzfp(volume);
+    const std::vector<Range> expected = dual_cell_ranges(dims, voxels);
     expect_ranges(macrocells, expected);
+    EXPECT_EQ(extremes[0], std::ranges::min(voxels));
+    EXPECT_EQ(extremes[1], std::ranges::max(voxels));
 
     std::size_t num_selected = 0, num_in_range = 0;
     for (const float isovalue : awkward_isovalues(expected, max_ranges)) {

@@ -189,6 +189,7 @@ Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {
     frame.depth = renderer->depth();
   }
   frame.statistics.hits = renderer->num_hits();
+  frame.statistics.errors_are_stated = volume.errors_are_stated;
   if (request.want_picture)
     frame.picture = renderer->shade(core_appearance(request.appearance)).pixels;
   if (!request.want_depth) frame.depth.clear();

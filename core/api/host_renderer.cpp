@@ -77,6 +77,7 @@ Frame HostRenderer::Implementation::draw(const FrameRequest &request) {
   }
   Frame frame;
   describe_frame(request, renderer.render(wanted), frame);
+  frame.statistics.errors_are_stated = volume->errors_are_stated();
   if (request.want_picture)
     frame.picture = renderer.shade(core_appearance(request.appearance)).pixels;
   fill_frame(request, renderer.hits(), volume->implementation().volume, false, frame);

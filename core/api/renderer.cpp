@@ -171,6 +171,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   core::FrameRequest wanted = core_request(request);
   Frame frame;
   draw_hits(request, wanted, frame);
+  frame.statistics.errors_are_stated = volume->errors_are_stated();
   note_memory();
   fetch(request, wanted, frame);
   return frame;

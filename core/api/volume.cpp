@@ -140,6 +140,9 @@ std::uint64_t Volume::compressed_bytes() const {
 std::optional<double> Volume::max_voxel_error() const {
   return implementation_->volume.max_voxel_error;
 }
+bool Volume::errors_are_stated() const {
+  return implementation_->volume.errors_are_stated;
+}
 std::uint32_t Volume::num_levels() const {
   return static_cast<std::uint32_t>(implementation_->volume.coarser_levels.size() + 1);
 }

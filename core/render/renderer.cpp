@@ -1,6 +1,7 @@
 #include "core/render/renderer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include "core/render/stall_guard.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
+#include "core/zfp/stated_errors.hpp"
 #include "kernels_cl/portable/block_grid.h"
 #include "kernels_cl/portable/window.h"
 
@@ -36,14 +38,19 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
   const auto buffers = std::make_shared<MacrocellBuffers>(device, limits.macrocells);
   std::vector<DeviceStream> streams;
   std::vector<Macrocells> macrocells;  // of all levels before any decoder, see plan.setup_bytes
+  // Bounds need the range of values (value_offset()), which a file may get wrong.
+  const bool checks_range = options.with_bounds && volume.errors_are_stated;
+  std::array<float, 2> extremes{};
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     streams.push_back(
         plan.stream == StreamPlace::kHost
             ? DeviceStream(device, *volumes[i], OnHost{plan.window_blocks}, options.with_bounds)
             : DeviceStream(device, *volumes[i], options.largest_stream_part, options.with_bounds));
     macrocells.emplace_back(device, grids[i], streams.back(), buffers,
-                            i == 0 ? options.range_thresholds : std::vector<float>());
+                            i == 0 ? options.range_thresholds : std::vector<float>(),
+                            i == 0 && checks_range ? &extremes : nullptr);
   }
+  if (checks_range) check_value_range(volume, extremes);
   std::vector<Level> levels;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const CompressedVolume &level = *volumes[i];

@@ -14,6 +14,14 @@
 
 namespace isowave::core {
 
+namespace {
+
+/// Of no values, as macrocell_extremes orders them.
+constexpr std::array kNoExtremes = {std::numeric_limits<int>::max(),
+                                    std::numeric_limits<int>::min()};
+
+}  // namespace
+
 ocl::BufferSizes MacrocellBuffers::sizes(const Limits &limits) {
   ocl::BufferSizes sizes{ocl::buffer_size<cl_ushort>("block ranges", limits.num_blocks)};
   for (std::size_t i = 0; i < limits.num_selections; ++i)
@@ -36,7 +44,8 @@ ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num
 }
 
 Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
-                       std::shared_ptr<MacrocellBuffers> buffers, std::vector<float> thresholds)
+                       std::shared_ptr<MacrocellBuffers> buffers, std::vector<float> thresholds,
+                       std::array<float, 2> *extremes)
     : num_coarse_(static_cast<std::uint32_t>(num_macrocells(frame.grid))),
       coarse_range_(ocl::Range::strided(num_coarse_, ocl::kGroupSize, device)),
       buffers_(buffers
@@ -49,11 +58,12 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
       masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
   for (const ocl::BufferSize &size : own_sizes().named("active box"))
     selections_.push_back({.box = ocl::Buffer<int>(device, size)});
-  build(device, frame, stream);
+  build(device, frame, stream, extremes);
 }
 
 /// Launches every kernel without a block to work on.
-void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels) {
+void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels,
+                         bool with_extremes) {
   const auto compiling = device.compiling();
   const FrameParams no_blocks{};
   const ocl::Range range{1, ocl::kGroupSize};
@@ -64,16 +74,23 @@ void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildK
                    0, 0, 0, partials);
   kernels.ranges(range, no_blocks, 0, partials, partials, thresholds, buffers_->ranges);
   kernels.coarse_ranges(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_);
+  if (with_extremes) {
+    ocl::Buffer<int> extremes(device, layer_sizes(1)["extremes"]);
+    extremes.write(kNoExtremes);
+    kernels.extremes(range, 0, partials, extremes);
+  }
   masks_kernel_(coarse_range_, no_blocks, 0, buffers_->ranges, coarse_ranges_, limits_, 0, limits_,
                 0, buffers_->masks[0], selections_[0].box);
 }
 
-void Macrocells::build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream) {
+void Macrocells::build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
+                       std::array<float, 2> *extremes) {
   const auto stage = device.timer().stage("macrocells");
   BuildKernels kernels{{device, "macrocells", "macrocell_partials", stream.defines()},
                        {device, "macrocells", "macrocell_ranges", stream.defines()},
-                       {device, "macrocells", "macrocell_coarse_ranges", stream.defines()}};
-  compile(device, stream, kernels);
+                       {device, "macrocells", "macrocell_coarse_ranges", stream.defines()},
+                       {device, "macrocells", "macrocell_extremes", stream.defines()}};
+  compile(device, stream, kernels, extremes != nullptr);
   Partials decode{device, frame, stream, kernels.partials};
   if (thresholds_.empty()) {
     thresholds_ =
@@ -87,14 +104,26 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
   ocl::Buffer<ValueRange> below(device, scratch["range partials, layer below"]);
   ocl::Buffer<ValueRange> above(device, scratch["range partials, layer above"]);
   const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
+  constexpr std::uint32_t kBlocksPerItem = 64;
+  const ocl::Range few_items = ocl::Range::strided(
+      (layer_blocks + kBlocksPerItem - 1) / kBlocksPerItem, ocl::kGroupSize, device);
+  ocl::Buffer<int> extreme_bits(device, scratch["extremes"]);
+  extreme_bits.write(kNoExtremes);
 
   decode(0, 1, layer_blocks, below);
   for (std::uint32_t layer = 0; layer < frame.grid.blocks_z; ++layer) {
     if (layer + 1 < frame.grid.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
+    if (extremes != nullptr) kernels.extremes(few_items, layer_blocks, below, extreme_bits);
     kernels.ranges(layer_range, frame, layer, below, above, thresholds, buffers_->ranges);
     std::swap(below, above);
   }
   kernels.coarse_ranges(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_);
+  if (extremes != nullptr) {
+    const std::vector<int> bits = extreme_bits.read();
+    std::ranges::transform(bits, extremes->begin(), [](int of_value) {
+      return std::bit_cast<float>(of_value < 0 ? of_value ^ 0x7FFFFFFF : of_value);
+    });
+  }
   device.finish();
 }
 
@@ -112,7 +141,8 @@ ocl::BufferSizes Macrocells::sampling_sizes(std::uint64_t num_blocks) {
 ocl::BufferSizes Macrocells::layer_sizes(std::uint64_t layer_blocks) {
   return {ocl::buffer_size<float>("range thresholds", kNumThresholds),
           ocl::buffer_size<ValueRange>("range partials, layer below", 8 * layer_blocks),
-          ocl::buffer_size<ValueRange>("range partials, layer above", 8 * layer_blocks)};
+          ocl::buffer_size<ValueRange>("range partials, layer above", 8 * layer_blocks),
+          ocl::buffer_size<int>("extremes", 2)};
 }
 
 void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,

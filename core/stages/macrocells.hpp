@@ -51,9 +51,11 @@ class Macrocells {
   /// frame       its grid and place are used
   /// buffers     shared with other levels; none: its own
   /// thresholds  see thresholds(); none: of a sample of the blocks
+  /// extremes    becomes the least and the largest of all voxels, padding left out
   /// Waits       yes
   Macrocells(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
-             std::shared_ptr<MacrocellBuffers> buffers = {}, std::vector<float> thresholds = {});
+             std::shared_ptr<MacrocellBuffers> buffers = {}, std::vector<float> thresholds = {},
+             std::array<float, 2> *extremes = nullptr);
 
   /// Makes masks() for an isovalue; nothing to do where they are those in use. Ranges were made of
   /// voxels of all bit planes, and blocks may since be decoded to other values: by voxel_error and
@@ -128,9 +130,12 @@ class Macrocells {
                 ocl::Out<cl_ushort>>
         ranges;
     ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_ranges;
+    ocl::Kernel<uint, ocl::In<ValueRange>, ocl::Out<int>> extremes;
   };
-  void compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels);
-  void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream);
+  void compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels,
+               bool with_extremes);
+  void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
+             std::array<float, 2> *extremes);
   std::vector<float> sample_thresholds(ocl::Device &device, std::uint32_t num_blocks,
                                        Partials &decode);
 

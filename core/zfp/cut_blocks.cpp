@@ -16,6 +16,7 @@ BlockCutter::BlockCutter(const CompressedVolume &whole, const BlockBox &box) : w
   cut_.precision = whole.precision;
   cut_.value_range = whole.value_range;
   cut_.max_voxel_error = whole.max_voxel_error;
+  cut_.errors_are_stated = whole.errors_are_stated;
   if (cut_.is_indexed()) {
     index_.reserve(cut_.block_count());
   } else {

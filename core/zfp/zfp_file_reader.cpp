@@ -88,9 +88,13 @@ class ZfpFileReader {
   ZfpFileReader(const ZfpFileReader &finer, std::uint64_t begin, std::uint64_t size)
       : file_(finer.file_), begin_(begin), file_size_(size), is_level_(true) {
     read_head();
-    if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims)
+    // Means of integers are not rounded.
+    if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims ||
+        volume_.precision.whole_numbers)
       refuse_level();
+    // What a level says of its grid and range of values is not needed, so it cannot be wrong.
     volume_.info = coarser_level(finer.volume_.info);
+    volume_.value_range = kUnknownRange;
     layout_.counts_casts = finer.layout_.counts_casts;
   }
 
@@ -139,6 +143,7 @@ class ZfpFileReader {
     volume_.file_first_bit = 8 * begin_ + header_bits_;
     if (volume_.is_indexed()) read_index(keep);
     if (layout_.bounds_bytes != 0) read_bounds(keep);
+    check_errors(volume_);
     for (ZfpFileReader &level : levels_) volume_.coarser_levels.push_back(level.take(keep));
     if (!keep) volume_.file.reset();
     return std::move(volume_);
@@ -190,7 +195,18 @@ class ZfpFileReader {
       inflate_bounds([&](std::span<const std::uint8_t> some) { bounds.add(some); });
       if (layout_.counts_casts) cut.bounds = bounds.finish(volume_.bounds);
     }
+    check_errors(cut);
     return cut;
+  }
+
+  /// A block's bound is that of its voxels' errors, so the largest one is not below theirs.
+  void check_errors(const CompressedVolume &volume) const {
+    if (is_level_ || volume.bounds.codes.empty() || !volume.max_voxel_error) return;
+    const double largest = double{largest_bound(volume.bounds)};
+    if (*volume.max_voxel_error > largest) {
+      fail("broken trailer: a voxel is off by {}, and no block by more than {}",
+           *volume.max_voxel_error, largest);
+    }
   }
 
   /// Keeps the lengths of a row at a time.
@@ -268,8 +284,7 @@ class ZfpFileReader {
     const bool fixed_rate = zfp_stream_compression_mode(stream.get()) == zfp_mode_fixed_rate;
     volume_.bits_per_block = fixed_rate ? stream->maxbits : 0;
     if (!fixed_rate) volume_.precision.min_exponent = stream->minexp;
-    volume_.value_range = {-std::numeric_limits<float>::infinity(),
-                           std::numeric_limits<float>::infinity()};
+    volume_.errors_are_stated = true;
 
     if (!fixed_rate) {  // how long the stream is, a trailer tells, or else the file
       if (volume_.block_count() >= std::numeric_limits<std::uint32_t>::max()) {

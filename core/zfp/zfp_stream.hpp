@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <glm/glm.hpp>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -61,6 +62,10 @@ struct BlockBounds {
   std::uint8_t largest_of_whole = 0;
 };
 
+/// CompressedVolume::value_range of a volume whose values are not known.
+inline constexpr std::array<float, 2> kUnknownRange = {-std::numeric_limits<float>::infinity(),
+                                                       std::numeric_limits<float>::infinity()};
+
 /// Words past its last bit that a decoder reads at most.
 inline constexpr std::uint64_t kDecoderAhead = 2;
 
@@ -80,10 +85,13 @@ struct CompressedVolume {
   std::vector<std::uint32_t> words;
   std::shared_ptr<const InputFile> file{};  ///< which holds the payload instead,
   std::uint64_t file_first_bit = 0;         ///< from this bit on.
-  /// [min, max] of the source's voxels, as float32 and after map_nan; {-inf, inf} when unknown.
-  std::array<float, 2> value_range{};
+  /// [min, max] of the source's voxels, as float32 and after map_nan.
+  std::array<float, 2> value_range = kUnknownRange;
   std::optional<double> max_voxel_error{};  ///< largest |decoded - source| when it was measured
   BlockBounds bounds{};                     ///< of a level of detail; no codes: not known
+  /// max_voxel_error and bounds, of all levels, are what a file says: its writer may be wrong, or
+  /// lie. false: this process measured them.
+  bool errors_are_stated = false;
   /// Levels of detail, each of half the voxels along each axis: pyramid.hpp.
   std::vector<CompressedVolume> coarser_levels{};
 

@@ -41,16 +41,34 @@ VoxelType type_from(const json &value) {
   return voxel_type_from_string(value.get<std::string>().substr(0, kMostShown));
 }
 
+/// Whether a voxel of the type can have this value as float32.
+bool can_be(float value, VoxelType type) {
+  return with_voxel_type(type, [value]<typename T>(T) {
+    if constexpr (std::is_integral_v<T>) {
+      return value == std::trunc(value) &&
+             value >= static_cast<float>(std::numeric_limits<T>::lowest()) &&
+             value <= static_cast<float>(std::numeric_limits<T>::max());
+    } else {
+      return std::abs(value) < kMaxMagnitude;
+    }
+  });
+}
+
 void apply_errors(const json &trailer, bool counts_casts, CompressedVolume &volume) {
   if (trailer.contains("value_range")) {
     const json &range = trailer["value_range"];
     volume.value_range = {number_from<float>(range.at(0)), number_from<float>(range.at(1))};
     if (volume.value_range[0] > volume.value_range[1])
       throw Error("{} to {} is no range", volume.value_range[0], volume.value_range[1]);
+    for (const float value : volume.value_range) {
+      if (!can_be(value, volume.info.type))
+        throw Error("{} is no value of type {}", value, to_string(volume.info.type));
+    }
   }
   if (trailer.contains("max_error")) {
     const auto max_error = number_from<double>(trailer["max_error"]);
-    if (max_error < 0) throw Error("{} is no error", max_error);
+    if (max_error < 0 || max_error > double{std::numeric_limits<float>::max()})
+      throw Error("{} is no error", max_error);
     if (counts_casts) volume.max_voxel_error = max_error;
   }
   if (volume.is_indexed()) volume.precision.max_voxel_error = volume.max_voxel_error;
@@ -80,6 +98,8 @@ ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
   if (!volume.is_indexed()) return layout;
   volume.indexed_bits = number_from<std::uint64_t>(trailer.at("payload_bits"));
   volume.precision.whole_numbers = trailer.at("whole_numbers").get<bool>();
+  if (volume.precision.whole_numbers && !is_integer(volume.info.type))
+    throw Error("voxels of type {} are no whole numbers", to_string(volume.info.type));
   layout.index_bytes = number_from<std::uint64_t>(trailer.at("index_bytes"));
   return layout;
 }

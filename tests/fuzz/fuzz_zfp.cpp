@@ -1,6 +1,6 @@
 // Compressed volumes. Input: the file. Of one that is accepted, our decoder and libzfp decode each
-// block to the same bits, and what is written again reads the same. Mutations change what checksums
-// and compression guard (zfp_parts.hpp).
+// block to the same bits, what is written again reads the same, and its stated errors are checked.
+// Mutations change what checksums and compression guard (zfp_parts.hpp).
 
 #include <algorithm>
 #include <array>
@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "core/zfp/stated_errors.hpp"
 #include "core/zfp/zfp_file.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "kernels_cl/portable/zfp_codec.h"
@@ -131,6 +132,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
                "two ways to read a file differ");
   demand_libzfp_agrees(in_file);
   for (const CompressedVolume &level : in_file.coarser_levels) demand_libzfp_agrees(level);
+  fuzz::accepts([&] { check_stated_errors(in_file, {}); });
   // At a fixed rate, only blocks of whole 64-bit words are written.
   if (volume.bits_per_block % 64 == 0) demand_written_again(volume, path);
   return 0;

@@ -14,6 +14,7 @@
 #include "core/base/error.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/zfp/level_bounds.hpp"
+#include "core/zfp/stated_errors.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/render_stats.hpp"
@@ -46,10 +47,20 @@ ordered_json describe_grid(const VolumeInfo &info) {
   return result;
 }
 
+/// Reads all of a `.zfp` file and, if it says anything of its voxels, decodes them.
+CompressedVolume scan_zfp(const std::string &path) {
+  const CompressedVolume head = read_zfp_file_info(path);
+  if (!std::isfinite(head.value_range[0]) && head.coarser_levels.empty())
+    return check_zfp_file(path);
+  CompressedVolume volume = open_zfp_file(path);
+  check_stated_errors(volume, make_progress_bar("checking"));
+  return volume;
+}
+
 ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
   if (overrides.dims || overrides.type)
     throw Error("{}: --dims and --type are for raw files", path);
-  CompressedVolume volume = no_scan ? read_zfp_file_info(path) : check_zfp_file(path);
+  CompressedVolume volume = no_scan ? read_zfp_file_info(path) : scan_zfp(path);
   if (overrides.spacing) {
     set_spacing(volume, *overrides.spacing);
     check_volume_info(volume.info, path);
@@ -61,7 +72,7 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   result["format"] = volume.is_indexed() ? "zfp, fixed accuracy" : "zfp, fixed rate";
   if (volume.is_indexed()) {
     result["zfp_tolerance"] = std::ldexp(1.0, volume.precision.min_exponent);
-    result["exact"] = volume.precision.whole_numbers;
+    result["exact"] = volume.precision.whole_numbers && volume.max_voxel_error == 0;
   } else {
     result["bits_per_block"] = volume.bits_per_block;
   }
@@ -72,6 +83,7 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
     result["coarser"].push_back({level.info.dims.x, level.info.dims.y, level.info.dims.z});
     if (!level.bounds.codes.empty()) result["level_errors"].push_back(largest_bound(level.bounds));
   }
+  if (known_voxel_error(volume)) result["errors"] = "stated";
   return result;
 }
 
@@ -156,8 +168,10 @@ void add_info(CLI::App &app) {
   CLI::App *command = app.add_subcommand("info", "Print everything known of a volume file");
   command->add_option("FILE", options->input, std::string(kVolumeHelp) + ", or .zfp")->required();
   command->add_flag("--json", options->json, "print JSON");
-  command->add_flag("--no-scan", options->no_scan,
-                    "look at the header only: no value range, no checksum of the data");
+  command->add_flag(
+      "--no-scan", options->no_scan,
+      "look at the header only: no value range, no checksum of the data; nor is a .zfp "
+      "file decoded to check what it says of its values and levels of detail");
   add_volume_options(*command, options->volume);
   command->callback([options] { run(*options); });
 }

@@ -125,23 +125,30 @@ nlohmann::ordered_json detail_json(const Detail &detail) {
   return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
 }
 
+/// What the errors of a volume's voxels and levels come from, and so what bounds rest on.
+std::string_view errors_of(const CompressedVolume &volume) {
+  return volume.errors_are_stated ? "stated" : "measured";
+}
+
 /// Prints how far a frame of that size may be off, and writes it to error_map, if that is not
 /// empty.
-nlohmann::ordered_json report_error(double max_surface_error, const DetailChoice &choice,
-                                    const Certificate &certificate, const ImageSize &size,
-                                    const fs::path &error_map) {
+nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,
+                                    const DetailChoice &choice, const Certificate &certificate,
+                                    const ImageSize &size, const fs::path &error_map) {
   const CertificateSummary summary = summarize(certificate, max_surface_error);
   const double certified = summary.num_pixels == 0
                                ? 100.0
                                : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
   fmt::print(
-      "  within {} pixels of the true surface: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
+      "  within {} pixels of the true surface{}: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
       "{:.3g}); {} "
       "uncertain\n"
       "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
       "bounded in "
       "{:.0f} ms\n",
-      max_surface_error, certified, with_commas(summary.num_pixels), summary.median, summary.p99,
+      max_surface_error,
+      volume.errors_are_stated ? ", if the errors are right that the file states" : "", certified,
+      with_commas(summary.num_pixels), summary.median, summary.p99,
       with_commas(summary.num_uncertain), choice.detail.voxel_pixels, choice.detail.voxel_error,
       choice.total_ms, certificate.total_ms);
   if (!choice.reachable) {
@@ -156,6 +163,7 @@ nlohmann::ordered_json report_error(double max_surface_error, const DetailChoice
     tries.back()["certified"] = each.certified;
   }
   return {{"max_surface_error", max_surface_error},
+          {"errors", errors_of(volume)},
           {"reachable", choice.reachable},
           {"chosen", detail_json(choice.detail)},
           {"tries", tries},
@@ -204,7 +212,7 @@ class DeviceFrames : public FrameSource {
   Camera surface_camera(std::span<const float> isovalues) { return renderer_.camera(isovalues); }
   void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
     if (max_surface_error_) {
-      frame["error"] = report_error(*max_surface_error_, choice_,
+      frame["error"] = report_error(*max_surface_error_, volume_, choice_,
                                     certify(renderer_, volume_, request_, renderer_.hits()),
                                     renderer_.options().size, error_map);
     }
@@ -342,6 +350,7 @@ nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVo
       {"rate", volume.rate()},
       {"max_voxel_error", volume.max_voxel_error ? nlohmann::ordered_json(*volume.max_voxel_error)
                                                  : nlohmann::ordered_json()},
+      {"errors", errors_of(volume)},
       {"blocks", volume.block_count()},
       {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
 }
@@ -584,7 +593,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
         together(team, [&] {
           if (team.rank() != 0) return;
           frames.back()["error"] = report_error(
-              *options.max_surface_error, choice, certificate, scene.size,
+              *options.max_surface_error, scene.volume, choice, certificate, scene.size,
               frame_path(options.error_map, scene.cameras.size(), options, isovalue, view));
         });
       }

@@ -330,6 +330,7 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["total_ms"] = statistics.total_ms;
   result["cancelled"] = statistics.cancelled;
   result["complete"] = statistics.complete;
+  result["errors_are_stated"] = statistics.errors_are_stated;
   result["stage_ms"] = statistics.stage_ms;
   return result;
 }
@@ -704,6 +705,8 @@ NB_MODULE(_core, m) {
       .def_prop_ro("compressed_bytes",
                    [](const PyVolume &v) { return v.volume->compressed_bytes(); })
       .def_prop_ro("max_voxel_error", [](const PyVolume &v) { return v.volume->max_voxel_error(); })
+      .def_prop_ro("errors_are_stated",
+                   [](const PyVolume &v) { return v.volume->errors_are_stated(); })
       .def_prop_ro("num_levels", [](const PyVolume &v) { return v.volume->num_levels(); })
       .def(
           "level_dims",

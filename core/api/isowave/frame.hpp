@@ -108,6 +108,8 @@ struct FrameStatistics {
   double total_ms = 0;     ///< wall clock, from camera to finished hits on the device
   bool cancelled = false;  ///< by on_pass
   bool complete = true;    ///< false: cancelled, or the time was over
+  /// Volume::errors_are_stated() of what was drawn: Frame::bounds rest on these errors.
+  bool errors_are_stated = false;
   std::map<std::string, double> stage_ms{};  ///< of a device with profiling
 };
 
@@ -132,7 +134,8 @@ struct Frame {
   std::vector<std::array<float, 3>> positions{};
   std::vector<Hit> hits{};  ///< [rows][columns]
   /// [rows][columns] how far the surface may be from the true one along the ray, at most [pixels];
-  /// infinity: nothing is certain.
+  /// infinity: nothing is certain. They hold if the volume's errors do: see
+  /// FrameStatistics::errors_are_stated.
   std::vector<float> bounds{};
 
   FrameStatistics statistics{};

@@ -74,6 +74,10 @@ class Volume {
   std::uint64_t compressed_bytes() const;
   /// Largest |decoded - source|, where it was measured.
   std::optional<double> max_voxel_error() const;
+  /// The errors of voxels and levels, and value_range(), are those that a `.zfp` file states. The
+  /// source is not there to check them, so bounds of frames hold if the file's writer is right.
+  /// false: they were measured when this volume was compressed.
+  bool errors_are_stated() const;
   std::uint32_t num_levels() const;  ///< of detail, the volume itself among them
 
   /// The grid of a level of detail; 0: that of the volume.

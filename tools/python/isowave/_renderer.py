@@ -105,7 +105,8 @@ class Image:
     position: npt.NDArray[np.float32] | None  #: (rows, columns, 3), world space; nan: no surface
     bounds: npt.NDArray[np.float32] | None
     """How far the surface is from that of the volume before compression, at most [pixels]; inf:
-    nothing is certain."""
+    nothing is certain. They hold if the volume's errors do, which a file may state wrongly:
+    `statistics["errors_are_stated"]`, as `Volume.errors_are_stated`."""
 
     def __init__(
         self, frame: dict[str, Any], camera: Camera, isovalue: float, samples: int

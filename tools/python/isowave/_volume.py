@@ -297,6 +297,15 @@ class Volume(Placed[_core.Volume]):
         return self._core.max_voxel_error
 
     @property
+    def errors_are_stated(self) -> bool:
+        """Whether errors and `value_range` are those that a .zfp file states.
+
+        The source is not there to check them: bounds of images hold if the file's writer is right.
+        False: they were measured when this volume was compressed.
+        """
+        return self._core.errors_are_stated
+
+    @property
     def num_levels(self) -> int:
         """Levels of detail, the volume itself among them."""
         return self._core.num_levels

@@ -3,12 +3,15 @@
 import ast
 import gc
 import gzip
+import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 import threading
 import time
+import zlib
 
 import numpy as np
 import pytest
@@ -293,6 +296,34 @@ def test_on_pass_stops_and_raises(volume):
     with pytest.raises(KeyError, match="mine"):
         renderer.render(6, on_pass=fail)
     assert renderer.render(6).complete
+
+
+def test_bounds_of_files_rest_on_what_they_state(tmp_path):
+    measured = isowave.compress(sphere_voxels((20, 22, 24)), tolerance=0.001)
+    measured.save(tmp_path / "a.zfp")
+    stated = isowave.open(tmp_path / "a.zfp")
+    assert not measured.errors_are_stated and stated.errors_are_stated
+    for volume in (measured, stated):
+        image = volume.render(5, size=SIZE, outputs=("depth", "bounds"))
+        assert image.statistics["errors_are_stated"] == volume.errors_are_stated
+
+
+def test_ranges_that_blocks_leave_give_no_bounds(tmp_path):
+    path = tmp_path / "a.zfp"
+    isowave.compress(sphere_voxels((20, 22, 24)), tolerance=0.001).save(path)
+    data = path.read_bytes()
+    version, text_bytes, crc = struct.unpack("<3I", data[-24:-12])
+    before, text = data[: -24 - text_bytes], data[-24 - text_bytes : -24]
+    trailer = json.loads(text)
+    trailer["value_range"][1] *= 0.75
+    text = json.dumps(trailer).encode()
+    numbers = struct.pack("<3I", version, len(text), crc)
+    check = struct.pack("<I", zlib.crc32(text + numbers))
+    path.write_bytes(before + text + numbers + check + b"ISOWAVE\n")
+    volume = isowave.open(path)
+    volume.render(5, size=SIZE)
+    with pytest.raises(isowave.Error, match="its trailer says that values are"):
+        volume.render(5, size=SIZE, outputs=("depth", "bounds"))
 
 
 def test_errors_are_kept_and_bounds_given():

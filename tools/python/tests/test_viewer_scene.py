@@ -109,6 +109,7 @@ def test_a_wish_is_drawn_small_then_whole_then_lossless() -> None:
     assert volume.frames[-1].outputs == ("depth", "bounds")
     # A pixel of the whole picture is a quarter of one of the first picture.
     assert [h["within_pixel"] for h in eye.of_type("bounds")] == [pytest.approx(2 / 3)]
+    assert not eye.of_type("bounds")[0]["errors_are_stated"]
     frames = len(volume.frames)
     clock.now += 100
     run(scene)

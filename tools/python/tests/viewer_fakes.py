@@ -142,7 +142,11 @@ class FakeRenderer:
             rows = size[1] * (i + 1) // self._volume.passes
             image = picture.copy()
             image[rows:] = _bytes(background)
-            statistics = {"passes": i + 1, "decoded_blocks": 0 if cached else 100 * (i + 1)}
+            statistics = {
+                "passes": i + 1,
+                "decoded_blocks": 0 if cached else 100 * (i + 1),
+                "errors_are_stated": False,
+            }
             percent = 100.0 * (i + 1) / self._volume.passes
             if on_pass and not on_pass(FakeProgress(image, i + 1, percent)):
                 drawn.stopped = True

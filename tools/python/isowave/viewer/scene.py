@@ -440,7 +440,9 @@ class Scene:
                 client.stage = Stage.DONE
                 if image.depth is not None and image.bounds is not None and image.complete:
                     within = share_within(image.depth, image.bounds, pixels)
-                    self._post(client, {"type": "bounds", "wish": wish.id, "within_pixel": within})
+                    stated = bool(image.statistics["errors_are_stated"])
+                    bounds = {"wish": wish.id, "within_pixel": within, "errors_are_stated": stated}
+                    self._post(client, {"type": "bounds", **bounds})
 
     # Renderers.
 

@@ -13,7 +13,8 @@
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, camera,
 //              isovalue, complete, passes, decoded_blocks, percent, ms, detail; and its bytes
 //   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of
-//              the volume before compression; null: there is no surface
+//              the volume before compression; null: there is no surface. errors_are_stated: that
+//              is certain only if the errors are right that the volume's file states
 //   error      message, wish or null: of none
 //   closed     message, retry: whether to connect again
 //
@@ -523,8 +524,10 @@ class View {
     if (head.wish !== this.wish || head.within_pixel === null) return;
     const percent = Math.floor(1000 * head.within_pixel) / 10;
     const [name, value] = [document.createElement("dt"), document.createElement("dd")];
-    [name.textContent, value.textContent] = ["Certain", `${percent} % within 1 px`];
-    value.title = "of the surface: no further from that of the volume before compression";
+    name.textContent = head.errors_are_stated ? "By its file" : "Certain";
+    value.textContent = `${percent} % within 1 px`;
+    value.title = "of the surface: no further from that of the volume before compression"
+        + (head.errors_are_stated ? ", if the errors are right that the file states" : "");
     this.find(".facts").append(name, value);
   }
 
