@@ -451,6 +451,24 @@ def test_a_new_budget_makes_a_new_renderer_for_all() -> None:
         assert states == [("ready", None), ("starting", 1 << 29), ("ready", 1 << 29)]
 
 
+def test_budgets_that_change_too_often_do_not_keep_others_from_their_pictures() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye, other = Eye(scene), Eye(scene)
+    for i in range(100):
+        scene.receive(eye.client, Budget((1 << 29) + i))
+        scene.step()
+    other.wish()
+    run(scene)
+    assert other.pictures == [(1, "first"), (1, "whole")] and not other.of_type("error")
+    assert len(volume.renderers) == 1 + 5
+    assert "changed too often" in eye.of_type("error")[-1]["message"]
+    clock.now += GIVE_BACK_SECONDS
+    scene.receive(eye.client, Budget(1 << 28))
+    run(scene)
+    assert volume.renderers[-1]["memory_budget"] == 1 << 28
+
+
 def test_a_budget_that_is_too_small_leaves_the_old_one() -> None:
     def refuse(options: dict[str, Any]) -> Exception | None:
         too_small = options["memory_budget"] is not None and options["memory_budget"] < 1000

@@ -45,6 +45,7 @@ GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smal
 CLOSE_SECONDS: Final = 0.5  # for threads to end; a pass may take longer
 MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
 MAX_CAMERA_RAYS: Final = 1 << 25  # of them, rays of the camera: each takes memory of the device
+TOO_MANY_BUDGETS: Final = "the memory budget was changed too often: try again in a few seconds"
 
 Post = Callable[[dict[str, Any], bytes | None], None]
 """Sends a message, and the bytes of a picture with it. Must not block, and may be called from any
@@ -168,6 +169,7 @@ class Scene:
         self._wanted = RendererOptions(self._base, memory_budget)
         self._too_large_since: float | None = None  # the renderer, for what clients want
         self._max_rays = max_rays
+        self._budgets = TokenBucket(1 / GIVE_BACK_SECONDS, 5, clock)  # each makes a renderer
         self._fallback: RendererOptions | None = None  # worked before
         self._host: RendererLike | None = None  # draws until there is a renderer
         self._ray_limit = self._first_ray_limit = max(MAX_CAMERA_RAYS, self._base.rays)
@@ -213,7 +215,10 @@ class Scene:
             elif isinstance(message, Wish):
                 self._take_wish(client, message)
             elif isinstance(message, Budget):
-                self._want(replace(self._wanted, memory_budget=message.bytes))
+                if self._budgets.take():
+                    self._want(replace(self._wanted, memory_budget=message.bytes))
+                else:
+                    self._post_error(client, RuntimeError(TOO_MANY_BUDGETS), None)
             self._changed.notify_all()
 
     @property

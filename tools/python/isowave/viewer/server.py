@@ -584,5 +584,8 @@ def wait_and_close(server: Server) -> str | None:
     except KeyboardInterrupt:
         pass
     failure = server.scene.failure
-    server.close()
+    try:
+        server.close()
+    except KeyboardInterrupt:  # once more
+        pass
     return failure
