@@ -27,20 +27,8 @@ namespace {
   throw Error("{}: cannot write: {}", target.string(), std::strerror(error_number));
 }
 
-}  // namespace
-
-fs::path follow_links(const fs::path &path) {
-  constexpr int kMostLinks = 40;  // as many as Linux follows
-  fs::path target = path;
-  for (int i = 0; i < kMostLinks; ++i) {
-    std::error_code failure;
-    const fs::path next = fs::read_symlink(target, failure);
-    if (failure) return target;
-    target = next.is_absolute() ? next : target.parent_path() / next;
-  }
-  fail(path, ELOOP);
-}
-
+/// Gives a new file the mode of the file that it will replace, and its owner, group and access list
+/// as far as this user may. Does nothing if there is no such file.
 void keep_permissions(const fs::path &replaced, int file) {
   struct stat old {
   }, made{};
@@ -58,6 +46,20 @@ void keep_permissions(const fs::path &replaced, int file) {
   const ssize_t length = ::getxattr(replaced.c_str(), kAccessList, list.data(), list.size());
   if (length > 0) ::fsetxattr(file, kAccessList, list.data(), static_cast<std::size_t>(length), 0);
   ::fchmod(file, mode);
+}
+
+}  // namespace
+
+fs::path follow_links(const fs::path &path) {
+  constexpr int kMostLinks = 40;  // as many as Linux follows
+  fs::path target = path;
+  for (int i = 0; i < kMostLinks; ++i) {
+    std::error_code failure;
+    const fs::path next = fs::read_symlink(target, failure);
+    if (failure) return target;
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  fail(path, ELOOP);
 }
 
 AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {

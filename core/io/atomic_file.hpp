@@ -19,10 +19,6 @@ namespace isowave::core {
 /// Throws  Error: links go in circles
 std::filesystem::path follow_links(const std::filesystem::path &path);
 
-/// Gives a new file the mode of the file that it will replace, and its owner, group and access list
-/// as far as this user may. Does nothing if there is no such file.
-void keep_permissions(const std::filesystem::path &replaced, int file);
-
 /// Writes to a temporary file beside the target; commit() renames it over the target. Destroyed
 /// without commit(), it removes what it wrote. A target that exists stays as it was until commit();
 /// its mode is kept, and a symbolic link stays one. Where the system has files without a name

@@ -56,11 +56,11 @@ DRAWN = """() => {
 }"""
 
 
-def fake_scene(volume: FakeVolume, **options: Any) -> Scene:
+def fake_scene(volume: FakeVolume, title: str = "ball.nrrd", **options: Any) -> Scene:
     return Scene(
         volume,
         isovalue=80,
-        title="ball.nrrd",
+        title=title,
         make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy),
         **options,
     )
@@ -201,6 +201,32 @@ def state(page: Any) -> dict[str, str]:
 
 def eye(page: Any) -> np.ndarray[Any, Any]:
     return np.array([float(x) for x in state(page)["eye"].split(",")])
+
+
+def test_a_files_name_is_text_in_the_page(open_page: Callable[..., Any]) -> None:
+    name = "<img src=x onerror=alert(1)><b>.nrrd"
+    with Server(fake_scene(FakeVolume(), title=name)) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        assert page.locator("h1").inner_text() == name
+        assert page.locator("h1 *").count() == 0 and not page.problems
+
+
+def test_a_picture_with_fewer_rays_than_asked_for_says_so(open_page: Callable[..., Any]) -> None:
+    with Server(fake_scene(FakeVolume(), max_rays=1_000_000)) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        note = page.locator(".note")
+        assert not note.is_visible()
+        page.locator("[name=ambient]").select_option("64")
+        rests(page)
+        assert note.inner_text().startswith("The server draws at most 1,000,000 rays")
+        keep(page, "reduced")
+        page.locator("[name=ambient]").select_option("0")
+        rests(page)
+        assert not note.is_visible()
 
 
 def test_the_page_loads_without_errors_or_foreign_requests(

@@ -11,8 +11,10 @@ import pytest
 from PIL import Image
 from viewer_fakes import Drawn, FakeCamera, FakeVolume
 
-from isowave.viewer.pictures import count_rays, dividing_value, fit_size, share_within
+from isowave.viewer.pictures import Extent, Stopped, count_rays, dividing_value, encode_png
+from isowave.viewer.pictures import fit_size, share_within
 from isowave.viewer.protocol import Ack, Budget, ProtocolError, TokenBucket, View, Wish
+from isowave.viewer.scene import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS, TURN_SECONDS
 from isowave.viewer.scene import Client, Scene, Session, Stage
 
 
@@ -51,6 +53,10 @@ class Eye:
         wish = Wish(id=self.wishes, isovalue=isovalue, size=size, **fields)  # type: ignore
         self.scene.receive(self.client, wish)
         return self.wishes
+
+    def stage_done(self) -> bool:
+        """Whether nothing is to be drawn for it before it has rested."""
+        return self.client.stage not in (Stage.FIRST, Stage.WHOLE)
 
     def ack(self) -> None:
         """Acknowledges all that came."""
@@ -309,6 +315,50 @@ def test_a_long_whole_picture_gives_way_once_to_a_first_picture() -> None:
     ]
 
 
+def test_small_pictures_of_others_come_in_bounded_time_and_the_large_one_in_the_end() -> None:
+    clock, volume = Clock(), FakeVolume(passes=200)
+    scene = make_scene(volume, clock)
+    slow, quick = Eye(scene), Eye(scene)
+    asked, waits = 0.0, list[float]()
+
+    def before_pass(drawn: Drawn) -> None:
+        nonlocal asked
+        clock.now += 0.1 if drawn.size == (96, 72) else 0.001
+        slow.ack()
+        quick.ack()
+        # The other client wishes again and again, until it has had 12 whole pictures.
+        if drawn.size == (96, 72) and quick.stage_done() and quick.wishes < 12:
+            asked = clock.now
+            quick.wish(2.0, size=(64, 48))
+        if drawn.isovalue == 2.0 and drawn.size == (64, 48) and drawn.passes == 199:
+            waits.append(clock.now - asked)
+
+    volume.before_pass = before_pass
+    slow.wish(1.0, size=(96, 72))
+    run(scene)
+    assert len(waits) == 12 and max(waits) <= 2 * TURN_SECONDS + 1
+    assert sorted(waits)[0] < 1
+    drawn = [f.passes for f in volume.frames if f.size == (96, 72)]
+    assert drawn == sorted(drawn) and drawn[-1] == 200, "each time longer, at last the whole"
+    assert (1, "whole") in slow.pictures
+
+
+def test_pictures_of_the_same_size_do_not_interrupt_each_other() -> None:
+    clock, volume = Clock(), FakeVolume(passes=50)
+    scene = make_scene(volume, clock)
+    eyes = [Eye(scene) for _ in range(3)]
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.1 if drawn.size == (64, 48) else 0.0
+
+    volume.before_pass = before_pass
+    for eye in eyes:
+        eye.wish()
+    run(scene)
+    whole = [f for f in volume.frames if f.size == (64, 48)]
+    assert [f.stopped for f in whole] == [False] * 3
+
+
 def test_a_new_wish_cancels_a_frame_with_a_time_budget() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)
@@ -400,6 +450,24 @@ def test_a_new_budget_makes_a_new_renderer_for_all() -> None:
     for eye in eyes:
         states = [(h["state"], h["memory_budget"]) for h in eye.of_type("status")]
         assert states == [("ready", None), ("starting", 1 << 29), ("ready", 1 << 29)]
+
+
+def test_budgets_that_change_too_often_do_not_keep_others_from_their_pictures() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye, other = Eye(scene), Eye(scene)
+    for i in range(100):
+        scene.receive(eye.client, Budget((1 << 29) + i))
+        scene.step()
+    other.wish()
+    run(scene)
+    assert other.pictures == [(1, "first"), (1, "whole")] and not other.of_type("error")
+    assert len(volume.renderers) == 1 + 5
+    assert "changed too often" in eye.of_type("error")[-1]["message"]
+    clock.now += GIVE_BACK_SECONDS
+    scene.receive(eye.client, Budget(1 << 28))
+    run(scene)
+    assert volume.renderers[-1]["memory_budget"] == 1 << 28
 
 
 def test_a_budget_that_is_too_small_leaves_the_old_one() -> None:
@@ -513,6 +581,10 @@ def test_a_renderer_that_cannot_grow_draws_smaller_pictures() -> None:
     run(scene)
     assert len(volume.renderers) == 3  # the first, the one too large, the first again
     assert (volume.frames[-1].size, volume.frames[-1].samples) == ((32, 24), 2)
+    assert eye.of_type("picture")[-1]["reduced"] == (
+        "The device has no memory for more: this picture has 32 x 24 pixels, 4 rays a pixel, "
+        "0 ambient rays."
+    )
 
 
 def test_whole_pictures_have_ambient_rays_and_a_renderer_for_them() -> None:
@@ -547,6 +619,190 @@ def test_without_memory_for_ambient_rays_pictures_have_none() -> None:
     eye.wish(82.0, size=(64, 48), ambient=16)
     run(scene)
     assert volume.renderers[-2]["rays"], "tried again with another budget"
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        dict(size=(8192, 8192)),
+        dict(size=(8192, 8192), ambient=255),
+        dict(size=(8192, 8192), samples=8, ambient=255),
+        dict(size=(8192, 1), samples=8, ambient=255),
+        dict(size=(40, 40), ambient=255),
+    ],
+)
+def test_no_picture_has_more_rays_than_the_server_allows(wish: dict[str, Any]) -> None:
+    clock, volume = Clock(), FakeVolume()
+    limit = 20_000
+    scene = make_scene(volume, clock, size=(64, 48), max_rays=limit)
+    eye = Eye(scene)
+    eye.wish(**wish)
+    run(scene)
+    eye.ack()
+    clock.now += 0.2
+    run(scene)
+    clock.now += 1
+    run(scene)
+    assert eye.of_type("picture")[-1]["stage"] == "lossless" and not eye.of_type("error")
+    for frame in volume.frames:
+        rays = frame.size[0] * frame.size[1] * frame.samples**2
+        assert 0 < rays * (1 + frame.ambient) <= limit
+    for made in volume.renderers:
+        assert made["size"][0] * made["size"][1] * made["samples"] ** 2 <= limit
+    for head in eye.of_type("picture")[-2:]:
+        drawn = next(f for f in reversed(volume.frames) if f.outputs == ("rgb",))
+        assert (head["size"], head["ambient"]) == (list(drawn.size), drawn.ambient)
+        assert head["reduced"].startswith("The server draws at most 20,000 rays, 20,000 from")
+        assert f"{drawn.size[0]} x {drawn.size[1]} pixels" in head["reduced"]
+        assert f"{drawn.ambient} ambient rays" in head["reduced"]
+
+
+def test_pictures_within_the_limits_are_drawn_as_they_are() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48), max_rays=64 * 48 * 4 * 17)
+    eye = Eye(scene)
+    eye.wish(samples=2, ambient=16)
+    run(scene)
+    assert (volume.frames[-1].samples, volume.frames[-1].ambient) == (2, 16)
+    assert all(head["reduced"] is None for head in eye.of_type("picture"))
+
+
+def test_camera_rays_have_a_limit_of_their_own() -> None:
+    """Each takes memory of the device. The pictures are not drawn: they would take too long."""
+    scene = make_scene(FakeVolume(), Clock())
+    eye = Eye(scene)
+    eye.wish(size=(8192, 8192), ambient=255)
+    assert eye.client.wish is not None
+    plan = scene._plan(eye.client.wish)
+    assert 0.99 * MAX_CAMERA_RAYS < plan.rays <= MAX_CAMERA_RAYS and plan.ambient == 3
+    owner = make_scene(FakeVolume(), Clock(), size=(8000, 8000))
+    assert owner._plan(eye.client.wish).rays == 64_000_000, "the server's own size counts"
+
+
+@pytest.mark.parametrize("option", ["max_rays", "max_clients"])
+def test_limits_below_1_are_refused(option: str) -> None:
+    with pytest.raises(ValueError, match=f"{option} 0: give 1 or more"):
+        Scene(FakeVolume(), start=False, **{option: 0})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("goes", ["leaves", "wants less"])
+@pytest.mark.parametrize("wish", [dict(size=(128, 96)), dict(samples=2), dict(ambient=8)])
+def test_memory_goes_back_when_it_is_not_needed_any_more(goes: str, wish: dict[str, Any]) -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye, other = Eye(scene), Eye(scene)
+    eye.wish(**wish)
+    other.wish()
+    run(scene)
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 2, "a client that rests still needs it"
+    if goes == "leaves":
+        scene.leave(eye.client)
+    else:
+        eye.wish()
+    run(scene)
+    clock.now += GIVE_BACK_SECONDS - 1
+    run(scene)
+    assert len(volume.renderers) == 2, "it may be needed again"
+    clock.now += 2
+    run(scene)
+    assert len(volume.renderers) == 3 and volume.renderers[2] == volume.renderers[0]
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 3
+    other.ack()
+    other.wish(90.0)
+    run(scene)
+    assert other.pictures[-1] == (2, "whole")
+
+
+def test_a_large_renderer_stays_for_those_who_still_need_it() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eyes = [Eye(scene), Eye(scene)]
+    for eye in eyes:
+        eye.wish(samples=2)
+        run(scene)
+    scene.leave(eyes[0].client)
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 2
+    eyes[1].wish()
+    clock.now += 1
+    run(scene)
+    eyes[1].wish(samples=2)
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 2, "it was needed again in time"
+
+
+def test_an_encoding_stops_when_its_picture_is_not_wanted_any_more() -> None:
+    rgb = np.random.default_rng(3).integers(0, 256, (400, 400, 3), np.uint8)
+    assert encode_png(rgb, lambda: True).startswith(b"\x89PNG")
+    asked = iter([True, True, False])
+    with pytest.raises(Stopped):
+        encode_png(rgb, lambda: next(asked))
+
+
+def test_an_extent_shrinks_by_its_pixels_first() -> None:
+    extent = Extent((100, 50), 2, 9)
+    assert (extent.rays, extent.all_rays) == (20_000, 200_000)
+    assert extent.within(20_000, 200_000) == extent
+    assert extent.within(5_000, 200_000) == Extent((50, 25), 2, 9)
+    assert extent.within(20_000, 100_000) == Extent((100, 50), 2, 4)
+    assert extent.within(20_000, 5_000) == Extent((50, 25), 2, 0)
+
+
+@pytest.mark.parametrize("what", ["before_pass", "refuse"])
+def test_closing_does_not_wait_for_a_long_pass_or_compilation(what: str) -> None:
+    began, may_end = threading.Event(), threading.Event()
+
+    def hold(_: Any) -> None:
+        began.set()
+        assert may_end.wait(60)
+
+    volume = FakeVolume(**{what: hold})  # type: ignore[arg-type]
+    scene = Scene(volume, isovalue=80, make_camera=fake_camera, make_host=lambda v: None)
+    Eye(scene).wish()
+    assert began.wait(60)
+    scene.close()  # returns although the pass or the compilation does not end before
+    assert scene.is_busy
+    may_end.set()
+    for thread in scene._threads:
+        thread.join(60)
+    assert not scene.is_busy and scene._renderer is None
+
+
+def test_others_get_pictures_while_a_larger_renderer_is_made() -> None:
+    may_end, changed, shown = threading.Event(), threading.Condition(), list[str]()
+
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        with changed:
+            changed.notify_all()
+        assert not options["rays"] or may_end.wait(60)
+        return None
+
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        with changed:
+            shown.append(head.get("stage", head["type"]))
+            changed.notify_all()
+
+    volume = FakeVolume(refuse=refuse)
+    host = FakeVolume().renderer(device="host", size=(64, 48), samples=1, rays=True)
+    scene = Scene(volume, isovalue=80, make_camera=fake_camera, make_host=lambda v: host)
+    fields: Any = dict(id=1, isovalue=80.0, size=(32, 32), view=None, color=(1, 1, 1), samples=1)
+    fields |= dict(background=(0, 0, 0), max_error=None, time_budget=None, ambient=0)
+    large, other = scene.join(lambda head, data: None), scene.join(post)
+    assert large is not None and other is not None
+    scene.receive(large, Wish(**{**fields, "ambient": 8}))
+    with changed:
+        assert changed.wait_for(lambda: len(volume.renderers) == 2, 60)
+    scene.receive(other, Wish(**fields))
+    with changed:
+        assert changed.wait_for(lambda: "whole" in shown, 60)
+    may_end.set()
+    scene.close()
 
 
 def test_the_first_isovalue_divides_the_histogram() -> None:
@@ -671,6 +927,8 @@ def test_100_reconnects_leave_nothing() -> None:
         session.close()
     assert scene.num_clients == 0
     scene.close()
+    for thread in scene._threads:
+        thread.join(60)
     assert threading.active_count() == threads
     assert len(volume.renderers) == 1
 

@@ -6,6 +6,7 @@ import gc
 import json
 import os
 import random
+import re
 import signal
 import socket as sockets
 import struct
@@ -19,6 +20,7 @@ from typing import Any
 
 import httpx
 import pytest
+from conftest import TOP
 from viewer_fakes import FakeCamera, FakeVolume
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -103,9 +105,6 @@ def test_the_page_and_its_script(server: Server) -> None:
     script = httpx.get(server.url + "view.js")
     assert script.status_code == 200 and "text/javascript" in script.headers["content-type"]
     for answer in (page, script):
-        assert answer.headers["x-content-type-options"] == "nosniff"
-        assert answer.headers["referrer-policy"] == "no-referrer"
-        assert answer.headers["cache-control"] == "no-store"
         assert "server" not in answer.headers
     policy = page.headers["content-security-policy"]
     assert policy.startswith("default-src 'none'; script-src 'self';")
@@ -131,7 +130,6 @@ def test_without_the_token_nothing_is_found(server: Server, path: str) -> None:
     url = f"http://127.0.0.1:{server.port}/" + path.format(server.token)
     answer = httpx.get(url, follow_redirects=False)
     assert answer.status_code == 403
-    assert answer.headers["x-content-type-options"] == "nosniff"
     assert server.token not in answer.text
 
 
@@ -159,15 +157,242 @@ def test_the_pages_own_origin_is_let_in(server: Server) -> None:
         assert receive(socket)[0]["type"] == "status"
 
 
+def test_a_page_of_a_name_that_leads_here_lacks_the_token(server: Server) -> None:
+    host = f"evil.example:{server.port}"
+    headers = {"Host": host, "Origin": f"http://{host}"}
+    for path in ("", "view.js", "ws"):
+        answer = httpx.get(f"http://127.0.0.1:{server.port}/{path}", headers=headers)
+        assert answer.status_code == 403 and server.token not in answer.text
+
+
 def test_odd_hosts_are_refused(server: Server) -> None:
     answer = httpx.get(server.url, headers={"Host": "a; script-src *"})
     assert answer.status_code in (400, 403)
 
 
 def test_other_methods_do_nothing(server: Server) -> None:
-    for method in ("POST", "PUT", "DELETE", "OPTIONS"):
-        assert httpx.request(method, server.url).status_code in (403, 405)
+    for method in ("POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE"):
+        answer = httpx.request(method, server.url)
+        assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD")
+    whole, head = httpx.get(server.url), httpx.head(server.url)
+    assert (head.status_code, head.content) == (200, b"")
+    assert head.headers["content-length"] == str(len(whole.content))
     assert works(server)
+
+
+# What is sent and the answer's status. {t}: the token; {h}: the host.
+ANSWERS = {
+    "page": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\n\r\n", 200),
+    "with a query": ("GET /{t}/?x HTTP/1.0\r\nHost: {h}\r\n\r\n", 200),
+    "code": ("GET /{c} HTTP/1.1\r\nHost: {h}\r\n\r\n", 303),
+    "rubbish": ("rubbish\r\n\r\n", 400),
+    "encrypted": ("\x16\x03\x01\x02\x00", 400),
+    "version": ("GET /{t}/ HTTP/2\r\nHost: {h}\r\n\r\n", 400),
+    "another address": ("GET http://{h}/{t}/ HTTP/1.1\r\nHost: {h}\r\n\r\n", 400),
+    "bad field": ("GET /{t}/ HTTP/1.1\r\nHost : {h}\r\n\r\n", 400),
+    "folded field": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nX: a\r\n b\r\n\r\n", 400),
+    "control character": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nX: \x00\r\n\r\n", 400),
+    "no token": ("GET / HTTP/1.1\r\nHost: {h}\r\n\r\n", 403),
+    "nothing there": ("GET /{t}/x HTTP/1.1\r\nHost: {h}\r\n\r\n", 403),
+    "no host": ("GET /{t}/ HTTP/1.1\r\n\r\n", 403),
+    "two hosts": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nHost: {h}\r\n\r\n", 403),
+    "origin": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nOrigin: http://x\r\n\r\n", 403),
+    "body of a stranger": ("POST / HTTP/1.1\r\nHost: {h}\r\nContent-Length: 9999\r\n\r\n", 403),
+    "method": ("POST /{t}/ HTTP/1.1\r\nHost: {h}\r\nContent-Length: 9999\r\n\r\n", 405),
+    "half": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nX-", 408),
+    "body": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nContent-Length: 9999\r\n\r\n", 413),
+    "chunks": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nTransfer-Encoding: chunked\r\n\r\n", 413),
+    "no upgrade": ("GET /{t}/ws HTTP/1.1\r\nHost: {h}\r\n\r\n", 426),
+    "no key": (
+        "GET /{t}/ws HTTP/1.1\r\nHost: {h}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\r\n",
+        400,
+    ),
+    "many fields": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\n" + "X: y\r\n" * 200 + "\r\n", 431),
+    "long field": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nX: " + "y" * 20000 + "\r\n\r\n", 431),
+    "long path": ("GET /" + "y" * 20000, 431),
+    "no place": ("GET /{t}/ HTTP/1.1\r\nHost: {h}\r\n\r\n", 503),
+}
+
+
+@pytest.mark.parametrize("case", ANSWERS)
+def test_all_answers_have_the_same_headers_and_close_the_connection(case: str) -> None:
+    text, status = ANSWERS[case]
+    limits = Limits(head_seconds=0.2 if status == 408 else 60, connections=1 - (status == 503))
+    with serving(limits=limits) as server:
+        code = server.url_for_once().rpartition("/")[2]
+        sent = text.format(t=server.token, c=code, h=f"127.0.0.1:{server.port}")
+        with dialling(server) as raw:
+            raw.sendall(sent.encode("latin-1"))
+            answer = read_all(raw).decode()
+    head, _, body = answer.partition("\r\n\r\n")
+    first, *lines = head.split("\r\n")
+    fields = dict(line.lower().split(": ", 1) for line in lines)
+    assert first.startswith(f"HTTP/1.1 {status} ")
+    assert fields["x-content-type-options"] == "nosniff"
+    assert fields["referrer-policy"] == "no-referrer"
+    assert fields["x-frame-options"] == "deny"
+    assert fields["cross-origin-opener-policy"] == "same-origin"
+    assert fields["cross-origin-resource-policy"] == "same-origin"
+    assert fields["cache-control"] == "no-store"
+    assert fields["content-security-policy"].startswith("default-src 'none';")
+    assert "close" in fields["connection"]
+    assert fields["content-length"] == str(len(body.encode()))
+    assert status in (200, 303) or body.startswith("isowave: ") and body.count("\n") == 1
+
+
+def test_a_websocket_is_opened_with_the_same_headers(server: Server) -> None:
+    with talking(server) as socket:
+        assert socket.response is not None
+        assert socket.response.headers["x-content-type-options"] == "nosniff"
+        assert socket.response.headers["cache-control"] == "no-store"
+
+
+@contextmanager
+def dialling(server: Server) -> Iterator[sockets.socket]:
+    with sockets.create_connection(("127.0.0.1", server.port), timeout=TIMEOUT) as raw:
+        yield raw
+
+
+def read_all(raw: sockets.socket) -> bytes:
+    """Until the server has closed the connection; b"" also when it was reset."""
+    data = b""
+    try:
+        while part := raw.recv(65536):
+            data += part
+    except ConnectionResetError:
+        pass
+    return data
+
+
+QUICK = Limits(head_seconds=0.3, answer_seconds=0.3, hello_seconds=0.3, idle_seconds=0.3)
+HANDSHAKE = (
+    "GET /{t}/ws HTTP/1.1\r\nHost: {h}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+)
+SLOW = {
+    "sends nothing": "",
+    "half a request line": "GET /",
+    "half a head": "GET /nope/ HTTP/1.1\r\nHost: x\r\nX-",
+    "half a head with the token": "GET /{t}/ HTTP/1.1\r\nHost: {h}\r\nX-",
+    "half a handshake": HANDSHAKE[:-2],
+    "keeps an answered connection": "GET / HTTP/1.1\r\nHost: x\r\n\r\n",
+    "keeps the page's connection": "GET /{t}/ HTTP/1.1\r\nHost: {h}\r\n\r\n",
+    "half a body": "POST /{t}/ HTTP/1.1\r\nHost: {h}\r\nContent-Length: 9999\r\n\r\nabc",
+    "no hello": HANDSHAKE,
+    "half a frame": HANDSHAKE + "\x81",
+}
+
+
+@pytest.mark.parametrize("case", SLOW)
+def test_slow_connections_end(case: str) -> None:
+    with serving(limits=QUICK) as server, dialling(server) as raw:
+        sent = SLOW[case].format(t=server.token, h=f"127.0.0.1:{server.port}")
+        raw.sendall(sent.encode("latin-1"))
+        read_all(raw)
+        assert eventually(lambda: not server._tasks and not server._known)
+        assert not server._strangers
+
+
+def test_a_head_that_comes_byte_by_byte_has_one_time_limit() -> None:
+    with serving(limits=QUICK) as server, dialling(server) as raw:
+        sent = 0
+        with pytest.raises(OSError):
+            for _ in range(10 * TIMEOUT):
+                raw.sendall(b"G")
+                sent += 1
+                threading.Event().wait(0.1)
+        assert sent < 10 * TIMEOUT
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET /nope/ HTTP/1.1\r\nHost: x\r\nX-"])
+def test_connections_without_the_token_never_keep_out_those_with_it(sent: bytes) -> None:
+    """However many there are, and even if none of them ends by itself."""
+    with serving(limits=Limits(strangers=8, connections=8, head_seconds=TIMEOUT)) as server:
+        held = [sockets.create_connection(("127.0.0.1", server.port)) for _ in range(100)]
+        for raw in held:
+            try:
+                raw.sendall(sent)
+            except OSError:  # it had to make room
+                pass
+        assert httpx.get(server.url).status_code == 200
+        assert works(server)
+        assert len(server._strangers) <= 8
+        for raw in held:
+            raw.close()
+
+
+def test_thousands_of_connections_in_turn_leave_nothing(server: Server) -> None:
+    files = len(os.listdir("/proc/self/fd"))
+    for i in range(2000):
+        with dialling(server) as raw:
+            raw.sendall(b"GET / HT"[: i % 9])
+    assert works(server)
+    assert eventually(lambda: len(os.listdir("/proc/self/fd")) <= files)
+
+
+def test_too_many_connections_with_the_token_are_refused_and_places_come_back() -> None:
+    with serving(limits=Limits(connections=3)) as server:
+        with talking(server), talking(server), talking(server):
+            refused = httpx.get(server.url)
+            assert (refused.status_code, refused.headers["retry-after"]) == (503, "1")
+            assert refused.text == (
+                "isowave: too many connections are open: close one, then try again\n"
+            )
+            with pytest.raises(InvalidStatus) as late:
+                connect(websocket_url(server))
+            assert late.value.response.status_code == 503
+        assert eventually(lambda: not server._known)
+        assert works(server)
+
+
+def test_a_client_that_reads_nothing_at_all_is_gone_in_the_end() -> None:
+    """What it is sent is more than sockets hold, but less than the queue does."""
+    with serving(limits=QUICK) as server, dialling(server) as raw:
+        sent = HANDSHAKE.format(t=server.token, h=f"127.0.0.1:{server.port}")
+        raw.sendall(sent.encode() + masked(HELLO))
+        assert eventually(lambda: server.scene.num_clients == 1)
+        for _ in range(30):
+            server.scene._clients[0].post({"type": "picture"}, bytes(1 << 20))
+        assert eventually(lambda: server.scene.num_clients == 0 and not server._tasks)
+        assert works(server)
+
+
+def masked(text: str) -> bytes:
+    """A frame of a client: text, with a mask of zeros."""
+    data = text.encode()
+    size = struct.pack("!B", 0x80 | len(data)) if len(data) < 126 else b"\xfe"
+    long = struct.pack("!H", len(data)) if len(data) >= 126 else b""
+    return b"\x81" + size + long + bytes(4) + data
+
+
+def test_a_client_that_answers_no_pings_is_gone() -> None:
+    with serving(limits=QUICK) as server, dialling(server) as raw:
+        sent = HANDSHAKE.format(t=server.token, h=f"127.0.0.1:{server.port}")
+        raw.sendall(sent.encode() + masked(HELLO))
+        data = read_all(raw)
+        assert b"the client does not answer" in data
+        assert server.scene.num_clients == 0
+
+
+def test_a_client_that_answers_pings_stays() -> None:
+    with serving(limits=Limits(idle_seconds=0.1)) as server, talking(server) as socket:
+        receive_until(socket, state="ready")
+        with pytest.raises(TimeoutError):
+            while True:
+                socket.recv(timeout=1)
+        socket.send(wish_text(1))
+        assert receive_until(socket, stage="whole")["wish"] == 1
+
+
+def test_a_message_may_come_in_fragments(server: Server) -> None:
+    with talking(server) as socket:
+        socket.send([wish_text(1)[:40], wish_text(1)[40:]])
+        assert receive_until(socket, stage="whole")["wish"] == 1
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.send(["x" * 5000, "x" * 5000])
+            while True:
+                socket.recv(timeout=TIMEOUT)
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
 
 
 BAD = [
@@ -387,6 +612,43 @@ def test_the_browser_gets_a_url_that_works_once(monkeypatch: pytest.MonkeyPatch)
     assert len(opened) == 1  # without a display, no browser of the terminal
 
 
+def test_a_port_that_is_none_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    volume = FakeVolume()
+    for port in (80000, 65536, -1):
+        with pytest.raises(ValueError, match=f"port {port}: give one from 1 to 65535"):
+            serve(volume, port=port, open_browser=False)
+    assert not volume.renderers, "none is begun"
+
+
+@pytest.mark.parametrize(
+    "arguments, error",
+    [
+        (["--port", "80000"], "port 80000: give one from 1 to 65535, or 0 for a free one"),
+        (["--port", "x"], "argument --port: invalid int value: 'x'"),
+        (["--max-clients", "0"], "max_clients 0: give 1 or more"),
+        (["--max-rays", "-5"], "max_rays -5: give 1 or more"),
+        (["-i", "nan"], "isovalue nan: give a number that is finite in float32"),
+        (["--memory-budget", "much"], "'much' is no number of bytes, such as 600MB or 1GiB"),
+        (["--nonsense"], "unrecognized arguments: --nonsense"),
+    ],
+)
+def test_bad_arguments_get_one_line_and_status_1(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    error: str,
+) -> None:
+    monkeypatch.setattr(isowave, "open", lambda path: FakeVolume())
+    try:
+        status: object = main(["ball.nrrd", "--no-browser", *arguments])
+    except SystemExit as ended:
+        status = ended.code
+    output = capsys.readouterr()
+    assert (status, output.out) == (1, "")
+    assert output.err.startswith("isowave view: ") and output.err.endswith(error + "\n")
+    assert output.err.count("\n") == 1
+
+
 def failing(options: dict[str, Any]) -> Exception:
     return RuntimeError("no such device: nonsense")
 
@@ -411,12 +673,26 @@ def test_a_view_that_does_not_block_is_a_server() -> None:
 
 
 def test_the_command_ends_with_ctrl_c(tmp_path: Path) -> None:
+    assert run_until_ctrl_c(tmp_path, "FakeVolume()") == (0, "")
+
+
+@pytest.mark.parametrize("what", ["before_pass", "refuse"])
+def test_ctrl_c_ends_the_command_in_a_pass_or_a_compilation_of_any_length(
+    tmp_path: Path, what: str
+) -> None:
+    """They take longer than the test waits for the end."""
+    volume = f"FakeVolume({what}=lambda _: time.sleep({10 * TIMEOUT}))"
+    assert run_until_ctrl_c(tmp_path, volume) == (0, "")
+
+
+def run_until_ctrl_c(tmp_path: Path, volume: str) -> tuple[int, str]:
+    """Status and errors of `isowave view`, ended when a client has wished for a picture."""
     script = tmp_path / "run.py"
     script.write_text(
-        "import isowave, sys, signal\n"
+        "import isowave, sys, signal, time\n"
         "from viewer_fakes import FakeVolume\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "isowave.open = lambda path: FakeVolume()\n"
+        f"isowave.open = lambda path: {volume}\n"
         "from isowave.viewer import main\n"
         "sys.exit(main(['ball.nrrd', '--no-browser']))\n"
     )
@@ -432,9 +708,13 @@ def test_the_command_ends_with_ctrl_c(tmp_path: Path) -> None:
         assert process.stdout is not None
         url = process.stdout.readline().strip()
         assert httpx.get(url).status_code == 200
-        process.send_signal(signal.SIGINT)
-        _, error = process.communicate(timeout=TIMEOUT)
-    assert (process.returncode, error) == (0, "")
+        with connect(url.replace("http", "ws", 1) + "ws", compression=None) as socket:
+            socket.send(HELLO)
+            receive_until(socket, type="histogram")
+            socket.send(wish_text(1, 0.0))
+            process.send_signal(signal.SIGINT)
+            _, error = process.communicate(timeout=TIMEOUT)
+    return process.returncode, error
 
 
 def test_the_command_says_in_one_line_what_is_wrong(
@@ -447,3 +727,12 @@ def test_the_command_says_in_one_line_what_is_wrong(
     assert main(["no_such_file.nrrd", "--no-browser"]) == 1
     error = capsys.readouterr().err
     assert error.startswith("isowave view: ") and error.count("\n") == 1
+
+
+def test_the_threat_model_names_tests_that_exist() -> None:
+    readme = (TOP / "tools/python/isowave/viewer/README.md").read_text()
+    named = set(re.findall(r"`(test_[a-z0-9_]+)`", readme))
+    here = Path(__file__).parent
+    texts = [path.read_text() for path in here.glob("test_viewer_*.py")]
+    existing = {name for text in texts for name in re.findall(r"^def (test_\w+)", text, re.M)}
+    assert len(named) > 20 and not named - existing

@@ -30,8 +30,12 @@ def view(
               device, memory_budget [bytes], size (width, height) [pixels], samples: as for Renderer
               title        above the picture
               max_clients  that look at the same time
+              max_rays     of a client's picture: pixels x samples^2 x (1 + ambient rays); larger
+                           ones are drawn smaller, and say so; 150 million by default
               height       of the widget [CSS pixels]
               host, port, open_browser: of the server; port 0: a free one
+
+    Ctrl-C returns within a second. A long pass then ends in a thread of its own.
 
     Raises ImportError with the command that installs what is missing; RuntimeError where it blocks
     and the volume cannot be drawn.

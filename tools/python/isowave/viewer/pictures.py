@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,36 @@ JPEG_QUALITY: Final = 70
 def count_rays(size: tuple[int, int], samples: int) -> int:
     """Rays of a picture: samples x samples a pixel."""
     return size[0] * size[1] * samples * samples
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is drawn for a picture.
+
+    size     width, height [pixels]
+    samples  rays of a pixel along each axis
+    ambient  rays of a hit
+    """
+
+    size: tuple[int, int]
+    samples: int
+    ambient: int = 0
+
+    @property
+    def rays(self) -> int:
+        """Those of the camera."""
+        return count_rays(self.size, self.samples)
+
+    @property
+    def all_rays(self) -> int:
+        """At most, with the ambient ones."""
+        return self.rays * (1 + self.ambient)
+
+    def within(self, max_rays: int, max_all_rays: int) -> Extent:
+        """A smaller one, with no more rays than these: first fewer pixels, then ambient rays."""
+        size = fit_size(self.size, self.samples, min(max_rays, max_all_rays))
+        fitted = count_rays(size, self.samples)
+        return Extent(size, self.samples, min(self.ambient, max(0, max_all_rays // fitted - 1)))
 
 
 def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, int]:
@@ -63,6 +94,23 @@ def share_within(
     return float(np.count_nonzero(bounds[surface] <= limit)) / count if count else None
 
 
+class Stopped(Exception):
+    """A picture that is no longer wanted was not encoded to its end."""
+
+
+class _Stream(io.BytesIO):
+    """Raises Stopped when more is written and the picture is no longer wanted."""
+
+    def __init__(self, is_wanted: Callable[[], bool]) -> None:
+        super().__init__()
+        self._is_wanted = is_wanted
+
+    def write(self, data: Any) -> int:
+        if not self._is_wanted():
+            raise Stopped
+        return super().write(data)
+
+
 def encode_jpeg(rgb: NDArray[np.uint8]) -> bytes:
     """A picture on the way. rgb: uint8 [h, w, 3]."""
     stream = io.BytesIO()
@@ -70,8 +118,8 @@ def encode_jpeg(rgb: NDArray[np.uint8]) -> bytes:
     return stream.getvalue()
 
 
-def encode_png(rgb: NDArray[np.uint8]) -> bytes:
-    """The lossless picture. rgb: uint8 [h, w, 3]."""
-    stream = io.BytesIO()
+def encode_png(rgb: NDArray[np.uint8], is_wanted: Callable[[], bool]) -> bytes:
+    """The lossless picture. rgb: uint8 [h, w, 3]. Raises Stopped soon after it is not wanted."""
+    stream = _Stream(is_wanted)
     pillow.fromarray(rgb).save(stream, "png", compress_level=1)
     return stream.getvalue()

@@ -6,8 +6,9 @@
 Of each client the newest wish counts; it cancels the frame of the one before. A wish is drawn in
 stages: a first picture of a quarter of the width and height; the whole picture (sent as JPEG after
 passes); once the client rests, the lossless picture (PNG), and what is certain of it. Clients take
-turns, stage by stage. At most two pictures are on the way to a client; of those that wait for it
-only the last is kept, and it is always sent.
+turns, stage by stage; a long picture gives way to smaller ones between two passes. At most two
+pictures are on the way to a client; of those that wait for it only the last is kept, and it is
+always sent.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from numpy.typing import NDArray
 
 from .host import make_host
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
-from .pictures import count_rays, dividing_value, encode_jpeg, encode_png, fit_size, share_within
+from .pictures import Extent, Stopped, dividing_value, encode_jpeg, encode_png, share_within
 from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, View, Wish
-from .protocol import VERSION, check
+from .protocol import MAX_FLOAT32, VERSION, check
 
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
 FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
@@ -35,12 +36,16 @@ PASS_SECONDS: Final = 0.06  # between pictures of passes
 SETTLE_SECONDS: Final = 0.1  # after a first picture, for the next wish to come before the whole
 REST_SECONDS: Final = 0.12  # without a wish, until the lossless picture
 CERTAIN_SECONDS: Final = 0.4  # after the lossless picture, until its bounds are looked for
-GIVE_WAY_SECONDS: Final = 0.15  # of a whole picture, before others' first pictures come between
+GIVE_WAY_SECONDS: Final = 0.15  # of a picture, before smaller ones come between; then twice as long
+TURN_SECONDS: Final = 5.0  # of a picture, at most, before smaller ones come between
 QUICK_SECONDS: Final = 0.02  # a whole picture that needs no first one
 SHOW_SECONDS: Final = 0.15  # without a picture, until what a cancelled one has is shown
 HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws meanwhile
-CLOSE_SECONDS: Final = 10.0  # for a pass, or a renderer that is being made, to end
-MAX_RAYS: Final = 1 << 26  # of a picture
+GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smaller one is made
+CLOSE_SECONDS: Final = 0.5  # for threads to end; a pass may take longer
+MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
+MAX_CAMERA_RAYS: Final = 1 << 25  # of them, rays of the camera: each takes memory of the device
+TOO_MANY_BUDGETS: Final = "the memory budget was changed too often: try again in a few seconds"
 
 Post = Callable[[dict[str, Any], bytes | None], None]
 """Sends a message, and the bytes of a picture with it. Must not block, and may be called from any
@@ -53,6 +58,7 @@ class Stage(Enum):
     FIRST = "first"
     WHOLE = "whole"
     LOSSLESS = "lossless"
+    ENCODING = "encoding"  # the lossless picture, in a thread of its own
     CERTAIN = "certain"
     DONE = "done"
 
@@ -65,7 +71,7 @@ class Client:
     wish: Wish | None = None
     stage: Stage = Stage.DONE
     view: View | None = None  # of the wish, once it is known
-    gave_way: bool = False  # the wish's whole picture was interrupted for another client
+    gave_way: int = 0  # how often the wish's whole picture was interrupted for another client
     due: float = -math.inf  # when the stage may begin
     lossless: tuple[dict[str, Any], NDArray[np.uint8]] | None = None  # what it is made of
     sent: int = 0  # pictures, numbered from 1
@@ -80,14 +86,13 @@ class Client:
 class RendererOptions:
     """What the scene's renderer is made for."""
 
-    size: tuple[int, int]
-    samples: int
+    largest: Extent  # of a picture
     memory_budget: int | None
     ambient: bool = False  # pictures may have ambient rays, which takes memory
 
     @property
     def rays(self) -> int:
-        return count_rays(self.size, self.samples)
+        return self.largest.rays
 
 
 @dataclass
@@ -99,8 +104,7 @@ class _Frame:
     stage: Stage
     view: View
     began: float
-    size: tuple[int, int]
-    samples: int
+    extent: Extent
     passes: int = 0
     percent: float = 0.0  # of its rays that have ended
     last_sent: float = field(default=-math.inf)
@@ -116,9 +120,14 @@ class Scene:
     size, samples  the largest picture that the renderer is made for at first; it is made anew when
                    a client wants more
     max_clients    further ones are refused
+    max_rays       of a client's picture: pixels x samples^2 x (1 + ambient). A larger one is drawn
+                   with fewer pixels, then fewer ambient rays, and says so. Of the camera's rays
+                   there are MAX_CAMERA_RAYS at most, or as many as `size` and `samples` have.
     make_host      a renderer that draws while the first one of the device is prepared, or None
     clock          seconds; tests replace it
     start          False: no thread; call step() instead, as tests do
+
+    Raises ValueError, whose text is one line.
     """
 
     def __init__(
@@ -132,11 +141,17 @@ class Scene:
         size: tuple[int, int] = (1920, 1080),
         samples: int = 1,
         max_clients: int = 16,
+        max_rays: int = MAX_RAYS,
         make_camera: Callable[[View], Any] | None = None,
         make_host: Callable[[VolumeLike], RendererLike | None] = make_host,
         clock: Callable[[], float] = time.monotonic,
         start: bool = True,
     ) -> None:
+        if isovalue is not None and not abs(isovalue) <= MAX_FLOAT32:
+            raise ValueError(f"isovalue {isovalue}: give a number that is finite in float32")
+        for name, limit in (("max_clients", max_clients), ("max_rays", max_rays)):
+            if limit < 1:
+                raise ValueError(f"{name} {limit}: give 1 or more")
         self._volume, self._isovalue, self._title = volume, isovalue, title
         self._device, self._max_clients = device, max_clients
         self._make_camera = make_camera or _isowave_camera
@@ -150,15 +165,20 @@ class Scene:
         self._range = (0.0, 1.0)
         self._renderer: RendererLike | None = None
         self._made: RendererOptions | None = None  # what the renderer was made for
-        self._wanted = RendererOptions(size, samples, memory_budget)
+        self._base = Extent(size, samples)  # of the first renderer
+        self._wanted = RendererOptions(self._base, memory_budget)
+        self._too_large_since: float | None = None  # the renderer, for what clients want
+        self._max_rays = max_rays
+        self._budgets = TokenBucket(1 / GIVE_BACK_SECONDS, 5, clock)  # each makes a renderer
         self._fallback: RendererOptions | None = None  # worked before
         self._host: RendererLike | None = None  # draws until there is a renderer
-        self._making: threading.Thread | None = None  # the first renderer
-        self._ray_limit, self._may_have_ambient = MAX_RAYS, True
-        self._thread: threading.Thread | None = None
+        self._ray_limit = self._first_ray_limit = max(MAX_CAMERA_RAYS, self._base.rays)
+        self._may_have_ambient = True
+        self._makes = False  # a renderer is being made
+        self._threads: list[threading.Thread] = []
+        self._has_threads = start
         if start:
-            self._thread = threading.Thread(target=self._work, name="isowave-viewer", daemon=True)
-            self._thread.start()
+            self._do(self._work)
 
     # Called by transports, from any thread. None of these waits for a frame, except close().
 
@@ -182,6 +202,7 @@ class Scene:
             client.stage = Stage.DONE
             if client in self._clients:
                 self._clients.remove(client)
+            self._note_needs()
             self._changed.notify_all()
 
     def receive(self, client: Client, message: Message) -> None:
@@ -194,7 +215,10 @@ class Scene:
             elif isinstance(message, Wish):
                 self._take_wish(client, message)
             elif isinstance(message, Budget):
-                self._want(replace(self._wanted, memory_budget=message.bytes))
+                if self._budgets.take():
+                    self._want(replace(self._wanted, memory_budget=message.bytes))
+                else:
+                    self._post_error(client, RuntimeError(TOO_MANY_BUDGETS), None)
             self._changed.notify_all()
 
     @property
@@ -208,19 +232,38 @@ class Scene:
         with self._changed:
             return self._failure if self._failed and self._fallback is None else None
 
+    @property
+    def is_busy(self) -> bool:
+        """After close(): whether a pass is being drawn, or a renderer made, to its end."""
+        return any(thread.is_alive() for thread in self._threads)
+
     def close(self) -> None:
-        """Ends the frame at hand, the thread and the renderer."""
+        """Ends the frame at hand, the threads and the renderer.
+
+        A long pass ends later; so does a renderer that is being made, which is not waited for.
+        """
         with self._changed:
             self._closing = True
             for client in list(self._clients):
                 client.joined = False
             self._clients.clear()
+            self._renderer = self._host = None  # a frame that is being drawn still holds it
             self._changed.notify_all()
-        if self._thread and self._thread is not threading.current_thread():
-            self._thread.join(CLOSE_SECONDS)
-        if self._making:
-            self._making.join(CLOSE_SECONDS)
-        self._renderer = self._host = None  # the thread's last frame may still hold it
+            threads = [t for t in self._threads if t is not threading.current_thread()]
+        end = time.monotonic() + CLOSE_SECONDS
+        while any(t.is_alive() for t in threads) and not self._makes and time.monotonic() < end:
+            time.sleep(0.005)
+
+    def _do(self, work: Callable[[], None]) -> None:
+        """Works in another thread, if the scene has threads."""
+        if not self._has_threads:
+            work()
+            return
+        thread = threading.Thread(target=work, name="isowave-viewer", daemon=True)
+        with self._changed:
+            self._threads = [t for t in self._threads if t.is_alive()]
+            self._threads.append(thread)
+            thread.start()
 
     # What follows runs in the scene's thread.
 
@@ -229,8 +272,9 @@ class Scene:
         if not self._prepared:
             self._prepare()
             return True
+        self._give_back()
         if self._must_make():
-            self._make_renderer()
+            self._make()
             return True
         turn = self._next_turn()
         if turn is not None:
@@ -242,7 +286,7 @@ class Scene:
         return False
 
     def _work(self) -> None:
-        self._begin()
+        self._make()  # meanwhile, the volume is looked at
         while True:
             with self._changed:
                 if self._closing:
@@ -256,27 +300,42 @@ class Scene:
         return any(self._has_turn(client) for client in self._clients) or self._must_make()
 
     def _must_make(self) -> bool:
-        """Whether the renderer is another one than is wanted, and nobody is at it."""
-        is_made = self._made == self._wanted or self._failed
-        return not is_made and (self._making is None or not self._making.is_alive())
+        """Whether the renderer is another one than is wanted, and none is being made."""
+        return not (self._made == self._wanted or self._failed or self._makes)
 
-    def _begin(self) -> None:
-        """Kernels may take long to compile: in another thread, and the host draws meanwhile."""
-        self._making = threading.Thread(target=self._make_renderer, daemon=True)
-        self._making.start()
-        self._prepare()
-        self._making.join(HOST_SECONDS)
-        if self._making.is_alive():
-            try:
-                host = self._make_host(self._volume)
-            except Exception:  # there is not enough memory: then nothing is drawn meanwhile
+    def _make(self) -> None:
+        """Replaces the renderer. Memory for two is rarely there: the old one goes first.
+
+        Kernels may take long to compile: in another thread, and the host draws meanwhile.
+        """
+        with self._changed:
+            self._makes, wanted = True, self._wanted
+            self._renderer, self._made = None, None
+            self._broadcast(self._status())
+        self._do(lambda: self._make_renderer(wanted))
+        if self._has_threads:
+            self._do(self._make_host_renderer)
+
+    def _make_host_renderer(self) -> None:
+        def is_over() -> bool:
+            return self._closing or not self._makes
+
+        with self._changed:
+            if self._host is not None or self._changed.wait_for(is_over, HOST_SECONDS):
                 return
-            with self._changed:
-                if self._renderer is None and not self._failed:
-                    self._host = host
+        try:
+            host = self._make_host(self._volume)
+        except Exception:  # there is not enough memory: then nothing is drawn meanwhile
+            return
+        with self._changed:
+            if not is_over():
+                self._host = host
+                self._changed.notify_all()
 
     def _seconds_to_rest(self) -> float | None:
         due = [c.due for c in self._clients if self._may_begin(c)]
+        if self._too_large_since is not None:
+            due.append(self._too_large_since + GIVE_BACK_SECONDS)
         return max(0.0, min(due) - self._clock()) if due else None
 
     def _has_turn(self, client: Client) -> bool:
@@ -284,7 +343,7 @@ class Scene:
 
     def _may_begin(self, client: Client) -> bool:
         """Whether there is what the client's stage needs, but for time."""
-        if client.stage in (Stage.DONE, Stage.LOSSLESS):
+        if client.stage in (Stage.DONE, Stage.ENCODING, Stage.LOSSLESS):
             return client.stage is Stage.LOSSLESS
         if self._renderer is not None or self._failed:
             return True
@@ -302,10 +361,11 @@ class Scene:
 
     def _serve(self, client: Client, wish: Wish, stage: Stage) -> None:
         """One stage of a wish. Whatever goes wrong concerns this client alone."""
-        renderer = self._renderer or self._host
+        with self._changed:
+            renderer = self._renderer or self._host
         try:
             if stage is Stage.LOSSLESS:
-                self._send_lossless(client, wish)
+                self._encode_lossless(client, wish)
             elif renderer is None:
                 raise RuntimeError(self._failure)
             elif stage is Stage.CERTAIN:
@@ -313,10 +373,13 @@ class Scene:
             elif renderer is self._host or not self._grow(wish, stage):
                 self._draw(renderer, client, wish, stage)
         except Exception as error:  # of the library, or of its drivers
-            with self._changed:
-                if client.joined and client.wish is wish:
-                    client.stage = Stage.DONE
-                    self._post_error(client, error, wish.id)
+            self._wish_failed(client, wish, error)
+
+    def _wish_failed(self, client: Client, wish: Wish, error: Exception) -> None:
+        with self._changed:
+            if client.joined and client.wish is wish:
+                client.stage = Stage.DONE
+                self._post_error(client, error, wish.id)
 
     def _draw(self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage) -> None:
         began = self._clock()
@@ -325,19 +388,19 @@ class Scene:
             if client.wish is not wish:
                 return
             client.view = view
-        size, samples = self._fitted(wish, stage)
-        frame = _Frame(client, wish, stage, view, began, size, samples)
+        extent = self._fitted(wish, stage)
+        frame = _Frame(client, wish, stage, view, began, extent)
         image = renderer.render(
             wish.isovalue,
             camera=self._make_camera(view),
-            size=size,
-            samples=samples,
+            size=extent.size,
+            samples=extent.samples,
             color=wish.color,
             background=wish.background,
             max_error=wish.max_error,
             outputs=("rgb",),
             time_budget=None if wish.time_budget is None else wish.time_budget / 1000,
-            ambient=0 if stage is Stage.FIRST or not self._has_ambient() else wish.ambient,
+            ambient=extent.ambient,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.stopped:
@@ -384,14 +447,24 @@ class Scene:
         return frame.client.wish is not frame.wish or self._closing
 
     def _gives_way(self, frame: _Frame, now: float) -> bool:
-        """A whole picture lets others' first pictures come between, once."""
+        """A picture that takes long lets smaller ones of others come between, and is drawn anew.
+
+        It is drawn twice as long each time before it gives way, up to TURN_SECONDS.
+        """
         client = frame.client
-        if frame.stage is not Stage.WHOLE or client.gave_way:
+        turn = min(GIVE_WAY_SECONDS * 2.0**client.gave_way, TURN_SECONDS)
+        if frame.stage is not Stage.WHOLE or now - frame.began < turn:
             return False
-        client.gave_way = now - frame.began >= GIVE_WAY_SECONDS and any(
-            other.stage is Stage.FIRST for other in self._clients if other is not client
+        gives_way = any(
+            other.wish is not None
+            and other.stage in (Stage.FIRST, Stage.WHOLE)
+            and self._has_turn(other)
+            and self._fitted(other.wish, other.stage).all_rays < frame.extent.all_rays
+            for other in self._clients
+            if other is not client
         )
-        return client.gave_way
+        client.gave_way += gives_way
+        return gives_way
 
     def _show_what_there_is(self, frame: _Frame, image: ImageLike) -> None:
         """While wishes come faster than first pictures are made, parts of those are shown."""
@@ -403,30 +476,42 @@ class Scene:
             if client.joined:
                 self._offer(client, self._head(frame, "pass"), data, keep=False)
 
-    def _send_lossless(self, client: Client, wish: Wish) -> None:
+    def _encode_lossless(self, client: Client, wish: Wish) -> None:
+        """In a thread of its own: large pictures take seconds."""
         with self._changed:
             made_of = client.lossless
-        if made_of is None:
+            if client.wish is not wish or made_of is None:
+                return
+            client.stage, client.lossless = Stage.ENCODING, None
+        self._do(lambda: self._send_lossless(client, wish, *made_of))
+
+    def _send_lossless(
+        self, client: Client, wish: Wish, head: dict[str, Any], rgb: NDArray[np.uint8]
+    ) -> None:
+        try:
+            data = encode_png(rgb, lambda: client.wish is wish and not self._closing)
+        except Stopped:
             return
-        head, rgb = made_of
-        data = encode_png(rgb)
+        except Exception as error:
+            self._wish_failed(client, wish, error)
+            return
         with self._changed:
             if client.wish is wish:
-                client.stage, client.lossless = Stage.CERTAIN, None
-                client.due = self._clock() + CERTAIN_SECONDS
+                client.stage, client.due = Stage.CERTAIN, self._clock() + CERTAIN_SECONDS
                 self._offer(client, {**head, "stage": "lossless", "format": "png"}, data, keep=True)
+                self._changed.notify_all()
 
     def _send_bounds(self, renderer: RendererLike, client: Client, wish: Wish) -> None:
         """How far the surface may be off, by the rays of a first picture: bounds take time."""
         if client.view is None:
             return
-        size, samples = self._fitted(wish, Stage.FIRST)
-        pixels = size[1] / wish.size[1]  # of the first picture, to one of the whole picture
+        extent = self._fitted(wish, Stage.FIRST)
+        pixels = extent.size[1] / wish.size[1]  # of the first picture, to one of the whole picture
         image = renderer.render(
             wish.isovalue,
             camera=self._make_camera(client.view),
-            size=size,
-            samples=samples,
+            size=extent.size,
+            samples=extent.samples,
             color=wish.color,
             background=wish.background,
             outputs=("depth", "bounds"),
@@ -446,38 +531,58 @@ class Scene:
 
     # Renderers.
 
+    def _plan(self, wish: Wish) -> Extent:
+        """The whole picture of a wish, as far as the server's limits and the memory allow it."""
+        ambient = wish.ambient if self._may_have_ambient else 0
+        return Extent(wish.size, wish.samples, ambient).within(self._ray_limit, self._max_rays)
+
     def _grow(self, wish: Wish, stage: Stage) -> bool:
-        """Wants a renderer for more rays, or ambient ones, if the wish has such and may."""
-        wanted = self._wanted
-        more = wanted.rays < count_rays(wish.size, wish.samples) <= self._ray_limit
-        ambient = wanted.ambient or (wish.ambient > 0 and self._may_have_ambient)
-        if stage is Stage.FIRST or (not more and ambient == wanted.ambient):
+        """Wants a renderer for more rays, or ambient ones, if the wish's picture has such."""
+        wanted, plan = self._wanted, self._plan(wish)
+        ambient = wanted.ambient or plan.ambient > 0
+        if stage is Stage.FIRST or (plan.rays <= wanted.rays and ambient == wanted.ambient):
             return False
-        size, samples = (wish.size, wish.samples) if more else (wanted.size, wanted.samples)
-        self._want(RendererOptions(size, samples, wanted.memory_budget, ambient))
+        largest = replace(plan, ambient=0) if plan.rays > wanted.rays else wanted.largest
+        self._want(RendererOptions(largest, wanted.memory_budget, ambient))
         return True
 
-    def _has_ambient(self) -> bool:
-        """The host, which draws before there is a renderer of the device, always has."""
-        return self._made is None or self._made.ambient
+    def _needed(self) -> RendererOptions:
+        """The smallest renderer for what clients want now. The lock is held."""
+        plans = [self._plan(client.wish) for client in self._clients if client.wish is not None]
+        largest = max((self._base, *plans), key=lambda plan: plan.rays)
+        ambient = any(plan.ambient > 0 for plan in plans)
+        return RendererOptions(replace(largest, ambient=0), self._wanted.memory_budget, ambient)
+
+    def _note_needs(self) -> None:
+        """Notes since when the renderer is much larger than clients need. The lock is held."""
+        needed, wanted = self._needed(), self._wanted
+        fits = needed.rays > wanted.rays / 2 and needed.ambient >= wanted.ambient
+        if fits:
+            self._too_large_since = None
+        elif self._too_large_since is None:
+            self._too_large_since = self._clock()
+
+    def _give_back(self) -> None:
+        """Wants a smaller renderer if none of the clients has needed a large one for long."""
+        with self._changed:
+            since = self._too_large_since
+            if since is not None and self._clock() >= since + GIVE_BACK_SECONDS:
+                self._too_large_since = None
+                self._want(self._needed())
 
     def _want(self, options: RendererOptions) -> None:
         with self._changed:
             if options.memory_budget != self._wanted.memory_budget:
-                self._ray_limit, self._may_have_ambient = MAX_RAYS, True
+                self._ray_limit, self._may_have_ambient = self._first_ray_limit, True
             self._wanted, self._failed = options, False
+            self._note_needs()
 
-    def _make_renderer(self) -> None:
-        """Replaces the renderer. Memory for two is rarely there: the old one goes first."""
-        with self._changed:
-            wanted = self._wanted
-            self._renderer, self._made = None, None
-            self._broadcast(self._status())
+    def _make_renderer(self, wanted: RendererOptions) -> None:
         try:
             renderer = self._volume.renderer(
                 device=self._device,
-                size=wanted.size,
-                samples=wanted.samples,
+                size=wanted.largest.size,
+                samples=wanted.largest.samples,
                 memory_budget=wanted.memory_budget,
                 levels=self._volume.num_levels > 1,
                 bounds=True,
@@ -488,14 +593,17 @@ class Scene:
             self._renderer_failed(wanted, error)
             return
         with self._changed:
+            self._makes, self._host = False, None
+            if self._closing:
+                return
             self._renderer, self._made, self._fallback = renderer, wanted, wanted
-            self._host = None
             self._broadcast(self._status())
             self._changed.notify_all()
 
     def _renderer_failed(self, wanted: RendererOptions, error: Exception) -> None:
         """Goes back to what worked. Nothing did: waits for another budget."""
         with self._changed:
+            self._makes = False
             fallback = self._fallback if self._fallback != wanted else None
             if self._wanted == wanted:
                 self._failed, self._failure = fallback is None, first_line(error)
@@ -511,15 +619,19 @@ class Scene:
             self._broadcast(self._status())
             self._changed.notify_all()
 
-    def _fitted(self, wish: Wish, stage: Stage) -> tuple[tuple[int, int], int]:
-        """Size and samples of a stage's picture, within what the renderer was made for."""
-        if stage is Stage.FIRST:
-            width, height = (max(1, side // FIRST_DIVISOR) for side in wish.size)
-            return fit_size((width, height), 1, self._limit()), 1
-        return fit_size(wish.size, wish.samples, self._limit()), wish.samples
+    def _fitted(self, wish: Wish, stage: Stage) -> Extent:
+        """A stage's picture, within what the renderer was made for.
 
-    def _limit(self) -> int:
-        return self._made.rays if self._made else MAX_RAYS
+        The host, which draws before there is a renderer of the device, has no limits of its own.
+        """
+        made, plan = self._made, self._plan(wish)
+        if stage is not Stage.WHOLE:
+            width, height = (max(1, side // FIRST_DIVISOR) for side in wish.size)
+            plan = Extent((width, height), 1)
+        if made is None:
+            return plan.within(self._ray_limit, self._max_rays)
+        fitted = plan.within(made.rays, self._max_rays)
+        return fitted if made.ambient else replace(fitted, ambient=0)
 
     # What is sent. The lock is held.
 
@@ -529,7 +641,8 @@ class Scene:
         skip_first = client.whole_seconds < QUICK_SECONDS or wish.time_budget is not None
         client.wish, client.view = wish, wish.view
         client.stage = Stage.WHOLE if skip_first else Stage.FIRST
-        client.gave_way, client.lossless, client.due = False, None, -math.inf
+        client.gave_way, client.lossless, client.due = 0, None, -math.inf
+        self._note_needs()
 
     def _acknowledge(self, client: Client, frame: int) -> None:
         if frame > client.sent:
@@ -560,6 +673,7 @@ class Scene:
         statistics = image.statistics
         return {
             **self._head(frame, frame.stage.value),
+            "reduced": self._reduced(frame),
             "complete": bool(image.complete),
             "passes": int(statistics["passes"]),
             "percent": 100.0,
@@ -574,8 +688,10 @@ class Scene:
             "wish": frame.wish.id,
             "stage": stage,
             "format": "jpeg",
-            "size": list(frame.size),
-            "samples": frame.samples,
+            "size": list(frame.extent.size),
+            "samples": frame.extent.samples,
+            "ambient": frame.extent.ambient,
+            "reduced": None,
             "isovalue": frame.wish.isovalue,
             "camera": {
                 "eye": list(view.eye),
@@ -590,6 +706,22 @@ class Scene:
             "decoded_blocks": None,
             "detail": None,
         }
+
+    def _reduced(self, frame: _Frame) -> str | None:
+        """Why a whole picture has fewer rays than its wish, in one line; None: it has all."""
+        wish, extent = frame.wish, frame.extent
+        asked = Extent(wish.size, wish.samples, wish.ambient)
+        if frame.stage is not Stage.WHOLE or extent == asked:
+            return None
+        why = "The device has no memory for more"
+        if asked != asked.within(self._first_ray_limit, self._max_rays):
+            of_camera = min(self._first_ray_limit, self._max_rays)
+            why = f"The server draws at most {self._max_rays:,} rays, {of_camera:,} from the camera"
+        width, height = extent.size
+        return (
+            f"{why}: this picture has {width} x {height} pixels, {extent.samples**2} rays a pixel, "
+            f"{extent.ambient} ambient rays."
+        )
 
     def _post_error(self, client: Client, error: Exception, wish: int | None) -> None:
         self._post(client, {"type": "error", "wish": wish, "message": first_line(error)})
@@ -717,6 +849,11 @@ class Session:
             raise ProtocolError("the first message must be hello")
         else:
             self._scene.receive(self._client, message)
+
+    @property
+    def has_joined(self) -> bool:
+        """Whether the front end has said hello."""
+        return self._client is not None
 
     def close(self) -> None:
         """Ends it. May be called twice."""

@@ -6,55 +6,49 @@
         /CODE            leads to the page, once: for a browser whose command line others can see
 
 Anything else, a wrong token and a foreign Origin are answered with 403.
+
+Connections that have not shown the token yet have places of their own. When these are full, the
+oldest such connection ends. So connections without the token never keep out those that have it.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
-import hmac
 import json
 import os
 import re
-import secrets
 import socket
+import secrets
 import struct
 import sys
 import threading
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Final
-from urllib.parse import urlsplit
+from typing import Any, Final, NoReturn
 
-import uvicorn
-from starlette.applications import Starlette
-from starlette.requests import HTTPConnection, Request
-from starlette.responses import Response
-from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Receive, Scope, Send
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from websockets.frames import Frame, Opcode
+from websockets.http11 import Request as Handshake
+from websockets.protocol import State
+from websockets.server import ServerProtocol
 
+from .door import HEADERS, Door, Refused, Request, answer, hand_over, parse_head, read_head
 from .interfaces import VolumeLike
 from .protocol import MAX_MESSAGE_BYTES, ProtocolError, parse
-from .scene import Scene, Session, TooManyClients
+from .scene import MAX_RAYS, Scene, Session, TooManyClients, first_line
 
-HEADERS: Final = {
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "X-Frame-Options": "DENY",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-store",
-}
 POLICY: Final = (
     "default-src 'none'; script-src 'self'; connect-src 'self' ws://{host} wss://{host}; "
     "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+CLOSE_SECONDS: Final = 0.3  # for clients to hear that the server ends
 # Close codes of RFC 6455 and its registry.
-UNSUPPORTED_DATA, POLICY_VIOLATION, TRY_AGAIN_LATER, GOING_AWAY = 1003, 1008, 1013, 1001
+GOING_AWAY, UNSUPPORTED_DATA, INVALID_DATA = 1001, 1003, 1007
+POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013
+NOT_READ: Final = "the client does not read what it is sent"
 
 
 @dataclass(frozen=True)
@@ -62,21 +56,35 @@ class Limits:
     """What a server takes from its clients.
 
     message_rate, message_burst  messages of a client: a second, and at once
-    queue                        messages that wait to be sent to a client; more: it is gone
-    connections                  at the same time, of all kinds
+    queue           messages that wait to be sent to a client; more: it is gone
+    connections     at the same time, of those that have shown the token
+    strangers       at the same time, of those that have not; when one more comes, the oldest ends
+    head_seconds    for the whole head of a request
+    answer_seconds  for an answer to be taken, or for a websocket that ends to be closed
+    hello_seconds   from the websocket's beginning to the client's hello
+    idle_seconds    for a client to read something while it is sent something; for the answer to a
+                    ping, and between pings
     """
 
     message_rate: float = 250
     message_burst: float = 500
     queue: int = 64
     connections: int = 64
+    strangers: int = 256
+    head_seconds: float = 5
+    answer_seconds: float = 2
+    hello_seconds: float = 5
+    idle_seconds: float = 20
 
 
 class Server:
     """Serves a scene from a thread of its own, until close().
 
     host, port  to listen at; port 0: a free one
-    token       who knows it may look; None: a random one of 192 bits
+    listener    a socket that listens there already, or None
+    token       lets its holders look; None: a random one of 192 bits
+
+    Raises OSError or ValueError, whose text is one line, when it cannot listen there.
     """
 
     def __init__(
@@ -85,40 +93,33 @@ class Server:
         *,
         host: str = "127.0.0.1",
         port: int = 0,
+        listener: socket.socket | None = None,
         token: str | None = None,
         limits: Limits = Limits(),
     ) -> None:
-        self.scene = scene
-        self._codes: set[str] = set()
+        self.scene, self._limits = scene, limits
         self.token = token or secrets.token_urlsafe(24)
-        self._socket = _listen(host, port)
+        self._door = Door(self.token)
+        self._socket = listener or _listen(host, port)
         self.host, self.port = host, int(self._socket.getsockname()[1])
-        config = uvicorn.Config(
-            _application(scene, self.token, self._codes, limits),
-            ws_max_size=MAX_MESSAGE_BYTES,
-            ws_per_message_deflate=False,
-            limit_concurrency=limits.connections,
-            timeout_graceful_shutdown=2,
-            lifespan="off",
-            log_config=None,
-            log_level="critical",
-            server_header=False,
-        )
-        self._uvicorn = uvicorn.Server(config)
+        self._strangers: dict[asyncio.StreamWriter, None] = {}  # the oldest is in front
+        self._known = set[asyncio.StreamWriter]()
+        self._talks = set[_Connection]()
+        self._tasks = set[asyncio.Task[None]]()
+        self._loop, self._stop = asyncio.new_event_loop(), asyncio.Event()
+        self._loop.set_exception_handler(_report)
         self._thread = threading.Thread(target=self._run, name="isowave-server", daemon=True)
         self._thread.start()
 
     @property
     def url(self) -> str:
-        """Where the page is. Whoever has it may look at the volume."""
+        """Where the page is. All who have it may look at the volume."""
         host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/{self.token}/"
 
     def url_for_once(self) -> str:
         """A URL that leads to the page when it is opened first, and then no more."""
-        code = secrets.token_urlsafe(24)
-        self._codes.add(code)
-        return self.url.removesuffix(f"{self.token}/") + code
+        return self.url.removesuffix(f"{self.token}/") + self._door.make_code()
 
     def __repr__(self) -> str:
         return f"isowave viewer at {self.url}"
@@ -133,7 +134,10 @@ class Server:
 
     def close(self) -> None:
         """Ends server and scene. May be called twice."""
-        self._uvicorn.should_exit = True
+        try:
+            self._loop.call_soon_threadsafe(self._stop.set)
+        except RuntimeError:  # it has ended
+            pass
         self.scene.close()
         self._thread.join()
         self._socket.close()
@@ -144,112 +148,198 @@ class Server:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
+    # What follows runs in the server's thread.
+
     def _run(self) -> None:
-        self._uvicorn.run(sockets=[self._socket])
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._serve())
+        finally:
+            self._loop.close()
+
+    async def _serve(self) -> None:
+        listener = await asyncio.start_server(self._take, sock=self._socket, backlog=128)
+        await self._stop.wait()
+        listener.close()
+        for talk in self._talks:
+            talk.end(GOING_AWAY, "the server ends")
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=CLOSE_SECONDS)
+        for task in self._tasks:
+            task.cancel()
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=CLOSE_SECONDS)
+
+    async def _take(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One connection, from its beginning to its end."""
+        task = asyncio.current_task()
+        assert task is not None
+        self._tasks.add(task)
+        self._strangers[writer] = None
+        if len(self._strangers) > self._limits.strangers:
+            oldest = next(iter(self._strangers))
+            del self._strangers[oldest]
+            oldest.transport.abort()
+        try:
+            await self._answer(reader, writer)
+        except (asyncio.TimeoutError, EOFError, OSError):  # the client is gone, or too slow
+            pass
+        finally:
+            self._strangers.pop(writer, None)
+            self._known.discard(writer)
+            self._tasks.discard(task)
+            writer.transport.abort()
+
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with_body = True
+        try:
+            head, rest = await self._read_head(reader)
+            request = parse_head(head)
+            with_body = request.method != "HEAD"
+            self._admit(request, writer)
+            if request.path == f"/{self.token}/ws":
+                protocol = _shake_hands(head)
+                talk = _Connection(self.scene, self._limits, protocol, reader, writer)
+                self._talks.add(talk)
+                try:
+                    await talk.run(rest)
+                finally:
+                    self._talks.discard(talk)
+                return
+            data = self._file(request, with_body)
+        except Refused as refused:
+            text = f"isowave: {refused}\n".encode()
+            data = answer(refused.status, text, with_body=with_body, **refused.headers)
+        await hand_over(reader, writer, data, self._limits.answer_seconds)
+
+    async def _read_head(self, reader: asyncio.StreamReader) -> tuple[bytes, bytes]:
+        try:
+            return await asyncio.wait_for(read_head(reader), self._limits.head_seconds)
+        except asyncio.TimeoutError:
+            raise Refused(408) from None
+
+    def _admit(self, request: Request, writer: asyncio.StreamWriter) -> None:
+        """Gives a connection with the token one of the places for these. Raises Refused."""
+        if self._door.takes_code(request):
+            raise Refused(303, Location=f"/{self.token}/")
+        if not self._door.may_enter(request):
+            raise Refused(403)
+        if len(self._known) >= self._limits.connections:
+            raise Refused(503, Retry_After="1")
+        self._strangers.pop(writer, None)
+        self._known.add(writer)
+        if request.method not in ("GET", "HEAD"):
+            raise Refused(405, Allow="GET, HEAD")
+        if request.has_body:
+            raise Refused(413)
+
+    def _file(self, request: Request, with_body: bool) -> bytes:
+        name = request.path.removeprefix(f"/{self.token}/")
+        if name == "":
+            policy = POLICY.format(host=request.only("host"))
+            page, kind = _read("page.html"), "text/html; charset=utf-8"
+            return answer(200, page, kind, with_body=with_body, Content_Security_Policy=policy)
+        if name == "view.js":
+            return answer(200, _read(name), "text/javascript; charset=utf-8", with_body=with_body)
+        raise Refused(403)
 
 
-class _Gate:
-    """Lets nobody in but those with the token, from a page of ours or from no page."""
-
-    def __init__(self, app: ASGIApp, token: str, codes: set[str]) -> None:
-        self._app, self._token, self._codes = app, token.encode(), codes
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] not in ("http", "websocket"):
-            return
-        if self._may_enter(scope):
-            await self._app(scope, receive, send)
-        elif scope["type"] == "http" and self._takes_code(scope):
-            page = {**HEADERS, "Location": f"/{self._token.decode()}/"}
-            await Response("", 303, page)(scope, receive, send)
-        elif scope["type"] == "http":
-            response = Response("isowave: open the whole URL that was printed\n", 403, HEADERS)
-            await response(scope, receive, send)
-        else:  # before it is accepted, this is answered with 403
-            await WebSocket(scope, receive, send).close()
-
-    def _takes_code(self, scope: Scope) -> bool:
-        given = str(scope["path"])[1:].encode(errors="replace")
-        known = [code for code in self._codes if hmac.compare_digest(code.encode(), given)]
-        self._codes.difference_update(known)
-        return bool(known)
-
-    def _may_enter(self, scope: Scope) -> bool:
-        token = str(scope["path"]).split("/")[1:2] or [""]
-        if not hmac.compare_digest(token[0].encode(errors="replace"), self._token):
-            return False
-        headers = HTTPConnection(scope).headers
-        host = headers.get("host", "")
-        if not re.fullmatch(r"[A-Za-z0-9._\[\]:-]{1,255}", host):
-            return False
-        origins = headers.getlist("origin")
-        return all(_host_of(origin) == host.lower() for origin in origins)
+def _report(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Failures of sockets are no news: a connection that cannot be accepted waits."""
+    if not isinstance(context.get("exception"), OSError):
+        loop.default_exception_handler(context)
 
 
-def _host_of(origin: str) -> str | None:
-    try:
-        parts = urlsplit(origin)
-    except ValueError:
-        return None
-    return parts.netloc.lower() if parts.scheme in ("http", "https") else None
+def _shake_hands(head: bytes) -> ServerProtocol:
+    """A websocket whose answer is still to be sent. Raises Refused."""
+    protocol = ServerProtocol(max_size=MAX_MESSAGE_BYTES)
+    protocol.receive_data(head)
+    events = protocol.events_received()
+    if len(events) != 1 or not isinstance(events[0], Handshake):
+        raise Refused(400)
+    response = protocol.accept(events[0])
+    if response.status_code == 426:
+        raise Refused(426, Upgrade="websocket", Connection="Upgrade, close")
+    if response.status_code != 101:
+        raise Refused(400)
+    for name, value in HEADERS.items():
+        response.headers[name] = value
+    protocol.send_response(response)
+    return protocol
 
 
-def _application(scene: Scene, token: str, codes: set[str], limits: Limits) -> ASGIApp:
-    def page(request: Request) -> Response:
-        policy = POLICY.format(host=request.headers["host"])
-        headers = {**HEADERS, "Content-Security-Policy": policy}
-        return Response(_read("page.html"), 200, headers, "text/html")
+class _Ended(Exception):
+    """A websocket that is to be closed; code None: it is closed, or cannot be any more."""
 
-    def script(request: Request) -> Response:
-        return Response(_read("view.js"), 200, HEADERS, "text/javascript")
-
-    def nothing(request: Request) -> Response:
-        return Response("isowave: there is nothing here\n", 403, HEADERS)
-
-    async def talk(websocket: WebSocket) -> None:
-        await _Connection(scene, limits, websocket).run()
-
-    app = Starlette(
-        routes=[
-            Route("/{token}/", page),
-            Route("/{token}/view.js", script),
-            WebSocketRoute("/{token}/ws", talk),
-            Route("/{rest:path}", nothing),
-        ]
-    )
-    return _Gate(app, token, codes)
+    def __init__(self, code: int | None = None, reason: str = "") -> None:
+        super().__init__(reason)
+        self.code, self.reason = code, reason
 
 
 class _Connection:
-    """A websocket and its session. Ends with whichever of reading and writing ends first."""
+    """A websocket and its session. Ends with whichever of its tasks ends first."""
 
-    def __init__(self, scene: Scene, limits: Limits, websocket: WebSocket) -> None:
-        self._websocket, self._limits = websocket, limits
+    def __init__(
+        self,
+        scene: Scene,
+        limits: Limits,
+        protocol: ServerProtocol,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+    ) -> None:
+        self._limits, self._protocol = limits, protocol
+        self._reader, self._writer = reader, writer
         self._loop = asyncio.get_running_loop()
         self._queue: asyncio.Queue[tuple[dict[str, Any], bytes | None]] = asyncio.Queue()
-        self._full = asyncio.Event()
+        self._end: asyncio.Future[_Ended] = self._loop.create_future()
+        self._message = bytearray()  # fragments so far
+        self._heard = True  # something came since the last ping
+        self._drains = asyncio.Lock()  # Python 3.10 lets only one task wait for a writer
         self._session = Session(
             scene, self._post, rate=limits.message_rate, burst=limits.message_burst
         )
 
-    async def run(self) -> None:
-        await self._websocket.accept()
-        tasks = [
-            asyncio.create_task(work) for work in (self._read(), self._write(), self._full.wait())
-        ]
+    def end(self, code: int | None = None, reason: str = "") -> None:
+        """Lets run() close the websocket, with the first code that is given."""
+        if not self._end.done():
+            self._end.set_result(_Ended(code, reason))
+
+    async def run(self, begun: bytes) -> None:
+        """begun: what came behind the handshake's head."""
+        works = (self._read(begun), self._write(), self._ping())
+        tasks = [asyncio.create_task(self._until_end(work)) for work in works]
+        timer = self._loop.call_later(self._limits.hello_seconds, self._expect_hello)
         try:
-            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            code, reason = _close_reason([task.exception() for task in done])
+            ended = await self._end
         finally:
+            timer.cancel()
             self._session.close()
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-        if code is not None:
-            try:
-                await self._websocket.close(code, reason)
-            except RuntimeError:  # it is closed already
-                pass
+        if self._protocol.state is State.OPEN and ended.code is not None:
+            self._protocol.send_close(ended.code, ended.reason)
+        data = b"".join(self._protocol.data_to_send())
+        await hand_over(self._reader, self._writer, data, self._limits.answer_seconds)
+
+    async def _until_end(self, work: Coroutine[Any, Any, None]) -> None:
+        # Before Python 3.12, wait_for() may lose a cancellation: the works look at _end, too.
+        try:
+            await work
+        except _Ended as ended:
+            self.end(ended.code, ended.reason)
+        except ProtocolError as error:
+            code = TRY_AGAIN_LATER if isinstance(error, TooManyClients) else POLICY_VIOLATION
+            # A reason has at most 123 bytes.
+            self.end(code, str(error).encode()[:123].decode(errors="ignore"))
+        except OSError:
+            pass
+        finally:
+            self.end()
+
+    def _expect_hello(self) -> None:
+        if not self._session.has_joined:
+            self.end(POLICY_VIOLATION, "no hello came in time")
 
     def _post(self, head: dict[str, Any], data: bytes | None) -> None:
         # Raises RuntimeError when the loop has ended; the scene then forgets the client.
@@ -259,49 +349,68 @@ class _Connection:
         if self._queue.qsize() < self._limits.queue:
             self._queue.put_nowait((head, data))
         else:
-            self._full.set()
+            self.end(POLICY_VIOLATION, NOT_READ)
 
-    async def _read(self) -> None:
-        while True:
-            message = await self._websocket.receive()
-            if message["type"] == "websocket.disconnect":
-                raise WebSocketDisconnect(int(message.get("code") or 1005))
-            text = message.get("text")
-            if text is None:
-                raise _BinaryMessage("messages must be text")
+    async def _read(self, data: bytes) -> None:
+        while not self._end.done():
+            self._heard = True
+            self._protocol.receive_data(data)
+            for event in self._protocol.events_received():
+                assert isinstance(event, Frame)
+                self._take(event)
+            await self._flush()  # answers to pings and to a close
+            if self._protocol.state is not State.OPEN:
+                raise _Ended
+            data = await self._reader.read(65536)
+            if not data:
+                raise _Ended
+
+    def _take(self, frame: Frame) -> None:
+        if frame.opcode is Opcode.BINARY:
+            raise _Ended(UNSUPPORTED_DATA, "messages must be text")
+        if frame.opcode not in (Opcode.TEXT, Opcode.CONT):
+            return
+        self._message += frame.data  # the protocol limits the sum
+        if frame.fin:
+            try:
+                text = self._message.decode()
+            except UnicodeDecodeError:
+                raise _Ended(INVALID_DATA, "messages must be UTF-8") from None
+            self._message.clear()
             self._session.receive(parse(text))
 
     async def _write(self) -> None:
-        while True:
+        while not self._end.done():
             head, data = await self._queue.get()
-            # Who does not read is noticed by the pings that uvicorn sends.
-            text = json.dumps(head, allow_nan=False)
+            encoded = json.dumps(head, allow_nan=False).encode()
             if data is None:
-                await self._websocket.send_text(text)
+                self._protocol.send_text(encoded)
             else:
-                encoded = text.encode()
                 size = struct.pack("<I", len(encoded))
-                await self._websocket.send_bytes(size + encoded + data)
+                self._protocol.send_binary(size + encoded + data)
+            await self._flush()
 
+    async def _ping(self) -> None:
+        while not self._end.done():
+            await asyncio.sleep(self._limits.idle_seconds)
+            if not self._heard and self._writer.transport.get_write_buffer_size() == 0:
+                raise _Ended(POLICY_VIOLATION, "the client does not answer")
+            self._heard = False
+            self._protocol.send_ping(b"")
+            await self._flush()
 
-class _BinaryMessage(ProtocolError):
-    pass
-
-
-def _close_reason(errors: Sequence[BaseException | None]) -> tuple[int | None, str]:
-    """What a websocket is closed with; None: it is closed already."""
-    for error in errors:
-        if isinstance(error, WebSocketDisconnect):
-            return None, ""
-        if isinstance(error, ProtocolError):
-            code = POLICY_VIOLATION
-            if isinstance(error, TooManyClients):
-                code = TRY_AGAIN_LATER
-            elif isinstance(error, _BinaryMessage):
-                code = UNSUPPORTED_DATA
-            # A reason has at most 123 bytes.
-            return code, str(error).encode()[:123].decode(errors="ignore")
-    return POLICY_VIOLATION, "the client does not read what it is sent"
+    async def _flush(self) -> None:
+        """Sends what the protocol has, and waits while the client reads it, however slowly."""
+        self._writer.write(b"".join(self._protocol.data_to_send()))
+        async with self._drains:
+            while True:
+                left = self._writer.transport.get_write_buffer_size()
+                try:
+                    await asyncio.wait_for(self._writer.drain(), self._limits.idle_seconds)
+                    return
+                except asyncio.TimeoutError:
+                    if self._writer.transport.get_write_buffer_size() >= left:
+                        raise _Ended(POLICY_VIOLATION, NOT_READ) from None
 
 
 def _read(name: str) -> bytes:
@@ -309,7 +418,9 @@ def _read(name: str) -> bytes:
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """Raises OSError whose text is one line."""
+    """Raises OSError or ValueError, whose text is one line."""
+    if not 0 <= port <= 65535:
+        raise ValueError(f"port {port}: give one from 1 to 65535, or 0 for a free one")
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         listener = socket.socket(family, socket.SOCK_STREAM)
@@ -335,9 +446,16 @@ def serve(
 ) -> Server:
     """Serves a view of a volume and opens it in a browser, where there is a display.
 
-    options  as for Scene: isovalue, title, device, memory_budget, size, samples, max_clients
+    options  as for Scene: isovalue, title, device, memory_budget, size, samples, max_clients,
+             max_rays
     """
-    server = Server(Scene(volume, **options), host=host, port=port)
+    listener = _listen(host, port)  # before a renderer is made, which takes long
+    try:
+        scene = Scene(volume, **options)
+    except Exception:
+        listener.close()
+        raise
+    server = Server(scene, host=host, port=port, listener=listener)
     # Without a display, Python would open a browser of the terminal.
     if open_browser and any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")):
         url = server.url_for_once()
@@ -364,9 +482,16 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong, with status 1, as the other commands do."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(1, f"{self.prog}: {message}\n")
+
+
 def make_parser() -> argparse.ArgumentParser:
-    """Of the command line of `isowave view`."""
-    parser = argparse.ArgumentParser(
+    """The command line of `isowave view`."""
+    parser = _Parser(
         prog="isowave view",
         description="Shows isosurfaces of a volume in a browser, until Ctrl-C ends it.",
     )
@@ -384,6 +509,13 @@ def make_parser() -> argparse.ArgumentParser:
     add("--host", default="127.0.0.1", help="to listen at; others than loopback are not encrypted")
     add("--port", type=int, default=0, help="0: a free one")
     add("--max-clients", type=int, default=16, help="that look at the same time")
+    add(
+        "--max-rays",
+        type=int,
+        default=MAX_RAYS,
+        help="of a client's picture: pixels x samples x (1 + ambient rays); larger pictures are "
+        "drawn smaller, which the page says [%(default)s]",
+    )
     add("--no-browser", action="store_true", help="only print the URL")
     return parser
 
@@ -418,12 +550,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             memory_budget=arguments.memory_budget,
             size=arguments.size,
             max_clients=arguments.max_clients,
+            max_rays=arguments.max_rays,
             host=arguments.host,
             port=arguments.port,
             open_browser=not arguments.no_browser,
         )
+    except KeyboardInterrupt:
+        return 130
     except Exception as error:  # of the library, of the socket
-        print(f"isowave view: {str(error).splitlines()[0]}", file=sys.stderr)
+        print(f"isowave view: {first_line(error)}", file=sys.stderr)
         return 1
     print(f"{server.url}\nCtrl-C ends it.", flush=True)
     if "SSH_CONNECTION" in os.environ:
@@ -432,7 +567,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     failure = wait_and_close(server)
     if failure is not None:
         print(f"isowave view: {failure}", file=sys.stderr)
-    return 0 if failure is None else 1
+    status = 0 if failure is None else 1
+    if server.scene.is_busy:
+        # A long pass, or a driver that compiles kernels, cannot be stopped, and Python would wait
+        # for its end.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    return status
 
 
 def wait_and_close(server: Server) -> str | None:
@@ -442,5 +584,8 @@ def wait_and_close(server: Server) -> str | None:
     except KeyboardInterrupt:
         pass
     failure = server.scene.failure
-    server.close()
+    try:
+        server.close()
+    except KeyboardInterrupt:  # once more
+        pass
     return failure

@@ -10,8 +10,9 @@
 //   status     state: starting, ready, failed; device, device_memory, memory_bytes,
 //              memory_budget, nbytes of the compressed volume
 //   histogram  counts of equally wide bins, range
-//   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, camera,
-//              isovalue, complete, passes, decoded_blocks, percent, ms, detail; and its bytes
+//   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, ambient,
+//              camera, isovalue, complete, passes, decoded_blocks, percent, ms, detail;
+//              reduced: why a finished one has fewer rays than its wish, or null; and its bytes
 //   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of
 //              the volume before compression; null: there is no surface. errors_are_stated: that
 //              is certain only if the errors are right that the volume's file states
@@ -495,6 +496,7 @@ class View {
     const rest = head.stage === "whole" || head.stage === "lossless";
     this.progress(rest ? 100 : head.percent ?? 50);
     if (rest) this.showFacts(head);
+    if (rest && head.reduced) this.note(head.reduced, "drawing");
     if (head.stage === "lossless") {
       this.lossless = { wish: head.wish, blob: new Blob([data], { type: "image/png" }) };
       if (this.wantsShot) this.download();
