@@ -20,8 +20,8 @@
 
 #include "core/api/guarded.hpp"
 #include "core/base/error.hpp"
-#include "core/ocl/arithmetic.hpp"
 #include "core/io/atomic_file.hpp"
+#include "core/ocl/arithmetic.hpp"
 #include "core/ocl/device.hpp"
 #include "core/ocl/driver_environment.hpp"
 #include "isowave/version.hpp"
