@@ -80,8 +80,13 @@ std::vector<Operands> arithmetic_operands() {
     Operands &given = operands[i];
     given = {number(), number(), number(), 0x1p-140f, random(), random()};
     if (i % 4 == 1) given.c = -(given.a * given.b);  // what is left is the product's rounding
-    // Half of an ulp of the product, and a little to one side: rounded twice, that is lost.
-    if (i % 4 == 2) given.c = std::ldexp(given.c, std::ilogb(given.a) + std::ilogb(given.b) - 24);
+    // The product lies halfway between two float32, and c decides. Rounded twice, c is lost.
+    if (i % 4 == 2) {
+      const auto odd = [&random] { return static_cast<float>(random() % 64 * 2 + 1); };
+      given.a = 1 + odd() * 0x1p-12f;
+      given.b = 1 + odd() * 0x1p-12f;
+      given.c = random() % 2 == 0 ? 0x1p-60f : -0x1p-60f;
+    }
   }
   return operands;
 }
