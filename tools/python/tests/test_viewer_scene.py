@@ -343,6 +343,26 @@ def test_small_pictures_of_others_come_in_bounded_time_and_the_large_one_in_the_
     assert (1, "whole") in slow.pictures
 
 
+def test_lossless_pictures_do_not_wait_for_a_long_picture_of_others() -> None:
+    clock, volume = Clock(), FakeVolume(passes=20)
+    scene = make_scene(volume, clock)
+    slow, other = Eye(scene), Eye(scene)
+
+    def before_pass(drawn: Drawn) -> None:
+        if drawn.size == (96, 72):
+            clock.now += 0.1
+            if drawn.passes == 19:
+                assert (1, "lossless") in other.pictures
+
+    volume.before_pass = before_pass
+    other.wish()
+    run(scene)
+    other.ack()
+    slow.wish(size=(96, 72))
+    run(scene)
+    assert [f.stopped for f in volume.frames if f.size == (96, 72)] == [False]
+
+
 def test_pictures_of_the_same_size_do_not_interrupt_each_other() -> None:
     clock, volume = Clock(), FakeVolume(passes=50)
     scene = make_scene(volume, clock)
@@ -654,7 +674,7 @@ def test_no_picture_has_more_rays_than_the_server_allows(wish: dict[str, Any]) -
         assert (head["size"], head["ambient"]) == (list(drawn.size), drawn.ambient)
         assert head["reduced"].startswith("The server draws at most 20,000 rays, 20,000 from")
         assert f"{drawn.size[0]} x {drawn.size[1]} pixels" in head["reduced"]
-        assert f"{drawn.ambient} ambient rays" in head["reduced"]
+        assert f", {drawn.ambient} ambient ray" in head["reduced"]
 
 
 def test_pictures_within_the_limits_are_drawn_as_they_are() -> None:
@@ -674,7 +694,7 @@ def test_camera_rays_have_a_limit_of_their_own() -> None:
     eye.wish(size=(8192, 8192), ambient=255)
     assert eye.client.wish is not None
     plan = scene._plan(eye.client.wish)
-    assert 0.99 * MAX_CAMERA_RAYS < plan.rays <= MAX_CAMERA_RAYS and plan.ambient == 3
+    assert 0.99 * MAX_CAMERA_RAYS < plan.rays <= MAX_CAMERA_RAYS and plan.ambient == 7
     owner = make_scene(FakeVolume(), Clock(), size=(8000, 8000))
     assert owner._plan(eye.client.wish).rays == 64_000_000, "the server's own size counts"
 
@@ -802,6 +822,36 @@ def test_others_get_pictures_while_a_larger_renderer_is_made() -> None:
     with changed:
         assert changed.wait_for(lambda: "whole" in shown, 60)
     may_end.set()
+    scene.close()
+
+
+def test_the_device_overtakes_the_host() -> None:
+    may_end, done = threading.Event(), threading.Event()
+
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        assert may_end.wait(60)
+        return None
+
+    def before_host_pass(drawn: Drawn) -> None:
+        """It would take 100 seconds."""
+        may_end.set()
+        threading.Event().wait(0.005)
+
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        if head.get("stage") == "whole":
+            done.set()
+
+    volume, by_host = FakeVolume(refuse=refuse), FakeVolume(20_000, before_host_pass)
+    host = by_host.renderer(device="host", size=(64, 48), samples=1, rays=True)
+    scene = Scene(volume, isovalue=80, make_camera=fake_camera, make_host=lambda v: host)
+    client = scene.join(post)
+    assert client is not None
+    fields: Any = dict(id=1, isovalue=80.0, size=(32, 32), view=None, color=(1, 1, 1), samples=1)
+    fields |= dict(background=(0, 0, 0), max_error=None, time_budget=1000.0, ambient=0)
+    scene.receive(client, Wish(**fields))  # within a time: without a first picture
+    assert done.wait(60)
+    assert [f.stopped for f in by_host.frames] == [True]
+    assert [f.stopped for f in volume.frames if f.outputs == ("rgb",)] == [False]
     scene.close()
 
 

@@ -17,7 +17,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Final
 
@@ -33,6 +33,7 @@ from .protocol import MAX_FLOAT32, VERSION, check
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
 FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
 PASS_SECONDS: Final = 0.06  # between pictures of passes
+SENDING_SHARE: Final = 4  # passes get so many times the time that their pictures take
 SETTLE_SECONDS: Final = 0.1  # after a first picture, for the next wish to come before the whole
 REST_SECONDS: Final = 0.12  # without a wish, until the lossless picture
 CERTAIN_SECONDS: Final = 0.4  # after the lossless picture, until its bounds are looked for
@@ -44,7 +45,7 @@ HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws mea
 GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smaller one is made
 CLOSE_SECONDS: Final = 0.5  # for threads to end; a pass may take longer
 MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
-MAX_CAMERA_RAYS: Final = 1 << 25  # of them, rays of the camera: each takes memory of the device
+MAX_CAMERA_RAYS: Final = 1 << 24  # of them, from the camera: memory, and how long a pass takes
 TOO_MANY_BUDGETS: Final = "the memory budget was changed too often: try again in a few seconds"
 
 Post = Callable[[dict[str, Any], bytes | None], None]
@@ -107,7 +108,9 @@ class _Frame:
     extent: Extent
     passes: int = 0
     percent: float = 0.0  # of its rays that have ended
-    last_sent: float = field(default=-math.inf)
+    by_host: bool = False
+    last_sent: float = -math.inf
+    sending_took: float = 0.0  # seconds of the last picture of a pass
     stopped: bool = False
 
 
@@ -363,15 +366,16 @@ class Scene:
         """One stage of a wish. Whatever goes wrong concerns this client alone."""
         with self._changed:
             renderer = self._renderer or self._host
+            extent = self._fitted(wish, stage)
         try:
             if stage is Stage.LOSSLESS:
                 self._encode_lossless(client, wish)
             elif renderer is None:
                 raise RuntimeError(self._failure)
             elif stage is Stage.CERTAIN:
-                self._send_bounds(renderer, client, wish)
+                self._send_bounds(renderer, client, wish, extent)
             elif renderer is self._host or not self._grow(wish, stage):
-                self._draw(renderer, client, wish, stage)
+                self._draw(renderer, client, wish, stage, extent)
         except Exception as error:  # of the library, or of its drivers
             self._wish_failed(client, wish, error)
 
@@ -381,15 +385,16 @@ class Scene:
                 client.stage = Stage.DONE
                 self._post_error(client, error, wish.id)
 
-    def _draw(self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage) -> None:
+    def _draw(
+        self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage, extent: Extent
+    ) -> None:
         began = self._clock()
         view = client.view or wish.view or home_view(renderer, wish)
         with self._changed:
             if client.wish is not wish:
                 return
             client.view = view
-        extent = self._fitted(wish, stage)
-        frame = _Frame(client, wish, stage, view, began, extent)
+        frame = _Frame(client, wish, stage, view, began, extent, by_host=renderer is self._host)
         image = renderer.render(
             wish.isovalue,
             camera=self._make_camera(view),
@@ -427,17 +432,24 @@ class Scene:
         frame.passes, frame.percent = so_far.passes, so_far.completed_percent
         now = self._clock()
         with self._changed:
-            if self._is_stale(frame) or self._gives_way(frame, now):
+            is_overtaken = frame.by_host and self._renderer is not None  # by the device
+            if self._is_stale(frame) or is_overtaken or self._gives_way(frame, now):
                 frame.stopped = True
                 return False
+            for other in self._clients:
+                if other.stage is Stage.LOSSLESS and other.wish is not None and now >= other.due:
+                    self._encode_lossless(other, other.wish)
+            # A large picture takes long to send: then passes get most of the time nevertheless.
+            wait = max(PASS_SECONDS, SENDING_SHARE * frame.sending_took)
             worth_it = (
                 frame.stage is Stage.WHOLE
-                and now - max(frame.began, frame.last_sent) >= PASS_SECONDS
+                and now - max(frame.began, frame.last_sent) >= wait
                 and self._in_flight(frame.client) < MAX_IN_FLIGHT
             )
         if worth_it:
-            frame.last_sent = now
             data = encode_jpeg(so_far.rgb)
+            frame.last_sent = self._clock()
+            frame.sending_took = frame.last_sent - now
             with self._changed:
                 if not self._is_stale(frame):
                     self._offer(frame.client, self._head(frame, "pass"), data, keep=False)
@@ -501,11 +513,12 @@ class Scene:
                 self._offer(client, {**head, "stage": "lossless", "format": "png"}, data, keep=True)
                 self._changed.notify_all()
 
-    def _send_bounds(self, renderer: RendererLike, client: Client, wish: Wish) -> None:
+    def _send_bounds(
+        self, renderer: RendererLike, client: Client, wish: Wish, extent: Extent
+    ) -> None:
         """How far the surface may be off, by the rays of a first picture: bounds take time."""
         if client.view is None:
             return
-        extent = self._fitted(wish, Stage.FIRST)
         pixels = extent.size[1] / wish.size[1]  # of the first picture, to one of the whole picture
         image = renderer.render(
             wish.isovalue,
@@ -718,10 +731,8 @@ class Scene:
             of_camera = min(self._first_ray_limit, self._max_rays)
             why = f"The server draws at most {self._max_rays:,} rays, {of_camera:,} from the camera"
         width, height = extent.size
-        return (
-            f"{why}: this picture has {width} x {height} pixels, {extent.samples**2} rays a pixel, "
-            f"{extent.ambient} ambient rays."
-        )
+        rays, ambient = _count(extent.samples**2, "ray"), _count(extent.ambient, "ambient ray")
+        return f"{why}: this picture has {width} x {height} pixels, {rays} a pixel, {ambient}."
 
     def _post_error(self, client: Client, error: Exception, wish: int | None) -> None:
         self._post(client, {"type": "error", "wish": wish, "message": first_line(error)})
@@ -877,6 +888,10 @@ def picture_of(image: ImageLike) -> NDArray[np.uint8]:
     rgb = image.rgb
     assert rgb is not None  # it was asked for
     return rgb
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'s' * (number != 1)}"
 
 
 def first_line(error: Exception) -> str:
