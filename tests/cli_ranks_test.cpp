@@ -268,6 +268,18 @@ TEST_F(CliRanks, CompressWhatOneProcessCompresses) {
   expect_same_file(spot, "--tolerance 0.4", 14);
 }
 
+TEST_F(CliRanks, KeepTheModeOfTheFileThatTheyReplace) {
+  const std::filesystem::path path = folder_ / "v.zfp";
+  test::write_file(path, std::string_view("old"));
+  constexpr auto kOwners = std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
+  std::filesystem::permissions(path, kOwners);
+  const ProgramResult run = run_command(
+      on_ranks(2, "convert generate:gyroid_32x32x32_uint8 --rate 4 -o " + quoted(path)));
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(read_file(path), "old");
+  EXPECT_EQ(std::filesystem::status(path).permissions(), kOwners);
+}
+
 /// What casts to float32 lose, and tiny values, count in the errors of all levels.
 TEST_F(CliRanks, CompressWithErrorsOfTheSource) {
   const std::string waves = write_raw<double>("float64", [](int x, int y, int z) {

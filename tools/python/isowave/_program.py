@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 from isowave import _loader
@@ -20,4 +21,5 @@ def main() -> int:
     if _loader.found["loader"] == str(_loader.BUNDLED_LOADER):
         folders = [str(_loader.BUNDLED_LOADER.parent), os.environ.get("LD_LIBRARY_PATH", "")]
         os.environ["LD_LIBRARY_PATH"] = ":".join(filter(None, folders))
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # Python ignores it, which a program inherits
     os.execv(PROGRAM, ["isowave", *arguments])

@@ -528,3 +528,11 @@ def test_command_is_the_program():
     assert isowave.__version__ in version.stdout
     failed = subprocess.run([command, "info", "missing.zfp"], capture_output=True, text=True)
     assert failed.returncode == 1 and failed.stderr.count("\n") == 1
+
+
+def test_command_ends_quietly_when_its_reader_does():
+    command = os.path.join(os.path.dirname(sys.executable), "isowave")
+    with subprocess.Popen([command, "man"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        run.stdout.close()
+        assert run.stderr.read() == b""
+    assert run.returncode == -signal.SIGPIPE
