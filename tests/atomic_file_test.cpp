@@ -108,11 +108,24 @@ TEST(OutputGroup, LeavesNothingWithoutCommit) {
   const TemporaryFolder folder;
   {
     OutputGroup group;
-    group.make_folders(folder / "new" / "er");
+    group.make_folder(folder / "new" / "er");
     write_and_commit(folder / "new" / "er" / "a", "1");
     write_and_commit(folder / "b", "2");
+    EXPECT_EQ(folder.num_files(), 0u);
   }
   EXPECT_EQ(folder.num_files(), 0u);
+}
+
+TEST(OutputGroup, MakesFoldersLast) {
+  const TemporaryFolder folder;
+  OutputGroup group;
+  group.make_folder(folder / "new" / "er");
+  write_and_commit(folder / "new" / "er" / "a", "1");
+  write_and_commit(folder / "b", "2");
+  EXPECT_EQ(folder.num_files(), 0u);
+  group.commit();
+  EXPECT_EQ(read_file(folder / "new" / "er" / "a"), "1");
+  EXPECT_EQ(folder.num_files(), 2u);
 }
 
 /// The third of three cannot take its place, since a folder has come there.

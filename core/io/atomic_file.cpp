@@ -6,6 +6,7 @@
 #include <sys/xattr.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -75,6 +76,8 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {
   } else if (errno != ENOENT) {
     fail(target, errno);
   }
+  folder_ = target_.has_parent_path() ? target_.parent_path() : ".";
+  if (const OutputGroup *group = OutputGroup::current()) folder_ = group->place_of(folder_);
   const int fd = open_temporary();
   if (fd < 0) fail(target_, errno);
   keep_permissions(target_, fd);
@@ -90,16 +93,14 @@ AtomicFile::AtomicFile(const fs::path &target) : target_(follow_links(target)) {
 void AtomicFile::choose_temporary_name() {
   static std::atomic<unsigned> next_id{0};
   // Not of the target's name, which may be as long as names may be.
-  temporary_ =
-      target_.parent_path() / fmt::format(".isowave.{}.{}.tmp", ::getpid(), next_id.fetch_add(1));
+  temporary_ = folder_ / fmt::format(".isowave.{}.{}.tmp", ::getpid(), next_id.fetch_add(1));
 }
 
 int AtomicFile::open_temporary() {
 #ifdef O_TMPFILE
   // commit() names the file through /proc.
   if (::access("/proc/self/fd", X_OK) == 0) {
-    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
-    const int fd = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666);
+    const int fd = ::open(folder_.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666);
     nameless_ = fd >= 0;
     if (nameless_) return fd;
   }
@@ -113,6 +114,7 @@ int AtomicFile::open_temporary() {
 
 AtomicFile::AtomicFile(AtomicFile &&other) noexcept
     : target_(std::move(other.target_)),
+      folder_(std::move(other.folder_)),
       temporary_(std::move(other.temporary_)),
       old_(std::move(other.old_)),
       file_(std::exchange(other.file_, nullptr)),
@@ -225,6 +227,14 @@ OutputGroup::~OutputGroup() {
   for (const fs::path &folder : std::views::reverse(folders_)) ::rmdir(folder.c_str());
 }
 
+fs::path OutputGroup::place_of(const fs::path &folder) const {
+  if (std::ranges::find(new_folders_, folder / "") == new_folders_.end()) return folder;
+  fs::path place = folder;
+  std::error_code failure;
+  while (place.has_parent_path() && !fs::exists(place, failure)) place = place.parent_path();
+  return fs::exists(place, failure) ? place : fs::path(".");
+}
+
 void OutputGroup::make_folders(const fs::path &folder) {
   fs::path made;
   for (const fs::path &part : folder) {
@@ -248,8 +258,9 @@ void OutputGroup::take(AtomicFile &&file) {
 }
 
 void OutputGroup::commit() {
-  for (const auto &file : files_) file->close();
   try {
+    for (const fs::path &folder : new_folders_) make_folders(folder);
+    for (const auto &file : files_) file->close();
     const bool alone = files_.size() == 1;
     for (const auto &file : files_) file->replace_target(!alone);
   } catch (...) {

@@ -76,7 +76,7 @@ class AtomicFile {
   void put_back() noexcept;
   void remove_old() noexcept;
 
-  std::filesystem::path target_, temporary_;
+  std::filesystem::path target_, folder_, temporary_;  ///< folder_: of the temporary file
   std::filesystem::path old_;  ///< other name of the file that the target was before
   std::FILE *file_ = nullptr;
   bool nameless_ =
@@ -100,11 +100,11 @@ class OutputGroup {
 
   /// Bytes of a file that was committed, whether or not the group has renamed it yet.
   std::uint64_t bytes_of(const std::filesystem::path &path) const;
-  /// Makes a folder, and those that it is to lie in.
-  ///
-  /// Throws  Error
-  void make_folders(const std::filesystem::path &folder);
-  /// Renames all files. If one cannot be renamed, all targets become again what they were.
+  /// Has commit() make a folder that is missing, and those that it is to lie in. Its files are kept
+  /// in the deepest one that exists, until then.
+  void make_folder(const std::filesystem::path &folder) { new_folders_.push_back(folder / ""); }
+  /// Makes the folders and renames all files. If one cannot be renamed, all targets become again
+  /// what they were.
   ///
   /// Throws  Error
   void commit();
@@ -112,10 +112,14 @@ class OutputGroup {
  private:
   friend class AtomicFile;
   void take(AtomicFile &&file);
+  /// Where the files of a folder are kept.
+  std::filesystem::path place_of(const std::filesystem::path &folder) const;
+  void make_folders(const std::filesystem::path &folder);
 
   static OutputGroup *current_;
   std::vector<std::unique_ptr<AtomicFile>> files_;
-  std::vector<std::filesystem::path> folders_;  ///< made by make_folders(), outermost first
+  std::vector<std::filesystem::path> new_folders_;  ///< to be made
+  std::vector<std::filesystem::path> folders_;      ///< made by commit(), outermost first
 };
 
 }  // namespace isowave::core

@@ -113,7 +113,7 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder,
 }
 
 void Outputs::make_folder() const {
-  if (!new_folder_.empty()) OutputGroup::current()->make_folders(new_folder_);
+  if (!new_folder_.empty()) OutputGroup::current()->make_folder(new_folder_);
 }
 
 }  // namespace isowave::core::tools

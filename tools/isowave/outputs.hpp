@@ -25,7 +25,7 @@ class Outputs {
   /// has such a name.
   void write_pictures(const std::string &option, const std::filesystem::path &folder,
                       const std::string &prefix);
-  /// As a part of the program's OutputGroup. Throws Error.
+  /// Has the program's OutputGroup make it.
   void make_folder() const;
 
  private:
