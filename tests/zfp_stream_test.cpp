@@ -136,7 +136,9 @@ TEST(ZfpFile, ZfpsOwnToolDecodesIt) {
 
 TEST(ZfpFile, KeepsWhatZfpCannotSay) {
   const TemporaryFolder folder;
-  ArrayReader reader({5, 6, 7}, wavy({5, 6, 7}));
+  std::vector<float> whole = wavy({5, 6, 7});
+  for (float &voxel : whole) voxel = std::rint(100 * voxel);
+  ArrayReader reader({5, 6, 7}, whole);
   VolumeInfo &info = reader.mutable_info();
   info.spacing = {0.1, 2.0 / 3.0, 1e-7};
   info.origin = {-1e9, 0.3, 5};

@@ -15,6 +15,7 @@
 #include "core/zfp/libzfp.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_trailer.hpp"
+#include "kernels_cl/portable/block_bound.h"
 
 namespace isowave::core {
 namespace fs = std::filesystem;
@@ -199,12 +200,19 @@ class ZfpFileReader {
     return cut;
   }
 
-  /// A block's bound is that of its voxels' errors, so the largest one is not below theirs.
+  /// A block's bound is that of its voxels' errors: the largest is not below theirs. Nor is it
+  /// above their quotient by the smallest share, and a step between codes.
   void check_errors(const CompressedVolume &volume) const {
     if (is_level_ || volume.bounds.codes.empty() || !volume.max_voxel_error) return;
     const double largest = double{largest_bound(volume.bounds)};
     if (*volume.max_voxel_error > largest) {
       fail("broken trailer: a voxel is off by {}, and no block by more than {}",
+           *volume.max_voxel_error, largest);
+    }
+    constexpr double kStep = 17.0 / 16.0 * (1 + 0x1p-20);
+    const double most = kStep * *volume.max_voxel_error / double{bound_share(0)};
+    if (volume.bounds.by_place && volume.bounds.exponent > kMinBoundExponent && largest > most) {
+      fail("broken trailer: no voxel is off by more than {}, and a block by {}",
            *volume.max_voxel_error, largest);
     }
   }

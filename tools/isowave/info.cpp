@@ -170,8 +170,8 @@ void add_info(CLI::App &app) {
   command->add_flag("--json", options->json, "print JSON");
   command->add_flag(
       "--no-scan", options->no_scan,
-      "look at the header only: no value range, no checksum of the data; nor is a .zfp "
-      "file decoded to check what it says of its values and levels of detail");
+      "look at the header only: no value range, no checksum of the data, no check of what "
+      "a .zfp file says of its voxels");
   add_volume_options(*command, options->volume);
   command->callback([options] { run(*options); });
 }
