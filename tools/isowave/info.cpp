@@ -158,7 +158,7 @@ void run(const InfoArgs &options) {
     fmt::print("{}", json_text(result));
     return;
   }
-  for (const auto &[key, value] : result.items()) fmt::print("{:<15}{}\n", key, to_text(value));
+  for (const auto &[key, value] : result.items()) fmt::print("{:<16}{}\n", key, to_text(value));
 }
 
 }  // namespace
