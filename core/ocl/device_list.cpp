@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/base/error.hpp"
+#include "core/base/fork.hpp"
 #include "core/base/text.hpp"
 #include "core/ocl/pocl_environment.hpp"
 
@@ -110,6 +111,8 @@ void append_devices(const cl::Platform &platform, std::vector<ListedDevice> &res
 }
 
 std::vector<ListedDevice> enumerate() {
+  check_not_forked();
+  begin_threads();  // of drivers
   std::vector<cl::Platform> platforms;
   prepare_for_pocl();  // before a driver is loaded
   try {
