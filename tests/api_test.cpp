@@ -3,12 +3,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <isowave/isowave.hpp>
 #include <map>
+#include <optional>
 #include <thread>
 
 #include "core/ocl/device.hpp"
@@ -402,6 +406,109 @@ TEST_P(ApiOnDevice, FramesCanBeWatchedAndStopped) {
   EXPECT_NE(stopped.picture, picture);
   request.on_pass = {};
   EXPECT_EQ(renderer.render(request).picture, picture);
+}
+
+TEST_P(ApiOnDevice, ThreadsLookAtAFrameInTurns) {
+  const std::shared_ptr<Device> device = open_device(selector());
+  Renderer renderer(device, sphere(), {.largest = {64, 48, 1}, .cache_blocks = 8});
+  FrameRequest request = small_request(renderer);
+  request.on_pass = [&](const Progress &progress) {
+    const std::vector<std::uint8_t> picture = progress.picture();
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < 3; ++i)
+      threads.emplace_back([&] { EXPECT_EQ(progress.picture(), picture); });
+    threads.clear();
+    return true;
+  };
+  const Frame watched = renderer.render(request);
+  request.on_pass = {};
+  EXPECT_EQ(renderer.render(request).depth, watched.depth);
+}
+
+TEST_P(ApiOnDevice, WhatIsAtWorkIsNotUsedInItsOnPass) {
+  const std::shared_ptr<Device> device = open_device(selector());
+  Renderer renderer(device, sphere(), {.largest = {64, 48, 1}});
+  HostRenderer host(renderer.volume());
+  FrameRequest request = small_request(renderer);
+  std::optional<Renderer> other(std::in_place, device, sphere(),
+                                RendererOptions{.largest = {8, 8, 1}});
+  int num_calls = 0;
+  request.on_pass = [&](const Progress &) {
+    ++num_calls;
+    for (const auto &call : std::vector<std::function<void()>>{
+             [&] { renderer.camera(0.6f); }, [&] { renderer.render(request); },
+             [&] {
+               Renderer(device, sphere(), {.largest = {8, 8, 1}});
+             },
+             [&] { extract(device, sphere(), 0.6f); }})
+      EXPECT_THAT(error_of(call), HasSubstr("at work"));
+    other.reset();  // buffers of others may go
+    EXPECT_GT(device->memory_in_use(), 0u);
+    return false;
+  };
+  renderer.render(request);
+  EXPECT_EQ(num_calls, 1);
+  request.on_pass = [&](const Progress &) {
+    ++num_calls;
+    EXPECT_THAT(error_of([&] { host.camera(0.6f); }), HasSubstr("at work"));
+    EXPECT_THAT(error_of([&] { host.render(request); }), HasSubstr("at work"));
+    return false;
+  };
+  host.render(request);
+  EXPECT_EQ(num_calls, 2);
+}
+
+/// In a forked process, in which no more than this is done.
+int status_in_fork(const std::function<bool()> &is_right) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(60);  // a hang ends it
+    ::_exit(is_right() ? 0 : 1);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  return status;
+}
+
+TEST_P(ApiOnDevice, ForkedProcessesGetAnError) {
+  const std::shared_ptr<Device> device = open_device(selector());
+  auto renderer =
+      std::make_unique<Renderer>(device, sphere(), RendererOptions{.largest = {64, 48, 1}});
+  const FrameRequest request = small_request(*renderer);
+  renderer->render(request);
+  const auto refuses = [](const auto &call) {
+    return error_of(call).find("forked") != std::string::npos;
+  };
+  EXPECT_EQ(status_in_fork([&] { return refuses([&] { renderer->render(request); }); }), 0);
+  EXPECT_EQ(status_in_fork([&] { return refuses([&] { renderer->camera(0.6f); }); }), 0);
+  EXPECT_EQ(status_in_fork([&] { return refuses([] { open_device(); }); }), 0);
+  EXPECT_EQ(status_in_fork([&] { return refuses([] { list_devices(); }); }), 0);
+  EXPECT_EQ(status_in_fork([&] {
+              return refuses([&] { extract(renderer->device(), renderer->volume(), 0.6f); });
+            }),
+            0);
+  EXPECT_EQ(status_in_fork([&] {
+              renderer.reset();
+              return true;
+            }),
+            0);
+  const std::vector<float> voxels = sphere()->decode();
+  EXPECT_EQ(status_in_fork([&] { return sphere()->decode() == voxels; }), 0) << "of the host";
+}
+
+TEST_P(ApiOnDevice, HitsBeyondFloat32AreAnError) {
+  const std::shared_ptr<Device> device = open_device(selector());
+  Renderer renderer(device, sphere(), {.largest = {64, 48, 1}, .with_rays = true});
+  HostRenderer host(renderer.volume());
+  const auto ray = [](double length) { return Ray{{15, 26, 0}, {0, 0, length}}; };
+  const std::vector<Ray> near{ray(1e-36), ray(1e-36)}, far{ray(1), ray(1e-39)};
+  const Frame frame = renderer.cast_rays(near, 0.6f);
+  EXPECT_EQ(host.cast_rays(near, 0.6f).depth, frame.depth);
+  EXPECT_TRUE(std::isfinite(frame.depth[0])) << frame.depth[0];
+  EXPECT_THAT(error_of([&] { renderer.cast_rays(far, 0.6f); }), HasSubstr("ray 1 "));
+  EXPECT_THAT(error_of([&] { host.cast_rays(far, 0.6f); }), HasSubstr("ray 1 "));
+  EXPECT_EQ(host.cast_rays({}, 0.6f).columns, 0u);
+  EXPECT_EQ(renderer.cast_rays({}, 0.6f).columns, 0u);
 }
 
 TEST_P(ApiOnDevice, RenderersKeepWhatTheyNeed) {

@@ -21,7 +21,7 @@ constexpr ImageSize kSize{128, 96};
 /// The renderer of a device cannot be made while others have the device.
 class QuickRendererOnDevice : public testing::TestWithParam<core::ocl::DeviceInfo> {
  protected:
-  std::unique_lock<std::mutex> busy_device() const {
+  std::unique_lock<Turns> busy_device() const {
     return std::unique_lock(device_->implementation().mutex);
   }
   /// A renderer of one thread on the host, so that its frames have several bands.
@@ -131,15 +131,31 @@ TEST_P(QuickRendererOnDevice, WhatTheHostCannotDrawWaits) {
 
 TEST_P(QuickRendererOnDevice, ErrorsOfTheDeviceComeWithTheNextFrame) {
   std::unique_lock busy = busy_device();
-  QuickRenderer renderer = make({.largest = kSize, .memory_budget = 1000});
+  QuickRenderer renderer = make();
   const FrameRequest wanted = request();
   EXPECT_NO_THROW(renderer.render(wanted));
+  renderer.give_up();
   busy.unlock();
-  EXPECT_THAT(error_of([&] { renderer.wait(); }), HasSubstr("1000"));
+  EXPECT_THAT(error_of([&] { renderer.wait(); }), HasSubstr("no longer wanted"));
   EXPECT_TRUE(renderer.ready());
-  EXPECT_THAT(error_of([&] { renderer.render(wanted); }), HasSubstr("1000"));
-  EXPECT_THAT(error_of([&] { renderer.camera(10); }), HasSubstr("1000"));
+  EXPECT_THAT(error_of([&] { renderer.render(wanted); }), HasSubstr("no longer wanted"));
+  EXPECT_THAT(error_of([&] { renderer.camera(10); }), HasSubstr("no longer wanted"));
+}
+
+TEST_P(QuickRendererOnDevice, TheHostDrawsNothingThatTheDeviceWouldRefuse) {
+  EXPECT_THAT(error_of([&] { make({.largest = kSize, .memory_budget = 1000}); }),
+              HasSubstr("1000"));
   EXPECT_THAT(error_of([&] { QuickRenderer(nullptr, volume_); }), HasSubstr("needs a device"));
+}
+
+TEST_P(QuickRendererOnDevice, IsNotUsedInItsOwnOnPass) {
+  QuickRenderer renderer = make();
+  FrameRequest wanted = request();
+  wanted.on_pass = [&](const Progress &) {
+    EXPECT_THAT(error_of([&] { renderer.camera(10); }), HasSubstr("at work"));
+    return true;
+  };
+  renderer.render(wanted);
 }
 
 /// Whether it has begun to compile or not.

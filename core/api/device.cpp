@@ -25,7 +25,10 @@ Device::Implementation::Implementation(const core::ocl::DeviceInfo &device_info,
 
 Device::Device(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
-Device::~Device() = default;
+/// In a forked process, a driver would wait for its threads.
+Device::~Device() {
+  if (core::is_forked()) static_cast<void>(implementation_.release());
+}
 
 const DeviceInfo &Device::info() const {
   return implementation_->info;
@@ -36,12 +39,12 @@ const std::string &Device::notice() const {
 }
 
 double Device::compile_ms() const {
-  const std::lock_guard lock(implementation_->mutex);
+  const TurnOrMine turn(implementation_->mutex);
   return implementation_->device.compile_ms();
 }
 
 std::uint64_t Device::memory_in_use() const {
-  const std::lock_guard lock(implementation_->mutex);
+  const TurnOrMine turn(implementation_->mutex);
   return implementation_->device.ledger().current();
 }
 

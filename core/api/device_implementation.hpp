@@ -1,8 +1,7 @@
 #pragma once
 // Private to core/api: what is behind isowave::Device.
 
-#include <mutex>
-
+#include "core/api/turns.hpp"
 #include "core/ocl/device.hpp"
 #include "isowave/device.hpp"
 
@@ -12,7 +11,7 @@ struct Device::Implementation {
   Implementation(const core::ocl::DeviceInfo &device_info, const DeviceOptions &options);
 
   DeviceInfo info;
-  mutable std::mutex mutex;  ///< one thread at a time drives the device
+  mutable Turns mutex;  ///< one thread at a time drives the device
   core::ocl::Device device;
 };
 

@@ -155,6 +155,53 @@ void check_bounds(const FrameRequest &request, const RendererOptions &options) {
     throw core::Error("bounds of the error need a renderer that was made with_bounds");
 }
 
+bool ProgressInTurns::show(const core::PassStats &pass,
+                           const std::function<bool(const Progress &)> &on_pass) {
+  ++passes_;  // other threads see both only while it is open
+  completed_percent_ = pass.completed_percent;
+  set_open(true);
+  bool goes_on = false;
+  try {
+    goes_on = on_pass(*this);
+  } catch (...) {
+    set_open(false);
+    throw;
+  }
+  set_open(false);
+  return goes_on;
+}
+
+void ProgressInTurns::set_open(bool is_open) {
+  const std::lock_guard lock(mutex_);
+  is_open_ = is_open;
+}
+
+std::unique_lock<std::mutex> ProgressInTurns::turn() const {
+  std::unique_lock lock(mutex_);
+  if (!is_open_) throw core::Error("this pass is over: look at it within on_pass");
+  return lock;
+}
+
+std::uint32_t ProgressInTurns::passes() const {
+  const auto lock = turn();
+  return passes_;
+}
+
+double ProgressInTurns::completed_percent() const {
+  const auto lock = turn();
+  return completed_percent_;
+}
+
+ImageSize ProgressInTurns::size() const {
+  const auto lock = turn();
+  return current_size();
+}
+
+std::vector<std::uint8_t> ProgressInTurns::picture() const {
+  const auto lock = turn();
+  return draw_picture();
+}
+
 DetailChoice public_choice(const core::DetailChoice &choice) {
   return {choice.detail.voxel_pixels, choice.detail.voxel_error, choice.reachable, choice.advice};
 }
@@ -190,6 +237,14 @@ void fill_frame(const FrameRequest &request, const std::vector<core::HitRecord> 
 
 Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::CompressedVolume &volume,
                     bool with_levels) {
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (std::isinf(hits[i].t) && hits[i].block_id != ISO_INVALID_ID) {
+      throw core::Error(
+          "ray {} hits the surface more than 3.4e38 lengths of its direction away, which float32 "
+          "does not hold: give a longer direction",
+          i);
+    }
+  }
   Frame frame;
   frame.rows = 1;
   frame.columns = static_cast<std::uint32_t>(hits.size());

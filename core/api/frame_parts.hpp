@@ -1,6 +1,8 @@
 #pragma once
 // Private to core/api: requests and frames of its users and of core, whichever renderer draws.
 
+#include <functional>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -23,6 +25,31 @@ core::FrameRequest core_request(const FrameRequest &request);
 /// Throws  core::Error: bounds, or a choice of detail, that cannot be had
 void check_bounds(const FrameRequest &request, const RendererOptions &options);
 
+/// A Progress that any number of threads may look at: pictures take turns, and between two calls of
+/// on_pass, while the frame is drawn, there are none.
+class ProgressInTurns : public Progress {
+ public:
+  /// Calls on_pass() with this. Waits for other threads' pictures before it returns.
+  bool show(const core::PassStats &pass, const std::function<bool(const Progress &)> &on_pass);
+
+  std::uint32_t passes() const final;
+  double completed_percent() const final;
+  ImageSize size() const final;
+  std::vector<std::uint8_t> picture() const final;
+
+ private:
+  virtual ImageSize current_size() const = 0;
+  virtual std::vector<std::uint8_t> draw_picture() const = 0;
+
+  std::unique_lock<std::mutex> turn() const;
+  void set_open(bool is_open);
+
+  mutable std::mutex mutex_;
+  bool is_open_ = false;
+  std::uint32_t passes_ = 0;
+  double completed_percent_ = 0;
+};
+
 DetailChoice public_choice(const core::DetailChoice &choice);
 
 /// Fills in the frame's size and statistics.
@@ -31,6 +58,8 @@ void describe_frame(const FrameRequest &request, const core::FrameStats &stats, 
 std::vector<core::WorldRay> world_rays(std::span<const Ray> rays);
 
 /// One row: what rays of any origin hit.
+///
+/// Throws  core::Error: a hit is too many lengths of its direction away
 Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::CompressedVolume &volume,
                     bool with_levels);
 

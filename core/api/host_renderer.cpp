@@ -7,6 +7,7 @@
 #include "core/api/convert.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
+#include "core/api/turns.hpp"
 #include "core/api/volume_implementation.hpp"
 #include "core/host/host_renderer.hpp"
 
@@ -27,28 +28,22 @@ void check(const FrameRequest &request) {
 }
 
 /// The frame at work, for on_pass.
-class HostProgress : public Progress {
+class HostProgress : public ProgressInTurns {
  public:
   HostProgress(const core::HostRenderer &renderer, const FrameRequest &request)
       : renderer_(renderer),
         size_(request.size),
         appearance_(core_appearance(request.appearance)) {}
 
-  void end_pass(const core::PassStats &pass) {
-    ++passes_;
-    completed_percent_ = pass.completed_percent;
-  }
-  std::uint32_t passes() const override { return passes_; }
-  double completed_percent() const override { return completed_percent_; }
-  ImageSize size() const override { return size_; }
-  std::vector<std::uint8_t> picture() const override { return renderer_.shade(appearance_).pixels; }
-
  private:
+  ImageSize current_size() const override { return size_; }
+  std::vector<std::uint8_t> draw_picture() const override {
+    return renderer_.shade(appearance_).pixels;
+  }
+
   const core::HostRenderer &renderer_;
   ImageSize size_;
   core::Appearance appearance_;
-  std::uint32_t passes_ = 0;
-  double completed_percent_ = 0;
 };
 
 }  // namespace
@@ -61,7 +56,7 @@ struct HostRenderer::Implementation {
   Frame draw(const FrameRequest &request);
 
   std::shared_ptr<const Volume> volume;
-  mutable std::mutex mutex;  ///< one frame at a time
+  mutable Turns mutex;  ///< one frame at a time
   core::HostRenderer renderer;
 };
 
@@ -71,8 +66,7 @@ Frame HostRenderer::Implementation::draw(const FrameRequest &request) {
   HostProgress progress(renderer, request);
   if (request.on_pass) {
     wanted.on_pass = [&](const core::PassStats &pass) {
-      progress.end_pass(pass);
-      return request.on_pass(progress);
+      return progress.show(pass, request.on_pass);
     };
   }
   Frame frame;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/api/guarded.hpp"
+#include "core/api/turns.hpp"
 #include "core/base/error.hpp"
 
 namespace isowave {
@@ -31,7 +32,7 @@ struct QuickRenderer::Implementation {
   std::shared_ptr<const Volume> volume;
   ImageSize size;  ///< of the largest picture
   HostRendererOptions host_options;
-  std::mutex mutex;                  ///< one frame at a time
+  Turns mutex;                       ///< one frame at a time
   std::optional<HostRenderer> host;  ///< from the first frame on that the host draws
   bool has_host = true;              ///< false: the volume cannot be drawn there
   // Written by the thread that makes the renderer, and read by others once done is true.
@@ -57,6 +58,7 @@ void QuickRenderer::Implementation::make(const std::shared_ptr<Device> &device,
 
 /// Waits for it.
 Renderer &QuickRenderer::Implementation::device_renderer() {
+  core::check_not_forked();
   done.wait(false);
   if (failure) std::rethrow_exception(failure);
   return made.value();
@@ -79,6 +81,10 @@ HostRenderer *QuickRenderer::Implementation::host_renderer() {
 }
 
 Frame QuickRenderer::Implementation::draw(const FrameRequest &request) {
+  if (done) {
+    host.reset();
+    return device_renderer().render(request);
+  }
   HostRenderer *on_host = HostRenderer::can_draw(request) ? host_renderer() : nullptr;
   if (on_host == nullptr) return device_renderer().render(request);
   FrameRequest wanted = request;
@@ -96,12 +102,16 @@ QuickRenderer::QuickRenderer(std::shared_ptr<Device> device, std::shared_ptr<con
                              const HostRendererOptions &host_options) {
   core::guarded("making a renderer", [&] {
     if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
+    Renderer::check_options(*device, *volume, options);
     implementation_ = std::make_unique<Implementation>(std::move(device), std::move(volume),
                                                        options, host_options);
   });
 }
 
-QuickRenderer::~QuickRenderer() = default;
+/// In a forked process, the thread that makes the renderer is not there.
+QuickRenderer::~QuickRenderer() {
+  if (core::is_forked()) static_cast<void>(implementation_.release());
+}
 QuickRenderer::QuickRenderer(QuickRenderer &&) noexcept = default;
 QuickRenderer &QuickRenderer::operator=(QuickRenderer &&) noexcept = default;
 
@@ -126,6 +136,10 @@ Camera QuickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
 
 bool QuickRenderer::ready() const {
   return implementation_->done;
+}
+
+void QuickRenderer::give_up() {
+  implementation_->maker.request_stop();
 }
 
 void QuickRenderer::wait() const {

@@ -16,6 +16,7 @@
 #include "core/api/volume_implementation.hpp"
 #include "core/io/file_name.hpp"
 #include "core/render/renderer.hpp"
+#include "core/render/renderer_options.hpp"
 #include "core/render/time_budget.hpp"
 
 namespace isowave {
@@ -68,28 +69,22 @@ struct Renderer::Implementation {
 namespace {
 
 /// The frame at work, for on_pass.
-class ProgressOf : public Progress {
+class ProgressOf : public ProgressInTurns {
  public:
   ProgressOf(core::Renderer &renderer, const core::Appearance &appearance)
       : renderer_(renderer), appearance_(appearance) {}
 
-  void end_pass(const core::PassStats &pass) {
-    ++passes_;
-    completed_percent_ = pass.completed_percent;
-  }
-  std::uint32_t passes() const override { return passes_; }
-  double completed_percent() const override { return completed_percent_; }
-  ImageSize size() const override {
+ private:
+  ImageSize current_size() const override {
     const core::ImageSize size = renderer_.size();
     return {size.width, size.height, size.samples};
   }
-  std::vector<std::uint8_t> picture() const override { return renderer_.shade(appearance_).pixels; }
+  std::vector<std::uint8_t> draw_picture() const override {
+    return renderer_.shade(appearance_).pixels;
+  }
 
- private:
   core::Renderer &renderer_;
   core::Appearance appearance_;
-  std::uint32_t passes_ = 0;
-  double completed_percent_ = 0;
 };
 
 /// Has before_kernel called for each kernel that is compiled while this lives.
@@ -127,8 +122,7 @@ void Renderer::Implementation::draw_hits(const FrameRequest &request, core::Fram
                                          Frame &frame) {
   ProgressOf progress(renderer, core_appearance(request.appearance));
   const core::OnPass on_pass = [&](const core::PassStats &pass) {
-    progress.end_pass(pass);
-    return request.on_pass(progress);
+    return progress.show(pass, request.on_pass);
   };
   if (request.time_budget_ms) {
     if (request.on_pass) wanted.on_pass = on_pass;
@@ -191,6 +185,13 @@ Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume>
   });
 }
 
+void Renderer::check_options(const Device &device, const Volume &volume,
+                             const RendererOptions &options) {
+  const core::ocl::Device &on = device.implementation().device;
+  const core::CompressedVolume &compressed = volume.implementation().volume;
+  core::make_plan(on, compressed, core::checked(core_options(options, volume), compressed, on));
+}
+
 Renderer::~Renderer() {
   release();
 }
@@ -201,11 +202,16 @@ Renderer &Renderer::operator=(Renderer &&other) noexcept {
   return *this;
 }
 
-/// Buffers go while no other thread drives the device, which must outlive the lock.
+/// Buffers go while no other thread drives the device, which must outlive the lock. In a forked
+/// process all is left as it is: a driver would wait for its threads.
 void Renderer::release() noexcept {
   if (!implementation_) return;
+  if (core::is_forked()) {
+    static_cast<void>(implementation_.release());
+    return;
+  }
   const std::shared_ptr<Device> device = implementation_->device;
-  const std::lock_guard lock(device->implementation().mutex);
+  const TurnOrMine turn(device->implementation().mutex);
   implementation_.reset();
 }
 

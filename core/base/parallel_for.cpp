@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "core/base/fork.hpp"
+
 namespace isowave::core {
 
 std::uint32_t thread_count(std::uint32_t requested) {
@@ -16,6 +18,11 @@ std::uint32_t thread_count(std::uint32_t requested) {
 
 void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,
                   const std::function<void(std::uint64_t item, std::uint32_t thread)> &body) {
+  if (is_forked()) {  // TBB's threads are not there
+    for (std::uint64_t item = 0; item < num_items; ++item) body(item, 0);
+    return;
+  }
+  begin_threads();
   // An arena of its own, so that a thread's number is below the count whoever calls. More threads
   // than processors do not help, and TBB warns of them.
   tbb::task_arena arena(static_cast<int>(std::min(thread_count(num_threads), thread_count(0))));

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/base/error.hpp"
+#include "core/base/fork.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/base/text.hpp"
 #include "core/ocl/driver_environment.hpp"
@@ -156,7 +157,9 @@ bool has_room_for_driver() {
 }
 
 std::vector<ListedDevice> enumerate() {
+  check_not_forked();
   if (!has_room_for_driver()) return {};
+  begin_threads();  // of drivers
   std::vector<cl::Platform> platforms;
   prepare_for_drivers();  // before a driver is loaded
   try {

@@ -4,6 +4,9 @@
 // The GIL is released wherever the library works. What waits for a device's lock must not hold the
 // GIL, since the thread that has the lock may wait for the GIL to report a pass; that goes for
 // destructors, too.
+//
+// When Python ends, its daemon threads go on. One that asks for the GIL then is ended within C++,
+// which aborts the process; one that still draws crashes in drivers that are gone. See PythonsEnd.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -14,12 +17,20 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cxxabi.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <cstring>
 #include <isowave/isowave.hpp>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -52,6 +63,158 @@ auto reader_of(const nb::dict &options) {
   };
 }
 
+/// Lets the library's work in other threads come to an end before Python does: frames after the
+/// pass at hand, compression after the layer, renderers after the kernel. A thread that was at it
+/// never returns to Python.
+class PythonsEnd {
+ public:
+  static PythonsEnd &instance() {
+    static auto *end = new PythonsEnd;  // threads may need it for as long as the process lives
+    return *end;
+  }
+
+  /// Whether work is to stop.
+  bool is_near() {
+    const std::lock_guard lock(mutex_);
+    return is_near_ && !is_own();
+  }
+  /// Called with the GIL, by Python, before it ends. Waits for work without callbacks, and for a
+  /// second at most for callbacks.
+  void come() {
+    const nb::gil_scoped_release no_gil;
+    std::unique_lock lock(mutex_);
+    ending_thread_ = std::this_thread::get_id();
+    is_near_ = true;
+    for (isowave::QuickRenderer *renderer : being_made_) renderer->give_up();
+    if (process_ != ::getpid()) {  // a forked one, without the threads that are counted
+      is_over_ = true;
+      return;
+    }
+    const auto latest = std::chrono::steady_clock::now() + std::chrono::seconds(1);
+    changed_.wait_until(lock, latest, [&] { return num_working_ == 0 && num_in_callbacks_ == 0; });
+    changed_.wait(lock, [&] { return num_working_ == 0; });
+    for (isowave::QuickRenderer *renderer : being_made_) {
+      try {
+        renderer->wait();
+      } catch (const Error &) {  // it was given up
+      }
+    }
+    is_over_ = true;
+  }
+
+  /// The library begins to work in this thread, which has left the GIL. May not return.
+  void begin_work() {
+    std::unique_lock lock(mutex_);
+    if (is_over_ || (is_near_ && callback_depth() == 0)) stay_if_foreign(lock);
+    ++num_working_;
+  }
+  /// The work is done, and the thread is going to take the GIL. May not return.
+  void before_gil() {
+    std::unique_lock lock(mutex_);
+    if (!is_near_ || is_own() || (callback_depth() > 0 && !is_over_)) return;
+    --num_working_;
+    changed_.notify_all();
+    stay_if_foreign(lock);
+  }
+  /// The thread has the GIL.
+  void end_work() {
+    const std::lock_guard lock(mutex_);
+    --num_working_;
+    changed_.notify_all();
+  }
+
+  /// The library's work calls Python's code, with the GIL.
+  void begin_callback() {
+    const std::lock_guard lock(mutex_);
+    --num_working_, ++num_in_callbacks_, ++callback_depth();
+    changed_.notify_all();
+  }
+  /// Back in the library's work, still with the GIL. May not return.
+  void end_callback() {
+    std::unique_lock lock(mutex_);
+    --num_in_callbacks_, --callback_depth();
+    if (is_over_ && !is_own()) {
+      PyEval_SaveThread();
+      stay_if_foreign(lock);
+    }
+    ++num_working_;
+  }
+  /// Keeps this thread, which Python wants to end within a callback, for as long as the process
+  /// lives: C++ cannot be left so.
+  [[noreturn]] static void stay() {
+    for (;;) ::pause();
+  }
+
+  void begin_making(isowave::QuickRenderer &renderer) {
+    const std::lock_guard lock(mutex_);
+    being_made_.insert(&renderer);
+    if (is_near_) renderer.give_up();
+  }
+  void end_making(isowave::QuickRenderer &renderer) {
+    const std::lock_guard lock(mutex_);
+    being_made_.erase(&renderer);
+  }
+
+ private:
+  bool is_own() const { return ending_thread_ == std::this_thread::get_id(); }
+  static int &callback_depth() {
+    thread_local int depth = 0;
+    return depth;
+  }
+  void stay_if_foreign(std::unique_lock<std::mutex> &lock) {
+    if (is_own()) return;
+    lock.unlock();
+    stay();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  const pid_t process_ = ::getpid();
+  std::thread::id ending_thread_;
+  bool is_near_ = false, is_over_ = false;
+  int num_working_ = 0;  ///< threads that work without the GIL, or wait for it afterwards
+  int num_in_callbacks_ = 0;
+  std::set<isowave::QuickRenderer *> being_made_;
+};
+
+/// The library works in this thread without the GIL.
+class WithoutGil {
+ public:
+  WithoutGil() : state_(PyEval_SaveThread()) { PythonsEnd::instance().begin_work(); }
+  ~WithoutGil() {
+    PythonsEnd::instance().before_gil();
+    PyEval_RestoreThread(state_);
+    PythonsEnd::instance().end_work();
+  }
+  WithoutGil(const WithoutGil &) = delete;
+  WithoutGil &operator=(const WithoutGil &) = delete;
+
+ private:
+  PyThreadState *state_;
+};
+
+/// Python's code runs in this thread, which is at the library's work.
+class InCallback {
+ public:
+  InCallback() { PythonsEnd::instance().begin_callback(); }
+  ~InCallback() { PythonsEnd::instance().end_callback(); }
+  InCallback(const InCallback &) = delete;
+  InCallback &operator=(const InCallback &) = delete;
+
+ private:
+  nb::gil_scoped_acquire gil_;
+};
+
+/// Calls a function of Python's.
+template <class... Args>
+nb::object call(const nb::callable &function, const Args &...args) {
+  try {
+    return function(args...);
+  } catch (const abi::__forced_unwind &) {  // Python has ended
+    PythonsEnd::stay();
+  }
+}
+
 /// Keeps the first exception of Python's that a callback raises, since the library makes an Error
 /// of what leaves a callback, and raises it again when the library has returned.
 class Callbacks {
@@ -60,7 +223,8 @@ class Callbacks {
   /// something, or a signal came (Ctrl-C).
   template <class Work>
   bool run(const Work &work) {
-    const nb::gil_scoped_acquire gil;
+    if (PythonsEnd::instance().is_near()) return false;
+    const InCallback callback;
     if (raised_) return false;
     try {
       work();
@@ -74,7 +238,7 @@ class Callbacks {
   template <class Work>
   auto without_gil(const Work &work) {
     try {
-      const nb::gil_scoped_release no_gil;
+      const WithoutGil no_gil;
       return work();
     } catch (...) {
       if (!raised_) throw;
@@ -97,7 +261,7 @@ struct Stopped {};
 template <class T>
 struct DestroyWithoutGil {
   void operator()(T *object) const {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     delete object;
   }
 };
@@ -137,7 +301,7 @@ void report_to(Callbacks &callbacks, const std::optional<nb::callable> &progress
                isowave::Compression &compression) {
   compression.progress = [&callbacks, &progress](std::string_view what, double done) {
     const bool goes_on = callbacks.run([&] {
-      if (progress) (*progress)(std::string(what), done);
+      if (progress) call(*progress, std::string(what), done);
     });
     if (!goes_on) throw Stopped();
   };
@@ -158,8 +322,8 @@ PyVolume compress(const nb::callable &read, const std::string &type, const Index
   const auto read_layers = [&](std::uint32_t z, std::uint32_t num_layers,
                                std::span<std::byte> out) {
     const bool goes_on = callbacks.run([&] {
-      const auto layers =
-          nb::cast<nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>>(read(z, z + num_layers));
+      const auto layers = nb::cast<nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>>(
+          call(read, z, z + num_layers));
       if (layers.nbytes() != out.size()) {
         throw Error("a source gave " + std::to_string(layers.nbytes()) + " bytes for layers of " +
                     std::to_string(out.size()));
@@ -209,7 +373,7 @@ nb::object decode(const PyVolume &self, std::uint32_t level, const Index3 &begin
                   const Index3 &step) {
   std::vector<float> voxels;
   {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     voxels = self.volume->decode(level, {begin, end, step});
   }
   const auto count = [&](std::size_t axis) -> std::size_t {
@@ -221,7 +385,7 @@ nb::object decode(const PyVolume &self, std::uint32_t level, const Index3 &begin
 nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
   std::vector<float> voxels;
   {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     voxels = self.volume->sample(max_voxels);
   }
   const std::size_t count = voxels.size();
@@ -238,7 +402,7 @@ nb::dict extract(const PyVolume &self, const std::string &device, float isovalue
       .level = level, .with_normals = normals, .memory_budget = memory_budget};
   options.progress = [&](std::string_view what, double done) {
     const bool goes_on = callbacks.run([&] {
-      if (progress) (*progress)(std::string(what), done);
+      if (progress) call(*progress, std::string(what), done);
     });
     if (!goes_on) throw Stopped();
   };
@@ -270,7 +434,7 @@ void save_mesh(const Rows<float> &vertices, const Rows<std::uint32_t> &faces,
       .vertices = to_vector(vertices),
       .normals = normals ? to_vector(*normals) : std::vector<std::array<float, 3>>{},
       .triangles = to_vector(faces)};
-  const nb::gil_scoped_release no_gil;
+  const WithoutGil no_gil;
   isowave::save_mesh(mesh, path);
 }
 
@@ -294,23 +458,44 @@ nb::tuple camera_tuple(const isowave::Camera &camera) {
                         camera.fovy_degrees);
 }
 
-/// The picture so far; only while the callback that got it is at work.
-struct PassView {
-  const isowave::Progress *progress;
+/// The picture so far; only while the callback that got it is at work. Threads take turns.
+class PassView {
+  /// Who has the lock never waits for the GIL.
+  template <class Look>
+  auto look(const Look &at) const {
+    const WithoutGil no_gil;
+    const std::lock_guard lock(mutex_);
+    if (progress_ == nullptr) throw Error("this pass is over: look at it within on_pass");
+    return at(*progress_);
+  }
 
-  const isowave::Progress &get() const {
-    if (progress == nullptr) throw Error("this pass is over: look at it within on_pass");
-    return *progress;
+ public:
+  explicit PassView(const isowave::Progress &progress) : progress_(&progress) {}
+
+  std::uint32_t passes() const {
+    return look([](const isowave::Progress &progress) { return progress.passes(); });
+  }
+  double completed_percent() const {
+    return look([](const isowave::Progress &progress) { return progress.completed_percent(); });
   }
   nb::object picture() const {
-    std::vector<std::uint8_t> pixels;
-    {
-      const nb::gil_scoped_release no_gil;
-      pixels = get().picture();
-    }
-    const isowave::ImageSize size = get().size();
+    isowave::ImageSize size;
+    std::vector<std::uint8_t> pixels = look([&](const isowave::Progress &progress) {
+      size = progress.size();
+      return progress.picture();
+    });
     return to_numpy<std::uint8_t>(std::move(pixels), {size.height, size.width, 3});
   }
+  /// The callback is over. Waits for pictures of other threads.
+  void end() {
+    const WithoutGil no_gil;
+    const std::lock_guard lock(mutex_);
+    progress_ = nullptr;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  const isowave::Progress *progress_;
 };
 
 nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
@@ -347,22 +532,23 @@ void add_hits(const isowave::Frame &frame, nb::dict &result) {
   result["levels"] = to_numpy<std::uint32_t>(std::move(levels), {frame.rows, frame.columns});
 }
 
-nb::dict frame_dict(isowave::Frame &&frame) {
+/// is_of_rays: arrays are there even if they are empty.
+nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
   nb::dict result;
   const std::size_t rows = frame.rows, columns = frame.columns;
   if (!frame.picture.empty()) {
     result["picture"] =
         to_numpy<std::uint8_t>(std::move(frame.picture), {frame.size.height, frame.size.width, 3});
   }
-  if (!frame.depth.empty())
+  if (is_of_rays || !frame.depth.empty())
     result["depth"] = to_numpy<float>(std::move(frame.depth), {rows, columns});
-  if (!frame.normals.empty())
+  if (is_of_rays || !frame.normals.empty())
     result["normals"] = to_numpy<float>(std::move(frame.normals), {rows, columns, 3});
-  if (!frame.positions.empty())
+  if (is_of_rays || !frame.positions.empty())
     result["positions"] = to_numpy<float>(std::move(frame.positions), {rows, columns, 3});
   if (!frame.bounds.empty())
     result["bounds"] = to_numpy<float>(std::move(frame.bounds), {rows, columns});
-  if (!frame.hits.empty()) add_hits(frame, result);
+  if (is_of_rays || !frame.hits.empty()) add_hits(frame, result);
   nb::dict statistics = statistics_dict(frame.statistics);
   if (frame.detail) {
     nb::dict detail;
@@ -423,16 +609,15 @@ nb::dict draw(AnyRenderer &renderer, const nb::dict &options,
       bool wanted = true;
       const bool goes_on = callbacks.run([&] {
         if (!on_pass) return;
-        const nb::object view = nb::cast(PassView{&progress});
-        const auto end = [&] { nb::cast<PassView &>(view).progress = nullptr; };
+        auto *const view = new PassView(progress);
+        const nb::object owner = nb::cast(view, nb::rv_policy::take_ownership);
         try {
-          const nb::object answer = (*on_pass)(view);
-          wanted = answer.is_none() || nb::cast<bool>(answer);
+          wanted = nb::cast<bool>(call(*on_pass, owner));
         } catch (...) {
-          end();
+          view->end();
           throw;
         }
-        end();
+        view->end();
       });
       return goes_on && wanted;
     };
@@ -449,11 +634,11 @@ nb::dict cast(AnyRenderer &renderer, const RayArray &rays, float isovalue, bool 
   const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
   isowave::Frame frame;
   {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     frame = renderer.cast_rays({first, rays.shape(0)}, isovalue,
                                smooth ? isowave::Normals::kSmooth : isowave::Normals::kCell);
   }
-  return frame_dict(std::move(frame));
+  return frame_dict(std::move(frame), true);
 }
 
 /// A renderer, with the device that it draws on.
@@ -475,14 +660,21 @@ class PyRenderer {
     get("profiling", device_options.profiling);
     bool quick = false;
     get("quick", quick);
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     device_ = isowave::open_device(selector, device_options);
     if (quick) {
       quick_.reset(new isowave::QuickRenderer(device_, volume.volume, wanted));
+      PythonsEnd::instance().begin_making(*quick_);
     } else {
       renderer_.reset(new isowave::Renderer(device_, volume.volume, wanted));
     }
   }
+
+  ~PyRenderer() {
+    if (quick_) PythonsEnd::instance().end_making(*quick_);
+  }
+  PyRenderer(const PyRenderer &) = delete;
+  PyRenderer &operator=(const PyRenderer &) = delete;
 
   nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
                   bool interrupts) {
@@ -499,7 +691,7 @@ class PyRenderer {
     const isowave::ImageSize size{width, height, 1};
     isowave::Camera camera;
     {
-      const nb::gil_scoped_release no_gil;
+      const WithoutGil no_gil;
       camera = quick_ ? quick_->camera(isovalue, size) : renderer_->camera(isovalue, size);
     }
     return camera_tuple(camera);
@@ -507,7 +699,7 @@ class PyRenderer {
 
   bool ready() const { return !quick_ || quick_->ready(); }
   void wait() const {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     if (quick_) quick_->wait();
   }
   nb::dict device() const { return device_dict(device_->info()); }
@@ -526,7 +718,7 @@ class PyRenderer {
 class PyHostRenderer {
  public:
   PyHostRenderer(const PyVolume &volume, std::uint64_t memory_limit) {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     renderer_ = std::make_unique<isowave::HostRenderer>(
         volume.volume, isowave::HostRendererOptions{.memory_limit = memory_limit});
   }
@@ -543,7 +735,7 @@ class PyHostRenderer {
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
     isowave::Camera camera;
     {
-      const nb::gil_scoped_release no_gil;
+      const WithoutGil no_gil;
       camera = renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
     }
     return camera_tuple(camera);
@@ -661,7 +853,7 @@ nb::bytes encode_png(const Picture &picture) {
   const isowave::Frame frame = frame_of(picture);
   std::vector<std::uint8_t> bytes;
   {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     bytes = isowave::encode_png(frame);
   }
   return nb::bytes(bytes.data(), bytes.size());
@@ -669,14 +861,14 @@ nb::bytes encode_png(const Picture &picture) {
 
 void save_png(const Picture &picture, const std::filesystem::path &path) {
   const isowave::Frame frame = frame_of(picture);
-  const nb::gil_scoped_release no_gil;
+  const WithoutGil no_gil;
   isowave::save_png(frame, path);
 }
 
 std::vector<nb::dict> list_devices() {
   std::vector<isowave::DeviceInfo> infos;
   {
-    const nb::gil_scoped_release no_gil;
+    const WithoutGil no_gil;
     infos = isowave::list_devices();
   }
   std::vector<nb::dict> result;
@@ -688,6 +880,11 @@ std::vector<nb::dict> list_devices() {
 
 NB_MODULE(_core, m) {
   nb::exception<Error>(m, "Error", PyExc_RuntimeError);
+  // Threads that are still at work when Python ends keep their objects: that is no leak to tell of.
+  nb::set_leak_warnings(false);
+  nb::module_::import_("atexit").attr("register")(
+      nb::cpp_function([] { PythonsEnd::instance().come(); }));
+  m.def("is_ending", [] { return PythonsEnd::instance().is_near(); });
   m.attr("__version__") = std::string(isowave::version());
   m.def("devices", &list_devices);
   m.def("encode_png", &encode_png, "picture"_a);
@@ -717,7 +914,7 @@ NB_MODULE(_core, m) {
       .def(
           "save",
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
-          "path"_a, nb::call_guard<nb::gil_scoped_release>())
+          "path"_a, nb::call_guard<WithoutGil>())
       .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a, "memory_budget"_a,
            "progress"_a.none());
   m.def("save_mesh", &save_mesh, "vertices"_a, "faces"_a, "normals"_a.none(), "path"_a);
@@ -735,9 +932,8 @@ NB_MODULE(_core, m) {
       .def("camera", &PyHostRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
       .def_prop_ro("memory_bytes", &PyHostRenderer::memory_bytes);
   nb::class_<PassView>(m, "PassView")
-      .def_prop_ro("passes", [](const PassView &v) { return v.get().passes(); })
-      .def_prop_ro("completed_percent",
-                   [](const PassView &v) { return v.get().completed_percent(); })
+      .def_prop_ro("passes", &PassView::passes)
+      .def_prop_ro("completed_percent", &PassView::completed_percent)
       .def("picture", &PassView::picture);
   nb::class_<PyRenderer>(m, "Renderer")
       .def(nb::init<const std::string &, const PyVolume &, const nb::dict &>(), "device"_a,

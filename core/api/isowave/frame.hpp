@@ -39,7 +39,10 @@ struct Appearance {
   float above = 0.45f;  ///< of a light halfway between the eye and the picture's upper edge
 };
 
-/// The picture so far, for FrameRequest::on_pass.
+/// The picture so far, for FrameRequest::on_pass, and only until that returns. Several threads may
+/// look at it: they take turns.
+///
+/// Throws  Error: another thread asks after on_pass has returned, while the frame is drawn
 class Progress {
  public:
   virtual ~Progress() = default;

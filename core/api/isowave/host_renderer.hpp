@@ -48,7 +48,8 @@ class HostRenderer {
   /// Returns  one row of rays.size() columns: depth, in lengths of the ray's direction; normals,
   ///          positions and hits; no picture
   /// Throws   Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more
-  ///          than 1e7 voxels from the volume's origin; a file cannot be read
+  ///          than 1e7 voxels from the volume's origin; a hit is so many lengths of the direction
+  ///          away that float32 does not hold the depth; a file cannot be read
   Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
 
   /// The view that Renderer::camera() takes, for a picture of that size.

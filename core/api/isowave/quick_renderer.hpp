@@ -21,7 +21,8 @@ class QuickRenderer {
   /// Begins to make the device's renderer, and returns at once. Meanwhile others that ask the
   /// device for anything wait. Keeps device and volume alive.
   ///
-  /// Throws  Error: no device, or no volume. What else goes wrong is thrown by render()
+  /// Throws  Error: no device, or no volume; the memory does not suffice; options out of range.
+  ///         What else goes wrong is thrown by render()
   QuickRenderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
                 const RendererOptions &options = {}, const HostRendererOptions &host_options = {});
   /// Waits for the kernel that is being compiled, not for those behind it.
@@ -47,6 +48,9 @@ class QuickRenderer {
   /// Throws  Error: NaN; as render() does
   Camera camera(float isovalue, std::optional<ImageSize> size = {});
 
+  /// Makes the device's renderer no longer: the kernel that is being compiled is the last. Returns
+  /// at once; afterwards, unless it was ready, calls that need it throw Error.
+  void give_up();
   /// Whether the device's renderer is made, or could not be.
   bool ready() const;
   /// Waits until ready().

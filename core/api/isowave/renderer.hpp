@@ -50,7 +50,8 @@ class Renderer {
   /// (in lengths of the ray's direction), normals, positions and hits. Needs with_rays.
   ///
   /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
-  ///         1e7 voxels away from the volume's origin
+  ///         1e7 voxels away from the volume's origin; a hit is so many lengths of the direction
+  ///         away that float32 does not hold the depth
   Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
 
   /// A view from the front right and above in which the isosurface fills a picture of that size
@@ -67,6 +68,9 @@ class Renderer {
   /// before_kernel: called before each kernel is compiled; what it throws is thrown here.
   Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
            const RendererOptions &options, const std::function<void()> &before_kernel);
+  /// Throws  Error: the memory does not suffice, or options are out of range
+  static void check_options(const Device &device, const Volume &volume,
+                            const RendererOptions &options);
   void release() noexcept;
 
   struct Implementation;

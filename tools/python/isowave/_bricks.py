@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
+from isowave._checked import flag, number, whole
 from isowave._placed import Placed
-from isowave._renderer import Camera, Color, Image, camera_of, request_for, size_of
+from isowave._renderer import Camera, Color, Image, bytes_of, camera_of, request_for, size_of
 from isowave._volume import compression_options
 
 OUTPUTS = ("rgb", "depth", "normals")
@@ -128,17 +129,17 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
                 "bricks": None if bricks is None else "{}x{}x{}".format(*bricks),
                 "width": width,
                 "height": height,
-                "samples": samples,
-                "memory_budget": memory_budget,
-                "cache_blocks": cache_blocks,
-                "with_levels": levels,
-                "with_bounds": bounds,
-                "with_rays": rays,
+                "samples": whole("samples", samples),
+                "memory_budget": bytes_of(memory_budget),
+                "cache_blocks": whole("cache_blocks", cache_blocks),
+                "with_levels": flag("levels", levels),
+                "with_bounds": flag("bounds", bounds),
+                "with_rays": flag("rays", rays),
             }
             return (width, height), compression, options
 
         self.size, compression, options = self._processes.together(read)
-        self._core = _core.BrickRenderer(self._processes, os.fspath(path), compression, options)
+        self._core = _core.BrickRenderer(self._processes, os.fsdecode(path), compression, options)
 
     @property
     def device(self) -> dict[str, Any]:
@@ -148,7 +149,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
         """As Renderer.camera()."""
         value, (width, height) = self._processes.together(
-            lambda: (float(isovalue), self.size if size is None else size_of(size))
+            lambda: (number("isovalue", isovalue), self.size if size is None else size_of(size))
         )
         return Camera(*self._core.camera(value, width, height))
 

@@ -28,7 +28,7 @@ class Mesh:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .ply, .stl, .obj, .vtp, .gltf or .glb file; whole, or not at all."""
-        _core.save_mesh(self.vertices, self.faces, self.normals, os.fspath(path))
+        _core.save_mesh(self.vertices, self.faces, self.normals, os.fsdecode(path))
 
     def to_pyvista(self) -> Any:
         """A pyvista.PolyData with the normals as point data. Needs pyvista."""

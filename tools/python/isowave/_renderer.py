@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
 import os
 import queue
 import re
@@ -16,12 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
+from isowave._checked import flag, function, number, numbers, refuse, whole
 
 if TYPE_CHECKING:
     from isowave._volume import Volume
 
 Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
 ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
+#: Of Renderer's arguments, what frames may ask for only if it was given.
+CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,7 +77,13 @@ def vector(values: Any) -> tuple[float, float, float]:
 
 
 def size_of(size: Sequence[int]) -> tuple[int, int]:
-    width, height = (operator.index(side) for side in size)
+    try:
+        sides = tuple(size)
+    except TypeError:
+        raise refuse("size", size, "width and height") from None
+    if len(sides) != 2:
+        raise ValueError(f"size={size!r:.60}: give width and height")
+    width, height = (whole("size", side) for side in sides)
     return width, height
 
 
@@ -85,7 +93,8 @@ def color_of(color: Color) -> tuple[float, float, float]:
         if not digits:
             raise ValueError(f"color {color!r}: give '#rrggbb', or red, green, blue from 0 to 1")
         return vector(int(part, 16) / 255 for part in digits.groups())
-    if len(color) != 3 or not all(0 <= part <= 1 for part in color):
+    color = numbers("color", color, 3)
+    if not all(0 <= part <= 1 for part in color):
         raise ValueError(f"color {tuple(color)}: give red, green and blue, from 0 to 1")
     return vector(color)
 
@@ -153,7 +162,7 @@ class Image:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .png file; whole, or not at all."""
-        _core.save_png(self._rgb(), os.fspath(path))
+        _core.save_png(self._rgb(), os.fsdecode(path))
 
     def __repr__(self) -> str:
         shown = "" if self.rgb is None else f"{self.rgb.shape[1]} x {self.rgb.shape[0]}, "
@@ -179,6 +188,10 @@ class Progress:
     def rgb(self) -> npt.NDArray[np.uint8]:
         """(height, width, 3), drawn when it is asked for; within a time budget, first smaller."""
         return self._view.picture()
+
+
+def bytes_of(memory_budget: int | None) -> int | None:
+    return None if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1)
 
 
 def needed_options(request: dict[str, Any]) -> dict[str, Any]:
@@ -218,23 +231,29 @@ def request_for(
     ambient: int = 0,
 ) -> dict[str, Any]:
     """What the compiled part is asked for; arguments as Renderer.render()."""
+    if not isinstance(camera, Camera):
+        raise refuse("camera", camera, "an isowave.Camera")
+    if isinstance(outputs, str):
+        raise refuse("outputs", outputs, "a sequence of names")
     return {
-        "eye": camera.eye,
-        "at": camera.at,
-        "up": camera.up,
-        "fovy_degrees": camera.fovy,
-        "isovalue": float(isovalue),
+        "eye": numbers("Camera.eye", camera.eye, 3),
+        "at": numbers("Camera.at", camera.at, 3),
+        "up": numbers("Camera.up", camera.up, 3),
+        "fovy_degrees": number("Camera.fovy", camera.fovy),
+        "isovalue": number("isovalue", isovalue),
         "width": size[0],
         "height": size[1],
-        "samples": samples,
+        "samples": whole("samples", samples),
         "surface": None if color is None else color_of(color),
         "background": None if background is None else color_of(background),
         "smooth_normals": is_smooth(normals),
-        "voxel_pixels": voxel_pixels,
-        "voxel_error": voxel_error,
-        "max_surface_error": max_error,
-        "time_budget_ms": None if time_budget is None else 1000 * time_budget,
-        "ambient_rays": ambient,
+        "voxel_pixels": number("voxel_pixels", voxel_pixels),
+        "voxel_error": number("voxel_error", voxel_error),
+        "max_surface_error": None if max_error is None else number("max_error", max_error),
+        "time_budget_ms": None
+        if time_budget is None
+        else 1000 * number("time_budget", time_budget),
+        "ambient_rays": whole("ambient", ambient),
         "want_picture": "rgb" in outputs,
         "want_depth": "depth" in outputs,
         "want_normals": "normals" in outputs,
@@ -254,9 +273,15 @@ def draw(
     interrupts: bool = True,
 ) -> dict[str, Any]:
     """The frame's arrays. interrupts: Ctrl-C is looked for after each pass."""
-    callback = None if on_pass is None else lambda view: on_pass(Progress(view))
+    function("on_pass", on_pass)
+
+    def callback(view: _core.PassView) -> bool:
+        assert on_pass is not None
+        answer = on_pass(Progress(view))
+        return answer is None or flag("what on_pass returns", answer)
+
     is_main = threading.current_thread() is threading.main_thread()
-    return renderer.render(request, callback, interrupts and is_main)
+    return renderer.render(request, None if on_pass is None else callback, interrupts and is_main)
 
 
 def cast_rays(
@@ -269,7 +294,9 @@ def cast_rays(
     array = np.ascontiguousarray(rays, np.float64)
     if array.ndim == 0 or array.shape[-1] != 6:
         raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
-    found = renderer.cast_rays(array.reshape(-1, 6), isovalue, is_smooth(normals))
+    found = renderer.cast_rays(
+        array.reshape(-1, 6), number("isovalue", isovalue), is_smooth(normals)
+    )
     lead = array.shape[:-1]
     return {
         "t_hit": found["depth"].reshape(lead),
@@ -309,9 +336,6 @@ class Renderer:
         time_budget), wait for the device.
     """
 
-    #: Of the constructor's arguments, what frames may ask for only if it was given.
-    CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
-
     def __init__(
         self,
         volume: Volume,
@@ -330,13 +354,15 @@ class Renderer:
     ) -> None:
         self.volume = volume
         self.size = size_of(size)
+        samples = whole("samples", samples)
         self.max_rays = self.size[0] * self.size[1] * samples**2
         self._can = {
-            "levels": levels,
-            "bounds": bounds,
-            "time_budget": time_budget,
-            "rays": rays,
+            "levels": flag("levels", levels),
+            "bounds": flag("bounds", bounds),
+            "time_budget": flag("time_budget", time_budget),
+            "rays": flag("rays", rays),
         }
+        self._iterating: int | None = None  # the thread that looks at a picture of passes()
         self._core = _core.Renderer(
             "" if device is None else str(device),
             volume._core,
@@ -344,14 +370,11 @@ class Renderer:
                 "width": self.size[0],
                 "height": self.size[1],
                 "samples": samples,
-                "memory_budget": memory_budget,
-                "cache_blocks": cache_blocks,
-                "with_levels": levels,
-                "with_bounds": bounds,
-                "with_time_budget": time_budget,
-                "with_rays": rays,
-                "profiling": profiling,
-                "quick": quick,
+                "memory_budget": bytes_of(memory_budget),
+                "cache_blocks": whole("cache_blocks", cache_blocks),
+                **{f"with_{name}": can for name, can in self._can.items()},
+                "profiling": flag("profiling", profiling),
+                "quick": flag("quick", quick),
             },
         )
 
@@ -376,8 +399,14 @@ class Renderer:
 
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
         """A view from the front right and above in which the isosurface fills the picture."""
+        self._check_turn()
         picture_size = self.size if size is None else size_of(size)
-        return Camera(*self._core.camera(float(isovalue), *picture_size))
+        return Camera(*self._core.camera(number("isovalue", isovalue), *picture_size))
+
+    def _check_turn(self) -> None:
+        """Raises Error in the loop over passes(): its frame has the renderer until it ends."""
+        if self._iterating == threading.get_ident():
+            raise _core.Error("the renderer is at work for passes(): end that, or make another one")
 
     def render(
         self,
@@ -437,6 +466,7 @@ class Renderer:
         Error
             A request that the renderer was not made for, in one line. The next is not affected.
         """
+        self._check_turn()
         self._check(max_error, voxel_pixels, time_budget, ambient, outputs)
         picture_size = self.size if size is None else size_of(size)
         request = request_for(
@@ -468,15 +498,17 @@ class Renderer:
         ambient: int,
         outputs: Sequence[str],
     ) -> None:
+        if isinstance(outputs, str):
+            raise refuse("outputs", outputs, "a sequence of names")
         unknown = set(outputs) - {*ALL_OUTPUTS, "bounds"}
         if unknown:
             known = ", ".join((*ALL_OUTPUTS, "bounds"))
             raise ValueError(f"outputs {', '.join(sorted(unknown))}: there are {known}")
         asked = {
             "bounds": ("max_error", max_error is not None or "bounds" in outputs),
-            "levels": ("voxel_pixels", voxel_pixels > 0),
+            "levels": ("voxel_pixels", number("voxel_pixels", voxel_pixels) > 0),
             "time_budget": ("time_budget", time_budget is not None),
-            "rays": ("ambient", ambient != 0),
+            "rays": ("ambient", whole("ambient", ambient) != 0),
         }
         for option, (argument, is_asked) in asked.items():
             if is_asked and not self._can[option]:
@@ -486,6 +518,7 @@ class Renderer:
         self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
     ) -> dict[str, npt.NDArray[Any]]:
         """As Volume.cast_rays(), on the device, from compressed blocks: needs rays=True."""
+        self._check_turn()
         if not self._can["rays"]:
             raise _core.Error("cast_rays needs a renderer that was made with rays=True")
         return cast_rays(self._core, rays, isovalue, normals)
@@ -502,7 +535,7 @@ class Renderer:
         samples = request.get("samples", 1)
 
         def put(item: Image | BaseException | None) -> None:
-            while not closed.is_set():
+            while not closed.is_set() and not _core.is_ending():
                 try:
                     pictures.put(item, timeout=0.05)
                 except queue.Full:
@@ -516,7 +549,7 @@ class Renderer:
             statistics["completed_percent"] = progress.completed_percent
             frame = {"picture": progress.rgb, "statistics": statistics}
             put(Image(frame, camera, isovalue, samples))
-            return not closed.is_set()
+            return not closed.is_set() and not _core.is_ending()
 
         def draw() -> None:
             try:
@@ -534,7 +567,12 @@ class Renderer:
                     return
                 if isinstance(item, BaseException):
                     raise item
+                self._iterating = threading.get_ident()
                 yield item
+                self._iterating = None
         finally:
+            self._iterating = None
             closed.set()
-            thread.join()
+            # Any thread may have dropped the iterator, and when Python ends the frame is over.
+            if thread is not threading.current_thread() and not _core.is_ending():
+                thread.join()

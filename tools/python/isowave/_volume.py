@@ -14,10 +14,12 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._arrays import as_source
+from isowave._checked import flag, function, number, numbers, whole
 from isowave._levels import Level
 from isowave._mesh import Mesh
 from isowave._placed import Placed
 from isowave._renderer import (
+    CAPABILITIES,
     Camera,
     Image,
     Renderer,
@@ -36,13 +38,43 @@ LARGEST_SAMPLE = 1 << 24  # voxels that a histogram is made of
 
 
 def reversed_axes(values: Sequence[float]) -> tuple[float, float, float]:
-    z, y, x = (float(value) for value in values)
+    z, y, x = numbers("spacing", values, 3)
     return x, y, z
 
 
 def dims_of(shape: Sequence[int]) -> tuple[int, int, int]:
-    z, y, x = (int(n) for n in shape)
-    return x, y, z
+    try:
+        z, y, x = tuple(shape)
+    except (TypeError, ValueError):
+        raise TypeError(f"shape={shape!r:.60}: give three whole numbers") from None
+    return whole("shape", x), whole("shape", y), whole("shape", z)
+
+
+class Turns:
+    """A lock for calls that take turns; one from within another's on_pass gets an Error."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._owner: tuple[int, int] | None = None  # process and thread
+
+    def __enter__(self) -> None:
+        owner, me = self._owner, (os.getpid(), threading.get_ident())
+        if owner == me:
+            raise _core.Error(
+                "the volume's renderer is at work, and waits for the on_pass that makes this call: "
+                "use it afterwards, or another one: volume.renderer()"
+            )
+        if owner is not None and owner[0] != me[0]:
+            raise _core.Error(
+                "this process was forked while the volume's renderer was at work: use the start "
+                "method 'spawn'"
+            )
+        self._lock.acquire()
+        self._owner = me
+
+    def __exit__(self, *exception: object) -> None:
+        self._owner = None
+        self._lock.release()
 
 
 def compression_options(
@@ -55,13 +87,15 @@ def compression_options(
     num_threads: int,
 ) -> dict[str, Any]:
     return {
-        "tolerance": tolerance,
-        "relative_tolerance": relative_tolerance,
-        "rate": rate,
-        "exact": exact,
-        "levels": levels,
-        "map_nan": map_nan,
-        "num_threads": num_threads,
+        "tolerance": None if tolerance is None else number("tolerance", tolerance),
+        "relative_tolerance": None
+        if relative_tolerance is None
+        else number("relative_tolerance", relative_tolerance),
+        "rate": None if rate is None else whole("rate", rate),
+        "exact": flag("exact", exact),
+        "levels": whole("levels", levels),
+        "map_nan": None if map_nan is None else number("map_nan", map_nan),
+        "num_threads": whole("num_threads", num_threads),
         # Where nothing bounds it, the error is measured: people ask.
         "measure_error": not exact and tolerance is None and relative_tolerance is None,
     }
@@ -90,6 +124,8 @@ def make_progress(progress: bool | Progress | None) -> Progress | None:
     """None: a bar where tqdm is installed and somebody watches."""
     if callable(progress):
         return progress
+    if progress is not None:
+        flag("progress", progress)
     in_notebook = "ipykernel" in sys.modules
     if progress is False or (progress is None and not (sys.stderr.isatty() or in_notebook)):
         return None
@@ -180,7 +216,7 @@ def compress(
         if path is None and is_plain(array):
             return Volume(_core.compress_array(array, *grid, options, shown))
         keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
-        file = None if path is None else os.fspath(path)
+        file = None if path is None else os.fsdecode(path)
         return Volume(_core.compress(source.read, *grid, options, keep, file, shown))
     finally:
         if isinstance(shown, TqdmProgress):
@@ -226,7 +262,8 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     Error
         The file is missing, broken or of another kind, in one line.
     """
-    is_compressed = os.fspath(path).endswith(".zfp")
+    path = os.fsdecode(path)
+    is_compressed = path.endswith(".zfp")
     options = compression_options(
         tolerance, relative_tolerance, rate, exact, levels, map_nan, num_threads
     )
@@ -236,7 +273,7 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     try:
         return Volume(
             _core.open(
-                os.fspath(path),
+                path,
                 options,
                 None if shape is None else dims_of(shape),
                 None if dtype is None else np.dtype(dtype).name,
@@ -261,7 +298,7 @@ class Volume(Placed[_core.Volume]):
 
     def __init__(self, core: _core.Volume) -> None:
         self._core = core
-        self._lock = threading.Lock()
+        self._lock = Turns()
         self._renderer: Renderer | None = None
         self._made_with: dict[str, Any] = {}
         self._host: _core.HostRenderer | None = None
@@ -320,6 +357,8 @@ class Volume(Placed[_core.Volume]):
         return z, y, x
 
     def _checked(self, level: int) -> int:
+        if isinstance(level, (bool, float, str)):
+            whole("level", level)
         if not 0 <= level < self.num_levels:
             raise ValueError(f"level {level} of a volume that has {self.num_levels}: from 0 on")
         return level
@@ -366,7 +405,7 @@ class Volume(Placed[_core.Volume]):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .zfp file, which open() and the program read; whole, or not at all."""
-        self._core.save(os.fspath(path))
+        self._core.save(os.fsdecode(path))
 
     def histogram(self, bins: int = 256) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
         """Counts [bins] and edges [bins + 1] of the values, as numpy.histogram gives them.
@@ -432,21 +471,25 @@ class Volume(Placed[_core.Volume]):
         """The kept renderer, or a new one where it lacks what is wanted."""
         made = self._made_with
         size = wanted.pop("size", (0, 0))
-        samples = wanted.get("samples", 1)
-        wanted.setdefault("memory_budget", made.get("memory_budget"))
-        for name in Renderer.CAPABILITIES:  # or two kinds of requests in turn would make it anew
-            wanted[name] = bool(wanted.get(name) or made.get(name))
+        samples = whole("samples", wanted.get("samples", 1))
         fits = (
             self._renderer is not None
             and size[0] * size[1] * samples**2 <= self._renderer.max_rays
-            and all(made.get(name) == wanted.get(name) for name in ("device", "memory_budget"))
-            and all(made.get(name) or not wanted[name] for name in Renderer.CAPABILITIES)
+            and made.get("device") == wanted.get("device")
+            and made.get("memory_budget") == wanted.get("memory_budget", made.get("memory_budget"))
+            and all(made.get(name) or not wanted.get(name) for name in CAPABILITIES)
         )
         if self._renderer is None or not fits:
             self._renderer = None  # its memory goes before that of the next is taken
             largest = max(size, (1280, 720), key=lambda s: s[0] * s[1])
-            self._renderer = Renderer(self, size=largest, quick=True, **wanted)
-            self._made_with = wanted
+            # Or two kinds of requests in turn would make it anew.
+            more = {name: bool(wanted.get(name) or made.get(name)) for name in CAPABILITIES}
+            self._made_with = {**wanted, **more}
+            try:
+                self._renderer = Renderer(self, size=largest, quick=True, **self._made_with)
+            except _core.Error:  # what other calls asked for may be too much for the memory
+                self._made_with = wanted
+                self._renderer = Renderer(self, size=largest, quick=True, **wanted)
         return self._renderer
 
     def _host_renderer(self) -> _core.HostRenderer:
@@ -532,11 +575,11 @@ class Volume(Placed[_core.Volume]):
         """
         found = self._core.extract(
             "" if device is None else str(device),
-            isovalue,
+            number("isovalue", isovalue),
             self._checked(level),
-            normals,
-            memory_budget or 0,
-            progress,
+            flag("normals", normals),
+            0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
+            function("progress", progress),
         )
         return Mesh(found["vertices"], found["faces"], found["normals"] if normals else None)
 

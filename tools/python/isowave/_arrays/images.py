@@ -17,6 +17,8 @@ def simpleitk_image(image: Any, has_spacing: bool) -> Found:
     what = type_name(image)
     _need_scalars(image.GetNumberOfComponentsPerPixel(), what)
     checked_shape(tuple(image.GetSize())[::-1], what)
+    if image.GetPixelIDTypeAsString().startswith("label of"):  # a view of it ends the process
+        raise bad_type(what, "a label map: SimpleITK.LabelMapToLabel() makes an image")
     array = sys.modules["SimpleITK"].GetArrayViewFromImage(image)
     rows = finite_numbers(image.GetDirection(), 9, what, "direction")
     placement = Placement(

@@ -1,0 +1,37 @@
+#include "core/base/fork.hpp"
+
+#include <pthread.h>
+
+#include <atomic>
+
+#include "core/base/error.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+std::atomic<bool> has_threads = false, has_lost_threads = false;
+
+}  // namespace
+
+bool is_forked() {
+  return has_lost_threads;
+}
+
+void begin_threads() {
+  static const int watches_forks = pthread_atfork(nullptr, nullptr, [] {
+    if (has_threads) has_lost_threads = true;
+  });
+  static_cast<void>(watches_forks);
+  has_threads = true;
+}
+
+void check_not_forked() {
+  if (!is_forked()) return;
+  throw Error(
+      "this process was forked from one that had used isowave, whose threads and OpenCL devices do "
+      "not survive a fork: start processes anew (in Python, multiprocessing's start method "
+      "'spawn'), or fork before isowave is used");
+}
+
+}  // namespace isowave::core

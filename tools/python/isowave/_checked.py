@@ -1,0 +1,60 @@
+"""Arguments of users as the compiled part takes them; errors name the argument."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+
+
+def refuse(name: str, value: Any, wanted: str) -> TypeError:
+    return TypeError(f"{name}={value!r:.60}: give {wanted}")
+
+
+def flag(name: str, value: Any) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise refuse(name, value, "True or False")
+    return bool(value)
+
+
+def whole(name: str, value: Any, largest: int = 2**32 - 1) -> int:
+    """From 0 on."""
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        number = operator.index(value)
+    except TypeError:
+        raise refuse(name, value, "a whole number") from None
+    if not 0 <= number <= largest:
+        raise ValueError(f"{name}={number}: give a whole number from 0 to {largest}")
+    return number
+
+
+def number(name: str, value: Any) -> float:
+    try:
+        if isinstance(value, (bool, np.bool_, str, bytes, bytearray)):
+            raise TypeError
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{name}: the number is too large for a float") from None
+    except (TypeError, ValueError):
+        raise refuse(name, value, "a number") from None
+
+
+def numbers(name: str, values: Any, count: int) -> tuple[float, ...]:
+    try:
+        if isinstance(values, (str, bytes)):
+            raise TypeError
+        items = tuple(values)
+    except TypeError:
+        raise refuse(name, values, f"{count} numbers") from None
+    if len(items) != count:
+        raise ValueError(f"{name}={items!r:.60}: give {count} numbers")
+    return tuple(number(name, item) for item in items)
+
+
+def function(name: str, value: Any) -> Any:
+    if value is not None and not callable(value):
+        raise refuse(name, value, "a function")
+    return value
