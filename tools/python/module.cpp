@@ -702,7 +702,11 @@ class PyRenderer {
     const WithoutGil no_gil;
     if (quick_) quick_->wait();
   }
-  nb::dict device() const { return device_dict(device_->info()); }
+  nb::dict device() const {
+    nb::dict result = device_dict(device_->info());
+    result["notice"] = device_->notice();
+    return result;
+  }
   std::uint64_t memory_bytes() const {
     return quick_ ? quick_->memory_bytes() : renderer_->memory_bytes();
   }

@@ -8,6 +8,7 @@ import os
 import queue
 import re
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -377,10 +378,13 @@ class Renderer:
                 "quick": flag("quick", quick),
             },
         )
+        if notice := self._core.device["notice"]:
+            warnings.warn(notice, RuntimeWarning, stacklevel=2)
 
     @property
     def device(self) -> dict[str, Any]:
-        """As an entry of isowave.devices()."""
+        """As an entry of isowave.devices(), and notice: what the device computes otherwise than the
+        host, so that pictures may differ from other devices' in last bits; "" if nothing."""
         return self._core.device
 
     @property

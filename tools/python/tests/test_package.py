@@ -496,6 +496,20 @@ def test_histogram_counts_all_voxels_of_a_small_volume(volume):
     assert np.allclose(edges, expected_edges) and np.array_equal(counts, expected)
 
 
+def test_what_a_device_computes_differently_is_a_warning(volume, renderer, monkeypatch):
+    assert renderer.device["notice"] == ""
+
+    class OfAnotherDevice:
+        device = {"notice": "device 'x' computes division differently"}
+
+        def __init__(self, *arguments):
+            pass
+
+    monkeypatch.setattr(isowave._core, "Renderer", OfAnotherDevice)
+    with pytest.warns(RuntimeWarning, match="'x' computes division differently"):
+        volume.renderer(size=SIZE)
+
+
 def test_report_names_devices_and_loader():
     text = str(isowave.Report())
     assert isowave.__version__ in text and "OpenCL loader" in text

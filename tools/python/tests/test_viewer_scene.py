@@ -504,6 +504,7 @@ def test_a_budget_that_is_too_small_leaves_the_old_one() -> None:
     assert [h["message"] for h in eye.of_type("error")] == ["needs 1000 bytes"]
     assert eye.of_type("status")[-1]["state"] == "ready"
     assert eye.of_type("status")[-1]["memory_budget"] is None
+    assert eye.of_type("status")[-1]["notice"] == ""
     assert eye.pictures == [(1, "first"), (1, "whole")]
 
 

@@ -99,6 +99,7 @@ class FakeRenderer:
         self.device: Mapping[str, Any] = {
             "name": options["device"] or "fake device",
             "memory_bytes": 1 << 30,
+            "notice": "",
         }
         width, height = options["size"]
         self.memory_bytes = 48 * width * height * options["samples"] ** 2

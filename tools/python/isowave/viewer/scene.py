@@ -755,6 +755,7 @@ class Scene:
             "type": "status",
             "state": state,
             "device": str(renderer.device["name"]) if renderer else None,
+            "notice": str(renderer.device["notice"]) if renderer else None,
             "memory_bytes": int(renderer.memory_bytes) if renderer else None,
             "device_memory": int(renderer.device["memory_bytes"]) if renderer else None,
             "memory_budget": self._wanted.memory_budget,

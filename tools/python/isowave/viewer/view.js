@@ -7,8 +7,9 @@
 //
 //   welcome    title, shape [z,y,x], spacing, dtype, range [low, high], bits_per_voxel,
 //              max_error of voxels, isovalue
-//   status     state: starting, ready, failed; device, device_memory, memory_bytes,
-//              memory_budget, nbytes of the compressed volume
+//   status     state: starting, ready, failed; device, notice (what it computes otherwise than
+//              the host, or ""), device_memory, memory_bytes, memory_budget, nbytes of the
+//              compressed volume
 //   histogram  counts of equally wide bins, range
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, ambient,
 //              camera, isovalue, complete, passes, decoded_blocks, percent, ms, detail;
@@ -437,6 +438,7 @@ class View {
     else this.clearNote("passing");
     this.list(".device", ready ? {
       Device: head.device,
+      ...(head.notice && { Arithmetic: head.notice }),
       Memory: `${toMiB(head.memory_bytes)} of ${toMiB(head.device_memory)}`,
       Volume: `${toMiB(head.nbytes)}, compressed`,
     } : { Device: head.state === "failed" ? "none" : "starting …" });
