@@ -44,7 +44,7 @@ TEST(Cli, ConvertAndInfo) {
 
   const auto text = run_isowave("info " + kHead);
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find("value_range    0.0 228.0"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("value_range     0.0 228.0"), std::string::npos) << text.out;
 }
 
 TEST(Cli, ConvertWithinAnError) {
