@@ -21,8 +21,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <isowave/isowave.hpp>
 #include <memory>
@@ -641,7 +644,27 @@ nb::dict cast(AnyRenderer &renderer, const RayArray &rays, float isovalue, bool 
   return frame_dict(std::move(frame), true);
 }
 
-/// A renderer, with the device that it draws on.
+/// A renderer that is no longer wanted while it is being made. A thread of its own waits for the
+/// kernel that is being compiled. A process that ends before leaves the compiler as it is.
+void abandon(std::unique_ptr<isowave::QuickRenderer> renderer) {
+  static std::atomic<int> num_abandoned = 0;
+  static const int ends_at_once = ::on_exit(
+      [](int status, void *) {
+        if (num_abandoned == 0) return;
+        std::fflush(nullptr);
+        ::_exit(status);
+      },
+      nullptr);
+  static_cast<void>(ends_at_once);
+  renderer->give_up();
+  ++num_abandoned;
+  std::thread([left = std::move(renderer)]() mutable {
+    left.reset();
+    --num_abandoned;
+  }).detach();
+}
+
+/// A renderer, with the device that it draws on. Unless it is quick, the device draws each frame.
 class PyRenderer {
  public:
   PyRenderer(const std::string &selector, const PyVolume &volume, const nb::dict &options) {
@@ -660,62 +683,69 @@ class PyRenderer {
     get("profiling", device_options.profiling);
     bool quick = false;
     get("quick", quick);
-    const WithoutGil no_gil;
-    device_ = isowave::open_device(selector, device_options);
-    if (quick) {
-      quick_.reset(new isowave::QuickRenderer(device_, volume.volume, wanted));
-      PythonsEnd::instance().begin_making(*quick_);
-    } else {
-      renderer_.reset(new isowave::Renderer(device_, volume.volume, wanted));
+    {
+      const WithoutGil no_gil;
+      device_ = isowave::open_device(selector, device_options);
+      renderer_.reset(new isowave::QuickRenderer(device_, volume.volume, wanted));
+      PythonsEnd::instance().begin_making(*renderer_);
+    }
+    if (quick) return;
+    try {
+      wait();
+    } catch (...) {
+      PythonsEnd::instance().end_making(*renderer_);
+      if (!ready()) abandon(std::unique_ptr<isowave::QuickRenderer>(renderer_.release()));
+      throw;
     }
   }
 
-  ~PyRenderer() {
-    if (quick_) PythonsEnd::instance().end_making(*quick_);
-  }
+  ~PyRenderer() { PythonsEnd::instance().end_making(*renderer_); }
   PyRenderer(const PyRenderer &) = delete;
   PyRenderer &operator=(const PyRenderer &) = delete;
 
   nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
                   bool interrupts) {
-    return quick_ ? draw(*quick_, options, on_pass, interrupts)
-                  : draw(*renderer_, options, on_pass, interrupts);
+    if (!isowave::HostRenderer::can_draw(request_of(options))) wait();
+    return draw(*renderer_, options, on_pass, interrupts);
   }
 
   nb::dict cast_rays(const RayArray &rays, float isovalue, bool smooth) {
-    return quick_ ? cast(*quick_, rays, isovalue, smooth)
-                  : cast(*renderer_, rays, isovalue, smooth);
+    return cast(*renderer_, rays, isovalue, smooth);
   }
 
   nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
-    const isowave::ImageSize size{width, height, 1};
     isowave::Camera camera;
     {
       const WithoutGil no_gil;
-      camera = quick_ ? quick_->camera(isovalue, size) : renderer_->camera(isovalue, size);
+      camera = renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
     }
     return camera_tuple(camera);
   }
 
-  bool ready() const { return !quick_ || quick_->ready(); }
+  bool ready() const { return renderer_->ready(); }
+  /// Until the device's renderer is made. Ctrl-C ends the wait.
   void wait() const {
+    for (std::chrono::microseconds pause{200}; !renderer_->ready();) {
+      {
+        const WithoutGil no_gil;
+        std::this_thread::sleep_for(pause);
+      }
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      pause = std::min(pause * 5 / 4, std::chrono::microseconds{20'000});
+    }
     const WithoutGil no_gil;
-    if (quick_) quick_->wait();
+    renderer_->wait();
   }
   nb::dict device() const {
     nb::dict result = device_dict(device_->info());
     result["notice"] = device_->notice();
     return result;
   }
-  std::uint64_t memory_bytes() const {
-    return quick_ ? quick_->memory_bytes() : renderer_->memory_bytes();
-  }
+  std::uint64_t memory_bytes() const { return renderer_->memory_bytes(); }
 
  private:
   std::shared_ptr<isowave::Device> device_;
-  // One of the two.
-  std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>> renderer_;
-  std::unique_ptr<isowave::QuickRenderer, DestroyWithoutGil<isowave::QuickRenderer>> quick_;
+  std::unique_ptr<isowave::QuickRenderer, DestroyWithoutGil<isowave::QuickRenderer>> renderer_;
 };
 
 /// Draws on the host.

@@ -1,8 +1,11 @@
 """What happens beside a frame at work: threads, exits, forks, calls from on_pass."""
 
+import os
+import signal
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -267,3 +270,32 @@ def test_label_maps_of_simpleitk_are_refused():
         image = sitk.GetImageFromArray(np.ones((8, 8, 8), dtype))
         with pytest.raises(TypeError, match="label map"):
             isowave.compress(sitk.LabelImageToLabelMap(image), tolerance=1)
+
+
+@pytest.mark.parametrize("quick", ["False", "True"])
+def test_ctrl_c_does_not_wait_until_all_kernels_are_compiled(tmp_path, quick):
+    """A renderer that is made, and one that a frame waits for. Few kernels are there afterwards."""
+    draw = "r.render(0, max_error=1, outputs=('rgb', 'bounds'))"  # the host does not
+    script = f"""
+import numpy as np, isowave
+volume = isowave.compress(np.random.default_rng(0).random((9, 9, 9)).astype("f4"), tolerance=0.01)
+print("begins", flush=True)
+try:
+    r = volume.renderer(size=(32, 24), device="cpu", bounds=True, quick={quick})
+    {draw}
+except KeyboardInterrupt:
+    print("stopped")
+"""
+    settings = {**os.environ, "POCL_CACHE_DIR": str(tmp_path), "OCL_ICD_VENDORS": "pocl.icd"}
+    command = [sys.executable, "-c", script]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=settings, text=True) as process:
+        assert process.stdout.readline() == "begins\n"
+        for _ in range(600):
+            if len([*tmp_path.rglob("*.so")]) > 1:
+                break
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=300)[0] == "stopped\n"
+        assert process.returncode == 0
+    num_kernels = len([*tmp_path.rglob("*.so")])
+    assert num_kernels < 8, num_kernels  # all are 20 or more
