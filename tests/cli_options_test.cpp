@@ -2,6 +2,7 @@
 // without effect, pipes, a standard output that fails, and errors that are one line whatever they
 // quote.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
