@@ -64,8 +64,7 @@ std::string danger_within(const fs::path &folder, bool can_enter) {
     if (S_ISLNK(status.st_mode)) return fmt::format("{} is a symbolic link", path.string());
     if (can_enter && (status.st_mode & kOthersWrite) != 0) return open_to_others(path);
     if (!S_ISDIR(status.st_mode)) continue;
-    const std::string danger =
-        danger_within(path, can_enter && (status.st_mode & kOthersEnter) != 0);
+    std::string danger = danger_within(path, can_enter && (status.st_mode & kOthersEnter) != 0);
     if (!danger.empty()) return danger;
   }
   return {};

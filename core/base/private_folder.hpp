@@ -21,7 +21,7 @@ struct FolderCheck {
 /// mode 0700: otherwise another user could make it after the check. A missing folder elsewhere is
 /// not made.
 ///
-/// A path without danger stays so: nobody but this user and root can change what it leads to.
+/// A path without danger stays so: only this user and root can change what it leads to.
 FolderCheck check_private(const std::filesystem::path &folder);
 
 /// Makes `name` in `parent` with mode 0700, or takes it if it is there. If another user took that

@@ -11,7 +11,6 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
-#include <ranges>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -209,11 +208,11 @@ void AtomicFile::remove_old() noexcept {
   old_.clear();
 }
 
-OutputGroup *OutputGroup::current_ = nullptr;
+OutputGroup *OutputGroup::current_group = nullptr;
 
 OutputGroup::OutputGroup() {
-  if (current_ != nullptr) throw std::logic_error("there is an OutputGroup already");
-  current_ = this;
+  if (current_group != nullptr) throw std::logic_error("there is an OutputGroup already");
+  current_group = this;
   // Every file without a name keeps its descriptor.
   rlimit descriptors{};
   if (::getrlimit(RLIMIT_NOFILE, &descriptors) != 0) return;
@@ -222,9 +221,10 @@ OutputGroup::OutputGroup() {
 }
 
 OutputGroup::~OutputGroup() {
-  current_ = nullptr;
+  current_group = nullptr;
   files_.clear();
-  for (const fs::path &folder : std::views::reverse(folders_)) ::rmdir(folder.c_str());
+  std::for_each(folders_.rbegin(), folders_.rend(),
+                [](const fs::path &folder) { ::rmdir(folder.c_str()); });
 }
 
 fs::path OutputGroup::place_of(const fs::path &folder) const {
@@ -249,7 +249,7 @@ void OutputGroup::make_folders(const fs::path &folder) {
 
 void OutputGroup::take(AtomicFile &&file) {
   files_.push_back(std::unique_ptr<AtomicFile>(new AtomicFile(std::move(file))));
-  // Of a system with few descriptors, some are left for the files at work.
+  // A system with few descriptors keeps some for the files at work.
   constexpr rlim_t kSpared = 64;
   rlimit descriptors{};
   if (::getrlimit(RLIMIT_NOFILE, &descriptors) == 0 &&
@@ -264,7 +264,7 @@ void OutputGroup::commit() {
     const bool alone = files_.size() == 1;
     for (const auto &file : files_) file->replace_target(!alone);
   } catch (...) {
-    for (const auto &file : std::views::reverse(files_)) file->put_back();
+    std::for_each(files_.rbegin(), files_.rend(), [](const auto &file) { file->put_back(); });
     throw;
   }
   for (const auto &file : files_) file->remove_old();

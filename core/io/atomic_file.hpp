@@ -96,7 +96,7 @@ class OutputGroup {
   OutputGroup &operator=(const OutputGroup &) = delete;
 
   /// None, or the one that lives.
-  static OutputGroup *current() { return current_; }
+  static OutputGroup *current() { return current_group; }
 
   /// Bytes of a file that was committed, whether or not the group has renamed it yet.
   std::uint64_t bytes_of(const std::filesystem::path &path) const;
@@ -116,7 +116,7 @@ class OutputGroup {
   std::filesystem::path place_of(const std::filesystem::path &folder) const;
   void make_folders(const std::filesystem::path &folder);
 
-  static OutputGroup *current_;
+  static OutputGroup *current_group;
   std::vector<std::unique_ptr<AtomicFile>> files_;
   std::vector<std::filesystem::path> new_folders_;  ///< to be made
   std::vector<std::filesystem::path> folders_;      ///< made by commit(), outermost first

@@ -16,7 +16,7 @@ namespace isowave::core {
 
 namespace {
 
-/// Of no values, as macrocell_extremes orders them.
+/// The extremes of no values, as macrocell_extremes orders them.
 constexpr std::array kNoExtremes = {std::numeric_limits<int>::max(),
                                     std::numeric_limits<int>::min()};
 
