@@ -1,9 +1,11 @@
 #include "tools/isowave/program.hpp"
 
+#include <execinfo.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -98,7 +100,7 @@ std::string command_name(const CLI::App &app) {
 
 void print_line(const std::string &name, const std::string &text) {
   const std::string line = fmt::format("{}: {}\n", name, one_line(text));
-  std::fwrite(line.data(), 1, line.size(), stderr);  // nobody can be told where that fails
+  std::fwrite(line.data(), 1, line.size(), stderr);  // a failure cannot be told
 }
 
 /// Takes no memory.
@@ -116,9 +118,17 @@ void print_out_of_memory() {
   });
 }
 
+/// Has glibc load its unwinder while there is memory. Else glibc does so when it first unwinds one
+/// of its own functions, and aborts the process if it cannot.
+void load_unwinder() {
+  std::array<void *, 1> frames{};
+  ::backtrace(frames.data(), frames.size());
+}
+
 }  // namespace
 
 int run_main(const std::function<int()> &work) {
+  load_unwinder();
   try {
     return work();
   } catch (...) {
