@@ -98,7 +98,7 @@ class LayerEncoder {
   ocl::Buffer<float> voxels_;
   ocl::Buffer<uint> words_;
   ocl::Buffer<float> device_errors_;
-  /// Of the piece at work, and of the one before it.
+  /// The piece at work, and the one before it.
   ocl::InFlight<Result> current_, previous_;
   bool in_flight_ = false;  ///< current_ is to come
 };

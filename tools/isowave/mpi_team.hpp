@@ -36,7 +36,7 @@ class MpiJob {
   static std::string command_line();
   /// Number of this process among those of its host.
   static std::uint32_t local_rank();
-  /// Of a team, all processes: a file that they write by MPI-IO. It has no name before its
+  /// A file that all processes of the team write by MPI-IO. It has no name before its
   /// commit(), or a temporary one. The target is a regular file, or none.
   ///
   /// Throws  Error at all of them
