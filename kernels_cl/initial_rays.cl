@@ -8,8 +8,8 @@
 ///
 /// Out     by pixel [height * width]: hits: none; the first block of the ray; whether it meets any
 ///         that may be active; ray_ids: its entry, for the compaction that follows
-/// Launch  grid-stride over pixels
-kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
+/// Launch  grid-stride over pixels, in `parts` launches (ocl::Range)
+kernel void initial_rays(const FrameParams frame_params, uint parts, global HitRecord *hits,
                          global uint *ray_block_ids, global uint *ray_ids,
                          global uint *ray_active_mask, global PassCounts *counts) {
   const FrameParams *frame = &frame_params;
@@ -19,7 +19,8 @@ kernel void initial_rays(const FrameParams frame_params, global HitRecord *hits,
     counts->ray_count = frame_rays(frame);
     counts->window_count = first_window(frame);
   }
-  for (uint pixel = get_global_id(0); pixel < frame_rays(frame); pixel += get_global_size(0)) {
+  for (uint pixel = get_global_id(0); pixel < frame_rays(frame);
+       pixel += parts * get_global_size(0)) {
     const Ray ray = make_ray(frame, pixel);
     const uint block_id = first_block(frame, &ray);
     hits[pixel] = no_hit();

@@ -37,19 +37,20 @@ ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes las
 ///         which of them are a block's; pair_block_ids [pair slots]
 /// Out     pair_hits [pair slots], written for every pair; closest_pairs [active rays]: see
 ///         closest_pair.h
-/// Launch  a work-group per visible block, striding over them
+/// Launch  a work-group per visible block, striding over them, in `parts` launches (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
-    const FrameParams frame_params, global const PassCounts *counts, global const uint *pair_ids,
-    global const BlockRays *block_rays, global const uint *pair_block_ids,
-    global const BlockEntry *table, global const float *cache_values,
-    global const uint *active_ray_ids, global const uint *pair_rays, global PairHit *pair_hits,
-    global uint *closest_pairs) {
+    const FrameParams frame_params, uint parts, global const PassCounts *counts,
+    global const uint *pair_ids, global const BlockRays *block_rays,
+    global const uint *pair_block_ids, global const BlockEntry *table,
+    global const float *cache_values, global const uint *active_ray_ids,
+    global const uint *pair_rays, global PairHit *pair_hits, global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
   local uint corner_slots[8];
   const LastPlanes last = last_planes(frame);
   const uint visible_count = counts->visible_count, spec_count = counts->spec_count;
-  for (uint visible = get_group_id(0); visible < visible_count; visible += get_num_groups(0)) {
+  for (uint visible = get_global_id(0) / ISO_GROUP_SIZE; visible < visible_count;
+       visible += parts * get_num_groups(0)) {
     const uint begin = block_rays[visible].begin, end = block_rays[visible].end;
     const BlockCoords b = block_coords(frame, pair_block_ids[pair_ids[begin]]);
     for (uint corner = get_local_id(0); corner < 8; corner += ISO_GROUP_SIZE) {
@@ -86,16 +87,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
 ///
 /// In      as intersect, without block_rays
 /// Out     pair_hits and closest_pairs of those pairs
-/// Launch  grid-stride over the pairs
-kernel void settle_doubts(const FrameParams frame_params, global const PassCounts *counts,
-                          global const uint *pair_ids, global const uint *pair_block_ids,
-                          global const BlockEntry *table, global const float *cache_values,
-                          global const uint *active_ray_ids, global const uint *pair_rays,
-                          global PairHit *pair_hits, global uint *closest_pairs) {
+/// Launch  grid-stride over the pairs, in `parts` launches (ocl::Range)
+kernel void settle_doubts(const FrameParams frame_params, uint parts,
+                          global const PassCounts *counts, global const uint *pair_ids,
+                          global const uint *pair_block_ids, global const BlockEntry *table,
+                          global const float *cache_values, global const uint *active_ray_ids,
+                          global const uint *pair_rays, global PairHit *pair_hits,
+                          global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   const LastPlanes last = last_planes(frame);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
-  for (uint i = get_global_id(0); i < counts->granted_count; i += get_global_size(0)) {
+  for (uint i = get_global_id(0); i < counts->granted_count; i += parts * get_global_size(0)) {
     const uint pair = pair_ids[i], start = pair_hits[pair].cell;
     if (start >= ISO_IN_DOUBT) {
       const uint a = ray_of_pair(frame, pair_rays, pair, counts->spec_count);

@@ -23,18 +23,18 @@
 ///                  ascending along the ray, ISO_INVALID_ID behind the last; ray_block_ids [pixel]:
 ///                  the first block not yet looked at, or ISO_INVALID_ID when the ray has left the
 ///                  volume; closest_pairs [window_count]: ISO_INVALID_ID
-/// Launch           grid-stride over the window
+/// Launch           grid-stride over the window, in `parts` launches (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse(
-    const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
-    global const uint *active_ray_ids, global uint *ray_block_ids, global uint *pair_block_ids,
-    global uint *closest_pairs) {
+    const FrameParams frame_params, uint parts, global const uint *macrocell_masks,
+    global PassCounts *counts, global const uint *active_ray_ids, global uint *ray_block_ids,
+    global uint *pair_block_ids, global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   local uint group_pairs, group_ahead;
   const uint window = counts->window_count, spec_count = counts->spec_count;
   uint pairs = 0, sum_ahead = 0;
   if (get_local_id(0) == 0) group_pairs = group_ahead = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
+  for (uint a = get_global_id(0); a < window; a += parts * get_global_size(0)) {
     const RayEntry entry = unpack_entry(active_ray_ids[a]);
     const uint ray_id = entry.pixel;
     const uint ahead =
@@ -74,9 +74,9 @@ ISO_INLINE uint most_counted(const FrameParams *frame, uint spec_count) {
 /// Out     closest_pairs [window_count]: how many there are, at most most_counted();
 ///         histogram [ISO_MAX_SPECULATION + 1]: how many rays have so many; pair_block_ids
 ///         [window_count]: nothing of use
-/// Launch  grid-stride over the window
+/// Launch  grid-stride over the window, in `parts` launches (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse_count(
-    const FrameParams frame_params, global const uint *macrocell_masks,
+    const FrameParams frame_params, uint parts, global const uint *macrocell_masks,
     global const PassCounts *counts, global const uint *active_ray_ids,
     global const uint *ray_block_ids, global uint *pair_block_ids, global uint *closest_pairs,
     global uint *histogram) {
@@ -85,7 +85,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
   const uint window = counts->window_count, most = most_counted(frame, counts->spec_count);
   for (uint i = get_local_id(0); i <= ISO_MAX_SPECULATION; i += ISO_GROUP_SIZE) of_group[i] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
+  for (uint a = get_global_id(0); a < window; a += parts * get_global_size(0)) {
     const uint ray_id = unpack_entry(active_ray_ids[a]).pixel;
     const Ray ray = make_ray(frame, ray_id);
     uint block_id = ray_block_ids[ray_id];
@@ -167,11 +167,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
 ///
 /// In      pair_begins [window_count + 1]; closest_pairs, as traverse_count leaves them
 /// Out     as traverse; pair_rays [pair_slot_count]
-/// Launch  grid-stride over the window
+/// Launch  grid-stride over the window, in `parts` launches (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse_scanned(
-    const FrameParams frame_params, global const uint *macrocell_masks, global PassCounts *counts,
-    global const uint *active_ray_ids, global const uint *pair_begins, global uint *pair_rays,
-    global uint *ray_block_ids, global uint *pair_block_ids, global uint *closest_pairs) {
+    const FrameParams frame_params, uint parts, global const uint *macrocell_masks,
+    global PassCounts *counts, global const uint *active_ray_ids, global const uint *pair_begins,
+    global uint *pair_rays, global uint *ray_block_ids, global uint *pair_block_ids,
+    global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   const uint window = counts->window_count, spec_count = counts->spec_count,
              most = most_counted(frame, speculation_count(frame, counts->active_count));
@@ -179,7 +180,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void traverse
     counts->pair_count = counts->pair_slot_count;
     counts->ahead_count = window * spec_count;
   }
-  for (uint a = get_global_id(0); a < window; a += get_global_size(0)) {
+  for (uint a = get_global_id(0); a < window; a += parts * get_global_size(0)) {
     const uint ray_id = unpack_entry(active_ray_ids[a]).pixel, begin = pair_begins[a],
                wanted = pair_begins[a + 1] - begin, num_blocks = closest_pairs[a];
     uint block_id = ISO_INVALID_ID;

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <isowave/isowave.hpp>
 #include <thread>
 
@@ -23,6 +24,7 @@ class ThreadProcess : public Processes {
   std::uint32_t size() const override { return kCount; }
   std::uint32_t local_rank() const override { return rank_; }
   std::vector<std::string> all_gather(const std::string &bytes) override {
+    if (on_gather) on_gather();
     return meeting_.all_gather(rank_, bytes);
   }
   void reduce(std::span<std::uint64_t> words, Reduction how, bool for_all) override {
@@ -33,6 +35,8 @@ class ThreadProcess : public Processes {
                                                      : Of::kOr,
                     for_all);
   }
+
+  std::function<void()> on_gather{};
 
  private:
   core::test::ThreadMeeting &meeting_;
@@ -95,6 +99,26 @@ TEST(ApiBricks, BoundsOfOneRenderer) {
       EXPECT_EQ(frame.detail->voxel_error, expected.detail->voxel_error);
       EXPECT_EQ(frame.detail->voxel_pixels, expected.detail->voxel_pixels);
     }
+  });
+}
+
+/// A call of the renderer that waits for them.
+TEST(ApiBricks, CallsFromItsOwnProcessesAreRefused) {
+  in_threads([](ThreadProcess &processes, std::uint32_t) {
+    BrickRenderer renderer(processes, kFuel, {}, {}, {.renderer = {.largest = {16, 16}}});
+    FrameRequest request{.isovalue = 40, .size = {16, 16}};
+    request.camera = renderer.camera(40);
+    std::string error;
+    processes.on_gather = [&] {
+      processes.on_gather = {};
+      try {
+        renderer.render(request);
+      } catch (const Error &refused) {
+        error = refused.what();
+      }
+    };
+    renderer.render(request);
+    EXPECT_THAT(error, testing::HasSubstr("at work"));
   });
 }
 

@@ -98,13 +98,17 @@ TEST_P(RenderOnDevice, SmallEyeInside) {
   EXPECT_GT(check(volume, {camera_along({4, 4.5, 5}, {1, 0.25, -0.5})}, {0.1f}, kSmall), 20u);
 }
 
-/// Rays in many launches, ray by ray: start_rays, march and smooth_normals.
+/// Rays, and blocks of rays, in many launches of a stage.
 TEST_P(RenderOnDevice, SmallLaunchesOfFewRays) {
   pretend([](ocl::Capabilities &can) { can.elements_per_launch = 7; });
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
-  EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, kSmall,
-                  {.packets = RayPackets::kOff}),
-            20u);
+  const std::vector<Camera> cameras = {orbit_cameras(volume.info(), 1)[0]};
+  EXPECT_GT(check(volume, cameras, {0.1f}, kSmall, {.packets = RayPackets::kOff}), 20u);
+  for (const bool scanned : {false, true}) {
+    EXPECT_GT(check(volume, cameras, {0.1f}, kSmall,
+                    {.pipeline = PipelineKind::kBlocks, .scanned_pairs = scanned}),
+              20u);
+  }
 }
 
 TEST_P(RenderOnDevice, SmallGroupsOfTwo) {

@@ -97,7 +97,7 @@ double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
 
 class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  using TraverseKernel = ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>,
+  using TraverseKernel = ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<PassCounts>,
                                      ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>;
 
   /// The kernel itself, since masks that no isovalue makes are wanted.
@@ -150,7 +150,7 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       counts.spec_count = spec_count;
       counts.pair_count = counts.ahead_count = 0;
       rays.counts.write({&counts, 1});
-      stages.kernel(stages.range, rays.frame, masks, rays.counts, rays.active_ray_ids,
+      stages.kernel(stages.range, rays.frame, 1, masks, rays.counts, rays.active_ray_ids,
                     rays.ray_block_ids, pairs, rays.closest_pairs);
       const std::vector<uint> got = pairs.read(), states = rays.ray_block_ids.read();
       counts.pair_count =

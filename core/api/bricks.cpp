@@ -110,6 +110,7 @@ struct BrickRenderer::Implementation {
   Frame draw(const FrameRequest &request);
 
   ProcessTeam team;
+  Turns turns;
   RendererOptions options;
   std::unique_ptr<Device::Implementation> device{};
   core::VolumeInfo whole{};
@@ -209,12 +210,16 @@ BrickRenderer::BrickRenderer(Processes &processes, const std::filesystem::path &
 BrickRenderer::~BrickRenderer() = default;
 
 Frame BrickRenderer::render(const FrameRequest &request) {
-  return guarded("rendering", [&] { return implementation_->draw(request); });
+  return guarded("rendering", [&] {
+    const std::lock_guard turn(implementation_->turns);
+    return implementation_->draw(request);
+  });
 }
 
 Camera BrickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
     Implementation &self = *implementation_;
+    const std::lock_guard turn(self.turns);
     std::optional<core::BlockBox> own;
     core::together(self.team, [&] { own = self.renderer->surface_box({&isovalue, 1}); });
     return public_camera(core::surface_camera(self.whole,

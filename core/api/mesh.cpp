@@ -54,6 +54,10 @@ void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<con
     throw core::Error("level {} of a volume that has {}: count from 0", options.level,
                       levels.size());
   const std::lock_guard lock(device->implementation().mutex);
+  const std::function<void()> before_kernel = [&options] {
+    if (options.progress) options.progress("extracting", 0);
+  };
+  const KernelWatch watch(device->implementation().device, before_kernel);
   core::Extractor extractor(device->implementation().device, *levels[options.level],
                             {.with_normals = options.with_normals,
                              .memory_budget = options.memory_budget,

@@ -87,21 +87,6 @@ class ProgressOf : public ProgressInTurns {
   core::Appearance appearance_;
 };
 
-/// Has before_kernel called for each kernel that is compiled while this lives.
-class KernelWatch {
- public:
-  KernelWatch(core::ocl::Device &device, const std::function<void()> &before_kernel)
-      : device_(device) {
-    if (before_kernel) device.on_new_kernel([&](std::string_view) { before_kernel(); });
-  }
-  ~KernelWatch() { device_.on_new_kernel({}); }
-  KernelWatch(const KernelWatch &) = delete;
-  KernelWatch &operator=(const KernelWatch &) = delete;
-
- private:
-  core::ocl::Device &device_;
-};
-
 void check(const FrameRequest &request, const RendererOptions &options) {
   if (request.max_surface_error && request.time_budget_ms)
     throw core::Error("a frame cannot keep both an error and a time: give one of the two");

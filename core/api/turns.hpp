@@ -19,8 +19,8 @@ class Turns {
     core::check_not_forked();
     if (is_mine()) {
       throw core::Error(
-          "this renderer or its device is at work, and waits for the on_pass or progress that "
-          "makes this call: use it afterwards, or make another one with a device of its own");
+          "this renderer or its device is at work, and waits for the callback that makes this "
+          "call: use it afterwards, or make another one with a device of its own");
     }
     mutex_.lock();
     owner_ = std::this_thread::get_id();

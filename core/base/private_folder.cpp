@@ -13,6 +13,8 @@
 #include <optional>
 #include <system_error>
 
+#include "core/base/names_in.hpp"
+
 namespace isowave::core {
 
 namespace fs = std::filesystem;
@@ -54,10 +56,8 @@ std::string open_to_others(const fs::path &path) {
 
 /// can_enter: whether other users can reach what is in the folder.
 std::string danger_within(const fs::path &folder, bool can_enter) {
-  std::error_code failure;
-  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
-       entry.increment(failure)) {
-    const fs::path &path = entry->path();
+  for (const std::string &name : names_in(folder)) {
+    const fs::path path = folder / name;
     struct stat status {};
     if (::lstat(path.c_str(), &status) != 0) continue;  // another process has removed it
     if (!is_own(status)) return of_another_user(path);
@@ -181,11 +181,9 @@ FolderCheck check_private(const fs::path &folder) {
 
 fs::path make_private(const fs::path &parent, const std::string &name) {
   if (const auto folder = make_or_take(parent / name)) return *folder;
-  std::error_code failure;
-  for (fs::directory_iterator entry(parent, failure), end; !failure && entry != end;
-       entry.increment(failure)) {
-    if (!entry->path().filename().string().starts_with(name + ".")) continue;
-    if (const auto folder = make_or_take(entry->path())) return *folder;
+  for (const std::string &other : names_in(parent)) {
+    if (!other.starts_with(name + ".")) continue;
+    if (const auto folder = make_or_take(parent / other)) return *folder;
   }
   std::string fresh = (parent / (name + ".XXXXXX")).string();
   if (::mkdtemp(fresh.data()) == nullptr) return {};

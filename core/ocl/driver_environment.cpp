@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/base/names_in.hpp"
 #include "core/base/private_folder.hpp"
 #include "core/ocl/environment.hpp"
 
@@ -154,9 +155,9 @@ bool is_usable(const fs::path &wanted) {
   if (!fs::is_directory(folder, failure) || ::access(folder.c_str(), W_OK | X_OK) != 0)
     return false;
   if (folder == wanted) {
-    for (const auto &entry :
-         fs::directory_iterator(folder, failure)) {  // root may have made some, by sudo
-      if (entry.is_directory(failure) && ::access(entry.path().c_str(), W_OK | X_OK) != 0)
+    for (const std::string &name : names_in(folder)) {  // root may have made some, by sudo
+      const fs::path entry = folder / name;
+      if (fs::is_directory(entry, failure) && ::access(entry.c_str(), W_OK | X_OK) != 0)
         return false;
     }
   }

@@ -18,8 +18,8 @@ class InitialRays {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<FrameParams, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<PassCounts>>
+  ocl::Kernel<FrameParams, uint, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
+              ocl::Out<uint>, ocl::Out<PassCounts>>
       kernel_;
 };
 

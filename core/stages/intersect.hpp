@@ -21,12 +21,12 @@ class Intersect {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockRays>, ocl::In<uint>,
-              ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::In<uint>, ocl::Out<PairHit>,
-              ocl::Out<uint>>
+  ocl::Kernel<FrameParams, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockRays>,
+              ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::In<uint>,
+              ocl::Out<PairHit>, ocl::Out<uint>>
       kernel_;
   /// Only a solver that can be in doubt has it.
-  std::optional<ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
+  std::optional<ocl::Kernel<FrameParams, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
                             ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::In<uint>,
                             ocl::Out<PairHit>, ocl::Out<uint>>>
       settle_doubts_;

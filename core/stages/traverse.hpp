@@ -36,19 +36,19 @@ class Traverse {
     ocl::Buffer<uint> histogram;  ///< [ISO_MAX_SPECULATION + 1] 0 between passes
     ocl::Buffer<uint> tile_sums;
     ExclusiveScan scan;
-    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
+    ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
                 ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
         count;
     ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::Out<uint>> share;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> tiles;
     ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> begins;
-    ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>,
-                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
+    ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
+                ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
         find;
   };
 
   ocl::Range range_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
+  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
               ocl::Out<uint>, ocl::Out<uint>>
       kernel_;
   std::optional<Scanned> scanned_;
