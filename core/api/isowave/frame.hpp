@@ -145,7 +145,7 @@ struct Frame {
   std::optional<DetailChoice> detail{};  ///< where max_surface_error was given
 };
 
-/// Writes frame.picture.
+/// Writes frame.picture: RGB, or RGBA if a caller has added an alpha to its pixels.
 ///
 /// Throws  Error: no picture, a name that ends in something else than .png, or it cannot be written
 void save_png(const Frame &frame, const std::filesystem::path &path);
