@@ -48,7 +48,8 @@ class Progress {
   virtual ~Progress() = default;
   virtual std::uint32_t passes() const = 0;
   virtual double completed_percent() const = 0;  ///< rays that have ended, of all
-  /// Of picture(): that of the frame, but within a time budget, whose first pictures are smaller.
+  /// Size of picture(): the frame's, except that the first pictures within a time budget are
+  /// smaller.
   virtual ImageSize size() const = 0;
   /// RGB [height][width][3], row 0 at the top. Takes a few milliseconds.
   virtual std::vector<std::uint8_t> picture() const = 0;
