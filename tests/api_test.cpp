@@ -15,6 +15,7 @@
 #include <optional>
 #include <thread>
 
+#include "core/io/png.hpp"
 #include "core/ocl/device.hpp"
 #include "core/volume/pyramid.hpp"
 #include "tests/run_program.hpp"
@@ -199,6 +200,9 @@ TEST(Api, WhatCannotBeOpenedIsAnError) {
   EXPECT_THAT(error_of([&] { open_device("no such device"); }), HasSubstr("no such device"));
   EXPECT_THAT(error_of([&] { sphere()->save(folder / "no" / "such" / "folder.zfp"); }),
               HasSubstr("folder.zfp"));
+  EXPECT_THAT(error_of([&] { sphere()->save(folder / "a.nrrd"); }),
+              AllOf(HasSubstr("a.nrrd"), HasSubstr("ending .zfp")));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.nrrd"));
   EXPECT_THAT(error_of([&] { save_png(Frame{}, folder / "a.png"); }), HasSubstr("no picture"));
   EXPECT_THAT(error_of([&] { encode_png(Frame{}); }), HasSubstr("no picture"));
 }
@@ -253,6 +257,13 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
   save_png(frame, folder / "a.png");
   const std::vector<std::uint8_t> png = encode_png(frame);
   EXPECT_EQ(test::read_file(folder / "a.png"), std::string(png.begin(), png.end()));
+  Frame transparent;
+  transparent.size = {2, 1, 1};
+  transparent.picture = {10, 20, 30, 255, 40, 50, 60, 0};
+  save_png(transparent, folder / "b.png");
+  const core::Image8 read = core::read_png(folder / "b.png");
+  EXPECT_EQ(read.channels, 4);
+  EXPECT_EQ(read.pixels, transparent.picture);
 }
 
 /// Where coarse levels draw, hits are at the depth that is said, too.

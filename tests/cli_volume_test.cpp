@@ -132,7 +132,7 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
   expect_one_line_error("convert " + file("b_4x4x4_uint8.raw", cube + "x") + to,
                         "need 64 bytes, found 65");
   expect_one_line_error("convert " + file("b_4x4x4_uint8.raw.gz", cube) + to, "not a gzip file");
-  expect_one_line_error("convert " + file("c.raw", cube) + to, "--dims and --type");
+  expect_one_line_error("convert " + file("c.raw", cube) + to, "dims and type");
   expect_one_line_error("convert " + file("d_0x4x4_uint8.raw", cube) + to, "0x4x4");
   expect_one_line_error("convert " + file("e_4x4x4_uint7.raw", cube) + to, "e_4x4x4_uint7.raw");
   expect_one_line_error("convert " + file("f.xyz", cube) + to, "unknown kind");

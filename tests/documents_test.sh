@@ -26,8 +26,8 @@ measured --only frames,normals,error,time,stability,sweep,paper,devices,cpus
 measured --only storage,sizes,detail,solvers,pareto --volumes "$top/tests/data"
 tables=(front frames normals error time cpus stability leaks storage sizes detail solvers
   solver_frames pareto pareto_times paper_claims paper_stand_ins paper_passes paper_times
-  paper_progress paper_utilisation paper_scanned paper_limits paper_working_set paper_memory
-  paper_blocks paper_scaling by_device)
+  paper_published_passes paper_published_memory paper_progress paper_utilisation paper_scanned
+  paper_limits paper_working_set paper_memory paper_blocks paper_scaling by_device)
 if [ -x "$programs/bench/peer_bench" ]; then
   measured --only peer
   tables+=(peer)
@@ -65,6 +65,9 @@ tables || fail 'tables cannot be made'
 tables --check || fail 'tables differ from what they were made of'
 made=$(grep -c '^|---' "$work/top/page.md")
 [ "$made" -eq "${#tables[@]}" ] || fail "$(cat "$work/top/page.md")"
+for set in Skull 'TACC Turbulence' Kingsnake DNS Richtmyer-Meshkov; do
+  [ "$(grep -c "^| $set |" "$work/top/page.md")" -eq 2 ] || fail "the article's $set is missing"
+done
 
 # must_fail NAME WORDS: --check fails in one line that has the words.
 must_fail() {

@@ -181,7 +181,7 @@ TEST(RawReader, OverridesReplaceTheName) {
   const TemporaryFolder folder;
   write_file(folder / "head.raw", std::string(24, 'a'));
   EXPECT_THAT([&] { open_volume(folder / "head.raw"); },
-              ThrowsMessage<Error>(HasSubstr("--dims and --type")));
+              ThrowsMessage<Error>(HasSubstr("dims and type")));
   EXPECT_THROW(
       open_volume(folder / "head.raw", {.dims = glm::uvec3(2, 3, 4), .type = {}, .spacing = {}}),
       Error);

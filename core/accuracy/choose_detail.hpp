@@ -1,6 +1,6 @@
 #pragma once
-// The cheapest way to draw a frame within an error: how coarse its levels of detail, how few its
-// bit planes may be.
+// The coarsest way to draw a frame within an error: how coarse its levels of detail, how few its
+// bit planes may be. That saves blocks; on CPUs it costs time (bench/detail.md).
 
 #include <optional>
 #include <string>
@@ -59,11 +59,11 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
 /// max_surface_error  that most pixels are to keep [pixels], above 0
 ///
 /// Draws small pictures of the frame, every so many pixels, and their bounds (certify()); so the
-/// choice depends on data, camera and size, never on timings. Levels of detail first, then bit
-/// planes: the coarsest that lose no more than kLostShare; no levels that spare hardly any blocks
-/// (kMaxBlocksShare), nor planes of volumes of few bits (kMinPlaneRate). Full detail, where most
-/// pixels do not keep max_surface_error even so. All ranks of a team choose alike: what rank 0
-/// finds counts. Throws Error as certify() does.
+/// choice depends on data, camera and size, never on timings. Picks the coarsest levels of detail,
+/// then the fewest bit planes, that cost at most kLostShare of the certified pixels. Levels are
+/// skipped if they save too few blocks (kMaxBlocksShare); bit planes are kept for volumes below
+/// kMinPlaneRate bits a voxel. Full detail if most pixels do not keep max_surface_error even so.
+/// All ranks of a team choose alike: what rank 0 finds counts. Throws Error as certify() does.
 DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
                            double max_surface_error);
 /// The same with one renderer. volume: what it was made for.

@@ -241,18 +241,28 @@ double Renderer::setup_ms() const {
   return implementation_->renderer.setup_ms();
 }
 
+namespace {
+
+core::Image8 image_of(const Frame &frame) {
+  const std::size_t num_pixels = std::size_t(frame.size.width) * frame.size.height;
+  const std::uint32_t channels = frame.picture.size() == 4 * num_pixels ? 4 : 3;
+  return {frame.size.width, frame.size.height, channels, frame.picture};
+}
+
+}  // namespace
+
 void save_png(const Frame &frame, const std::filesystem::path &path) {
   guarded("saving a picture", [&] {
     core::check_png_name(path);
     if (frame.picture.empty()) throw core::Error("{}: the frame has no picture", path.string());
-    core::write_png({frame.size.width, frame.size.height, 3, frame.picture}, path);
+    core::write_png(image_of(frame), path);
   });
 }
 
 std::vector<std::uint8_t> encode_png(const Frame &frame) {
   return guarded("encoding a picture", [&] {
     if (frame.picture.empty()) throw core::Error("the frame has no picture");
-    return core::encode_png({frame.size.width, frame.size.height, 3, frame.picture});
+    return core::encode_png(image_of(frame));
   });
 }
 

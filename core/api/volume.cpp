@@ -175,7 +175,10 @@ std::vector<float> Volume::sample(std::uint64_t max_voxels) const {
 }
 
 void Volume::save(const std::filesystem::path &path) const {
-  guarded("saving", [&] { core::write_zfp_file(implementation_->volume, path); });
+  guarded("saving", [&] {
+    core::check_zfp_name(path.string());
+    core::write_zfp_file(implementation_->volume, path);
+  });
 }
 
 std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,

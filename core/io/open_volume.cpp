@@ -54,7 +54,7 @@ std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrid
         path.string());
   }
   if (overrides.dims || overrides.type) {
-    throw Error("{}: --dims and --type are for raw files; this file's header gives its own",
+    throw Error("{}: dims and type are for raw files; this file's header gives its own",
                 path.string());
   }
   if (overrides.spacing) header->info.spacing = *overrides.spacing;

@@ -281,9 +281,8 @@ std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &f
   const std::optional<RawName> name = parse_raw_name(stem.string());
   if (!name && !(overrides.dims && overrides.type)) {
     throw Error(
-        "{}: the name does not end in _XxYxZ_TYPE (as in head_256x256x113_uint16.raw): give --dims "
-        "and "
-        "--type",
+        "{}: the name does not end in _XxYxZ_TYPE (as in head_256x256x113_uint16.raw): give dims "
+        "and type",
         file->what());
   }
   VolumeHeader header;

@@ -29,12 +29,12 @@ constexpr std::uint64_t kRaysPerUsefulSlot = 8;
 /// `rays` decodes 6 n^2, of 256^3 voxels as of 1024^3; pipeline `blocks`, which asks for whole dual
 /// grids, 9.6 n^2 (bench/README.md).
 constexpr double kSlotsPerFace = 12;
-/// Few rays need fewer: never more than five slots for eight of them.
+/// A small picture needs a smaller cache: at most 5 slots per 8 rays.
 constexpr std::uint64_t kRaysPerSlot = 8, kSlotsOfThose = 5;
 /// Where that keeps the plan below the decoded volume, a cache begins with as little as half.
 constexpr std::uint64_t kLeastPart = 2;
-/// Slots (5.3 MB) that no cache begins with fewer of, unless there are not so many blocks: those of
-/// a small noisy volume, where a frame needs most of the blocks.
+/// Least initial size of a cache, 2^14 slots (5.3 MB), or all blocks if there are fewer: a frame of
+/// a small noisy volume needs most of its blocks.
 constexpr std::uint64_t kFewSlots = 1 << 14;
 /// A frame that frees a smaller part of its slots for itself finds enough of them.
 constexpr std::uint32_t kSparePart = 32;

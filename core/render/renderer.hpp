@@ -214,7 +214,8 @@ class Renderer {
   /// Whether a single pass was enough: for the last frame that showed a new view [0], and for the
   /// last that showed the same view again [1].
   std::array<bool, 2> took_one_pass_{};
-  /// Of rays that wait for their normals, or are not those of the camera.
+  /// Levels whose block requests are still unanswered because a pass for normals or ambient rays
+  /// was cut short; empty when none are.
   std::optional<LevelRange> open_requests_;
   std::unique_ptr<Pipeline> pipeline_;
   SmoothNormals smooth_normals_;

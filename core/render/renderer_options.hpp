@@ -16,7 +16,7 @@ struct RendererOptions {
   /// Decoded blocks kept, at least 8. 0: as many as the budget allows; without one, as many as
   /// frames need: the cache grows, up to kAmpleCacheSlots (MemoryPlan::most_slots).
   std::uint32_t cache_slots = 0;
-  /// Of these, as many as it begins with where it may grow; 0: first_cache_slots().
+  /// Initial number of cache slots when the cache may grow; 0: first_cache_slots().
   std::uint32_t first_slots = 0;
   std::uint32_t max_speculation =
       64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off

@@ -131,8 +131,7 @@ CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
 CompressedVolume compress_volume_to_file(const OpenReader &open, std::string_view what,
                                          const Storage &storage,
                                          const std::filesystem::path &path) {
-  if (!is_zfp_name(path.string()))
-    throw Error("{}: compressed volumes are opened by the ending .zfp: give it", path.string());
+  check_zfp_name(path.string());
   const std::unique_ptr<VolumeReader> reader = open();
   compress_to_file(*reader, compress_options(open, reader->info(), what, storage), path);
   return open_compressed_volume(path.string(), {});
@@ -140,6 +139,11 @@ CompressedVolume compress_volume_to_file(const OpenReader &open, std::string_vie
 
 bool is_zfp_name(std::string_view path) {
   return path.ends_with(".zfp");
+}
+
+void check_zfp_name(std::string_view path) {
+  if (!is_zfp_name(path))
+    throw Error("{}: compressed volumes are opened by the ending .zfp: give it", path);
 }
 
 CompressedVolume open_compressed_volume(const std::string &path, const RawOverrides &overrides) {
@@ -158,7 +162,7 @@ std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
                                               const ocl::Device *maker) {
   if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
   if (overrides.dims || overrides.type)
-    throw Error("{}: it says dims and type itself: leave --dims and --type", path);
+    throw Error("{}: it says dims and type itself: leave them out", path);
   GenerateOptions options = parse_generator(std::string_view(path).substr(kGenerate.size()));
   if (maker != nullptr) options.device = maker->info();
   std::unique_ptr<VolumeReader> reader = open_generated(options);

@@ -55,6 +55,8 @@ CompressedVolume compress_volume_to_file(const OpenReader &open, std::string_vie
 
 /// Whether the name ends in .zfp.
 bool is_zfp_name(std::string_view path);
+/// Throws  Error: is_zfp_name() says no
+void check_zfp_name(std::string_view path);
 /// Opens a `.zfp` file, whose spacing may be overridden; the payload stays in the file. Throws
 /// Error also on what cannot be drawn.
 CompressedVolume open_compressed_volume(const std::string &path, const RawOverrides &overrides);

@@ -8,11 +8,11 @@
 /// slot. So nothing depends on when other work-items run.
 ///
 /// Order of memory: a block's values, bits and stamp, and what its entry says of its cells, are
-/// written before an atomic_xchg gives the entry its slot. Who reads an entry looks at the slot
-/// first, and at all else when there is one. OpenCL 1.2 orders no memory between work-groups, but
-/// PoCL does: its atomic functions are LLVM's, sequentially consistent, which neither compilers nor
-/// processors move a load or a store across; and what a slot leads to is found by its number, so
-/// that it is loaded after that.
+/// written before an atomic_xchg gives the entry its slot. A reader of an entry looks at the slot
+/// first, and at all else when there is one. OpenCL 1.2 orders no memory between work-groups.
+/// PoCL does: its atomic functions are LLVM's with order acq_rel (seen in PoCL 3.1's library for
+/// x86), so a work-item that reads the slot sees the stores before the atomic_xchg. What a slot
+/// leads to is found by the slot's number, so it is loaded after the slot.
 #ifndef ISOWAVE_ON_DEMAND_H
 #define ISOWAVE_ON_DEMAND_H
 

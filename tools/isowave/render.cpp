@@ -479,10 +479,11 @@ void print_picture_name(const RenderArgs &options, std::size_t num_views) {
                  : fmt::format("{}_isoV_viewK.png", volume_stem(options.input)));
 }
 
-/// What bricks cannot do, since it goes on in other bricks, or is not put together.
+/// Refuses options that bricks cannot serve.
 void check_brick_options(const CLI::App &command, const Team &team) {
   refuse_options(command, {"--reference", "--verbose"},
-                 fmt::format("not of a volume that {} processes draw together", team.size()));
+                 fmt::format("cannot be used with mpirun: {} processes draw parts of the volume",
+                             team.size()));
 }
 
 /// Throws Error where one process would make levels of detail. levels: that the volume has.
@@ -811,8 +812,9 @@ void add_render(CLI::App &app) {
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`); "
                       "several, with commas: of the first process of a host, the second, ...");
   command->add_option("--bricks", options->bricks,
-                      "XxYxZ: how many along each axis, one for each process; active: so that "
-                      "surfaces touch like many blocks of each [all alike large]");
+                      "how to cut the volume, one brick per process: XxYxZ bricks along each axis, "
+                      "or active to give each brick the same number of surface blocks [bricks of "
+                      "equal size]");
   command->add_option("--color", options->color, "surface colour #RRGGBB")->capture_default_str();
   command->add_option("--background", options->background, "background colour #RRGGBB")
       ->capture_default_str();

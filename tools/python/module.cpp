@@ -872,8 +872,9 @@ class PyBrickRenderer {
   std::unique_ptr<isowave::BrickRenderer, DestroyWithoutGil<isowave::BrickRenderer>> renderer_;
 };
 
+/// [height][width][3, or 4 with alpha]
 using Picture =
-    nb::ndarray<std::uint8_t, nb::ro, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+    nb::ndarray<std::uint8_t, nb::ro, nb::shape<-1, -1, -1>, nb::c_contig, nb::device::cpu>;
 
 isowave::Frame frame_of(const Picture &picture) {
   isowave::Frame frame;

@@ -48,7 +48,8 @@ class Progress {
   virtual ~Progress() = default;
   virtual std::uint32_t passes() const = 0;
   virtual double completed_percent() const = 0;  ///< rays that have ended, of all
-  /// Of picture(): that of the frame, but within a time budget, whose first pictures are smaller.
+  /// Size of picture(): the frame's, except that the first pictures within a time budget are
+  /// smaller.
   virtual ImageSize size() const = 0;
   /// RGB [height][width][3], row 0 at the top. Takes a few milliseconds.
   virtual std::vector<std::uint8_t> picture() const = 0;
@@ -145,7 +146,7 @@ struct Frame {
   std::optional<DetailChoice> detail{};  ///< where max_surface_error was given
 };
 
-/// Writes frame.picture.
+/// Writes frame.picture: RGB, or RGBA if a caller has added an alpha to its pixels.
 ///
 /// Throws  Error: no picture, a name that ends in something else than .png, or it cannot be written
 void save_png(const Frame &frame, const std::filesystem::path &path);

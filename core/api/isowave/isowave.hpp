@@ -1,5 +1,5 @@
 #pragma once
-// isowave: isosurfaces of volumes too large for the device that draws them, on any OpenCL device.
+// isowave: isosurfaces of volumes too large for the OpenCL device that draws them.
 //
 //   auto device = isowave::open_device();
 //   auto volume = isowave::open_volume("head.nrrd");

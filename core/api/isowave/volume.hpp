@@ -99,7 +99,7 @@ class Volume {
   std::vector<float> sample(std::uint64_t max_voxels) const;
   /// Writes a `.zfp` file to a temporary name and renames it.
   ///
-  /// Throws  Error: the file cannot be written
+  /// Throws  Error: the name does not end in .zfp, or the file cannot be written
   void save(const std::filesystem::path &path) const;
 
   struct Implementation;

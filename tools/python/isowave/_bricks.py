@@ -215,4 +215,4 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         frame = self._core.render(request)
         if self._processes.rank != 0:
             return None
-        return Image(frame, camera_of(request), isovalue, samples)
+        return Image(frame, camera_of(request), isovalue, samples, background)

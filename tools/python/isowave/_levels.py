@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from isowave import _core
+if TYPE_CHECKING:
+    from isowave._volume import Volume
 
 Shape = tuple[int, int, int]
 
@@ -28,10 +29,10 @@ class Level:
     ndim = 3
     dtype = np.dtype(np.float32)
 
-    def __init__(self, core: _core.Volume, number: int, shape: Sequence[int] | None = None) -> None:
+    def __init__(self, volume: Volume, number: int, shape: Sequence[int] | None = None) -> None:
         """shape: of the voxels from (0, 0, 0) on, where not all are wanted."""
-        self._core, self._number = core, number
-        nz, ny, nx = reversed(core.level_dims(number)) if shape is None else shape
+        self._volume, self._number = volume, number
+        nz, ny, nx = reversed(volume._core.level_dims(number)) if shape is None else shape
         self._shape = (nz, ny, nx)
 
     @property
@@ -68,6 +69,10 @@ class Level:
         voxels: npt.NDArray[Any] = self[...]
         return voxels if dtype is None else voxels.astype(dtype, copy=False)
 
+    def __dask_tokenize__(self) -> object:
+        """Whatever names dask's chunks of these voxels, and of no others."""
+        return self._volume.__dask_tokenize__(), self._number, self._shape
+
     def __repr__(self) -> str:
         shape = " x ".join(str(n) for n in self._shape)
         return f"<isowave.Level {self._number}, {shape} (z, y, x) {self.dtype}>"
@@ -77,7 +82,7 @@ class Level:
         if not all(ranges):  # the library knows no empty regions
             return np.empty([len(r) for r in ranges], np.float32)
         z, y, x = ranges
-        return self._core.decode(
+        return self._volume._core.decode(
             self._number,
             (x.start, y.start, z.start),
             (x[-1] + 1, y[-1] + 1, z[-1] + 1),

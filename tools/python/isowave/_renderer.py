@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from isowave._volume import Volume
 
 Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
+WHITE = (1.0, 1.0, 1.0)  # the background where none is given, as isowave::Appearance has it
 ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
 #: Of Renderer's arguments, what frames may ask for only if it was given.
 CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
@@ -119,7 +120,12 @@ class Image:
     `statistics["errors_are_stated"]`, as `Volume.errors_are_stated`."""
 
     def __init__(
-        self, frame: dict[str, Any], camera: Camera, isovalue: float, samples: int
+        self,
+        frame: dict[str, Any],
+        camera: Camera,
+        isovalue: float,
+        samples: int,
+        background: Color | None = None,
     ) -> None:
         self.rgb = frame.get("picture")
         self.depth = frame.get("depth")
@@ -131,6 +137,7 @@ class Image:
         self.camera = camera
         self.isovalue = isovalue
         self._samples = samples
+        self._background = WHITE if background is None else color_of(background)
 
     @property
     def complete(self) -> bool:
@@ -139,14 +146,24 @@ class Image:
 
     @property
     def rgba(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 4); alpha is the part of a pixel that the surface covers."""
+        """(height, width, 4); alpha is the part of a pixel that the surface covers.
+
+        Colours are the surface's alone, without the background. Opaque where depth was not asked
+        for.
+        """
         rgb = self._rgb()
-        alpha = np.full(rgb.shape[:2], 255, np.uint8)
-        if self.depth is not None:
-            s = self._samples
-            hit = np.isfinite(self.depth).reshape(rgb.shape[0], s, rgb.shape[1], s)
-            alpha = np.rint(255 * hit.mean(axis=(1, 3))).astype(np.uint8)
-        return np.dstack((rgb, alpha))
+        if self.depth is None:
+            return np.dstack((rgb, np.full(rgb.shape[:2], 255, np.uint8)))
+        s = self._samples
+        hit = np.isfinite(self.depth).reshape(rgb.shape[0], s, rgb.shape[1], s)
+        covered = hit.mean(axis=(1, 3))
+        edge = (covered > 0) & (covered < 1)
+        if edge.any():  # there, rays that met nothing have mixed the background in
+            part = covered[edge][:, None]
+            surface = (rgb[edge] - (1 - part) * 255 * np.array(self._background)) / part
+            rgb = rgb.copy()
+            rgb[edge] = np.rint(surface.clip(0, 255))
+        return np.dstack((rgb, np.rint(255 * covered).astype(np.uint8)))
 
     def _rgb(self) -> npt.NDArray[np.uint8]:
         if self.rgb is None:
@@ -161,9 +178,12 @@ class Image:
     def _repr_png_(self) -> bytes:
         return _core.encode_png(self._rgb())
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a .png file; whole, or not at all."""
-        _core.save_png(self._rgb(), os.fsdecode(path))
+    def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
+        """Writes a .png file; whole, or not at all.
+
+        alpha: writes `rgba`, transparent where there is no surface, in place of `rgb`.
+        """
+        _core.save_png(self.rgba if flag("alpha", alpha) else self._rgb(), os.fsdecode(path))
 
     def __repr__(self) -> str:
         shown = "" if self.rgb is None else f"{self.rgb.shape[1]} x {self.rgb.shape[0]}, "
@@ -251,9 +271,9 @@ def request_for(
         "voxel_pixels": number("voxel_pixels", voxel_pixels),
         "voxel_error": number("voxel_error", voxel_error),
         "max_surface_error": None if max_error is None else number("max_error", max_error),
-        "time_budget_ms": None
-        if time_budget is None
-        else 1000 * number("time_budget", time_budget),
+        "time_budget_ms": (
+            None if time_budget is None else 1000 * number("time_budget", time_budget)
+        ),
         "ambient_rays": whole("ambient", ambient),
         "want_picture": "rgb" in outputs,
         "want_depth": "depth" in outputs,
@@ -492,7 +512,7 @@ class Renderer:
         # pass would cost time.
         interrupts = self.device["type"] != "gpu"
         frame = draw(self._core, request, on_pass, interrupts)
-        return Image(frame, camera_of(request), isovalue, samples)
+        return Image(frame, camera_of(request), isovalue, samples, background)
 
     def _check(
         self,
@@ -527,6 +547,11 @@ class Renderer:
             raise _core.Error("cast_rays needs a renderer that was made with rays=True")
         return cast_rays(self._core, rays, isovalue, normals)
 
+    def __repr__(self) -> str:
+        width, height = self.size
+        state = "" if self.ready else ", not ready"
+        return f"<isowave.Renderer {width} x {height}, {self.device['name']}{state}>"
+
     def passes(self, isovalue: float, **request: Any) -> Iterator[Image]:
         """The picture after each pass, the last one finished; arguments as render().
 
@@ -552,7 +577,7 @@ class Renderer:
             statistics: dict[str, Any] = {"passes": progress.passes, "complete": False}
             statistics["completed_percent"] = progress.completed_percent
             frame = {"picture": progress.rgb, "statistics": statistics}
-            put(Image(frame, camera, isovalue, samples))
+            put(Image(frame, camera, isovalue, samples, request.get("background")))
             return not closed.is_set() and not _core.is_ending()
 
         def draw() -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import html
 import os
+import pathlib
 import sys
+import tempfile
 import threading
+import uuid
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -88,9 +91,9 @@ def compression_options(
 ) -> dict[str, Any]:
     return {
         "tolerance": None if tolerance is None else number("tolerance", tolerance),
-        "relative_tolerance": None
-        if relative_tolerance is None
-        else number("relative_tolerance", relative_tolerance),
+        "relative_tolerance": (
+            None if relative_tolerance is None else number("relative_tolerance", relative_tolerance)
+        ),
         "rate": None if rate is None else whole("rate", rate),
         "exact": flag("exact", exact),
         "levels": whole("levels", levels),
@@ -216,8 +219,8 @@ def compress(
         if path is None and is_plain(array):
             return Volume(_core.compress_array(array, *grid, options, shown))
         keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
-        file = None if path is None else os.fsdecode(path)
-        return Volume(_core.compress(source.read, *grid, options, keep, file, shown))
+        file = None if path is None else os.path.abspath(os.fsdecode(path))
+        return Volume(_core.compress(source.read, *grid, options, keep, file, shown), file)
     finally:
         if isinstance(shown, TqdmProgress):
             shown.close()
@@ -262,8 +265,8 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     Error
         The file is missing, broken or of another kind, in one line.
     """
-    path = os.fsdecode(path)
-    is_compressed = path.endswith(".zfp")
+    name = os.fsdecode(path)
+    is_compressed = name.endswith(".zfp")
     options = compression_options(
         tolerance, relative_tolerance, rate, exact, levels, map_nan, num_threads
     )
@@ -271,16 +274,17 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
         options["measure_error"] = False
     shown = make_progress(progress)
     try:
-        return Volume(
-            _core.open(
-                path,
-                options,
-                None if shape is None else dims_of(shape),
-                None if dtype is None else np.dtype(dtype).name,
-                None if spacing is None else reversed_axes(spacing),
-                shown,
-            )
+        core = _core.open(
+            name,
+            options,
+            None if shape is None else dims_of(shape),
+            None if dtype is None else np.dtype(dtype).name,
+            None if spacing is None else reversed_axes(spacing),
+            shown,
         )
+        if not is_compressed:
+            return Volume(core)
+        return Volume(core, os.path.abspath(name), None if spacing is None else tuple(spacing))
     finally:
         if isinstance(shown, TqdmProgress):
             shown.close()
@@ -291,13 +295,23 @@ class Volume(Placed[_core.Volume]):
 
     Made by compress() and open(). It is an array of float32, (z, y, x), that is decoded where it is
     indexed: volume[10], volume[10:20, ::4, -1]. Level has more of that.
+
+    A volume in a .zfp file is pickled as the file's path, so other processes of this machine open
+    the same file. A volume in memory is pickled with its compressed voxels.
     """
 
     ndim = 3
     dtype = Level.dtype  # of what indexing gives
 
-    def __init__(self, core: _core.Volume) -> None:
-        self._core = core
+    def __init__(
+        self,
+        core: _core.Volume,
+        file: str | None = None,
+        spacing: tuple[float, ...] | None = None,
+    ) -> None:
+        """file: the .zfp that has the voxels; spacing: what open() was given in place of its."""
+        self._core, self._file, self._file_spacing = core, file, spacing
+        self._token = uuid.uuid4().hex
         self._lock = Turns()
         self._renderer: Renderer | None = None
         self._made_with: dict[str, Any] = {}
@@ -366,7 +380,7 @@ class Volume(Placed[_core.Volume]):
     @property
     def levels(self) -> tuple[Level, ...]:
         """The levels of detail as arrays, the volume itself first: volume.levels[2][5]."""
-        return tuple(Level(self._core, number) for number in range(self.num_levels))
+        return tuple(Level(self, number) for number in range(self.num_levels))
 
     def decode(self, level: int = 0, region: Any = ...) -> npt.NDArray[np.float32]:
         """Voxels of a level of detail, float32, (z, y, x).
@@ -406,6 +420,24 @@ class Volume(Placed[_core.Volume]):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .zfp file, which open() and the program read; whole, or not at all."""
         self._core.save(os.fsdecode(path))
+
+    def __reduce__(self) -> tuple[Callable[..., Volume], tuple[Any, ...]]:
+        if self._file is not None:
+            return open_again, (self._file, self._file_spacing)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder, "volume.zfp")
+            self.save(path)
+            return from_bytes, (path.read_bytes(),)
+
+    def __copy__(self) -> Volume:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Volume:
+        return self
+
+    def __dask_tokenize__(self) -> object:
+        """Whatever names dask's chunks of these voxels, and of no others."""
+        return self._token
 
     def histogram(self, bins: int = 256) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
         """Counts [bins] and edges [bins + 1] of the values, as numpy.histogram gives them.
@@ -647,6 +679,19 @@ class Volume(Placed[_core.Volume]):
             for name, text in rows.items()
         )
         return f"<table>{cells}</table>"
+
+
+def open_again(path: str, spacing: tuple[float, ...] | None) -> Volume:
+    """A pickled volume of a file."""
+    return open(path, spacing=spacing)
+
+
+def from_bytes(data: bytes) -> Volume:
+    """A pickled volume of memory: it stays in a file without a name."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder, "volume.zfp")
+        path.write_bytes(data)
+        return Volume(_core.open(path, {}, None, None, None, None))
 
 
 def view(volume: Volume, **options: Any) -> Any:

@@ -47,7 +47,7 @@ class ShownLevel(Level):
     """
 
     def __init__(self, volume: Volume, number: int) -> None:
-        super().__init__(volume._core, number, [-(-n // (1 << number)) for n in volume.shape])
+        super().__init__(volume, number, [-(-n // (1 << number)) for n in volume.shape])
         self._lock = threading.Lock()
         self._voxels: npt.NDArray[np.float32] | None = None
 
@@ -78,7 +78,7 @@ class Box(Level):
     """Some of a level's voxels, not decoded yet."""
 
     def __init__(self, level: ShownLevel, ranges: Sequence[range]) -> None:
-        super().__init__(level._core, level._number, [len(r) for r in ranges])
+        super().__init__(level._volume, level._number, [len(r) for r in ranges])
         self._level, self._ranges = level, ranges
 
     def _decode(self, ranges: Sequence[range]) -> npt.NDArray[np.float32]:

@@ -5,6 +5,7 @@ swapped axes fail. ISOWAVE_PROGRAM is the built program, whose NIfTI reader niba
 """
 
 import array as array_module
+import itertools
 import json
 import os
 import pathlib
@@ -160,7 +161,8 @@ def test_structured_voxels_name_a_field():
         ((1, 1, 7, 5, 3), "pass array[0, 0]"),
         ((1, 7, 5, 3, 1), "pass array[0, ..., 0]"),
         ((7, 1, 5, 3), "squeeze()"),
-        ((2, 7, 5, 3), "for example array[0]"),
+        ((2, 7, 5, 6), "for example array[0]"),
+        ((9, 7, 5, 3), "pass one channel: array[..., 0]"),
         ((2, 2, 7, 5, 3), "for example array[0, 0]"),
         ((0, 5, 3), "0 voxels along z"),
         ((7, 1, 3), "1 voxels along y"),
@@ -757,12 +759,27 @@ def test_xarray():
     given = labelled(xarray, z=even(0), y=even(1), x=even(2))
     check_source(as_source(given), make_voxels(), spacing=SPACING, origin=ORIGIN)
     check_source(as_source(labelled(xarray)), make_voxels())
-    # The order of dims counts, not their names.
-    turned = labelled(xarray, z=even(0), y=even(1), x=even(2), dims=("x", "lat", "t"))
-    check_source(as_source(turned), make_voxels(), spacing=SPACING, origin=ORIGIN)
-    moved = given.transpose("x", "z", "y")
-    source = as_source(moved)
-    assert source.shape == (NX, NZ, NY) and source.spacing == (2.0, 3.0, 0.5)
+    # Names say which axis is which, and what has none takes the axes that are left.
+    for order in itertools.permutations("zyx"):
+        moved = as_source(given.transpose(*order))
+        check_source(moved, make_voxels(), spacing=SPACING, origin=ORIGIN)
+    for dims in (("t", "lat", "lon"), ("Z", "Y", "X"), ("k", "latitude", "i")):
+        other = labelled(xarray, z=even(0), y=even(1), x=even(2), dims=dims)
+        for moved in (other, other.transpose(dims[1], ...)):
+            check_source(as_source(moved), make_voxels(), spacing=SPACING, origin=ORIGIN)
+    plain = labelled(xarray, z=even(0), y=even(1), x=even(2), dims=("a", "b", "c"))
+    check_source(as_source(plain), make_voxels(), spacing=SPACING, origin=ORIGIN)
+
+
+def test_xarray_axes_of_the_cf_conventions():
+    xarray = pytest.importorskip("xarray")
+    given = labelled(xarray, z=even(0), y=even(1), x=even(2), dims=("a", "b", "c"))
+    for dim, axis in zip("abc", "ZYX"):
+        given.coords[dim].attrs["axis"] = axis
+    check_source(
+        as_source(given.transpose("c", "a", "b")), make_voxels(), spacing=SPACING, origin=ORIGIN
+    )
+    check_refused(labelled(xarray, dims=("x", "y", "lon")), "two of them are x")
 
 
 @pytest.mark.parametrize("falling", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
@@ -803,6 +820,9 @@ def test_xarray_over_dask():
     source = as_source(labelled(xarray, lazy, z=even(0)))
     assert source.chunk_layers == 4
     check_source(source, make_voxels(), spacing=(3.0, 1.0, 1.0), origin=(10.0, 0.0, 0.0))
+    turned = as_source(labelled(xarray, lazy, z=even(0)).transpose("x", "z", "y"))
+    assert turned.chunk_layers == 4
+    check_source(turned, make_voxels(), spacing=(3.0, 1.0, 1.0), origin=(10.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -823,6 +843,12 @@ def test_xarray_chunks_of_a_file(encoding, layers):
     given.encoding.update(encoding)
     assert as_source(given).chunk_layers == layers
     check_source(as_source(given), make_voxels())
+    turned = given.transpose("x", "y", "z")
+    if "original_shape" in encoding and encoding["original_shape"][0] == NZ:
+        turned.encoding["original_shape"] = (NX, NY, NZ)
+        turned.encoding["chunksizes"] = encoding["chunksizes"] and encoding["chunksizes"][::-1]
+    assert as_source(turned).chunk_layers == layers
+    check_source(as_source(turned), make_voxels())
 
 
 @pytest.mark.parametrize("slab", SLABS)
@@ -1002,10 +1028,10 @@ def check_equals_file(nibabel, image, path):
         return
     for given, source in ((image, unsaved), (image, as_source(image)), (loaded, as_source(loaded))):
         assert list(source.shape[::-1]) == info["dims"]
-        assert list(source.spacing[::-1]) == info["spacing"]
-        assert list(source.origin[::-1]) == info["origin"]
-        # Lengths of columns are rounded by other functions: two ulps of 1.
-        np.testing.assert_allclose(source.direction.T, info["direction"], rtol=0, atol=2**-51)
+        # The header has float32, of the affine and of the spacing: relative errors of 2^-24 each.
+        np.testing.assert_allclose(source.spacing[::-1], info["spacing"], rtol=2**-22)
+        np.testing.assert_allclose(source.origin[::-1], info["origin"], rtol=2**-22)
+        np.testing.assert_allclose(source.direction.T, info["direction"], rtol=0, atol=2**-21)
         voxels = read_all(source, 4)
         assert [voxels.min(), voxels.max()] == info["value_range"]
         np.testing.assert_array_equal(voxels, np.asarray(given.dataobj).squeeze().T)
@@ -1025,15 +1051,10 @@ def make_affine(seed=0, shear=0.0):
 def nifti_images(nibabel):
     data = np.ascontiguousarray(make_voxels().T)
     yield "identity", nibabel.Nifti1Image(data, np.eye(4))
-    yield "no affine", nibabel.Nifti1Image(data, None)
-    yield "shear", nibabel.Nifti1Image(data, make_affine(shear=0.1))
     yield "trailing axes", nibabel.Nifti1Image(data[..., None, None], make_affine())
     yield "float", nibabel.Nifti1Image(data.astype("float32"), make_affine())
     for seed in range(4):
         yield f"rotated {seed}", nibabel.Nifti1Image(data, make_affine(seed))
-        both = nibabel.Nifti1Image(data, make_affine(seed))
-        both.set_qform(make_affine(seed + 10), code=1)  # other spacings, too
-        yield f"qform {seed}", both
         scanner = nibabel.Nifti1Image(data, make_affine(seed))
         scanner.set_qform(make_affine(seed), code=2)
         scanner.set_sform(make_affine(seed), code=1)
@@ -1095,15 +1116,44 @@ def test_nibabel_positions_are_those_of_its_affine():
             np.testing.assert_allclose(world(source, z, y, x), expected, atol=300 * 8 * 2**-24)
 
 
+def test_nibabel_objects_lie_where_their_affine_says(tmp_path):
+    """Whichever form that is of, sheared or not; a file's unit of lengths counts."""
+    nibabel = pytest.importorskip("nibabel")
+    data = np.ascontiguousarray(make_voxels().T)
+    both = nibabel.Nifti1Image(data, make_affine(1))
+    both.set_qform(make_affine(11), code=1)  # other spacings, too
+    neither = nibabel.Nifti1Image(data, None)
+    sheared = nibabel.Nifti1Image(data, make_affine(2, shear=0.1))
+    in_memory = nibabel.Nifti1Image(data, make_affine(3))
+    in_memory.affine[:3, 3] += 5
+    for number, image in enumerate((both, neither, sheared, in_memory)):
+        nibabel.save(image, tmp_path / f"{number}.nii")
+        for given in (image, nibabel.load(tmp_path / f"{number}.nii")):
+            source = as_source(given)
+            for z, y, x in ((0, 0, 0), (6, 4, 2), (1, 3, 2)):
+                expected = np.array([x, y, z, 1.0])
+                if given.affine is not None:
+                    expected = given.affine @ expected
+                    expected *= [-1, -1, 1, 1]
+                atol = 300 * 8 * 2**-24
+                np.testing.assert_allclose(world(source, z, y, x), expected[:3], atol=atol)
+    sheared.header.set_xyzt_units("micron", "sec")
+    steps = np.linalg.norm(sheared.affine[:3, :3], axis=0)[::-1]
+    np.testing.assert_allclose(as_source(sheared).spacing, steps * 1e-3)
+
+
 def test_nibabel_that_is_refused():
     nibabel = pytest.importorskip("nibabel")
     series = nibabel.Nifti1Image(np.zeros((3, 5, 7, 4), "f4"), np.eye(4))
     check_refused(series, "image.slicer[..., 0]")
     check_refused(nibabel.Nifti1Image(np.zeros((3, 5), "f4"), np.eye(4)), "need 3 axes")
     check_refused(nibabel.Nifti1Image(np.zeros((3, 5, 7), "c8"), np.eye(4)), error=TypeError)
-    sheared = nibabel.MGHImage(np.zeros((3, 5, 7), "f4"), np.eye(4))
-    sheared._affine = make_affine(shear=0.2)
-    check_refused(sheared, "shear")
+    flat = nibabel.MGHImage(np.zeros((3, 5, 7), "f4"), np.eye(4))
+    flat._affine = np.diag([1.0, 0.0, 1.0, 1.0])
+    check_refused(flat, "column of axis y has length 0")
+    flat._affine = make_affine()
+    flat._affine[:, 2] = flat._affine[:, 1]
+    check_refused(flat, "singular")
 
 
 def test_nibabel_reads_a_file_by_slabs(tmp_path, monkeypatch):

@@ -1,5 +1,11 @@
 """Levels of detail as arrays: numpy's indexing, and only the blocks that it needs."""
 
+import copy
+import pickle
+import subprocess
+import sys
+import types
+
 import numpy as np
 import pytest
 from conftest import RecordingCore, sphere_voxels
@@ -133,7 +139,7 @@ def test_what_is_no_index_is_one_line(volume):
 )
 def test_only_needed_blocks_are_decoded(volume, key, blocks):
     core = RecordingCore(volume._core)
-    isowave.Level(core, 0)[key]
+    isowave.Level(types.SimpleNamespace(_core=core), 0)[key]
     assert sum(core.blocks) == blocks
 
 
@@ -152,7 +158,8 @@ def test_dask_decodes_chunks(volume):
     da = pytest.importorskip("dask.array", reason="dask is not installed")
     decoded = volume.decode()
     core = RecordingCore(volume._core)
-    array = da.from_array(isowave.Level(core, 0), chunks=(8, 8, 16))
+    recording = types.SimpleNamespace(_core=core, __dask_tokenize__=volume.__dask_tokenize__)
+    array = da.from_array(isowave.Level(recording, 0), chunks=(8, 8, 16))
     assert array.dtype == np.float32 and array.shape == SHAPE
     assert np.array_equal(array.compute(scheduler="threads"), decoded)
     assert sum(core.blocks) == 6 * 5 * 10  # each once
@@ -169,3 +176,53 @@ def test_levels_are_compressed_as_their_arrays(volume):
     level = volume.levels[1]
     again = isowave.compress(level, tolerance=0.1)
     assert np.array_equal(again.decode(), isowave.compress(level[...], tolerance=0.1).decode())
+
+
+def test_volumes_and_levels_are_pickled(volume, tmp_path):
+    volume.save(tmp_path / "a.zfp")
+    of_file = isowave.open(tmp_path / "a.zfp", spacing=(3, 2, 1))
+    for given in (volume, of_file):
+        data = pickle.dumps(given)
+        again = pickle.loads(data)
+        assert np.array_equal(again.decode(), given.decode())
+        assert again.spacing == given.spacing and again.num_levels == given.num_levels
+        assert again.value_range == given.value_range
+        assert copy.copy(given) is given and copy.deepcopy(given) is given
+        level = pickle.loads(pickle.dumps(given.levels[1]))
+        assert np.array_equal(level[3:5], given.levels[1][3:5])
+    assert len(data) < 1000, "a file's path, not its voxels"
+    (tmp_path / "a.zfp").unlink()
+    with pytest.raises(isowave.Error, match="a.zfp"):
+        pickle.loads(data)
+
+
+def test_a_relative_path_is_pickled_as_it_was_opened(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    volume = isowave.compress(sphere_voxels(SHAPE), rate=8, path="a.zfp")
+    data = pickle.dumps(volume), pickle.dumps(isowave.open("a.zfp"))
+    monkeypatch.chdir("/")
+    for one in data:
+        assert np.array_equal(pickle.loads(one)[3], volume[3])
+
+
+OTHER_PROCESS = """
+import pickle, sys
+import numpy as np
+print(float(np.asarray(pickle.load(sys.stdin.buffer)).sum(dtype=float)))
+"""
+
+
+def test_another_process_reads_what_is_pickled(volume):
+    data = pickle.dumps(volume)
+    command = [sys.executable, "-c", OTHER_PROCESS]
+    done = subprocess.run(command, input=data, capture_output=True, check=True)
+    assert float(done.stdout) == volume.decode().sum(dtype=float)
+
+
+def test_dask_names_chunks_without_pickling(volume, monkeypatch):
+    da = pytest.importorskip("dask.array", reason="dask is not installed")
+    monkeypatch.setattr(isowave.Volume, "__reduce__", lambda self: pytest.fail("pickled"))
+    arrays = [da.from_array(v, chunks=(8, 8, 16)) for v in (volume, volume, volume.levels[0])]
+    assert arrays[0].name == arrays[1].name
+    coarser = da.from_array(volume.levels[1], chunks=(8, 8, 16))
+    assert coarser.name != arrays[2].name

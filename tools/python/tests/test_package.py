@@ -164,6 +164,48 @@ def test_axes(renderer):
     assert (np.sum(inwards * image.normals[hit], axis=1) > 0.9).all()
 
 
+def test_rgba_is_the_surfaces_colour_without_a_fringe(renderer):
+    """Laid over a background, it is the picture drawn with that background."""
+    big = renderer.volume.renderer(size=SIZE, samples=3)
+    black, white = (big.render(6, samples=3, background=b) for b in ("#000000", "#ffffff"))
+    assert np.array_equal(big.render(6, samples=3).rgba, white.rgba)
+    alpha = white.rgba[..., 3:] / 255
+    assert ((alpha > 0) & (alpha < 1)).sum() > 30
+    for image in (black, white):
+        for other, behind in ((black, 0), (white, 255)):
+            laid_over = alpha * image.rgba[..., :3] + (1 - alpha) * behind
+            # rounded: the picture, the colour that is divided by alpha, and alpha
+            assert np.abs(laid_over - other.rgb).max() <= 1.5
+    one = renderer.render(6)
+    assert np.array_equal(one.rgba[..., :3], one.rgb)
+    opaque = renderer.render(6, outputs=("rgb",)).rgba
+    assert np.array_equal(opaque[..., :3], one.rgb) and (opaque[..., 3] == 255).all()
+
+
+def test_pictures_are_saved_with_alpha(renderer, tmp_path):
+    PIL = pytest.importorskip("PIL.Image", reason="pillow is not installed")
+    image = renderer.render(6)
+    image.save(tmp_path / "a.png", alpha=True)
+    image.save(tmp_path / "b.png")
+    assert np.array_equal(np.asarray(PIL.open(tmp_path / "a.png")), image.rgba)
+    assert np.array_equal(np.asarray(PIL.open(tmp_path / "b.png")), image.rgb)
+    with pytest.raises(TypeError, match="alpha='yes': give True or False"):
+        image.save(tmp_path / "c.png", alpha="yes")
+
+
+def test_names_of_other_formats_are_refused(volume, renderer, tmp_path):
+    saves = {"a.tif": renderer.render(6).save, "a.nrrd": volume.save}
+    for name, save in saves.items():
+        with pytest.raises(isowave.Error, match=name) as raised:
+            save(tmp_path / name)
+        assert "\n" not in str(raised.value) and not (tmp_path / name).exists()
+
+
+def test_renderers_say_what_they_are(renderer):
+    assert repr(renderer).startswith("<isowave.Renderer 64 x 48, ")
+    assert renderer.device["name"] in repr(renderer)
+
+
 def test_direction_turns_the_world():
     turned = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]], float)
     volume = isowave.compress(sphere_voxels(), rate=16, spacing=(3, 2, 1), direction=turned)

@@ -29,7 +29,16 @@ import isowave
 from isowave.viewer import server as server_module
 from isowave.viewer import view
 from isowave.viewer.scene import Scene
-from isowave.viewer.server import Limits, Server, main, make_parser, parse_bytes, parse_size, serve
+from isowave.viewer.server import (
+    Limits,
+    Server,
+    main,
+    make_parser,
+    parse_bytes,
+    parse_levels,
+    parse_size,
+    serve,
+)
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
 HELLO = '{"type": "hello", "version": 2}'
@@ -571,6 +580,52 @@ def test_sizes() -> None:
     for text in ("", "x", "0x5", "5x", "5X5", "100000x1"):
         with pytest.raises(ValueError, match="1920x1080"):
             parse_size(text)
+
+
+def test_numbers_of_levels() -> None:
+    assert (parse_levels("all"), parse_levels("3")) == (0, 3)
+    for text in ("", "0", "-1", "ALL", "2.5"):
+        with pytest.raises(ValueError, match="nor all"):
+            parse_levels(text)
+
+
+def opened_by(arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What `isowave view` hands to isowave.open()."""
+    seen = dict[str, Any]()
+
+    def fail(path: str, **options: Any) -> None:
+        seen.update(options)
+        raise isowave.Error("seen")
+
+    monkeypatch.setattr(isowave, "open", fail)
+    assert main(arguments) == 1
+    return seen
+
+
+def test_the_command_line_says_what_the_program_does_of_volumes(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = "a.raw --dims 4 5 6 --type uint8 --spacing 1 2 3 --tolerance-relative 0.1 --levels all"
+    assert opened_by(words.split(), monkeypatch) == {
+        "shape": (6, 5, 4),
+        "dtype": "uint8",
+        "spacing": (3, 2, 1),
+        "relative_tolerance": 0.1,
+        "levels": 0,
+    }
+    words = "a.raw --dims 4 --type uint8 --spacing 2"
+    found = opened_by(words.split(), monkeypatch)
+    assert (found["shape"], found["spacing"]) == ((4, 4, 4), (2, 2, 2))
+    capsys.readouterr()
+    assert opened_by(["a.raw", "--dims", "4", "5"], monkeypatch) == {}
+    said = capsys.readouterr().err
+    assert said == "isowave view: --dims: need X Y Z, or one for all, got 2 numbers\n"
+
+
+def test_a_raw_file_is_shown_by_its_dims(tmp_path: Path) -> None:
+    (tmp_path / "ct.dat.raw").write_bytes(bytes(4 * 5 * 6))
+    with pytest.raises(isowave.Error, match="give dims and type"):
+        isowave.open(tmp_path / "ct.dat.raw")
 
 
 def test_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -27,8 +27,9 @@ _LEAST_DETERMINANT = 1e-6
 """Of a direction matrix that can be inverted, as in core/volume."""
 _UNIT_TOLERANCE = 1e-3
 """How far the length of a given direction's columns may be from 1: they come rounded."""
-_MOST_COSINE = 1e-4
-"""Between two axes of an affine that has no shear, as in core/io's NIfTI reader."""
+
+_MOST_CHANNELS = 4
+"""Of the last axis of an array of colours, such as RGBA."""
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -134,8 +135,8 @@ def moved(placement: Placement, index: Vector) -> Vector:
 def placement_of_affine(rows: Matrix, origin: Vector, what: str) -> Placement:
     """Splits an affine transform of indices (x, y, z) into spacing, origin and direction.
 
-    Raises ArrayValueError where an axis has no length or two axes are not at right angles: a
-    direction has columns of length 1, and no known writer means shear.
+    Shear stays in the direction, whose columns have length 1. Raises ArrayValueError if an axis has
+    no length.
     """
     units: list[Vector] = []
     lengths: list[float] = []
@@ -148,13 +149,6 @@ def placement_of_affine(rows: Matrix, origin: Vector, what: str) -> Placement:
             raise bad_value(what, f"the affine's column of axis {axis} has length {length}")
         units.append(unit)
         lengths.append(length)
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        if not abs(dot(units[a], units[b])) <= _MOST_COSINE:
-            raise bad_value(
-                what,
-                f"the affine has shear (axes {'xyz'[a]} and {'xyz'[b]} are not at right angles): "
-                "resample the image first",
-            )
     return Placement(
         (lengths[0], lengths[1], lengths[2]), origin, columns((units[0], units[1], units[2]))
     )
@@ -191,6 +185,8 @@ def _advice_on_axes(sizes: tuple[int, ...]) -> str:
     surplus = len(sizes) - 3
     if surplus <= 0:
         return need
+    if surplus == 1 and 2 <= sizes[-1] <= _MOST_CHANNELS < min(sizes[:-1]):
+        return f"{need}: the last axis looks like channels, pass one channel: array[..., 0]"
     if sum(size != 1 for size in sizes) > 3:
         return f"{need}: take one volume of it, for example array[{', '.join('0' * surplus)}]"
     leading = 0

@@ -16,16 +16,35 @@ from .stores import uneven_rows
 
 _EVEN_TOLERANCE = 1e-2
 """How far, in steps, a coordinate may be from an even one: files round to float32 or decimals."""
+_AXES = {
+    "z": "z",
+    "depth": "z",
+    "height": "z",
+    "altitude": "z",
+    "lev": "z",
+    "level": "z",
+    "plev": "z",
+    "y": "y",
+    "lat": "y",
+    "latitude": "y",
+    "northing": "y",
+    "x": "x",
+    "lon": "x",
+    "longitude": "x",
+    "easting": "x",
+}
+"""Names of dims, in small letters, that say which axis they are."""
 
 
 def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
-    """Adapts an xarray.DataArray. Its dims, in their order, are z, y and x, whatever their names.
+    """Adapts an xarray.DataArray. Names of its dims say which is z, y and x, in any order.
 
-    A dimension's coordinate gives spacing and origin; a falling one a direction of -1, so that
-    every voxel stays where its coordinates say. Without a coordinate: spacing 1, origin 0.
+    Dims with other names take the axes that are left, in their order. A dimension's coordinate
+    gives spacing and origin; a falling one a direction of -1, so that every voxel stays where its
+    coordinates say. Without a coordinate: spacing 1, origin 0.
 
-    Raises ArrayValueError for a coordinate that is not of numbers, not even or not moving, unless
-    the caller gave a spacing; then such a coordinate is ignored.
+    Raises ArrayValueError for two dims of one axis, and for a coordinate that is not of numbers,
+    not even or not moving, unless the caller gave a spacing; then such a coordinate is ignored.
     """
     what = named(array)
     dims = tuple(array.dims)
@@ -37,7 +56,11 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
         raise bad_value(
             what, f"dims {short(dims)}: need 3 (z, y, x): choose with .isel() or .sel()"
         )
-    shape = checked_shape(array.shape, what)
+    order = _order(array, dims, what)
+    if order is not None:
+        dims = tuple(dims[axis] for axis in order)
+    sizes = array.shape if order is None else tuple(array.shape[axis] for axis in order)
+    shape = checked_shape(sizes, what)
 
     spacing, origin, signs = [1.0] * 3, [0.0] * 3, [1.0] * 3
     for axis, dim in enumerate(dims):
@@ -59,9 +82,42 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
 
     def fetch(begin: int, end: int) -> Any:
         # Of the variable, because indexing an array indexes all its coordinates, too.
-        return array.variable.isel({dims[0]: slice(begin, end)}).values
+        layers = array.variable.isel({dims[0]: slice(begin, end)}).values
+        return layers if order is None else layers.transpose(order)
 
-    return Found(what, shape, array.dtype, fetch, _rows(array, dims, shape, what), placement)
+    along_z = 0 if order is None else order[0]
+    rows = _rows(array, dims[0], along_z, shape[0], what)
+    return Found(what, shape, array.dtype, fetch, rows, placement)
+
+
+def _order(array: Any, dims: tuple[Any, ...], what: str) -> tuple[int, int, int] | None:
+    """Returns which of the dims are z, y and x; None: they are in this order.
+
+    A coordinate's attribute `axis` (CF conventions) goes before the dimension's name.
+    """
+    if len(dims) != 3:
+        return None  # checked_shape() refuses it
+    named_axes: dict[str, int] = {}
+    for index, dim in enumerate(dims):
+        axis = _axis(array, dim)
+        if axis is None:
+            continue
+        if axis in named_axes:
+            raise bad_value(what, f"dims {short(dims)}: two of them are {axis}: rename one")
+        named_axes[axis] = index
+    others = iter(sorted({0, 1, 2} - set(named_axes.values())))
+    z, y, x = (named_axes[axis] if axis in named_axes else next(others) for axis in "zyx")
+    return None if (z, y, x) == (0, 1, 2) else (z, y, x)
+
+
+def _axis(array: Any, dim: Any) -> str | None:
+    """Returns which of z, y and x a dimension is, if it says so."""
+    if dim in array.coords:
+        attributes = getattr(array.coords[dim], "attrs", None)
+        said = attributes.get("axis") if isinstance(attributes, Mapping) else None
+        if isinstance(said, str) and said in ("X", "Y", "Z"):
+            return said.lower()
+    return _AXES.get(dim.lower()) if isinstance(dim, str) else None
 
 
 def _even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, float, float]:
@@ -90,26 +146,24 @@ def _even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, fl
     return abs(step), float(positions[0]), -1.0 if step < 0 else 1.0
 
 
-def _rows(
-    array: Any, dims: tuple[Any, ...], shape: tuple[int, int, int], what: str
-) -> Sequence[int] | None:
-    """Returns the edges of chunk rows: dask's, or those that a file's reader noted.
+def _rows(array: Any, dim: Any, axis: int, num_layers: int, what: str) -> Sequence[int] | None:
+    """Returns the edges of chunk rows along an axis: dask's, or those that a file's reader noted.
 
     A slice of a file's variable keeps the note of the whole; chunks at the edges of its rows are
     then read twice.
     """
     if array.chunks is not None:
-        return uneven_rows(array.chunks[0], shape[0], what)
+        return uneven_rows(array.chunks[axis], num_layers, what)
     encoding = array.encoding
     if not isinstance(encoding, Mapping):
         return None
     preferred = encoding.get("preferred_chunks")
-    layers = preferred.get(dims[0]) if isinstance(preferred, Mapping) else None
-    if layers is None and encoding.get("original_shape") == shape:
+    layers = preferred.get(dim) if isinstance(preferred, Mapping) else None
+    if layers is None and encoding.get("original_shape") == tuple(array.shape):
         sizes = encoding.get("chunksizes")
-        layers = sizes[0] if isinstance(sizes, (list, tuple)) and sizes else None
+        layers = sizes[axis] if isinstance(sizes, (list, tuple)) and len(sizes) == 3 else None
     try:
         layers = operator.index(layers)  # type: ignore[arg-type]
     except TypeError:
         return None  # chunks of different sizes, or no note
-    return even_rows(layers, shape[0]) if layers > 0 else None
+    return even_rows(layers, num_layers) if layers > 0 else None

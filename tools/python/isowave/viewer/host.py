@@ -61,7 +61,7 @@ class HostRenderer:
             ambient=ambient,
         )
         frame = draw(self._core, request, on_pass, interrupts=False)
-        return Image(frame, camera, isovalue, samples)
+        return Image(frame, camera, isovalue, samples, background)
 
 
 def make_host(volume: VolumeLike) -> RendererLike | None:

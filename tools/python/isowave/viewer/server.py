@@ -482,6 +482,22 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
+def parse_levels(text: str) -> int:
+    """A number from 1 on, or 0 for "all". Raises ValueError."""
+    if text != "all" and not re.fullmatch("[1-9][0-9]{0,3}", text):
+        raise ValueError(f"'{text}' is no number of levels, such as 3, nor all")
+    return 0 if text == "all" else int(text)
+
+
+def reversed_axes(option: str, values: list[Any] | None) -> tuple[Any, ...] | None:
+    """X Y Z, or one for all, as (z, y, x). Raises ValueError."""
+    if values is None:
+        return None
+    if len(values) not in (1, 3):
+        raise ValueError(f"{option}: need X Y Z, or one for all, got {len(values)} numbers")
+    return tuple(reversed(values if len(values) == 3 else 3 * values))
+
+
 class _Parser(argparse.ArgumentParser):
     """Says in one line what is wrong, with status 1, as the other commands do."""
 
@@ -503,9 +519,12 @@ def make_parser() -> argparse.ArgumentParser:
     add("--size", type=_argument(parse_size), default=(1920, 1080), help="of the largest picture")
     add("--rate", type=int, help="bits per voxel of a volume that is compressed")
     add("--tolerance", type=float, help="instead: each voxel is within this of the input's")
-    add("--relative-tolerance", type=float, help="the same, as a part of the range of values")
+    add("--tolerance-relative", type=float, help="the same, as a part of the range of values")
     add("--exact", action="store_true", help="instead: keep the bits of integers")
-    add("--levels", type=int, help="levels of detail; 0: all")
+    add("--levels", type=_argument(parse_levels), metavar="N|all", help="levels of detail")
+    add("--dims", type=int, nargs="+", help="voxels of a raw file: X Y Z, or N for a cube")
+    add("--type", help="voxel type of a raw file: uint8, int8, ... float32, float64")
+    add("--spacing", type=float, nargs="+", help="world units between voxels: X Y Z, or one")
     add("--host", default="127.0.0.1", help="to listen at; others than loopback are not encrypted")
     add("--port", type=int, default=0, help="0: a free one")
     add("--max-clients", type=int, default=16, help="that look at the same time")
@@ -538,12 +557,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         import isowave
 
-        ways = ("rate", "tolerance", "relative_tolerance", "levels")
-        given = {w: getattr(arguments, w) for w in ways if getattr(arguments, w) is not None}
-        if arguments.exact:
-            given["exact"] = True
+        given = {
+            "rate": arguments.rate,
+            "tolerance": arguments.tolerance,
+            "relative_tolerance": arguments.tolerance_relative,
+            "exact": arguments.exact or None,
+            "levels": arguments.levels,
+            "shape": reversed_axes("--dims", arguments.dims),
+            "dtype": arguments.type,
+            "spacing": reversed_axes("--spacing", arguments.spacing),
+        }
         server = serve(
-            isowave.open(arguments.volume, **given),
+            isowave.open(arguments.volume, **{k: v for k, v in given.items() if v is not None}),
             title=Path(arguments.volume).name,
             isovalue=arguments.isovalue,
             device=arguments.device,
