@@ -65,6 +65,12 @@ tables || fail 'tables cannot be made'
 tables --check || fail 'tables differ from what they were made of'
 made=$(grep -c '^|---' "$work/top/page.md")
 [ "$made" -eq "${#tables[@]}" ] || fail "$(cat "$work/top/page.md")"
+PYTHONPATH=$top/tools /usr/bin/python3 -B - << 'EOF'
+from measuring.paper import ARTICLE, STAND_INS, in_collection, rate_of
+assert set(STAND_INS.values()) == {"", *ARTICLE}, "each set of the article has a stand-in"
+assert in_collection("richtmyer") == "Richtmyer-Meshkov" and in_collection("bonsai") is None
+assert [rate_of(name) for name in ("Richtmyer-Meshkov", "Skull", "", None)] == [1, 4, 4, 4]
+EOF
 for set in Skull 'TACC Turbulence' Kingsnake DNS Richtmyer-Meshkov; do
   [ "$(grep -c "^| $set |" "$work/top/page.md")" -eq 2 ] || fail "the article's $set is missing"
 done

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._checked import flag, number, whole
+from isowave._checked import flag, names, number, whole
 from isowave._placed import Placed
 from isowave._renderer import Camera, Color, Image, bytes_of, camera_of, request_for, size_of
 from isowave._volume import compression_options
@@ -192,7 +192,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
             camera = self.camera(isovalue, size)
 
         def ask() -> dict[str, Any]:
-            unknown = set(outputs) - {*ALL_OUTPUTS}
+            unknown = set(names("outputs", outputs)) - {*ALL_OUTPUTS}
             if unknown:
                 listed = ", ".join(sorted(unknown))
                 raise ValueError(f"outputs {listed}: bricks have {', '.join(ALL_OUTPUTS)}")

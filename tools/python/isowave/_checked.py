@@ -54,6 +54,18 @@ def numbers(name: str, values: Any, count: int) -> tuple[float, ...]:
     return tuple(number(name, item) for item in items)
 
 
+def names(name: str, values: Any) -> tuple[str, ...]:
+    try:
+        if isinstance(values, str):
+            raise TypeError
+        items = tuple(values)
+        if not all(isinstance(item, str) for item in items):
+            raise TypeError
+    except TypeError:
+        raise refuse(name, values, "a sequence of names, such as ('rgb', 'depth')") from None
+    return items
+
+
 def function(name: str, value: Any) -> Any:
     if value is not None and not callable(value):
         raise refuse(name, value, "a function")

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._checked import flag, function, number, numbers, refuse, whole
+from isowave._checked import flag, function, names, number, numbers, refuse, whole
 
 if TYPE_CHECKING:
     from isowave._volume import Volume
@@ -50,6 +50,7 @@ class Camera:
         distance = 0.8 * float(np.linalg.norm(extent))
         elevation = math.radians(20)
         cameras = []
+        count = whole("count", count)
         for i in range(count):
             azimuth = 2 * math.pi * i / count + 0.3
             towards = (
@@ -217,7 +218,9 @@ def bytes_of(memory_budget: int | None) -> int | None:
 
 def needed_options(request: dict[str, Any]) -> dict[str, Any]:
     """What a Renderer must be made with to draw such a request."""
-    bounds = request.get("max_error") is not None or "bounds" in request.get("outputs", ())
+    bounds = request.get("max_error") is not None or "bounds" in names(
+        "outputs", request.get("outputs", ())
+    )
     needed: dict[str, Any] = {
         "bounds": bounds,
         "time_budget": request.get("time_budget") is not None,
@@ -254,8 +257,7 @@ def request_for(
     """What the compiled part is asked for; arguments as Renderer.render()."""
     if not isinstance(camera, Camera):
         raise refuse("camera", camera, "an isowave.Camera")
-    if isinstance(outputs, str):
-        raise refuse("outputs", outputs, "a sequence of names")
+    outputs = names("outputs", outputs)
     return {
         "eye": numbers("Camera.eye", camera.eye, 3),
         "at": numbers("Camera.at", camera.at, 3),
@@ -312,7 +314,10 @@ def cast_rays(
     normals: str,
 ) -> dict[str, npt.NDArray[Any]]:
     """See Volume.cast_rays()."""
-    array = np.ascontiguousarray(rays, np.float64)
+    try:
+        array = np.ascontiguousarray(rays, np.float64)
+    except (TypeError, ValueError):
+        raise refuse("rays", rays, "numbers, (..., 6): origin, direction") from None
     if array.ndim == 0 or array.shape[-1] != 6:
         raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
     found = renderer.cast_rays(
@@ -522,8 +527,7 @@ class Renderer:
         ambient: int,
         outputs: Sequence[str],
     ) -> None:
-        if isinstance(outputs, str):
-            raise refuse("outputs", outputs, "a sequence of names")
+        outputs = names("outputs", outputs)
         unknown = set(outputs) - {*ALL_OUTPUTS, "bounds"}
         if unknown:
             known = ", ".join((*ALL_OUTPUTS, "bounds"))

@@ -204,7 +204,7 @@ def compress(
         array,
         spacing=spacing,
         origin=origin,
-        direction=None if direction is None else np.asarray(direction, float),
+        direction=direction,
         fill_value=fill_value,
     )
     options = compression_options(
@@ -444,6 +444,7 @@ class Volume(Placed[_core.Volume]):
 
         Of a large volume, of blocks that are spread over it: at most 2^24 voxels.
         """
+        bins = whole("bins", bins)
         values = self._core.sample(LARGEST_SAMPLE)
         least, largest = self.value_range
         if not np.isfinite([least, largest]).all():

@@ -206,6 +206,32 @@ def test_renderers_say_what_they_are(renderer):
     assert renderer.device["name"] in repr(renderer)
 
 
+@pytest.mark.parametrize("outputs", ["rgb", None, 5, [5], ("rgb", None)])
+def test_outputs_are_names(volume, renderer, outputs):
+    for render in (volume.render, renderer.render):
+        with pytest.raises(TypeError, match="outputs=.*: give a sequence of names, such as"):
+            render(6, size=SIZE, outputs=outputs)
+
+
+@pytest.mark.parametrize(
+    "call, error, text",
+    [
+        (lambda v: isowave.Camera.orbit(v, "3"), TypeError, "count='3': give a whole number"),
+        (lambda v: v.histogram("3"), TypeError, "bins='3': give a whole number"),
+        (lambda v: v.cast_rays("abc", 6), TypeError, "rays='abc': give numbers"),
+        (lambda v: isowave.compress(v, rate=8, direction="abc"), ValueError, "need 3 rows"),
+        (lambda v: v.render("6", size=SIZE), TypeError, "isovalue='6': give a number"),
+        (lambda v: v.render(6, size=64), TypeError, "size=64: give width and height"),
+        (lambda v: v.render(6, camera=((0, 0, 1),)), TypeError, "give an isowave.Camera"),
+        (lambda v: isowave.compress(v, tolerance="0.1"), TypeError, "tolerance='0.1': give a nu"),
+    ],
+)
+def test_arguments_of_a_wrong_type_are_named(volume, call, error, text):
+    with pytest.raises(error, match=text) as raised:
+        call(volume)
+    assert "\n" not in str(raised.value)
+
+
 def test_direction_turns_the_world():
     turned = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]], float)
     volume = isowave.compress(sphere_voxels(), rate=16, spacing=(3, 2, 1), direction=turned)

@@ -622,7 +622,14 @@ def test_the_command_line_says_what_the_program_does_of_volumes(
     assert said == "isowave view: --dims: need X Y Z, or one for all, got 2 numbers\n"
 
 
-def test_a_raw_file_is_shown_by_its_dims(tmp_path: Path) -> None:
+def test_help_lists_view() -> None:
+    code = "import sys; from isowave._program import main; sys.argv[1:] = ['-h']; sys.exit(main())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "\n  view   " in done.stdout and "\n  render   " in done.stdout, done.stdout
+
+
+def test_a_raw_file_without_dims_is_refused(tmp_path: Path) -> None:
     (tmp_path / "ct.dat.raw").write_bytes(bytes(4 * 5 * 6))
     with pytest.raises(isowave.Error, match="give dims and type"):
         isowave.open(tmp_path / "ct.dat.raw")

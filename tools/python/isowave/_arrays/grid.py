@@ -86,7 +86,7 @@ def vector(values: Any, what: str, name: str) -> Vector:
 def matrix(values: Any, what: str, name: str = "direction") -> Matrix:
     """Returns a 3 x 3 matrix of finite numbers by rows. Raises ArrayValueError."""
     try:
-        rows = list(islice(iter(values), 4))
+        rows = [] if isinstance(values, (str, bytes)) else list(islice(iter(values), 4))
     except Exception:
         rows = []
     if len(rows) != 3:

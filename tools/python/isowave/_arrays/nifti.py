@@ -1,5 +1,4 @@
-"""nibabel's images lie where their affine says. A NIfTI file that has two forms may lie elsewhere:
-nibabel prefers the sform, our reader of files (core/io) decides as ITK does.
+"""nibabel's images lie where their affine says, in the unit of lengths that their header names.
 
 nibabel's world is RAS (right, anterior, superior); ours is ITK's LPS. Its arrays are (x, y, z).
 """

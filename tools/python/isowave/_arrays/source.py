@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import images, labelled, memory, nifti, stores
 from .errors import ArrayTypeError, ArrayValueError, bad_type, bad_value, one_line, type_name
@@ -99,7 +99,7 @@ def as_source(
     *,
     spacing: float | Sequence[float] | NDArray[Any] | None = None,
     origin: Sequence[float] | NDArray[Any] | None = None,
-    direction: Sequence[Sequence[float]] | NDArray[Any] | None = None,
+    direction: ArrayLike | None = None,
     fill_value: float | None = None,
 ) -> ArraySource:
     """Returns a source of the voxels of any array-like; imports nothing that is not imported.
