@@ -168,7 +168,7 @@ int main(int argc, char **argv) {
   app.add_option("--size", options.size, "picture size WxH [1280x720]")
       ->delimiter('x')
       ->expected(2);
-  app.add_option("--rate", options.compression.rate, "bits per voxel")->capture_default_str();
+  app.add_option("--rate", options.compression.rate, "bits per voxel [4]");
   app.callback([&] { bench::measure(options); });
   return tools::run_program(app, argc, argv);
 }

@@ -259,6 +259,8 @@ TEST_F(CliRanks, ManyRanks) {
 TEST_F(CliRanks, CompressWhatOneProcessCompresses) {
   expect_same_file(kFuel, "--rate 5 --no-verify", 2);
   expect_same_file(kFuel, "--exact --levels all", 3);
+  expect_same_file(kFuel, "", 2);
+  expect_same_file("generate:mixing_layer_30x24x21_float32", "--levels 2", 3);
   expect_same_file("generate:mixing_layer_30x40x47_float32", "--rate 7 --levels all", 5);
   // Nearly all blocks take one bit, so bytes are shared by ranks; and some have no layer.
   const std::string spot = write_raw<std::uint8_t>("uint8", [](int x, int y, int z) {
@@ -287,6 +289,7 @@ TEST_F(CliRanks, CompressWithErrorsOfTheSource) {
     return x % 3 == 0 ? 1e-32 * value : value;
   });
   expect_same_file(waves, "--tolerance-relative 1e-3 --levels all", 5);
+  expect_same_file(waves, "", 3);
   expect_same_file(waves, "--rate 9 --levels all", 3);
 }
 

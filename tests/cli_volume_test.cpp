@@ -68,6 +68,7 @@ TEST(Cli, ConvertWithinAnError) {
   EXPECT_EQ(exact["max_voxel_error"], 0.0);
   EXPECT_EQ(exact["exact"], true);
   EXPECT_GT(exact["rate"], absolute["rate"]);
+  EXPECT_EQ(info_of(""), exact) << "the default, of integers";
   const auto render =
       run_isowave("render " + zfp + " --isovalue 100 --size 32x24 -o " + quoted(folder / "n.png"));
   EXPECT_EQ(render.status, 0) << render.err;
@@ -77,7 +78,8 @@ TEST(Cli, ConvertWithinAnError) {
   expect_one_line_error("convert " + kHead + " --tolerance 1 --exact" + to, "xact");
   expect_one_line_error("convert " + kHead + " --tolerance 1 --rate 8" + to, "rate");
   expect_one_line_error("convert " + kHead + " --exact --device cpu" + to, "fixed rate only");
-  expect_one_line_error("convert generate:sphere_8x8x8_float32 --exact" + to, "float32");
+  expect_one_line_error("convert " + kHead + " --device cpu" + to, "fixed rate only");
+  expect_one_line_error("convert generate:sphere_8x8x8_float64 --exact" + to, "float64");
   write_file(folder / "c_4x4x4_uint8.raw", std::string(64, 'x'));
   expect_one_line_error(
       "convert " + quoted(folder / "c_4x4x4_uint8.raw") + " --tolerance-relative 0.1" + to,
@@ -95,7 +97,7 @@ TEST(Cli, ConvertOnADeviceWritesTheSameFile) {
   EXPECT_EQ(on_device.err, "");
   EXPECT_EQ(test::read_file(folder / "device.zfp"), test::read_file(folder / "host.zfp"));
   expect_one_line_error(
-      "convert " + kHead + " --device no_such_device -o " + quoted(folder / "a.zfp"),
+      "convert " + kHead + " --rate 5 --device no_such_device -o " + quoted(folder / "a.zfp"),
       "no_such_device");
   EXPECT_EQ(folder.num_files(), 2u);
 }

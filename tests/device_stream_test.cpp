@@ -27,7 +27,7 @@ using testing::ThrowsMessage;
 
 constexpr std::uint32_t kOddBits[] = {9, 37, 64, 100, 777, 2048};
 constexpr std::int32_t kOddExponents[] = {
-    -20, -3, 1};  ///< of volumes whose blocks have lengths of their own
+    ISO_REVERSIBLE, -20, -3, 1};  ///< of volumes whose blocks have lengths of their own
 
 /// 6^3 blocks, partial ones too: 2, 3 and 4 parts can be had even where only 32 blocks are whole
 /// words.
@@ -152,6 +152,25 @@ TEST(ReadWords, AnyBitOfWordsAndFiles) {
 
 // ---- on devices
 
+/// The index of a volume whose blocks have other lengths, by as much as `most`, which add up to the
+/// same.
+std::vector<std::uint32_t> lying_index(const CompressedVolume &volume, std::uint32_t most,
+                                       uint seed) {
+  std::vector<std::uint32_t> lengths;
+  for (uint b = 0; b < volume.block_count(); ++b) lengths.push_back(volume.block_bits(b));
+  Random random(seed);
+  for (std::uint32_t &from : lengths) {
+    std::uint32_t &to = lengths[random() % lengths.size()];
+    const std::uint32_t moved =
+        std::min({std::uint32_t(random() % (most + 1)), from - 1, ISO_MAX_BLOCK_BITS - to});
+    from -= moved;
+    to += moved;
+  }
+  BlockIndexBuilder index;
+  for (const std::uint32_t length : lengths) index.add(length);
+  return index.finish();
+}
+
 class DeviceStreamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Decodes all blocks in a shuffled order through the stream.
@@ -194,13 +213,47 @@ class DeviceStreamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     EXPECT_EQ(got.thresholds(), expected.thresholds());
   }
 
+  /// A block ends where its length says, however it lies: the same wrong values everywhere, and
+  /// nothing outside the stream is read.
+  void check_lying_index(const CompressedVolume &truth) {
+    const auto num_blocks = static_cast<uint>(truth.block_count());
+    std::vector<CompressedVolume> volumes;
+    for (const std::uint32_t most : {1u, 40u, ISO_MAX_BLOCK_BITS}) {
+      volumes.push_back(truth);
+      volumes.back().index = lying_index(truth, most, most);
+    }
+    BlockIndexBuilder short_blocks;  // all but the last are too short for an exponent
+    for (uint b = 0; b + 1 < num_blocks; ++b) short_blocks.add(1 + b % 9);
+    const std::uint64_t rest = std::min<std::uint64_t>(
+        truth.payload_bits() - 5 * std::uint64_t{num_blocks}, ISO_MAX_BLOCK_BITS);
+    short_blocks.add(static_cast<uint>(rest));
+    volumes.push_back(truth);
+    volumes.back().index = short_blocks.finish();
+    for (const CompressedVolume &volume : volumes) {
+      const std::vector<float> expected = decode_blocks_with_libzfp(volume);
+      EXPECT_NE(first_difference(expected, decode_blocks_with_libzfp(truth)), kNoDifference);
+      expect_decoded(volume, DeviceStream(device_, volume));
+      expect_decoded(volume, DeviceStream(device_, volume, limit_for(volume, 2)));
+      expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
+      expect_same_ranges(volume, DeviceStream(device_, volume, OnHost{5}));
+      for (uint b = 0; b < num_blocks; ++b) {
+        float values[64];
+        zfp_decode_any_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
+                             volume.precision.min_exponent, values);
+        ASSERT_EQ(std::memcmp(values, &expected[64 * std::size_t{b}], sizeof(values)), 0)
+            << "block " << b;
+      }
+    }
+  }
+
   ocl::Device device_{GetParam()};
 };
 INSTANTIATE_TEST_SUITE_P(Devices, DeviceStreamOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
 
 TEST_P(DeviceStreamOnDevice, SmallPartsDecodeToTheSameBits) {
-  for (const CompressedVolume &volume : {small_volume(), indexed_volume(-2, {9, 10, 11})}) {
+  for (const CompressedVolume &volume : {small_volume(), indexed_volume(-2, {9, 10, 11}),
+                                         indexed_volume(ISO_REVERSIBLE, {9, 10, 11})}) {
     for (const std::uint32_t parts : {2u, 4u}) {
       SCOPED_TRACE(fmt::format("{} bits per block, {} parts", volume.bits_per_block, parts));
       const DeviceStream stream(device_, volume, limit_for(volume, parts));
@@ -217,57 +270,11 @@ TEST_P(DeviceStreamOnDevice, SmallWholeNumbersAreRounded) {
   expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
 }
 
-/// The index of a volume whose blocks have other lengths, by as much as `most`, which add up to the
-/// same.
-std::vector<std::uint32_t> lying_index(const CompressedVolume &volume, std::uint32_t most,
-                                       uint seed) {
-  std::vector<std::uint32_t> lengths;
-  for (uint b = 0; b < volume.block_count(); ++b) lengths.push_back(volume.block_bits(b));
-  Random random(seed);
-  for (std::uint32_t &from : lengths) {
-    std::uint32_t &to = lengths[random() % lengths.size()];
-    const std::uint32_t moved =
-        std::min({std::uint32_t(random() % (most + 1)), from - 1, ISO_MAX_BLOCK_BITS - to});
-    from -= moved;
-    to += moved;
-  }
-  BlockIndexBuilder index;
-  for (const std::uint32_t length : lengths) index.add(length);
-  return index.finish();
-}
-
-/// A block ends where its length says, however it lies: the same wrong values everywhere, and
-/// nothing outside the stream is read.
 TEST_P(DeviceStreamOnDevice, SmallLyingIndexDecodesToTheSameBits) {
-  const CompressedVolume truth = indexed_volume(-4, {9, 10, 11});
-  const auto num_blocks = static_cast<uint>(truth.block_count());
-  std::vector<CompressedVolume> volumes;
-  for (const std::uint32_t most : {1u, 40u, ISO_MAX_BLOCK_BITS}) {
-    volumes.push_back(truth);
-    volumes.back().index = lying_index(truth, most, most);
-  }
-  BlockIndexBuilder short_blocks;  // all but the last are too short for an exponent
-  for (uint b = 0; b + 1 < num_blocks; ++b) short_blocks.add(1 + b % 9);
-  const std::uint64_t rest = std::min<std::uint64_t>(
-      truth.payload_bits() - 5 * std::uint64_t{num_blocks}, ISO_MAX_BLOCK_BITS);
-  short_blocks.add(static_cast<uint>(rest));
-  volumes.push_back(truth);
-  volumes.back().index = short_blocks.finish();
-  for (const CompressedVolume &volume : volumes) {
-    const std::vector<float> expected = decode_blocks_with_libzfp(volume);
-    EXPECT_NE(first_difference(expected, decode_blocks_with_libzfp(truth)), kNoDifference);
-    expect_decoded(volume, DeviceStream(device_, volume));
-    expect_decoded(volume, DeviceStream(device_, volume, limit_for(volume, 2)));
-    expect_decoded(volume, DeviceStream(device_, volume, OnHost{8}));
-    expect_same_ranges(volume, DeviceStream(device_, volume, OnHost{5}));
-    for (uint b = 0; b < num_blocks; ++b) {
-      float values[64];
-      zfp_decode_block(volume.words.data(), volume.block_begin(b), volume.block_bits(b),
-                       volume.precision.min_exponent, values);
-      ASSERT_EQ(std::memcmp(values, &expected[64 * std::size_t{b}], sizeof(values)), 0)
-          << "block " << b;
-    }
-  }
+  check_lying_index(indexed_volume(-4, {9, 10, 11}));
+}
+TEST_P(DeviceStreamOnDevice, SmallLyingIndexOfAReversibleStreamDecodesToTheSameBits) {
+  check_lying_index(indexed_volume(ISO_REVERSIBLE, {9, 10, 11}));
 }
 
 /// Where the payload is too large to be copied, blocks are read from the file, wherever it is cut
@@ -327,7 +334,8 @@ TEST_P(DeviceStreamOnDevice, MoreThanFourPartsAreRefused) {
 }
 
 TEST_P(DeviceStreamOnDevice, SmallWindowsDecodeToTheSameBits) {
-  for (const CompressedVolume &volume : {small_volume(), indexed_volume(-2, {9, 10, 11})}) {
+  for (const CompressedVolume &volume : {small_volume(), indexed_volume(-2, {9, 10, 11}),
+                                         indexed_volume(ISO_REVERSIBLE, {9, 10, 11})}) {
     for (const std::uint32_t window : {8u, 1000u}) {
       SCOPED_TRACE(fmt::format("{} bits per block, window of {}", volume.bits_per_block, window));
       const DeviceStream stream(device_, volume, OnHost{window});

@@ -33,14 +33,16 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::ThrowsMessage;
 
+constexpr std::optional<std::int32_t> kKinds[] = {std::nullopt, -8, ISO_REVERSIBLE};
+
 class HostileZfp : public testing::Test {
  protected:
-  /// A small volume with levels, as a file; fixed rate, or fixed accuracy.
-  std::string make(bool indexed) {
+  /// A small volume with levels, as a file: of a fixed rate, or of blocks with these bit planes.
+  std::string make(std::optional<std::int32_t> min_exponent) {
     ArrayReader source(test::grid_info({18, 17, 19}),
                        test::sample({18, 17, 19}, test::gyroid_field(9)));
     CompressOptions options{.rate = 6, .measure_error = true, .levels = 2};
-    if (indexed) options.precision = BlockPrecision{-8};
+    if (min_exponent) options.precision = BlockPrecision{*min_exponent};
     compress_to_file(source, options, path_);
     return test::read_file(path_);
   }
@@ -61,8 +63,8 @@ std::string in_400_mb(const std::string &program) {
 // ---- files that become shorter
 
 TEST_F(HostileZfp, CutWhereverAfterItWasOpened) {
-  for (const bool indexed : {false, true}) {
-    const std::string bytes = make(indexed);
+  for (const auto &kind : kKinds) {
+    const std::string bytes = make(kind);
     const CompressedVolume volume = open_zfp_file(path_);
     const std::uint64_t end = 12 + (volume.payload_bits() + 7) / 8;
     const std::vector<float> expected = decode_with_libzfp(volume);
@@ -83,7 +85,7 @@ TEST_F(HostileZfp, CutWhereverAfterItWasOpened) {
 
 /// However it falls out: an answer or one line, never a signal.
 TEST_F(HostileZfp, CutWhileTheProgramReadsIt) {
-  const std::string bytes = make(true);
+  const std::string bytes = make(-8);
   std::atomic<bool> done = false;
   std::thread cutter([&] {
     for (std::uint64_t turn = 0; !done; ++turn) {
@@ -151,7 +153,7 @@ TEST_F(HostileZfp, MoreBlocksThanBitsAreRefusedFirst) {
         test::run_command(in_400_mb(test::isowave_program()) + " info " + quoted(path_));
     EXPECT_EQ(result.status, 1);
     EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
-    json trailer = json::parse(TrailerFile(make(true)).text);
+    json trailer = json::parse(TrailerFile(make(-8)).text);
     trailer.erase("level_bytes");
     trailer.erase("bounds_bytes");
     const std::string index = test::zlib(std::string(20'000, '\1'));
@@ -210,8 +212,8 @@ TEST_F(HostileZfp, FieldsOfAnyKindAreReadOrRefusedInOneLine) {
                                            "[18446744073709551615]",
                                            "[1,1]"};
   std::size_t num_read = 0, num_refused = 0;
-  for (const bool indexed : {false, true}) {
-    const TrailerFile parts(make(indexed));
+  for (const auto &kind : kKinds) {
+    const TrailerFile parts(make(kind));
     const json trailer = json::parse(parts.text);
     for (const auto &[key, right] : trailer.items()) {
       for (const std::string &value : values) {

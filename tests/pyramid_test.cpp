@@ -154,7 +154,7 @@ TEST(Pyramid, LevelsOfAnExactVolumeAreNoIntegers) {
   VolumeInfo info = test::grid_info(dims);
   info.type = VoxelType::kUint8;
   ArrayReader reader(info, test::sample(dims, test::plateau_field()));
-  const BlockPrecision bound = choose_precision(reader, {.tolerance = 0, .exact = true}, {});
+  const BlockPrecision bound = choose_precision(reader, {.exact = true}, {});
   const CompressedVolume volume = compress(reader, {.precision = bound, .levels = 0});
   EXPECT_TRUE(volume.precision.whole_numbers);
   const std::vector<float> exact = downsample(dims, decode_with_libzfp(volume));

@@ -191,7 +191,7 @@ TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
   const auto open = [] { return open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz"); };
   std::vector<float> source(open()->info().num_voxels());
   open()->read_layers(0, open()->info().dims.z, source);
-  const TestVolume volume(open()->info(), source, ErrorGoal{0, true});
+  const TestVolume volume(open()->info(), source, ErrorGoal{.exact = true});
   Renderer renderer(*device_, volume.compressed, {.size = kMedium});
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   for (const double voxel_error : {0.5, 4.0, 64.0}) {
@@ -209,7 +209,7 @@ TEST_P(RenderOnDevice, ExactVolumesAreTheirSource) {
   const auto open = [] { return open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz"); };
   std::vector<float> source(open()->info().num_voxels());
   open()->read_layers(0, open()->info().dims.z, source);
-  const TestVolume volume(open()->info(), source, ErrorGoal{0, true});
+  const TestVolume volume(open()->info(), source, ErrorGoal{.exact = true});
   ASSERT_EQ(volume.voxels, source);
   EXPECT_GT(check(volume, {1, 70, 69.5f}, kMedium), 1000u);
 }

@@ -182,14 +182,10 @@ TEST(SourceError, IntegersThatFloat32HoldsAreExactTo2To24) {
     return ArrayReader(kDims, voxels, VoxelType::kInt32);
   };
   ArrayReader below = range(16777215), at = range(16777216), above = range(16777217);
-  EXPECT_EQ(choose_precision(below, {0, true}, {}).max_voxel_error, 0.0);
-  for (ArrayReader *reader : {&at, &above}) {
-    EXPECT_THAT(
-        [&] {
-          choose_precision(*reader, {0, true}, {});
-        },
-        ThrowsMessage<Error>(HasSubstr("below 2^24")));
-  }
+  EXPECT_TRUE(choose_precision(below, {.exact = true}, {}).whole_numbers);
+  EXPECT_TRUE(choose_precision(at, {.exact = true}, {}).is_reversible());
+  EXPECT_THAT([&] { choose_precision(above, {.exact = true}, {}); },
+              ThrowsMessage<Error>(HasSubstr("off by up to 1:")));
 }
 
 TEST(SourceError, AMappedVoxelsSourceIsWhatItIsMappedTo) {
@@ -216,7 +212,7 @@ TEST(SourceError, DoublesBeyondFloat32AreRefused) {
     std::vector<double> voxels(kNumVoxels, 1.0);
     voxels[12] = large;
     ArrayReader reader(kDims, voxels, VoxelType::kFloat64);
-    EXPECT_THAT([&] { compress(reader, {.input = {.map_nan = 0.0f}}); },
+    EXPECT_THAT([&] { compress(reader, {.rate = 8, .input = {.map_nan = 0.0f}}); },
                 ThrowsMessage<Error>(HasSubstr("1 of 6426 voxels are beyond")));
   }
 }
@@ -325,7 +321,8 @@ TEST(SourceErrorOfTheProgram, PrintedErrorsAreNotBelow) {
   ArrayReader reader = sources()[0].reader();
   const auto path = folder / "a_21x18x17_float64.raw", out = folder / "a.zfp";
   test::write_file(path, reader.voxels());
-  const auto run = test::run_isowave("convert " + test::quoted(path) + " -o " + test::quoted(out));
+  const auto run =
+      test::run_isowave("convert " + test::quoted(path) + " --rate 32 -o " + test::quoted(out));
   ASSERT_EQ(run.status, 0) << run.err;
   const std::string before = "max error ";
   const double printed = std::stod(run.out.substr(run.out.find(before) + before.size()));

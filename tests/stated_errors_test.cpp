@@ -114,7 +114,7 @@ TEST_F(StatedErrors, HonestFilesAreAccepted) {
       const CompressedVolume volume = make_volume("generate:" + name, storage);
       EXPECT_FALSE(volume.errors_are_stated);
       write_zfp_file(volume, path_);
-      EXPECT_EQ(refusal(), "none") << name << " " << storage.rate;
+      EXPECT_EQ(refusal(), "none") << name << " " << storage.rate.value_or(0);
     }
   }
   write_zfp_file(make_volume("generate:gyroid_33x16x24_uint8", {.exact = true, .levels = 0}),

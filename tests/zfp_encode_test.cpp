@@ -304,7 +304,7 @@ TEST_P(CompressOnDevice, RefusesAndMapsAsTheHost) {
   voxels.back() = -std::numeric_limits<float>::infinity();
   voxels[9] = -0.0f;
   voxels[10] = 1e-40f;
-  CompressOptions options;
+  CompressOptions options{.rate = 8};
   options.device = &device_;
   const test::TemporaryFolder folder;
   ArrayReader reader(dims, voxels);
@@ -337,7 +337,7 @@ TEST_P(CompressOnDevice, FailuresOnTheWayAreReported) {
   };
   const glm::uvec3 dims(1100, 1000, 8);
   const std::vector<float> voxels(std::size_t{1100} * 1000 * 8, 1.0f);
-  CompressOptions options;
+  CompressOptions options{.rate = 8};
   options.device = &device_;
   FailingReader failing(dims, voxels);
   EXPECT_THAT([&] { compress(failing, options); }, ThrowsMessage<Error>("no more layers"));

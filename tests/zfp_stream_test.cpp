@@ -144,7 +144,7 @@ TEST(ZfpFile, KeepsWhatZfpCannotSay) {
   info.origin = {-1e9, 0.3, 5};
   info.direction = glm::dmat3(0, 1, 0, -1, 0, 0, 0, 0, -1);
   info.type = VoxelType::kInt16;
-  CompressOptions options;
+  CompressOptions options{.rate = 8};
   options.measure_error = true;
   const CompressedVolume written = compress_to_file(reader, options, folder / "a.zfp");
   EXPECT_TRUE(written.words.empty());
@@ -172,7 +172,7 @@ TEST(Compress, NanAndInfAreCountedOrMapped) {
   voxels[(2 * 600 + 9) * 600 + 3] = std::numeric_limits<float>::infinity();
   voxels.back() = -std::numeric_limits<float>::infinity();
   ArrayReader reader(dims, voxels);
-  CompressOptions options;
+  CompressOptions options{.rate = 8};
   EXPECT_THAT([&] { compress_to_file(reader, options, folder / "a.zfp"); },
               ThrowsMessage<Error>(AllOf(HasSubstr("3 of 4680000 voxels"), HasSubstr("(7,5,2)"))));
   EXPECT_EQ(folder.num_files(), 0u);
@@ -188,7 +188,7 @@ TEST(Compress, NanAndInfAreCountedOrMapped) {
 TEST(Compress, MagnitudesThatZfpCannotHold) {
   const glm::uvec3 dims(8, 8, 8);
   std::vector<float> voxels(512, 0.0f);
-  CompressOptions options;
+  CompressOptions options{.rate = 8};
   for (const float large : {kMaxMagnitude, -kMaxMagnitude, std::numeric_limits<float>::max()}) {
     voxels[9] = large;
     ArrayReader reader(dims, voxels);
@@ -212,7 +212,7 @@ TEST(Compress, MagnitudesThatZfpCannotHold) {
 }
 
 TEST(Compress, RangeOfValuesThatNeedAndNeedNoLook) {
-  CompressOptions options;
+  CompressOptions options{.rate = 8};
   options.input.map_nan = 5.0f;
   for (const float other :
        {-0.0f, 1e-40f, -1e-40f, std::numeric_limits<float>::infinity(), -3.0f}) {
@@ -303,7 +303,6 @@ TEST(ZfpFile, OtherKindsAreRefusedByName) {
                                         {"-f -2 16 32 -r 8", "2D"},
                                         {"-f -4 8 8 4 2 -r 8", "4D"},
                                         {"-f -3 8 8 8 -p 8", "fixed precision"},
-                                        {"-f -3 8 8 8 -R", "reversible"},
                                         {"-f -3 8 8 8 -c 64 512 0 -1074", "expert"},
                                         {"-f -3 8 8 8 -c 512 512 12 -1074", "expert"},
                                         {"-f -3 8 8 8 -r 33", "2112 bits per zfp block"},

@@ -69,7 +69,7 @@ class BlockValues {
     volume_.read_words(volume_.block_begin(id),
                        std::span(words).first((bits + 31) / 32 + kDecoderAhead));
     std::array<float, 64> &values = entry->second;
-    zfp_decode_block(words.data(), 0, bits, bound_.min_exponent, values.data());
+    zfp_decode_any_block(words.data(), 0, bits, bound_.min_exponent, values.data());
     if (bound_.whole_numbers)
       std::ranges::transform(values, values.begin(), [](float v) { return std::rint(v) + 0.0f; });
     return values;

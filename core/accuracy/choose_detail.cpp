@@ -175,7 +175,7 @@ DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
         of_first(team, std::vector{blocks_share(finest_depth, level_frames)}).front();
     if (share <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
   }
-  if (choice.reachable && frames.rate() > kMinPlaneRate) {
+  if (choice.reachable && frames.rate() > kMinPlaneRate && !volume.precision.is_reversible()) {
     choice.detail.voxel_error =
         first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
           return Detail{choice.detail.voxel_pixels, voxel_error};

@@ -143,7 +143,7 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
   core::agree_on(
       team, "request",
       fmt::format("{} {} {} {} {} {} {} {} {} {} {}", text_of(options.largest), options.with_levels,
-                  options.with_bounds, options.with_rays, wanted.bricks, storage.rate,
+                  options.with_bounds, options.with_rays, wanted.bricks, storage.rate.value_or(0),
                   storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
                   storage.exact, storage.levels, storage.map_nan.value_or(0)));
   whole = levels.front();

@@ -19,9 +19,10 @@ using core::guarded;
 
 // The two enumerations have the same types in the same order.
 static_assert(static_cast<int>(VoxelType::kFloat64) == static_cast<int>(core::VoxelType::kFloat64));
+static_assert(static_cast<int>(VoxelType::kInt64) == static_cast<int>(core::VoxelType::kInt64));
 
 core::VoxelType core_type(VoxelType type) {
-  if (type < VoxelType::kUint8 || type > VoxelType::kFloat64)
+  if (type < VoxelType::kUint8 || type > VoxelType::kInt64)
     throw core::Error("{} is no type of voxels", static_cast<int>(type));
   return static_cast<core::VoxelType>(type);
 }
@@ -53,7 +54,7 @@ core::Storage to_storage(const Compression &compression) {
     throw core::Error(
         "compression by more than one of rate, tolerance, relative tolerance, exact: give one");
   core::Storage storage;
-  storage.rate = compression.rate.value_or(storage.rate);
+  storage.rate = compression.rate;
   storage.tolerance = compression.tolerance;
   storage.relative_tolerance = compression.relative_tolerance;
   storage.exact = compression.exact;
@@ -80,8 +81,9 @@ const core::CompressedVolume &level_of(const core::CompressedVolume &volume, std
 
 core::OpenReader open_layers(const ReadLayers &read, VoxelType type, const Grid &grid, bool keep,
                              const core::Storage &storage) {
+  const core::VolumeInfo info = core_info(grid, type);
   const auto source =
-      std::make_shared<core::LayerSource>(core_info(grid, type), read, keep && storage.bounded());
+      std::make_shared<core::LayerSource>(info, read, keep && storage.reads_again(info.type));
   return [source] { return std::make_unique<core::LayerReader>(source); };
 }
 

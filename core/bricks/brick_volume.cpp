@@ -124,7 +124,7 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
   std::unique_ptr<VolumeReader> whole = open();
   const VolumeInfo info = brick_info(whole->info(), own);
   CompressOptions options;
-  options.rate = storage.rate;
+  options.rate = storage.rate.value_or(0);
   options.precision = find_precision(open, what, storage);
   options.measure_error = storage.measure_error;
   options.input = {storage.map_nan, {}, storage.num_threads};

@@ -265,7 +265,7 @@ void TeamCompressor::read_finest(PyramidCoder &coder) {
   VolumePart part = own_part(team_, level().info);
   const Layers layers = voxel_layers(level().info, worked());
   part.begin = layers.begin;
-  InputOptions input = options_.input;
+  InputOptions input = input_of(options_);
   input.part = &part;
   const std::unique_ptr<VolumeReader> reader = open_part(part, layers.count(), open_);
   level().value_range = read_in_chunks(*reader, input, coder).coded;
@@ -334,7 +334,7 @@ CodedSlab TeamCompressor::code(std::uint64_t begin, LevelData &next) {
     for (std::uint32_t z = 0; level_ > 0 && z < dims.z; z += chunk_layers) {
       const std::size_t count = std::min(chunk_layers, dims.z - z) * layer;
       code_chunk(make_chunk(dims, z, std::span(data_.voxels).subspan(z * layer, count)), dims,
-                 options.input, *coder);
+                 input_of(options), *coder);
     }
     slab.errors = coder->finish_level();
     if (!slab.errors.empty()) {

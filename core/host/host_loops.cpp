@@ -21,7 +21,7 @@ namespace isowave::core {
 namespace {
 
 inline void decode(const EncodedBlock &block, float *values) {
-  zfp_decode_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
+  zfp_decode_any_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
   if (!block.whole_numbers) return;
   for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
 }

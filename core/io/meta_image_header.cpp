@@ -111,7 +111,7 @@ VoxelType meta_voxel_type(const HeaderFields &fields) {
     std::string_view name;
     VoxelType type;
   };
-  constexpr std::array<Name, 10> kNames{
+  constexpr std::array<Name, 12> kNames{
       {{"MET_CHAR", VoxelType::kInt8},
        {"MET_UCHAR", VoxelType::kUint8},
        {"MET_SHORT", VoxelType::kInt16},
@@ -120,6 +120,8 @@ VoxelType meta_voxel_type(const HeaderFields &fields) {
        {"MET_UINT", VoxelType::kUint32},
        {"MET_LONG", VoxelType::kInt32},  // 4 bytes, on all systems
        {"MET_ULONG", VoxelType::kUint32},
+       {"MET_LONG_LONG", VoxelType::kInt64},
+       {"MET_ULONG_LONG", VoxelType::kUint64},
        {"MET_FLOAT", VoxelType::kFloat32},
        {"MET_DOUBLE", VoxelType::kFloat64}}};
   std::string_view name = fields["ElementType"];
@@ -128,7 +130,7 @@ VoxelType meta_voxel_type(const HeaderFields &fields) {
   for (const Name &candidate : kNames) {
     if (candidate.name == name) return candidate.type;
   }
-  fields.fail("ElementType", "not supported: need a number of 8, 16 or 32 bits, or MET_DOUBLE");
+  fields.fail("ElementType", "not supported: need an integer, MET_FLOAT or MET_DOUBLE");
 }
 
 /// Returns the number of axes. All beyond the third must have size 1.

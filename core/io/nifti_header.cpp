@@ -75,14 +75,16 @@ VoxelType nifti_voxel_type(const NiftiHeader &header) {
     std::int16_t code;
     VoxelType type;
   };
-  constexpr std::array<Code, 8> kCodes{{{2, VoxelType::kUint8},
-                                        {4, VoxelType::kInt16},
-                                        {8, VoxelType::kInt32},
-                                        {16, VoxelType::kFloat32},
-                                        {64, VoxelType::kFloat64},
-                                        {256, VoxelType::kInt8},
-                                        {512, VoxelType::kUint16},
-                                        {768, VoxelType::kUint32}}};
+  constexpr std::array<Code, 10> kCodes{{{2, VoxelType::kUint8},
+                                         {4, VoxelType::kInt16},
+                                         {8, VoxelType::kInt32},
+                                         {16, VoxelType::kFloat32},
+                                         {64, VoxelType::kFloat64},
+                                         {256, VoxelType::kInt8},
+                                         {512, VoxelType::kUint16},
+                                         {768, VoxelType::kUint32},
+                                         {1024, VoxelType::kInt64},
+                                         {1280, VoxelType::kUint64}}};
   const auto code = header.get<std::int16_t>(70);
   const auto bits = header.get<std::int16_t>(72);
   for (const Code &candidate : kCodes) {
@@ -92,10 +94,8 @@ VoxelType nifti_voxel_type(const NiftiHeader &header) {
     }
     return candidate.type;
   }
-  header.fail(
-      "NIfTI datatype {} is not supported: need one number of at most 32 bits, or float64, per "
-      "voxel",
-      code);
+  header.fail("NIfTI datatype {} is not supported: need one integer, float32 or float64 per voxel",
+              code);
 }
 
 void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
@@ -260,7 +260,7 @@ VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, boo
   voxels.type = nifti_voxel_type(bytes);
   voxels.big_endian = bytes.is_big_endian();
   set_nifti_scale(bytes, voxels);
-  // Scaled values are not whole, nor those of float32.
+  // Scaled values may be any that float64 has.
   header.info.type = voxels.is_scaled() ? VoxelType::kFloat64 : voxels.type;
   set_nifti_geometry(bytes, header.info);
 

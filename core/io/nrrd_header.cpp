@@ -115,9 +115,9 @@ bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields 
 VoxelType nrrd_voxel_type(const HeaderFields &fields) {
   struct Names {
     VoxelType type;
-    std::array<std::string_view, 6> names;
+    std::array<std::string_view, 8> names;
   };
-  constexpr std::array<Names, 8> kTypes{
+  constexpr std::array<Names, 10> kTypes{
       {{VoxelType::kInt8, {"signed char", "int8", "int8_t"}},
        {VoxelType::kUint8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
        {VoxelType::kInt16,
@@ -126,6 +126,11 @@ VoxelType nrrd_voxel_type(const HeaderFields &fields) {
         {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
        {VoxelType::kInt32, {"int", "signed int", "int32", "int32_t"}},
        {VoxelType::kUint32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+       {VoxelType::kInt64,
+        {"longlong", "long long", "long long int", "signed long long", "signed long long int",
+         "int64", "int64_t"}},
+       {VoxelType::kUint64,
+        {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
        {VoxelType::kFloat32, {"float"}},
        {VoxelType::kFloat64, {"double"}}}};
   const std::string wanted = lower_case(fields["type"]);
@@ -133,7 +138,7 @@ VoxelType nrrd_voxel_type(const HeaderFields &fields) {
     const auto found = std::find(candidate.names.begin(), candidate.names.end(), wanted);
     if (found != candidate.names.end() && !wanted.empty()) return candidate.type;
   }
-  fields.fail("type", "not supported: need a number of 8, 16 or 32 bits, or double");
+  fields.fail("type", "not supported: need an integer, float or double");
 }
 
 /// Vectors of three numbers like (1,0,0.5), or `none`.

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -200,6 +202,20 @@ void check_size(const VolumeHeader &header, std::uint64_t found) {
             fmt::format("{}{}", is_raw ? "" : "at least ", least), fmt::format("{}", found));
 }
 
+/// Throws  Error: float64 does not hold the integer
+template <class T>
+void check_held_by_double(T voxel) {
+  if constexpr (std::is_integral_v<T> && sizeof(T) == 8) {
+    using Unsigned = std::make_unsigned_t<T>;
+    const auto magnitude =
+        voxel < T{0} ? Unsigned{0} - static_cast<Unsigned>(voxel) : static_cast<Unsigned>(voxel);
+    if (magnitude == 0 || std::bit_width(magnitude) - std::countr_zero(magnitude) <=
+                              std::numeric_limits<double>::digits)
+      return;
+    throw Error("a voxel is {}: integers of 64 bits are read if float64 holds them", voxel);
+  }
+}
+
 template <class Value>
 void convert_voxels(VoxelType type, std::span<const std::byte> voxels, std::span<Value> out) {
   if (voxels.size() != out.size() * size_of(type))
@@ -207,6 +223,7 @@ void convert_voxels(VoxelType type, std::span<const std::byte> voxels, std::span
   with_voxel_type(type, [&]<class T>(T voxel) {
     for (std::size_t i = 0; i < out.size(); ++i) {
       std::memcpy(&voxel, voxels.data() + i * sizeof(T), sizeof(T));
+      check_held_by_double(voxel);
       out[i] = static_cast<Value>(voxel);
     }
   });

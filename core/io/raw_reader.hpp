@@ -35,7 +35,7 @@ std::optional<RawName> parse_raw_name(std::string_view stem);
 
 /// Converts little-endian voxels of `type` to float32. voxels.size() == out.size() * size_of(type).
 void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out);
-/// The same to float64, which holds all of them exactly.
+/// The same to float64. Throws Error on integers that float64 does not hold.
 void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::span<double> out);
 
 /// Reads the voxels that a header describes, whose info has passed check_volume_info(). Layers are

@@ -1,4 +1,5 @@
 #include "core/io/text_voxels.hpp"
+#include "core/base/text.hpp"
 
 #include <charconv>
 #include <cmath>
@@ -36,6 +37,8 @@ std::optional<T> parse_voxel(std::string_view text) {
     return parse_float(text);
   } else if constexpr (std::is_same_v<T, double>) {
     return parse_number(text);
+  } else if constexpr (sizeof(T) == 8) {
+    return parse_all<T>(text);
   } else {
     std::optional<double> value = parse_number(text);  // double holds all integers of 32 bits
     if (!value ||

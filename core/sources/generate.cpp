@@ -40,7 +40,8 @@ void store_as(std::span<const double> row, std::byte *out) {
     if constexpr (std::is_floating_point_v<T>) {
       voxel = static_cast<T>(row[x]);
     } else {
-      voxel = static_cast<T>(std::floor(row[x] * double(std::numeric_limits<T>::max()) + 0.5));
+      constexpr auto kLargest = static_cast<double>(std::numeric_limits<T>::max());
+      voxel = static_cast<T>(std::floor(row[x] * kLargest + 0.5));
     }
     std::memcpy(out + x * sizeof(T), &voxel, sizeof(T));
   }

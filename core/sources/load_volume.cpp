@@ -87,7 +87,7 @@ double absolute_tolerance(const OpenReader &open, std::string_view what, const S
 
 std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string_view what,
                                              const Storage &storage) {
-  if (!storage.bounded()) return {};
+  if (storage.rate) return {};
   const auto check = [](const char *name, const std::optional<double> &tolerance) {
     if (tolerance && !(*tolerance > 0))
       throw Error("a {} of {}: must be above 0", name, *tolerance);
@@ -95,7 +95,7 @@ std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string
   check("tolerance", storage.tolerance);
   check("relative tolerance", storage.relative_tolerance);
   InputOptions input{storage.map_nan, {}, storage.num_threads, storage.part};
-  ErrorGoal goal{storage.tolerance.value_or(0), storage.exact};
+  ErrorGoal goal{storage.tolerance, storage.exact};
   if (storage.relative_tolerance) goal.tolerance = absolute_tolerance(open, what, storage, input);
   input.progress = step(storage, "measuring errors");
   return choose_precision(*open(), goal, input);
@@ -108,7 +108,7 @@ CompressOptions compress_options(const OpenReader &open, const VolumeInfo &info,
                                  std::string_view what, const Storage &storage) {
   check_drawable(info, what);
   CompressOptions options;
-  options.rate = storage.rate;
+  options.rate = storage.rate.value_or(0);
   options.precision = find_precision(open, what, storage);
   options.levels = storage.levels;
   options.measure_error = storage.measure_error;

@@ -13,12 +13,13 @@
 
 namespace isowave::core {
 
-/// How voxels are compressed: at a rate, or by one of tolerance, relative_tolerance and exact.
+/// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact. By default
+/// they keep all that float32 holds of them: find_precision().
 struct Storage {
-  std::uint32_t rate = 8;                      ///< bits per voxel
+  std::optional<std::uint32_t> rate{};         ///< bits per voxel
   std::optional<double> tolerance{};           ///< largest error of a voxel
   std::optional<double> relative_tolerance{};  ///< the same, as a part of the range of values
-  bool exact = false;                          ///< none, of integers
+  bool exact = false;                          ///< no error: refuses what float32 does not hold
   std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
   bool measure_error = false;                  ///< at a fixed rate, too
   std::optional<float> map_nan{};              ///< see InputOptions
@@ -28,14 +29,17 @@ struct Storage {
   /// Makes the progress of each step, which it is told: "compressing".
   std::function<Progress(std::string_view step)> progress{};
 
-  bool bounded() const { return tolerance || relative_tolerance || exact; }
+  /// Whether a volume of this type is read more than once.
+  bool reads_again(VoxelType type) const {
+    return !rate && (tolerance || relative_tolerance || exact || type != VoxelType::kFloat32);
+  }
 };
 
 /// Opens a reader at the volume's front, each time it is called.
 using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
 
-/// The precision that was asked for, or none: the rate. Reads the whole volume, for a relative
-/// tolerance twice.
+/// The precision that was asked for, or the default; none: the rate. May read the whole volume, for
+/// a relative tolerance twice.
 ///
 /// Throws  Error, which names the volume `what`: see choose_precision()
 std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string_view what,

@@ -116,6 +116,10 @@ ocl::Defines defines_for(VoxelType type) {
       return {{"ISO_VOXEL", "int"}, {"ISO_LARGEST_VOXEL", "2147483647.0"}};
     case VoxelType::kFloat32:
       return {{"ISO_VOXEL", "float"}, {"ISO_LARGEST_VOXEL", "0"}};
+    case VoxelType::kUint64:
+      return {{"ISO_VOXEL", "ulong"}, {"ISO_LARGEST_VOXEL", "18446744073709551615.0"}};
+    case VoxelType::kInt64:
+      return {{"ISO_VOXEL", "long"}, {"ISO_LARGEST_VOXEL", "9223372036854775807.0"}};
     case VoxelType::kFloat64:
       break;
   }

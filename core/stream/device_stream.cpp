@@ -1,6 +1,7 @@
 #include "core/stream/device_stream.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "core/base/error.hpp"
@@ -18,6 +19,14 @@ StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_p
           0.0f,
           0,
           volume.bounds.by_place ? 1u : 0u};
+}
+
+/// Throws  Error: the device drops bits of values as small as the volume's
+void check_denormals(const ocl::Device &device, const CompressedVolume &volume) {
+  const float largest = std::max(std::abs(volume.value_range[0]), std::abs(volume.value_range[1]));
+  if (device.capabilities().denormals || largest == 0 || largest >= kMinMagnitude) return;
+  throw Error("device '{}' has no denormal numbers, as values of at most {} need: scale them up",
+              device.info().name, largest);
 }
 
 /// Uploads the volume's words from word `first` on.
@@ -88,6 +97,7 @@ ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, OnHost host
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
                            std::uint64_t largest_part, bool with_bounds)
     : indexed_(volume.is_indexed()) {
+  check_denormals(device, volume);
   const std::uint64_t largest =
       largest_part != 0 ? largest_part : device.capabilities().largest_allocation;
   const StreamSplit split = split_stream(volume, largest);
@@ -111,6 +121,7 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, 
     : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks, host.max_copy)),
       layout(layout_of(volume, 0)),
       indexed_(volume.is_indexed()) {
+  check_denormals(device, volume);
   add_index(device, {}, bounds_of(volume, with_bounds));
 }
 
@@ -135,6 +146,7 @@ ocl::Defines DeviceStream::defines() const {
   ocl::Defines defines;  // none: as kernels are built without a word
   if (parts.size() != 1) defines.emplace("ISO_STREAM_PARTS", parts.empty() ? "0" : "4");
   if (indexed_) defines.emplace("ISO_STREAM_INDEXED", "1");
+  if (layout.min_exponent == ISO_REVERSIBLE) defines.emplace("ISO_STREAM_REVERSIBLE", "1");
   return defines;
 }
 

@@ -16,14 +16,16 @@ struct TypeEntry {
   std::string_view name;
   std::size_t size;
 };
-constexpr std::array<TypeEntry, 8> kVoxelTypes{{{VoxelType::kUint8, "uint8", 1},
-                                                {VoxelType::kInt8, "int8", 1},
-                                                {VoxelType::kUint16, "uint16", 2},
-                                                {VoxelType::kInt16, "int16", 2},
-                                                {VoxelType::kUint32, "uint32", 4},
-                                                {VoxelType::kInt32, "int32", 4},
-                                                {VoxelType::kFloat32, "float32", 4},
-                                                {VoxelType::kFloat64, "float64", 8}}};
+constexpr std::array<TypeEntry, 10> kVoxelTypes{{{VoxelType::kUint8, "uint8", 1},
+                                                 {VoxelType::kInt8, "int8", 1},
+                                                 {VoxelType::kUint16, "uint16", 2},
+                                                 {VoxelType::kInt16, "int16", 2},
+                                                 {VoxelType::kUint32, "uint32", 4},
+                                                 {VoxelType::kInt32, "int32", 4},
+                                                 {VoxelType::kFloat32, "float32", 4},
+                                                 {VoxelType::kFloat64, "float64", 8},
+                                                 {VoxelType::kUint64, "uint64", 8},
+                                                 {VoxelType::kInt64, "int64", 8}}};
 
 const TypeEntry &entry(VoxelType type) {
   return kVoxelTypes.at(std::size_t(type));
@@ -41,7 +43,7 @@ bool is_integer(VoxelType type) {
   return type != VoxelType::kFloat32 && type != VoxelType::kFloat64;
 }
 bool fits_float32(VoxelType type) {
-  return type != VoxelType::kUint32 && type != VoxelType::kInt32 && type != VoxelType::kFloat64;
+  return type == VoxelType::kFloat32 || size_of(type) < 4;
 }
 
 VoxelType voxel_type_from_string(std::string_view name) {
@@ -49,7 +51,8 @@ VoxelType voxel_type_from_string(std::string_view name) {
     if (candidate.name == name) return candidate.type;
   }
   throw Error(
-      "unknown voxel type '{}': use uint8, int8, uint16, int16, uint32, int32, float32 or float64",
+      "unknown voxel type '{}': use uint8, int8, uint16, int16, uint32, int32, uint64, int64, "
+      "float32 or float64",
       name);
 }
 

@@ -13,7 +13,18 @@
 
 namespace isowave::core {
 
-enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
+enum class VoxelType {
+  kUint8,
+  kInt8,
+  kUint16,
+  kInt16,
+  kUint32,
+  kInt32,
+  kFloat32,
+  kFloat64,
+  kUint64,
+  kInt64
+};
 
 /// "uint8", "int8", ... "float64".
 std::string_view to_string(VoxelType type);
@@ -43,6 +54,10 @@ auto with_voxel_type(VoxelType type, const Use &use) {
       return use(std::int32_t{});
     case VoxelType::kFloat32:
       return use(float{});
+    case VoxelType::kUint64:
+      return use(std::uint64_t{});
+    case VoxelType::kInt64:
+      return use(std::int64_t{});
     case VoxelType::kFloat64:
       break;
   }
@@ -93,7 +108,8 @@ class VolumeReader {
   virtual void read_layers(std::uint32_t z_begin, std::uint32_t num_layers,
                            std::span<float> out) = 0;
 
-  /// As read_layers(), but every voxel exactly as the file has it. A reader of types that float32
+  /// As read_layers(), but every voxel exactly as the file has it. Throws Error also on integers of
+  /// 64 bits that float64 does not hold. A reader of types that float32
   /// does not hold (fits_float32()) must override this one, which throws std::logic_error for them.
   virtual void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
                                  std::span<double> out);

@@ -67,6 +67,7 @@ struct Findings {
 
 /// A run of voxels along x, from x = 0 on.
 struct Line {
+  float least = kMinMagnitude;  ///< smaller magnitudes become 0
   std::span<float> voxels{};
   std::span<const double> source{};  ///< none: voxels are
   std::uint64_t first = 0;           ///< linear voxel index of the first
@@ -89,7 +90,7 @@ void cast_line(const Line &line, Findings &found) {
       value = kMaxMagnitude;
     } else {
       value = static_cast<float>(source);
-      const float stored = std::abs(value) < kMinMagnitude ? 0.0f : value;
+      const float stored = std::abs(value) < line.least ? 0.0f : value;
       raise_lost(line.lost[x / kBlockEdge], std::abs(double{stored} - source));
       found.add_source(source, source);
     }
@@ -101,7 +102,7 @@ void cast_line(const Line &line, Findings &found) {
 /// order.
 bool add_plain_values(const Line &line, Findings &found) {
   constexpr std::int32_t kMagnitudeBits = 0x7FFFFFFF;
-  constexpr auto kLeast = std::bit_cast<std::int32_t>(kMinMagnitude);
+  const auto least_plain = std::bit_cast<std::int32_t>(line.least);
   constexpr auto kEnd = std::bit_cast<std::int32_t>(kMaxMagnitude);
   const auto ordered = [](std::int32_t bits) {
     return bits ^ ((bits >> 31) & kMagnitudeBits);
@@ -113,7 +114,7 @@ bool add_plain_values(const Line &line, Findings &found) {
     const auto bits = std::bit_cast<std::int32_t>(value);
     const std::int32_t magnitude = bits & kMagnitudeBits, order = ordered(bits);
     others |= std::uint32_t(magnitude != 0) &
-              (std::uint32_t(magnitude < kLeast) | std::uint32_t(magnitude >= kEnd));
+              (std::uint32_t(magnitude < least_plain) | std::uint32_t(magnitude >= kEnd));
     min = std::min(min, order);
     max = std::max(max, order);
   }
@@ -145,7 +146,7 @@ void check_line(const Line &line, const std::optional<float> &map_nan, Findings 
     found.min = std::min(found.min, value);
     found.max = std::max(found.max, value);
     const float magnitude = std::abs(value);
-    if (magnitude < kMinMagnitude) {
+    if (magnitude != 0 && magnitude < line.least) {
       raise_lost(line.lost[x / kBlockEdge], double{magnitude});
       value = 0.0f;
     } else if (magnitude >= kMaxMagnitude) {
@@ -197,7 +198,7 @@ Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm
     Findings found;
     for (std::uint64_t i = 0; i < std::uint64_t(row.ny) * row.nz; ++i) {
       const std::uint64_t at = begin + i / row.ny * layer + i % row.ny * dims.x;
-      check_line({chunk.voxels.subspan(at, dims.x),
+      check_line({options.keeps_tiny ? 0.0f : kMinMagnitude, chunk.voxels.subspan(at, dims.x),
                   source.empty() ? source : source.subspan(at, dims.x), first_z * layer + at, lost},
                  options.map_nan, found);
     }

@@ -17,8 +17,8 @@ namespace isowave::core {
 using Progress = std::function<void(std::uint32_t done, std::uint32_t total)>;
 
 /// zfp cannot hold every float32 (its block scale is a float32 itself, and decoding overshoots by
-/// up to 2x). Voxels of at least kMaxMagnitude are refused; those below kMinMagnitude become 0, so
-/// that no decoder ever meets an infinity or a denormal.
+/// up to 2x). Voxels of at least kMaxMagnitude are refused; those below kMinMagnitude become 0,
+/// unless they are kept (InputOptions), so that no decoder ever meets an infinity or a denormal.
 inline constexpr float kMaxMagnitude = 0x1p126f;
 inline constexpr float kMinMagnitude = 0x1p-97f;
 
@@ -40,6 +40,7 @@ struct InputOptions {
   std::uint32_t num_threads = 0;  ///< 0: one per processor; the result is the same for any number
   /// The reader gives this part. What is found, and refused, is the whole's, at all processes.
   const VolumePart *part = nullptr;
+  bool keeps_tiny = false;  ///< voxels below kMinMagnitude are coded as they are
 };
 
 /// A few voxel layers, whole layers of blocks but at the volume's end.

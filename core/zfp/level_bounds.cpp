@@ -162,6 +162,7 @@ std::optional<double> known_voxel_error(const CompressedVolume &volume) {
   if (volume.max_voxel_error) return volume.max_voxel_error;
   // zfp's promise is for the float32 that it was given.
   if (volume.precision.min_exponent == ISO_ALL_PLANES || !fits_float32(volume.info.type)) return {};
+  if (volume.precision.is_reversible()) return 0;
   return std::ldexp(1.0, volume.precision.min_exponent);
 }
 

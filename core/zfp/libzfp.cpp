@@ -12,6 +12,7 @@ static_assert(std::endian::native == std::endian::little,
               "zfp streams are read as little-endian words");
 
 static_assert(ISO_ALL_PLANES == ZFP_MIN_EXP);  // NOLINT(misc-redundant-expression): of two sources
+static_assert(ISO_REVERSIBLE == ZFP_MIN_EXP - 1);  // as zfp_stream_set_reversible() has it
 
 ZfpStream make_zfp_stream(std::uint32_t bits_per_block, std::int32_t min_exponent) {
   ZfpStream stream(or_bad_alloc(zfp_stream_open(nullptr)), &zfp_stream_close);

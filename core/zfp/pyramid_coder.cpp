@@ -153,6 +153,12 @@ class BoundedCoder : public LevelCoder {
 
 }  // namespace
 
+InputOptions input_of(const CompressOptions &options) {
+  InputOptions input = options.input;
+  input.keeps_tiny = options.precision && options.precision->is_reversible();
+  return input;
+}
+
 CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options) {
   if (options.precision && options.device)
     throw Error("a device compresses at a fixed rate only: leave the device, or the error bound");
@@ -203,7 +209,7 @@ PyramidCoder::PyramidCoder(const CompressOptions &options,
   downsampler_.emplace(dims, options.input.num_threads,
                        [this, &options, coarse_dims, next_level](const Chunk &chunk) {
                          if (next_level) next_level(chunk);
-                         code_chunk(chunk, coarse_dims, options.input, *next_);
+                         code_chunk(chunk, coarse_dims, input_of(options), *next_);
                          if (bounds_) bounds_->add_coarse(chunk.voxels, next_->coder_->decoded());
                        });
 }

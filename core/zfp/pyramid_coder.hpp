@@ -23,6 +23,8 @@ using PayloadSink = std::function<void(std::span<const std::byte>)>;
 ///
 /// Throws  Error: bad rate, a bad grid, more levels than it can have
 CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options);
+/// How voxels are read, and those of coarser levels checked.
+InputOptions input_of(const CompressOptions &options);
 
 /// Compresses the voxels of a level.
 class LevelCoder : public ChunkCoder {

@@ -17,7 +17,8 @@ namespace isowave::core {
 
 namespace {
 
-constexpr float kIntegerEnd = 0x1p24f;
+constexpr double kMostLost = 0x1p-8;  // of the range of values: else the volume is another one
+constexpr float kWholeEnd = 0x1p24f;  // all whole numbers below are float32
 
 /// One block at a time: encoded by libzfp, and decoded again down to fewer of its bit planes.
 class BlockCodec {
@@ -85,24 +86,31 @@ BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, co
   return error;
 }
 
+/// Bit planes that may do: candidate i ends at first + i, up to `last`.
+struct Candidates {
+  std::int32_t first = 0, last = -1;  ///< none
+};
+
 /// Largest errors of the whole volume with several numbers of bit planes at once.
 class ErrorMeter : public ChunkCoder {
  public:
-  /// Candidate i ends at first + i, up to `last`, at most kMaxCandidates. Those that exceed `limit`
-  /// are given up.
+  /// At most kMaxCandidates. Those that exceed `limit` are given up.
   static constexpr std::int32_t kMaxCandidates = 8;
-  ErrorMeter(const glm::uvec3 &dims, std::int32_t first, std::int32_t last, double limit,
-             bool rounded, std::uint32_t num_threads)
+  ErrorMeter(const glm::uvec3 &dims, const Candidates &candidates, double limit, bool rounded,
+             std::uint32_t num_threads)
       : nx_(dims.x),
         layer_(std::ptrdiff_t{dims.x} * dims.y),
         blocks_x_((dims.x + 3) / 4),
-        first_(first),
-        num_candidates_(std::size_t(last - first) + 1),
+        first_(candidates.first),
+        num_candidates_(std::size_t(candidates.last - candidates.first + 1)),
         limit_(limit),
         rounded_(rounded),
-        errors_(thread_count(num_threads)) {}
+        errors_(thread_count(num_threads)),
+        lost_(errors_.size()) {}
 
   void code_row(const BlockRow &row, std::uint32_t thread) override {
+    lost_[thread] = std::max(lost_[thread], *std::max_element(row.lost, row.lost + blocks_x_));
+    if (num_candidates_ == 0) return;
     BlockCodec codec(first_);
     for (std::uint32_t bx = 0; bx < blocks_x_; ++bx) {
       codec.set_planes(first_);
@@ -121,13 +129,19 @@ class ErrorMeter : public ChunkCoder {
 
   /// What other processes have found counts, too.
   void merge(Team &team) {
-    const std::size_t width = kMaxCandidates;
+    const std::size_t width = kMaxCandidates + 1;
     std::vector<double> own(width);
     for (std::size_t i = 0; i < num_candidates_; ++i)
       own[i] = given_up_[i].load() ? std::numeric_limits<double>::infinity() : error(i);
+    own.back() = double{lost()};
     const std::vector<double> all = gather(team, own);
-    for (std::size_t i = 0; i < all.size(); ++i)
-      errors_[0][i % width] = std::max(errors_[0][i % width], all[i]);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (i % width < kMaxCandidates) {
+        errors_[0][i % width] = std::max(errors_[0][i % width], all[i]);
+      } else {
+        lost_[0] = std::max(lost_[0], static_cast<float>(all[i]));
+      }
+    }
   }
 
   /// The coarsest within the limit, or none.
@@ -138,6 +152,9 @@ class ErrorMeter : public ChunkCoder {
     }
     return {};
   }
+
+  /// The most that float32 loses of a voxel.
+  float lost() const { return std::ranges::max(lost_); }
 
   double error(std::size_t candidate) const {
     double error = 0;
@@ -153,51 +170,39 @@ class ErrorMeter : public ChunkCoder {
   double limit_;
   bool rounded_;
   std::vector<std::array<double, kMaxCandidates>> errors_;  ///< of each thread
+  std::vector<float> lost_;                                 ///< of each thread
   std::array<std::atomic<bool>, kMaxCandidates> given_up_{};
 };
 
-}  // namespace
-
-namespace {
-
-/// The first and the last end of bit planes that are worth a look.
-std::array<std::int32_t, 2> exponents_to_try(VoxelType type, const ErrorGoal &goal) {
+/// Ends of bit planes that are worth a look.
+Candidates candidates_for(VoxelType type, double tolerance) {
   constexpr std::int32_t kNumFewer = 6, kAllPlanes = ISO_ALL_PLANES + 1;
-  if (goal.exact) return {-2, -2 + kNumFewer};  // a quarter at most
   // Values that became 0 may have taken nearly all of it.
-  if (goal.tolerance <= 4 * double{kMinMagnitude}) return {kAllPlanes, kAllPlanes};
+  if (tolerance <= 4 * double{kMinMagnitude}) return {kAllPlanes, kAllPlanes};
   // zfp's error is 2^promised at most. No voxel has planes beyond kLastPlane, and not all exponents
   // fit a file's header.
   constexpr std::int32_t kLastPlane = 130;
-  const std::int32_t promised = std::min(std::ilogb(goal.tolerance), kLastPlane);
+  const std::int32_t promised = std::min(std::ilogb(tolerance), kLastPlane);
   // Where the cast to float32, or to 0, may have taken a part of the tolerance, half of the rest is
   // enough: a block that does not have all its planes by then has lost a quarter at most.
-  const bool may_lose = !fits_float32(type) || goal.tolerance < 0x1p-80;
+  const bool may_lose = !fits_float32(type) || tolerance < 0x1p-80;
   return {promised - (may_lose ? 1 : 0), promised + kNumFewer};
 }
 
-}  // namespace
-
-BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
-                                const InputOptions &options) {
-  const VolumeInfo &info = reader.info();
-  if (goal.exact && !is_integer(info.type)) {
-    throw Error("exact compression is for integer volumes, and this one is {}: give a tolerance",
-                to_string(info.type));
-  }
-  if (!goal.exact && !(goal.tolerance > 0 && std::isfinite(goal.tolerance))) {
-    throw Error("tolerance {}: must be above 0 and finite", goal.tolerance);
-  }
-  const double limit = goal.exact ? 0 : goal.tolerance;
-  const std::array<std::int32_t, 2> exponents = exponents_to_try(info.type, goal);
-  ErrorMeter meter(info.dims, exponents[0], exponents[1], limit, goal.exact, options.num_threads);
-  const std::array<float, 2> range = read_in_chunks(reader, options, meter).coded;
+ValueRange measure(VolumeReader &reader, const InputOptions &options, ErrorMeter &meter) {
+  const ValueRange range = read_in_chunks(reader, options, meter);
   if (options.part != nullptr) meter.merge(*options.part->team);
-  if (goal.exact && std::max(-range[0], range[1]) >= kIntegerEnd) {
-    throw Error(
-        "values from {} to {}: exact compression is for integers below 2^24, which float32 holds",
-        range[0], range[1]);
-  }
+  return range;
+}
+
+BlockPrecision choose_by_tolerance(VolumeReader &reader, double tolerance,
+                                   const InputOptions &options) {
+  if (!(tolerance > 0 && std::isfinite(tolerance)))
+    throw Error("tolerance {}: must be above 0 and finite", tolerance);
+  const VolumeInfo &info = reader.info();
+  ErrorMeter meter(info.dims, candidates_for(info.type, tolerance), tolerance, false,
+                   options.num_threads);
+  measure(reader, options, meter);
   const std::optional<BlockPrecision> best = meter.best();
   if (!best) {
     throw Error(
@@ -205,9 +210,50 @@ BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
         "off by up "
         "to {}; "
         "give at least that",
-        goal.tolerance, printed_bound(meter.error(0)));
+        tolerance, printed_bound(meter.error(0)));
   }
   return *best;
+}
+
+/// All that float32 holds.
+BlockPrecision choose_closest(VolumeReader &reader, bool exact, const InputOptions &options) {
+  const BlockPrecision reversible{ISO_REVERSIBLE, false, {}};
+  const VolumeInfo &info = reader.info();
+  const bool may_be_whole = is_integer(info.type);
+  if (fits_float32(info.type) && !may_be_whole && !exact) return reversible;
+  // An error of a quarter at most is rounded away.
+  const Candidates candidates = may_be_whole ? Candidates{-2, 4} : Candidates{};
+  ErrorMeter meter(info.dims, candidates, 0, true, options.num_threads);
+  InputOptions keeping = options;
+  keeping.keeps_tiny = true;
+  const ValueRange range = measure(reader, keeping, meter);
+  if (may_be_whole && std::max(-range.coded[0], range.coded[1]) < kWholeEnd) {
+    const std::optional<BlockPrecision> best = meter.best();
+    if (best) return *best;
+  }
+  const auto lost = double{meter.lost()};
+  if (exact && lost > 0) {
+    throw Error(
+        "exact compression is for values that float32 holds, and voxels of type {} would be off by "
+        "up to {}: leave it out, or give a tolerance",
+        to_string(info.type), printed_bound(lost));
+  }
+  const auto [least, largest] = range.source;
+  if (least < largest && lost > kMostLost * (largest - least)) {
+    throw Error(
+        "voxels of type {} are from {} to {}, and float32 holds them within {} only: subtract an "
+        "offset, or scale them",
+        to_string(info.type), least, largest, printed_bound(lost));
+  }
+  return reversible;
+}
+
+}  // namespace
+
+BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
+                                const InputOptions &options) {
+  return goal.tolerance ? choose_by_tolerance(reader, *goal.tolerance, options)
+                        : choose_closest(reader, goal.exact, options);
 }
 
 void BlockIndexBuilder::note_begin() {

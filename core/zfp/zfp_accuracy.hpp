@@ -11,19 +11,25 @@
 
 namespace isowave::core {
 
-/// The error that may be made.
+/// The error that may be made. By default, what float32 cannot hold, and no more.
 struct ErrorGoal {
-  double tolerance = 0;  ///< largest |decoded - source| allowed, > 0; or, of an integer volume,
-  bool exact = false;    ///< none: decoded values are rounded, and are the source's
+  std::optional<double> tolerance{};  ///< largest |decoded - source| allowed, > 0
+  bool exact = false;                 ///< none: values that float32 cannot hold are refused
 };
 
-/// The fewest bit planes with which no voxel exceeds the goal. zfp's promise is for the worst of
-/// all volumes, so up to six planes fewer than it demands are tried on every voxel. What the cast
-/// to float32 loses counts (Chunk::lost). Reads the whole volume.
+/// The precision that a goal needs.
+///
+/// By a tolerance: the fewest bit planes with which no voxel exceeds it. zfp's promise is for the
+/// worst of all volumes, so up to six planes fewer than it demands are tried on every voxel. What
+/// the cast to float32 loses counts (Chunk::lost).
+/// Without: of integer types, if all voxels are below 2^24, the fewest bit planes from which
+/// decoded values are rounded to the source's. Else reversible.
+///
+/// Reads the whole volume, but not float32 by default.
 ///
 /// Throws  Error: what read_in_chunks() throws; a tolerance that is not positive, or that float32
-///         and zfp cannot keep (names the smallest that they can); `exact` of other volumes than
-///         integers below 2^24
+///         and zfp cannot keep (names the smallest that they can); `exact`, and a voxel that would
+///         be off
 BlockPrecision choose_precision(VolumeReader &reader, const ErrorGoal &goal,
                                 const InputOptions &options);
 

@@ -324,10 +324,13 @@ class ZfpFileReader {
     constexpr std::array<const char *, 6> kModes{"unknown",         "expert",         "fixed rate",
                                                  "fixed precision", "fixed accuracy", "reversible"};
     const zfp_mode mode = zfp_stream_compression_mode(&stream);
-    if (mode == zfp_mode_fixed_accuracy) return;
+    if (mode == zfp_mode_fixed_accuracy || mode == zfp_mode_reversible) return;
     if (mode != zfp_mode_fixed_rate) {
-      fail("zfp mode '{}': only fixed rate (zfp -r) and fixed accuracy (zfp -a) are supported",
-           kModes.at(mode));
+      fail(
+          "zfp mode '{}': only fixed rate (zfp -r), fixed accuracy (zfp -a) and reversible (zfp "
+          "-R) "
+          "are supported",
+          kModes.at(mode));
     }
     if (stream.maxbits < kMinBlockBits || stream.maxbits > kMaxBlockBits) {
       fail("{} bits per zfp block: only {} to {} are supported", stream.maxbits, kMinBlockBits,

@@ -27,7 +27,7 @@ std::vector<CompressedVolume *> all_levels(CompressedVolume &volume) {
 void run(VolumeReader &reader, const CompressOptions &options, std::span<const PayloadSink> sinks,
          CompressedVolume &volume) {
   PyramidCoder coder(options, all_levels(volume), sinks, true, !volume.coarser_levels.empty());
-  volume.value_range = read_in_chunks(reader, options.input, coder).coded;
+  volume.value_range = read_in_chunks(reader, input_of(options), coder).coded;
   coder.finish();
 }
 
@@ -130,12 +130,23 @@ BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error
   if (!(voxel_error >= 0) || !std::isfinite(voxel_error))
     throw Error("a value error of {} cannot be allowed: give 0 or more", voxel_error);
   const std::int32_t min_exponent = voxel_error > 0 ? std::ilogb(voxel_error) : ISO_ALL_PLANES;
-  if (min_exponent <= bound.min_exponent) return bound;
+  if (min_exponent <= bound.min_exponent || bound.is_reversible()) return bound;
   return {min_exponent, false, {}};  // rounding would only add to the error
 }
 
-/// A block with fewer bits has no exponent.
-constexpr std::uint32_t kExponentEnd = 9;
+namespace {
+
+/// Bits before the bit planes of the block that begins with bit `begin`. A block with fewer bits is
+/// zeros.
+std::uint32_t head_bits(const CompressedVolume &volume, std::span<const std::uint32_t> words,
+                        std::uint64_t begin) {
+  if (!volume.precision.is_reversible()) return 9;
+  std::array<std::uint32_t, 1> kind{};
+  copy_bits(std::as_bytes(words), begin, 2, kind);
+  return kind[0] == 1 ? 15 : 7;
+}
+
+}  // namespace
 
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double voxel_error) {
   // libzfp reads whole 64-bit words: four of 32 bits more keep its last read inside.
@@ -156,7 +167,7 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double vox
     stream_rseek(bits.get(),
                  volume.block_begin(id));  // a block may have more bits than are decoded
     const std::uint32_t length = volume.block_bits(id);
-    if (length < kExponentEnd) continue;  // an empty block: zeros
+    if (length < head_bits(volume, words, volume.block_begin(id))) continue;
     // A lying index may end a block before its bits do.
     if (volume.is_indexed())
       zfp_stream_set_params(stream.get(), ZFP_MIN_BITS, length, ZFP_MAX_PREC, bound.min_exponent);

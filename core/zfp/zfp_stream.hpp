@@ -28,17 +28,20 @@ class Device;
 /// How much of its voxels a volume keeps whose blocks have lengths of their own.
 struct BlockPrecision {
   /// Bit planes of blocks end where zfp can promise an error of at most 2^min_exponent (its
-  /// fixed-accuracy mode).
+  /// fixed-accuracy mode). ISO_REVERSIBLE: nothing is lost of float32 (its reversible mode).
   std::int32_t min_exponent = ISO_ALL_PLANES;
   bool whole_numbers = false;  ///< decoded values are rounded: the source's, which are integers
   std::optional<double> max_voxel_error{};  ///< largest |decoded - source|, measured
+
+  bool is_reversible() const { return min_exponent == ISO_REVERSIBLE; }
 };
 
-/// Drops the bit planes that a value error of at most voxel_error can spare. 0 drops none.
+/// Drops the bit planes that a value error of at most voxel_error can spare. 0 drops none. Blocks
+/// of reversible streams can spare none.
 BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error);
 
 struct CompressOptions {
-  std::uint32_t rate = 8;  ///< bits per voxel, 1..32; or
+  std::uint32_t rate = 0;  ///< bits per voxel, 1..32; or
   std::optional<BlockPrecision>
       precision{};  ///< as many bits as each block needs: see choose_precision()
   /// At a fixed rate, encodes instead of libzfp: the same result, bit for bit.

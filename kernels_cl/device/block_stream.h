@@ -8,7 +8,7 @@
 /// layout.bits_per_block long. 1: `index` says where they begin (block_index.h); a window begins
 /// with an entry (window_entry()) for each of its blocks, and for the end of the last. A block ends
 /// where its length says, also where that lies: what its bits say by then is decoded, as at a fixed
-/// rate.
+/// rate. ISO_STREAM_REVERSIBLE: 1 the stream is a reversible one (zfp_codec.h).
 #ifndef ISOWAVE_BLOCK_STREAM_H
 #define ISOWAVE_BLOCK_STREAM_H
 
@@ -21,6 +21,9 @@
 #endif
 #ifndef ISO_STREAM_INDEXED
 #define ISO_STREAM_INDEXED 0
+#endif
+#ifndef ISO_STREAM_REVERSIBLE
+#define ISO_STREAM_REVERSIBLE 0
 #endif
 
 /// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z.
@@ -47,7 +50,11 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
     words = part == 0 ? part_0 : part == 1 ? part_1 : part == 2 ? part_2 : part_3;
     first_bit -= part * part_bits;
   }
-  zfp_decode_block(words, first_bit, bits, layout.min_exponent, values);
+  if (ISO_STREAM_REVERSIBLE) {
+    zfp_decode_reversible_block(words, first_bit, bits, values);
+  } else {
+    zfp_decode_block(words, first_bit, bits, layout.min_exponent, values);
+  }
   if (layout.whole_numbers != 0u) {
     ISO_UNROLL
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {

@@ -14,10 +14,10 @@ ISO_NAMESPACE_BEGIN
 #define ISO_INDEX_BLOCKS 16u  ///< that share
 #define ISO_INDEX_WORDS 10u   ///< so many words
 
-/// The longest block, and so fifteen of them fit 16 bits: 9 bits of exponent, 32 planes of 64
-/// coefficients, of which each gets at most a bit in every plane; a group test before each that
-/// becomes significant; and one at each plane's end.
-#define ISO_MAX_BLOCK_BITS 2153u
+/// The longest block, and so fifteen of them fit 16 bits: up to 15 bits before the planes (of a
+/// reversible stream; else 9), 32 planes of 64 coefficients, of which each gets at most a bit in
+/// every plane; a group test before each that becomes significant; and one at each plane's end.
+#define ISO_MAX_BLOCK_BITS 2159u
 
 /// Words of the index of so many blocks.
 ISO_INLINE ulong block_index_words(ulong num_blocks) {

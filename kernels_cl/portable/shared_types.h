@@ -222,7 +222,7 @@ typedef struct StreamLayout {
   uint bits_per_block;  ///< at a fixed rate; 0: blocks have lengths of their own, see block_index.h
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
   int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES:
-                     ///< with the block's bits
+                     ///< with the block's bits; ISO_REVERSIBLE
   uint whole_numbers;  ///< not 0: decoded values are rounded to integers
   /// Added to a block's values, to draw a bound of the volume: value_offset + bound_unit *
   /// block_bound() of its code, of codes that begin with word bounds_begin of the index. Both 0:
@@ -234,6 +234,7 @@ typedef struct StreamLayout {
 ISO_CHECK_SIZE(StreamLayout, 32);
 
 #define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
+#define ISO_REVERSIBLE (-1075)  ///< the same of a reversible stream: other blocks (zfp_codec.h)
 
 /// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input
 /// is "the first n entries" take n from a field of this struct, so that no launch waits for the

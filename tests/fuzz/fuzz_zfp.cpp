@@ -48,7 +48,7 @@ std::array<float, 64> decode(const CompressedVolume &volume, std::uint32_t block
   std::vector<std::uint32_t> words((bits + 31) / 32 + kDecoderAhead);
   volume.read_words(volume.block_begin(block), words);
   std::array<float, 64> values{};
-  zfp_decode_block(words.data(), 0, bits, volume.precision.min_exponent, values.data());
+  zfp_decode_any_block(words.data(), 0, bits, volume.precision.min_exponent, values.data());
   if (volume.precision.whole_numbers)
     std::ranges::transform(values, values.begin(), [](float v) { return std::rint(v) + 0.0f; });
   return values;

@@ -252,14 +252,6 @@ double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point
   return quantiles(std::move(ratios)).p50;
 }
 
-/// The source as exactly as it can be stored: the truth.
-CompressionOptions finest_storage(VoxelType type) {
-  CompressionOptions options;
-  options.exact = is_integer(type) && size_of(type) < sizeof(float);
-  options.rate = 32;
-  return options;
-}
-
 /// What frames need of the volume.
 std::uint64_t stored_bytes(const CompressedVolume &volume, bool with_levels) {
   std::uint64_t bytes =
@@ -276,9 +268,7 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   subject.rounds = options.rounds;
   check_image_size(subject.size);
   const RawOverrides overrides = to_overrides(options.volume);
-  const CompressedVolume finest =
-      load_volume(options.input, overrides,
-                  finest_storage(open_any_volume(options.input, overrides)->info().type));
+  const CompressedVolume finest = load_volume(options.input, overrides, {});  // the truth
   const VolumeInfo &info = finest.info;
   subject.cameras = orbit_cameras(info, options.views);
   subject.voxel = std::max({info.spacing.x, info.spacing.y, info.spacing.z});

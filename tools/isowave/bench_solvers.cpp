@@ -417,10 +417,9 @@ void add_bench_solvers(CLI::App &bench) {
   command->add_option("VOLUME:ISOVALUE", options->volumes, "volumes and the isovalue of each")
       ->required();
   add_volume_options(*command, options->volume);
-  command
-      ->add_option("--rate", options->compression.rate,
-                   "bits per voxel of volumes that are not compressed")
-      ->capture_default_str();
+  command->add_option("--rate", options->compression.rate,
+                      "bits per voxel of volumes that are compressed [as many as keep all that "
+                      "float32 holds]");
   command->add_option("--size", options->size, "picture size WxH")->capture_default_str();
   command
       ->add_option("--rounds", options->rounds,

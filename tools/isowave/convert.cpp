@@ -1,4 +1,4 @@
-// isowave convert: compresses a volume to a zfp file, at a fixed rate or within an error.
+// isowave convert: compresses a volume to a zfp file.
 
 #include <fmt/format.h>
 
@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/base/error.hpp"
 #include "core/base/printed_bound.hpp"
@@ -84,13 +85,20 @@ CompressedVolume convert_alone(const ConvertArgs &options, const RawOverrides &o
   return volume;
 }
 
+/// How blocks are stored.
+std::string_view mode_of(const CompressedVolume &volume) {
+  if (volume.precision.is_reversible()) return "reversible";
+  if (volume.precision.whole_numbers) return "whole numbers";
+  return volume.is_indexed() ? "fixed accuracy" : "fixed rate";
+}
+
 void print_summary(const ConvertArgs &options, const CompressedVolume &volume) {
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);
   const std::uint64_t bytes_out = OutputGroup::current()->bytes_of(options.output);
-  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel{}\n", one_line(options.output),
-             dims.x, dims.y, dims.z, to_string(volume.info.type), with_commas(bytes_in),
-             with_commas(bytes_out), volume.rate(),
+  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel, {}{}\n",
+             one_line(options.output), dims.x, dims.y, dims.z, to_string(volume.info.type),
+             with_commas(bytes_in), with_commas(bytes_out), volume.rate(), mode_of(volume),
              volume.max_voxel_error
                  ? fmt::format(", max error {}", printed_bound(*volume.max_voxel_error))
                  : "");
@@ -105,12 +113,12 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
   if (!is_zfp_name(options.output))
     throw Error("{}: end the output's name in .zfp", options.output);
   if (is_zfp_name(options.path)) throw Error("{}: is compressed already", options.path);
-  if (options.device && options.compression.bounded())
-    throw Error("--device compresses at a fixed rate only: leave it, or the bound on the error");
-  if (options.compression.bounded())
-    refuse_options(command, {"--no-verify"}, "a bound on the error is found by measuring it");
+  if (options.device && !options.compression.rate)
+    throw Error("--device compresses at a fixed rate only: leave it, or give --rate");
+  if (!options.compression.rate)
+    refuse_options(command, {"--no-verify"}, "the error is measured except at a fixed --rate");
   const RawOverrides overrides = to_overrides(options.volume);
-  CompressOptions compress{.rate = options.compression.rate,
+  CompressOptions compress{.rate = options.compression.rate.value_or(0),
                            .measure_error = !options.no_verify,
                            .levels = options.compression.levels,
                            .input = options.input};

@@ -69,10 +69,13 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   const glm::uvec3 blocks = volume.num_blocks();
   result["blocks"] = {blocks.x, blocks.y, blocks.z};
   result["block_count"] = volume.block_count();
-  result["format"] = volume.is_indexed() ? "zfp, fixed accuracy" : "zfp, fixed rate";
+  const bool reversible = volume.precision.is_reversible();
+  result["format"] = reversible            ? "zfp, reversible"
+                     : volume.is_indexed() ? "zfp, fixed accuracy"
+                                           : "zfp, fixed rate";
   if (volume.is_indexed()) {
-    result["zfp_tolerance"] = std::ldexp(1.0, volume.precision.min_exponent);
-    result["exact"] = volume.precision.whole_numbers && volume.max_voxel_error == 0;
+    if (!reversible) result["zfp_tolerance"] = std::ldexp(1.0, volume.precision.min_exponent);
+    result["exact"] = known_voxel_error(volume) == 0;
   } else {
     result["bits_per_block"] = volume.bits_per_block;
   }

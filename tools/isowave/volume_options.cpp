@@ -51,18 +51,18 @@ RawOverrides to_overrides(const VolumeOptions &options) {
 }
 
 void add_compression_options(CLI::App &command, CompressionOptions &options) {
-  CLI::Option *rate = command
-                          .add_option("--rate", options.rate,
-                                      "bits per voxel of a volume that is compressed, 1 to 32")
-                          ->capture_default_str();
+  CLI::Option *rate =
+      command.add_option("--rate", options.rate,
+                         "compress to this many bits per voxel, 1 to 32 [as many as keep all that "
+                         "float32 holds: integers below 2^24 and float32 have no error]");
   CLI::Option *tolerance = command.add_option(
       "--tolerance", options.tolerance,
-      "instead: as few bits as keep each voxel within this error of the input's");
+      "compress to as few bits as keep each voxel within this error of the input's");
   CLI::Option *relative = command.add_option("--tolerance-relative", options.relative_tolerance,
                                              "the same, as a part of the range of values");
   CLI::Option *exact = command.add_flag(
       "--exact", options.exact,
-      "the same, with no error: decoded values are the input's (integers below 2^24 only)");
+      "compress without any error, or refuse the volume if float32 does not hold its values");
   CLI::Option *levels = command
                             .add_option("--levels", options.levels,
                                         "levels of detail of a volume that is compressed, each of "
@@ -93,7 +93,8 @@ namespace {
 
 Storage to_storage(const CompressionOptions &options) {
   Storage storage;
-  storage.rate = options.rate;
+  if (!options.tolerance && !options.relative_tolerance && !options.exact)
+    storage.rate = options.rate;
   storage.tolerance = options.tolerance;
   storage.relative_tolerance = options.relative_tolerance;
   storage.exact = options.exact;

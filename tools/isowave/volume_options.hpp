@@ -31,16 +31,14 @@ RawOverrides to_overrides(const VolumeOptions &options);
 /// N or X Y Z. Throws Error on another count.
 glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers);
 
-/// How a volume is compressed: at a rate, or within an error.
+/// How a volume is compressed: see Storage.
 struct CompressionOptions {
-  std::uint32_t rate = 8;  ///< bits per voxel
+  std::optional<std::uint32_t> rate{};  ///< bits per voxel; any of the next three replaces it
   std::optional<double> tolerance{}, relative_tolerance{};
   bool exact = false;
   std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
   bool measure_error = false;                  ///< at a fixed rate, too
   std::vector<const CLI::Option *> options{};  ///< those on the command line that say all this
-
-  bool bounded() const { return tolerance || relative_tolerance || exact; }
 };
 
 /// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given, and
@@ -51,8 +49,7 @@ void add_compression_options(CLI::App &command, CompressionOptions &options);
 void refuse_compression(const CompressionOptions &options, const std::string &path);
 /// Whether the command line says how many levels there are to be.
 bool says_levels(const CompressionOptions &options);
-/// The precision that was asked for, or none: the rate. Reads all of the volume, for a relative
-/// tolerance twice. Throws Error: see choose_precision().
+/// As core::find_precision(), of options. Throws Error.
 std::optional<BlockPrecision> find_precision(const std::string &path, const RawOverrides &overrides,
                                              const CompressionOptions &options,
                                              const InputOptions &input = {});

@@ -271,18 +271,18 @@ struct DestroyWithoutGil {
 
 // ---- Volumes ----
 
+/// In the order of isowave::VoxelType.
+constexpr std::array kTypeNames = {"uint8", "int8",    "uint16",  "int16",  "uint32",
+                                   "int32", "float32", "float64", "uint64", "int64"};
+
 isowave::VoxelType voxel_type(const std::string &name) {
-  constexpr std::array kNames = {"uint8",  "int8",  "uint16",  "int16",
-                                 "uint32", "int32", "float32", "float64"};
-  const auto found = std::ranges::find(kNames, name);
-  if (found == kNames.end()) throw Error("voxels of type " + name + " are not supported");
-  return static_cast<isowave::VoxelType>(found - kNames.begin());
+  const auto found = std::ranges::find(kTypeNames, name);
+  if (found == kTypeNames.end()) throw Error("voxels of type " + name + " are not supported");
+  return static_cast<isowave::VoxelType>(found - kTypeNames.begin());
 }
 
 std::string type_name(isowave::VoxelType type) {
-  constexpr std::array kNames = {"uint8",  "int8",  "uint16",  "int16",
-                                 "uint32", "int32", "float32", "float64"};
-  return kNames.at(static_cast<std::size_t>(type));
+  return kTypeNames.at(static_cast<std::size_t>(type));
 }
 
 isowave::Compression compression_of(const nb::dict &options) {

@@ -18,7 +18,18 @@
 
 namespace isowave {
 
-enum class VoxelType { kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64 };
+enum class VoxelType {
+  kUint8,
+  kInt8,
+  kUint16,
+  kInt16,
+  kUint32,
+  kInt32,
+  kFloat32,
+  kFloat64,
+  kUint64,  ///< 64-bit integers that float64 does not hold are refused
+  kInt64    ///< as kUint64
+};
 
 /// Where voxels are: world = origin + direction * (spacing * index), index (i,j,k) of a voxel.
 struct Grid {
@@ -36,15 +47,16 @@ struct Region {
   std::array<std::uint32_t, 3> step{1, 1, 1};
 };
 
-/// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact; at 8 bits a
-/// voxel where none is given. Compression takes memory for the result and a few layers of voxels.
+/// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact. By default
+/// voxels keep all that float32 holds of them: integers below 2^24 and float32 have no error at
+/// all. Compression takes memory for the result and a few layers of voxels.
 struct Compression {
   std::optional<std::uint32_t> rate{};         ///< bits per voxel, 1 to 32
   std::optional<double> tolerance{};           ///< no voxel is off by more [voxel values]
   std::optional<double> relative_tolerance{};  ///< the same, as a part of the range of values
-  bool exact = false;                          ///< integers below 2^24, kept as they are
-  bool measure_error = false;      ///< for Volume::max_voxel_error() also at a rate: decodes all
-  std::uint32_t levels = 1;        ///< of detail, the volume itself among them; 0: all it can have
+  bool exact = false;          ///< as by default, but voxels that float32 does not hold are refused
+  bool measure_error = false;  ///< for Volume::max_voxel_error() also at a rate: decodes all
+  std::uint32_t levels = 1;    ///< of detail, the volume itself among them; 0: all it can have
   std::optional<float> map_nan{};  ///< what replaces NaN and infinities; refused without
   std::uint32_t num_threads = 0;   ///< 0: one per processor. The result is the same for any number
   /// Called from the calling thread: what is done, and how much of it, 0 to 1.
@@ -137,9 +149,10 @@ using ReadLayers =
 /// at once: arrays in chunked stores, simulations.
 ///
 /// read     called for ascending layers, by one thread at a time, not always the calling one
-/// keep     Where compression reads more than once (by a tolerance, or exact), layers that were
-///          read are kept in a temporary file (TMPDIR) of the size of the volume, and each is asked
-///          for once. Else they are asked for again, from front to back.
+/// keep     If compression reads more than once (it does without a rate, but not float32 by
+///          default), layers that were read are kept in a temporary file (TMPDIR) of the size of
+///          the volume, and each is asked for once. Else layers are asked for again, from front to
+///          back.
 /// Throws   Error: as above; what read() throws, as Error
 std::shared_ptr<const Volume> compress(const ReadLayers &read, VoxelType type, const Grid &grid,
                                        const Compression &compression = {}, bool keep = true);
@@ -161,16 +174,16 @@ void check_num_voxels(std::uint64_t num_voxels, const Grid &grid);
 template <class T>
 constexpr VoxelType voxel_type_of() {
   static_assert(std::is_arithmetic_v<T> && !std::is_same_v<T, bool>,
-                "voxels are integers of up to 32 bits, float or double");
+                "voxels are integers, float or double");
   if constexpr (std::is_floating_point_v<T>) {
     static_assert(sizeof(T) == 4 || sizeof(T) == 8);
     return sizeof(T) == 4 ? VoxelType::kFloat32 : VoxelType::kFloat64;
   } else {
-    static_assert(sizeof(T) <= 4, "integers of 64 bits: convert them to double");
     constexpr bool kSigned = std::is_signed_v<T>;
     if (sizeof(T) == 1) return kSigned ? VoxelType::kInt8 : VoxelType::kUint8;
     if (sizeof(T) == 2) return kSigned ? VoxelType::kInt16 : VoxelType::kUint16;
-    return kSigned ? VoxelType::kInt32 : VoxelType::kUint32;
+    if (sizeof(T) == 4) return kSigned ? VoxelType::kInt32 : VoxelType::kUint32;
+    return kSigned ? VoxelType::kInt64 : VoxelType::kUint64;
   }
 }
 

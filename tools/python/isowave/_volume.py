@@ -159,8 +159,8 @@ def compress(
     """Compresses a three-dimensional array into memory, or into a file.
 
     Arrays in chunked stores (dask, zarr, h5py, tensorstore, and xarray of these) are read a few
-    layers at a time, each chunk once; by a tolerance or exact, a temporary file of the array's size
-    keeps them meanwhile.
+    layers at a time, each chunk once; meanwhile a temporary file of the array's size keeps them,
+    unless voxels are float32 and nothing is given, or a rate is.
 
     Parameters
     ----------
@@ -172,9 +172,10 @@ def compress(
     relative_tolerance
         The same, as a part of the range of values.
     rate
-        Bits per voxel, 1 to 32; 8 where nothing else is given.
+        Bits per voxel, 1 to 32.
     exact
-        Integers below 2^24, kept as they are.
+        Refuse voxels that float32 does not hold. Without tolerance, relative_tolerance and rate,
+        voxels keep all that float32 holds: integers below 2^24 and float32 have no error.
     spacing, origin
         World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). What the array
         says itself (xarray, SimpleITK...) where None, else 1 and 0.

@@ -85,7 +85,8 @@ def check_refused(obj, *texts, error=ValueError, read=False, **options):
 # numpy ------------------------------------------------------------------------------------------
 
 KEPT = ["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"]
-READ_AS = {"bool": "uint8", "float16": "float32", "int64": "float64", "uint64": "float64"}
+KEPT += ["uint64", "int64"]
+READ_AS = {"bool": "uint8", "float16": "float32"}
 
 
 @pytest.mark.parametrize("dtype", KEPT + list(READ_AS))
@@ -236,7 +237,7 @@ def test_64_bits_exact_values(dtype):
     voxels = make_voxels("uint8").astype(dtype)
     voxels.ravel()[: len(values)] = values
     got = read_all(as_source(voxels), 4)
-    assert got.dtype == np.float64
+    assert got.dtype == np.dtype(dtype).newbyteorder("=")
     assert [int(value) for value in got.ravel()] == [int(value) for value in voxels.ravel()]
 
 
@@ -888,7 +889,7 @@ def test_simpleitk():
     np.testing.assert_array_equal(read_all(source), make_voxels())
 
 
-@pytest.mark.parametrize("dtype", KEPT + ["int64", "uint64"])
+@pytest.mark.parametrize("dtype", KEPT)
 def test_simpleitk_types(dtype):
     sitk = pytest.importorskip("SimpleITK")
     source = as_source(sitk.GetImageFromArray(make_voxels(dtype)))
@@ -963,7 +964,7 @@ def test_pyvista():
     assert source.origin == (16.0, -19.5, 32.0)
 
 
-@pytest.mark.parametrize("dtype", KEPT + ["int64", "uint64", "bool"])
+@pytest.mark.parametrize("dtype", KEPT + ["bool"])
 def test_pyvista_types(dtype):
     pyvista = pytest.importorskip("pyvista")
     source = as_source(make_pyvista(pyvista, make_voxels(dtype)))

@@ -57,15 +57,30 @@ def test_level_shapes_are_those_that_decode_gives():
             volume.level_shape(level)
 
 
-@pytest.mark.parametrize(
-    "dtype", ["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"]
-)
-def test_every_type_is_compressed_without_loss_where_asked(dtype):
+INTEGERS = ["uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64"]
+
+
+@pytest.mark.parametrize("dtype", INTEGERS + ["float32", "float64"])
+@pytest.mark.parametrize("exact", [False, True])
+def test_every_type_is_compressed_without_loss(dtype, exact):
     voxels = np.arange(5 * 4 * 3).reshape(5, 4, 3).astype(dtype)
-    exact = np.issubdtype(dtype, np.integer)
-    volume = isowave.compress(voxels, exact=exact, tolerance=None if exact else 1e-3)
+    volume = isowave.compress(voxels, exact=exact)
     assert volume.source_dtype == np.dtype(dtype)
-    assert np.abs(volume.decode() - voxels).max() <= (0 if exact else 1e-3)
+    assert volume.max_error == 0
+    assert np.array_equal(volume.decode(), voxels)
+
+
+def test_floats_keep_their_bits_among_outliers():
+    voxels = sphere_voxels()
+    voxels[::5, ::7, 3] = 1e20
+    voxels[3, 3] = -0.0
+    voxels[4, 4] *= np.float32(1e-38)
+    assert isowave.compress(voxels).decode().tobytes() == voxels.tobytes()
+    doubles = voxels / 3.0
+    volume = isowave.compress(doubles)
+    assert 0 < volume.max_error <= 1e20 / 3 * 2**-24
+    with pytest.raises(isowave.Error, match="float64"):
+        isowave.compress(doubles, exact=True)
 
 
 def test_views_are_compressed_as_their_copies():
@@ -84,6 +99,10 @@ def test_files_are_those_of_the_program(program, tmp_path):
     opened = isowave.open(tmp_path / "program.zfp")
     assert opened.shape == (32, 33, 64) and opened.num_levels == 2
     assert opened.decode(1).shape == (17, 17, 33)
+    for source in (FUEL, "generate:mixing_layer_12x13x14_float32"):
+        program("convert", source, "-o", tmp_path / "program.zfp")
+        isowave.open(source).save(tmp_path / "package.zfp")
+        assert (tmp_path / "program.zfp").read_bytes() == (tmp_path / "package.zfp").read_bytes()
 
 
 def test_arrays_are_compressed_into_files(tmp_path):

@@ -32,8 +32,8 @@ class ArraySource:
     (x, y, z) and all else is (z, y, x).
 
     shape         (nz, ny, nx), voxels; each 2 to 65,536
-    dtype         of what read() returns: uint8, int8, uint16, int16, uint32, int32, float32 or
-                  float64, in native byte order
+    dtype         of what read() returns: uint8, int8, uint16, int16, uint32, int32, uint64,
+                  int64, float32 or float64, in native byte order
     spacing       (z, y, x), world units between voxels, above 0
     origin        (z, y, x), world position of voxel (0, 0, 0)
     direction     [3, 3] float64, not writable; column a is the world direction (x, y, z) of index
@@ -113,7 +113,7 @@ def as_source(
     direction   3 x 3, columns of length 1 in (x, y, z); None: what obj says, else the identity
     fill_value  what masked voxels become; needed if there are some
 
-    bool is read as uint8, float16 as float32, int64 and uint64 as float64. A 64-bit integer that
+    bool is read as uint8, float16 as float32, other types as they are. A 64-bit integer that
     float64 does not hold is refused, with its position, when its layer is read.
 
     Raises ValueError (shape, grid, metadata) or TypeError (no array, no such voxels), one line.

@@ -3,9 +3,9 @@
 | stored | read as |
 |---|---|
 | uint8 int8 uint16 int16 uint32 int32 float32 float64, any byte order | the same, native |
+| uint64, int64 | the same; a value that float64 does not hold is refused with its position |
 | bool | uint8, 0 and 1 |
 | float16 | float32 |
-| int64, uint64 | float64; a value that float64 does not hold is refused with its position |
 
 The type of what is read follows from the stored type alone, never from the values: a lazy array
 is not read to find it, and each time step of a series has the same one.
@@ -32,10 +32,10 @@ _READ_AS: dict[str, str] = {
     "f8": "f8",
     "b1": "u1",
     "f2": "f4",
-    "i8": "f8",
-    "u8": "f8",
+    "i8": "i8",
+    "u8": "u8",
 }
-VOXEL_TYPES = "uint8, int8, uint16, int16, uint32, int32, float32 or float64"
+VOXEL_TYPES = "uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64"
 _EXACT = 1 << 53
 """Every whole number up to this magnitude is a float64."""
 
@@ -103,7 +103,7 @@ def to_voxels(
         elif fill_value is None:
             raise masked_without_fill(what)
     voxels: NDArray[Any] = np.asarray(block)
-    if voxels.dtype.kind in "ui" and voxels.dtype.itemsize == 8 and dtype.kind == "f":
+    if voxels.dtype.kind in "ui" and voxels.dtype.itemsize == 8:
         _check_exact(voxels, mask, z_begin, what)
     with np.errstate(invalid="ignore"):  # a signalling NaN of float16 becomes a quiet one
         out = np.ascontiguousarray(voxels, dtype=dtype)
