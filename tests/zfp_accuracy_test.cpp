@@ -245,13 +245,13 @@ TEST(ChooseErrorBound, WhatCannotBeIsOneLine) {
         choose_precision(integers, {0, true}, {});
       },
       ThrowsMessage<Error>(HasSubstr("below 2^24")));
-  large[77] = NAN;
-  ArrayReader with_nan(dims, large);
-  EXPECT_THAT([&] { choose_precision(with_nan, {0.1}, {}); },
+  large[77] = INFINITY;
+  ArrayReader with_infinity(dims, large);
+  EXPECT_THAT([&] { choose_precision(with_infinity, {0.1}, {}); },
               ThrowsMessage<Error>(HasSubstr("1 of 512 voxels")));
   InputOptions mapped;
   mapped.map_nan = 4.0f;
-  EXPECT_NO_THROW(choose_precision(with_nan, {0.1}, mapped));
+  EXPECT_NO_THROW(choose_precision(with_infinity, {0.1}, mapped));
 }
 
 // ---- files

@@ -127,7 +127,7 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
   options.rate = storage.rate;
   options.precision = find_precision(open, what, storage);
   options.measure_error = storage.measure_error;
-  options.input = {storage.map_nan, {}, storage.num_threads};
+  options.input = {storage.map_nan, storage.no_data, {}, storage.num_threads};
   options.device = options.precision ? nullptr : storage.device;
   CroppedReader reader(std::move(whole), info);
   CompressedVolume volume = compress(reader, options);
