@@ -218,26 +218,31 @@ struct KnownVoxels {
   }
 };
 
-/// What a smooth field would have at an unknown voxel: the mean, over the axes, of what lies
-/// between two neighbours; else of what two on one side lead to; else of single neighbours.
+/// What a smooth field would have at an unknown voxel: the mean, over the axes, of what continues
+/// the three other voxels of its row as a parabola; else of what lies between two neighbours; else
+/// of what two on one side lead to; else of single neighbours.
 std::optional<double> smooth_guess(const KnownVoxels &block, const std::array<int, 3> &place) {
-  std::array<double, 3> sums{};
-  std::array<int, 3> counts{};
+  std::array<double, 4> sums{};
+  std::array<int, 4> counts{};
   const auto add = [&](std::size_t kind, double value) {
     sums.at(kind) += value;
     ++counts.at(kind);
   };
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::optional<double> below = block.at(place, axis, -1), above = block.at(place, axis, 1);
-    if (below && above) add(0, 0.5 * (*below + *above));
+    if (below && above) add(1, 0.5 * (*below + *above));
     for (const int side : {-1, 1}) {
       const std::optional<double> next = side < 0 ? below : above,
-                                  second = block.at(place, axis, 2 * side);
-      if (next && second) add(1, 2 * *next - *second);
-      if (next) add(2, *next);
+                                  second = block.at(place, axis, 2 * side),
+                                  third = block.at(place, axis, 3 * side),
+                                  other = side < 0 ? above : below;
+      if (next && second && third) add(0, 3 * (*next - *second) + *third);
+      if (next && second && other) add(0, *next + (*other - *second) / 3);
+      if (next && second) add(2, 2 * *next - *second);
+      if (next) add(3, *next);
     }
   }
-  for (std::size_t kind = 0; kind < 3; ++kind) {
+  for (std::size_t kind = 0; kind < counts.size(); ++kind) {
     if (counts.at(kind) != 0) return sums.at(kind) / counts.at(kind);
   }
   return {};
