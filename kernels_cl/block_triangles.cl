@@ -5,6 +5,7 @@
 ///
 /// What is drawn, and not kept for anything else, needs no more: no neighbour's vertices, and no
 /// gradients. marching_cubes.cl makes meshes whose triangles share their vertices.
+#include "device/cells_with_data.h"
 #include "device/dual_grid_inside.h"
 #include "device/work_group.h"
 #include "portable/block_vertex.h"
@@ -13,20 +14,24 @@
 /// Entries [begin, end) of the list.
 ///
 /// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+/// index, no_data_begin  the table of no_data.h: NoDataTable
 /// Out             num_triangles: of entry i at i - first
 /// Launch          grid-stride over entries
 kernel void block_triangles_count(const FrameParams frame_params, uint begin, uint end, uint first,
                                   global const uint *block_ids, global const BlockEntry *table,
                                   global const ulong *inside, global const uchar *cell_triangles,
+                                  global const uint *index, uint no_data_begin,
                                   global uint *num_triangles) {
   const FrameParams *frame = &frame_params;
   const BlockGrid grid = frame_params.grid;
+  const NoDataTable no_data = {index, no_data_begin};
   for (uint i = begin + get_global_id(0); i < end; i += get_global_size(0)) {
     const BlockCoords b = block_coords(frame, block_ids[i]);
     ulong of_blocks[8], v[8];
     dual_grid_inside(frame, table, inside, b, of_blocks);
     corners_inside(of_blocks, v);
-    num_triangles[i - first] = count_triangles(&grid, b, of_blocks, v, cell_triangles);
+    num_triangles[i - first] =
+        count_triangles(cells_with_data(frame, &grid, no_data, b), of_blocks, v, cell_triangles);
   }
 }
 
@@ -52,6 +57,7 @@ ISO_INLINE uint edge_steps(local const uint *slots, global const float *values, 
 
 /// Entries [begin, end) of the list, a work-group each, in rows of a work-item for each cell.
 ///
+/// index, no_data_begin  as block_triangles_count
 /// offsets  prefix sums of the counts: of entry i at i - first
 /// Out      vertices [3 * triangles]: triangle offsets[i - first] + k - skipped for the k-th of
 ///          entry i, counter-clockwise seen from where values are lower
@@ -59,10 +65,11 @@ ISO_INLINE uint edge_steps(local const uint *slots, global const float *values, 
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void block_triangles_write(
     const FrameParams frame_params, uint begin, uint end, uint first, uint skipped,
     global const uint *block_ids, global const BlockEntry *table, global const float *cache_values,
-    global const ulong *inside, global const uchar *cell_triangles, global const uint *offsets,
-    global BlockVertex *vertices) {
+    global const ulong *inside, global const uchar *cell_triangles, global const uint *index,
+    uint no_data_begin, global const uint *offsets, global BlockVertex *vertices) {
   const FrameParams *frame = &frame_params;
   const BlockGrid grid = frame_params.grid;
+  const NoDataTable no_data = {index, no_data_begin};
   local uint slots[8], sums[ISO_GROUP_SIZE];
   local ulong of_blocks[8];
   const uint item = get_local_id(0);
@@ -78,11 +85,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void block_tr
     }
     barrier(CLK_LOCAL_MEM_FENCE);
 
+    const ulong cells = cells_with_data(frame, &grid, no_data, b);
     uint before = offsets[i - first] - skipped; /* triangles of the rows before */
     for (uint row = 0; row < ISO_BLOCK_VOXELS; row += ISO_GROUP_SIZE) {
       const uint cell = row + item, x = cell & 3, y = cell >> 2 & 3, z = cell >> 4;
       uint total;
-      const uint signs = signs_of_cell(&grid, b, of_blocks, x, y, z);
+      const uint signs = signs_of_cell(cells, of_blocks, x, y, z);
       global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
       const uint num_triangles = own_triangles[0];
       const uint place = before + group_scan(sums, num_triangles, &total);

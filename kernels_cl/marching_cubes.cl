@@ -5,6 +5,7 @@
 ///
 /// Counting looks at signs alone, 64 of them in a word. Vertices are numbered through all listed
 /// blocks, in the order of the list, so that triangles name those of neighbours.
+#include "device/cells_with_data.h"
 #include "device/dual_grid_inside.h"
 #include "device/work_group.h"
 #include "portable/marching_cubes.h"
@@ -12,26 +13,30 @@
 /// Entries [begin, end) of the list.
 ///
 /// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+/// index, no_data_begin  the table of no_data.h: NoDataTable
 /// Out             edges, num_vertices, num_triangles [list]
 /// Launch          grid-stride over entries
 kernel void marching_cubes_count(const FrameParams frame_params, uint begin, uint end,
                                  global const uint *block_ids, global const BlockEntry *table,
                                  global const ulong *inside, global const uchar *cell_triangles,
+                                 global const uint *index, uint no_data_begin,
                                  global BlockEdges *edges, global uint *num_vertices,
                                  global uint *num_triangles) {
   const FrameParams *frame = &frame_params;
   const BlockGrid grid = frame_params.grid;
+  const NoDataTable no_data = {index, no_data_begin};
   for (uint i = begin + get_global_id(0); i < end; i += get_global_size(0)) {
     const BlockCoords b = block_coords(frame, block_ids[i]);
     ulong of_blocks[8], v[8];
     dual_grid_inside(frame, table, inside, b, of_blocks);
     corners_inside(of_blocks, v);
-    const BlockEdges own = crossed_edges(&grid, b, v);
+    const BlockEdges own = edges_with_data(frame, &grid, no_data, b, crossed_edges(&grid, b, v));
     edges[i].x = own.x;
     edges[i].y = own.y;
     edges[i].z = own.z;
     num_vertices[i] = vertex_count(own);
-    num_triangles[i] = count_triangles(&grid, b, of_blocks, v, cell_triangles);
+    num_triangles[i] =
+        count_triangles(cells_with_data(frame, &grid, no_data, b), of_blocks, v, cell_triangles);
   }
 }
 
@@ -54,18 +59,20 @@ ISO_INLINE void voxel_gradient(const BlockGrid *grid, const Neighbourhood *n, Bl
   const int px = (int)(4 * b.x) + x, py = (int)(4 * b.y) + y, pz = (int)(4 * b.z) + z;
   const int last_x = (int)grid->dims_x - 1, last_y = (int)grid->dims_y - 1,
             last_z = (int)grid->dims_z - 1;
-  gradient[0] = voxel_derivative(voxel_near(n, x - (px > 0), y, z),
-                                 voxel_near(n, x + (px < last_x), y, z), px, last_x);
-  gradient[1] = voxel_derivative(voxel_near(n, x, y - (py > 0), z),
-                                 voxel_near(n, x, y + (py < last_y), z), py, last_y);
-  gradient[2] = voxel_derivative(voxel_near(n, x, y, z - (pz > 0)),
-                                 voxel_near(n, x, y, z + (pz < last_z)), pz, last_z);
+  const float at = ISO_NO_DATA ? voxel_near(n, x, y, z) : 0.0f; /* not read without */
+  gradient[0] = derivative_with_data(voxel_near(n, x - (px > 0), y, z), at,
+                                     voxel_near(n, x + (px < last_x), y, z), px, last_x);
+  gradient[1] = derivative_with_data(voxel_near(n, x, y - (py > 0), z), at,
+                                     voxel_near(n, x, y + (py < last_y), z), py, last_y);
+  gradient[2] = derivative_with_data(voxel_near(n, x, y, z - (pz > 0)), at,
+                                     voxel_near(n, x, y, z + (pz < last_z)), pz, last_z);
 }
 
 /// Entries [begin, end) of the list, a work-group each, in rows of a work-item for each voxel and
 /// its cell.
 ///
 /// listed_masks, listed_offsets  of active_blocks.cl
+/// index, no_data_begin          as marching_cubes_count
 /// edges                         [list] of marching_cubes_count
 /// vertex_offsets                [list + 1] prefix sums of its counts; triangle_offsets as well
 /// with_gradients                0: gradients are not written
@@ -77,15 +84,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
     global const uint *block_ids, global const uint *listed_masks,
     global const uint *listed_offsets, global const BlockEntry *table,
     global const float *cache_values, global const ulong *inside,
-    global const uchar *cell_triangles, global const BlockEdges *edges,
-    global const uint *vertex_offsets, global const uint *triangle_offsets,
-    global MeshVertex *vertices, global float *gradients, global MeshTriangle *triangles) {
+    global const uchar *cell_triangles, global const uint *index, uint no_data_begin,
+    global const BlockEdges *edges, global const uint *vertex_offsets,
+    global const uint *triangle_offsets, global MeshVertex *vertices, global float *gradients,
+    global MeshTriangle *triangles) {
   const FrameParams *frame = &frame_params;
   const BlockGrid grid = frame_params.grid;
   local uint slots[27], first_vertex[8], sums[ISO_GROUP_SIZE];
   local ulong edges_x[8], edges_y[8], edges_z[8], of_blocks[8];
   const uint item = get_local_id(0);
   const Neighbourhood near_block = {slots, cache_values};
+  const NoDataTable no_data = {index, no_data_begin};
   for (uint i = begin + get_group_id(0); i < end; i += get_num_groups(0)) {
     const BlockCoords b = block_coords(frame, block_ids[i]);
     barrier(CLK_LOCAL_MEM_FENCE); /* all are through with the block before */
@@ -115,6 +124,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
     }
     barrier(CLK_LOCAL_MEM_FENCE);
 
+    const ulong cells = cells_with_data(frame, &grid, no_data, b);
     const uint first_of_batch = vertex_offsets[begin];
     uint before = triangle_offsets[i] - triangle_offsets[begin]; /* triangles of the rows before */
     for (uint row = 0; row < ISO_BLOCK_VOXELS; row += ISO_GROUP_SIZE) {
@@ -144,7 +154,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
       }
 
       uint total;
-      const uint signs = signs_of_cell(&grid, b, of_blocks, (uint)x, (uint)y, (uint)z);
+      const uint signs = signs_of_cell(cells, of_blocks, (uint)x, (uint)y, (uint)z);
       global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
       const uint num_triangles = own_triangles[0];
       const uint place = before + group_scan(sums, num_triangles, &total);

@@ -6,6 +6,11 @@
 
 #define ISO_STAGED_VALUES 16u  ///< of each block that go to the cache together: 64 bytes
 
+/// 1 for a voxel that is not inside. value: minus the isovalue, never -0; NaN of one without data.
+ISO_INLINE uint is_outside(float value) {
+  return ISO_NO_DATA ? (uint) !(value >= 0.0f) : as_uint(value) >> 31;
+}
+
 /// Decodes the blocks that got slots. One work-item decodes one block; the work-group stores them
 /// together, so that neighbouring work-items write neighbouring values.
 ///
@@ -29,7 +34,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
   local float
       staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
   local uint to_slots[ISO_LEVEL_SLOTS];
-  const float isovalue =
+  const float isovalue = /* nothing minus this is -0 */
       frame_params.surface.isovalue == 0.0f ? -0.0f : frame_params.surface.isovalue;
   const uint count = min(counts->decoded_count, end), item = get_local_id(0);
   for (uint begin = first + get_group_id(0) * ISO_GROUP_SIZE; begin < count;
@@ -49,9 +54,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
                    is_next ? next_index : index, is_next ? next_layout : layout, block_id,
                    begin + item - first, values);
       ISO_UNROLL
-      for (uint v = 32; v-- > 0;) { /* the signs; nothing minus this isovalue is -0 */
-        outside_low = outside_low << 1 | as_uint(values[v] - isovalue) >> 31;
-        outside_high = outside_high << 1 | as_uint(values[v + 32] - isovalue) >> 31;
+      for (uint v = 32; v-- > 0;) {
+        outside_low = outside_low << 1 | is_outside(values[v] - isovalue);
+        outside_high = outside_high << 1 | is_outside(values[v + 32] - isovalue);
       }
       inside[slots[request]] = ~((ulong)outside_high << 32 | outside_low);
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/stages/cell_triangles.hpp"
 #include "core/view/frame.hpp"
@@ -24,7 +25,7 @@ class MeshTwin {
   BlockMesh run() {
     each_block([&](const BlockCoords &b) {
       first_vertex_[place(b)] = num_vertices_;
-      edges_[place(b)] = crossed_edges(&grid_, b, signs_of(b).data());
+      edges_[place(b)] = with_data(b, crossed_edges(&grid_, b, signs_of(b).data()));
       num_vertices_ += vertex_count(edges_[place(b)]);
     });
     each_block([&](const BlockCoords &b) {
@@ -74,6 +75,39 @@ class MeshTwin {
     return signs;
   }
 
+  bool has_data(const glm::ivec3 &cell) const {
+    for (int corner = 0; corner < 8; ++corner) {
+      if (std::isnan(voxel(cell + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2))))
+        return false;
+    }
+    return true;
+  }
+
+  /// Does one of the up to four cells around the edge from `lower` along `axis` have data?
+  bool has_data(const glm::ivec3 &lower, int axis) const {
+    for (int i = 0; i < 4; ++i) {
+      glm::ivec3 cell = lower;
+      cell[(axis + 1) % 3] -= i & 1;
+      cell[(axis + 2) % 3] -= i >> 1;
+      if (glm::all(glm::greaterThanEqual(cell, glm::ivec3(0))) &&
+          glm::all(glm::lessThan(cell + 1, glm::ivec3(dims_))) && has_data(cell))
+        return true;
+    }
+    return false;
+  }
+
+  BlockEdges with_data(const BlockCoords &b, BlockEdges edges) const {
+    for (std::uint32_t v = 0; v < 64; ++v) {
+      const glm::ivec3 lower = 4 * glm::ivec3(b.x, b.y, b.z) + glm::ivec3(v % 4, v / 4 % 4, v / 16);
+      int axis = 0;
+      for (ulong *of_axis : {&edges.x, &edges.y, &edges.z}) {
+        if ((*of_axis >> v & 1) != 0 && !has_data(lower, axis)) *of_axis &= ~(ulong{1} << v);
+        ++axis;
+      }
+    }
+    return edges;
+  }
+
   std::array<float, 3> gradient(const glm::ivec3 &at) const {
     std::array<float, 3> result{};
     for (int axis = 0; axis < 3; ++axis) {
@@ -81,7 +115,7 @@ class MeshTwin {
       glm::ivec3 below = at, above = at;
       below[axis] = std::max(at[axis] - 1, 0);
       above[axis] = std::min(at[axis] + 1, last);
-      result.at(axis) = voxel_derivative(voxel(below), voxel(above), at[axis], last);
+      result.at(axis) = derivative_with_data(voxel(below), voxel(at), voxel(above), at[axis], last);
     }
     return result;
   }
@@ -119,7 +153,9 @@ class MeshTwin {
     const std::array<ulong, 8> signs = signs_of(b);
     const ulong cells = domain_of_block(&grid_, b, 1, 1, 1);
     for (std::uint32_t cell = 0; cell < 64; ++cell) {
-      if ((cells >> cell & 1) == 0) continue;
+      const glm::ivec3 at =
+          4 * glm::ivec3(b.x, b.y, b.z) + glm::ivec3(cell % 4, cell / 4 % 4, cell / 16);
+      if ((cells >> cell & 1) == 0 || !has_data(at)) continue;
       const uchar *entry =
           &cell_triangles().at(std::size_t{ISO_CASE_BYTES} * cell_signs(signs.data(), cell));
       for (std::uint32_t i = 0; i < entry[0]; ++i) {

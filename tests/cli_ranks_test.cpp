@@ -161,6 +161,19 @@ TEST_F(CliRanks, DrawWhatOneProcessDraws) {
   expect_same(kFuel, "--tolerance 0.3 --orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", 3);
 }
 
+/// Also where a rank has none but such voxels.
+TEST_F(CliRanks, VoxelsWithoutData) {
+  expect_same(convert("--no-data 0"), "-i 40 --size 96x64", 3);
+  expect_same(kFuel, "--no-data 40 -i 38.5 --size 64x48 --pipeline blocks", 2);
+  const std::string half = write_raw<float>("float32", [](int x, int y, int z) {
+    const float value = static_cast<float>(x + y) + 0.25f * static_cast<float>(z);
+    return z > 20 ? std::numeric_limits<float>::quiet_NaN() : value;
+  });
+  expect_same(half, "-i 9.5 --size 64x48", 3, " --bricks 1x1x3");
+  expect_error(on_ranks(3, "convert " + half + " -o " + quoted(folder_ / "v.zfp")),
+               "isowave: 2808 voxels have no data");
+}
+
 TEST_F(CliRanks, SamplesLevelsAndBricksAsAskedFor) {
   expect_same(convert("--exact"), "-i 40 --size 48x32 --samples 2", 3, " --bricks 1x1x3");
   expect_same(convert("--exact --levels 3"), "-i 40 --size 96x64 --voxel-pixels 1.5", 3);
@@ -299,12 +312,12 @@ TEST_F(CliRanks, CompressOnEachRanksDevice) {
 
 TEST_F(CliRanks, RefusedVoxelsAreCountedOnce) {
   const std::string bad = write_raw<float>("float32", [](int x, int y, int z) {
-    return x == 5 && y == 2 && z % 11 == 10 ? std::numeric_limits<float>::quiet_NaN() : 1.0f;
+    return x == 5 && y == 2 && z % 11 == 10 ? std::numeric_limits<float>::infinity() : 1.0f;
   });
   const std::string arguments = "convert " + bad + " -o " + quoted(folder_ / "v.zfp") + " ";
   for (const char *options : {"--rate 8 --levels all", "--tolerance 0.1"}) {
     expect_error(on_ranks(3, arguments + options),
-                 "isowave: 4 of 5265 voxels are NaN or infinite, the first at (5,2,10)");
+                 "isowave: 4 of 5265 voxels are infinite, the first at (5,2,10)");
   }
   expect_error(on_ranks(3, arguments + "--map-nan 0 --levels 7"), "7 levels of detail");
   EXPECT_EQ(folder_.num_files(), 1u);

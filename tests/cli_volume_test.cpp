@@ -164,7 +164,7 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
   EXPECT_EQ(out.num_files(), 0u);
 
   std::vector<float> voxels(64, 1.0f);
-  voxels[21] = NAN;
+  voxels[21] = INFINITY;
   write_file(folder / "l_4x4x4_float32.raw", voxels);
   expect_one_line_error("convert " + quoted(folder / "l_4x4x4_float32.raw") + to, "(1,1,1)");
   EXPECT_EQ(out.num_files(), 0u);

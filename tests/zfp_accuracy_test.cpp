@@ -342,13 +342,13 @@ TEST(ChooseErrorBound, WhatCannotBeIsOneLine) {
   EXPECT_THAT([&] { choose_precision(reader, {1e-30}, {}); },
               ThrowsMessage<Error>(HasSubstr("cannot be kept")));
   std::vector<float> large(512, 5.0f);
-  large[77] = NAN;
-  ArrayReader with_nan(dims, large);
-  EXPECT_THAT([&] { choose_precision(with_nan, {0.1}, {}); },
+  large[77] = INFINITY;
+  ArrayReader with_infinity(dims, large);
+  EXPECT_THAT([&] { choose_precision(with_infinity, {0.1}, {}); },
               ThrowsMessage<Error>(HasSubstr("1 of 512 voxels")));
   InputOptions mapped;
   mapped.map_nan = 4.0f;
-  EXPECT_NO_THROW(choose_precision(with_nan, {0.1}, mapped));
+  EXPECT_NO_THROW(choose_precision(with_infinity, {0.1}, mapped));
 }
 
 // ---- files

@@ -72,6 +72,7 @@ class BlockValues {
     zfp_decode_any_block(words.data(), 0, bits, bound_.min_exponent, values.data());
     if (bound_.whole_numbers)
       std::ranges::transform(values, values.begin(), [](float v) { return std::rint(v) + 0.0f; });
+    clear_no_data(volume_.no_data.mask(id), values);
     return values;
   }
 

@@ -140,12 +140,13 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
         core::choose_local_device(wanted.device, processes.local_rank()), DeviceOptions{});
   });
   core::agree_on(team, "volume", print);
-  core::agree_on(
-      team, "request",
-      fmt::format("{} {} {} {} {} {} {} {} {} {} {}", text_of(options.largest), options.with_levels,
-                  options.with_bounds, options.with_rays, wanted.bricks, storage.rate.value_or(0),
-                  storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
-                  storage.exact, storage.levels, storage.map_nan.value_or(0)));
+  core::agree_on(team, "request",
+                 fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}", text_of(options.largest),
+                             options.with_levels, options.with_bounds, options.with_rays,
+                             wanted.bricks, storage.rate.value_or(0), storage.tolerance.value_or(0),
+                             storage.relative_tolerance.value_or(0), storage.exact, storage.levels,
+                             storage.map_nan.value_or(0),
+                             storage.no_data ? fmt::to_string(*storage.no_data) : "none"));
   whole = levels.front();
   grid = public_grid(whole);
   if (!options.with_levels) levels.resize(1);

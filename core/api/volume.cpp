@@ -44,7 +44,7 @@ glm::uvec3 to_uvec3(const std::array<std::uint32_t, 3> &values) {
 bool is_default(const Compression &compression) {
   return !compression.rate && !compression.tolerance && !compression.relative_tolerance &&
          !compression.exact && !compression.measure_error && compression.levels == 1 &&
-         !compression.map_nan;
+         !compression.map_nan && !compression.no_data;
 }
 
 core::Storage to_storage(const Compression &compression) {
@@ -61,6 +61,7 @@ core::Storage to_storage(const Compression &compression) {
   storage.measure_error = compression.measure_error;
   storage.levels = compression.levels;
   storage.map_nan = compression.map_nan;
+  storage.no_data = compression.no_data;
   storage.num_threads = compression.num_threads;
   if (compression.progress) {
     storage.progress = [told = compression.progress](std::string_view step) -> core::Progress {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -127,7 +128,7 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
   options.rate = storage.rate.value_or(0);
   options.precision = find_precision(open, what, storage);
   options.measure_error = storage.measure_error;
-  options.input = {storage.map_nan, {}, storage.num_threads};
+  options.input = {storage.map_nan, storage.no_data, {}, storage.num_threads};
   options.device = options.precision ? nullptr : storage.device;
   CroppedReader reader(std::move(whole), info);
   CompressedVolume volume = compress(reader, options);
@@ -180,13 +181,14 @@ std::vector<float> range_samples(const CompressedVolume &brick, const VolumeInfo
     decoder.load(block, 1);
     decoder.decode(block, voxels);
     const glm::uvec3 size = glm::min(brick.info.dims - 4u * glm::uvec3(at), glm::uvec3(4));
-    float least = voxels[0], most = voxels[0];
+    float least = std::numeric_limits<float>::infinity(), most = -least;
     for (std::uint32_t z = 0; z < size.z; ++z) {
       for (std::uint32_t y = 0; y < size.y; ++y) {
-        const auto row = voxels.begin() + std::ptrdiff_t(4 * y + 16 * z);
-        const auto [low, high] = std::minmax_element(row, row + std::ptrdiff_t(size.x));
-        least = std::min(least, *low);
-        most = std::max(most, *high);
+        for (std::uint32_t x = 0; x < size.x; ++x) {  // NaN of voxels without data changes nothing
+          const float voxel = voxels.at(x + 4 * y + 16 * z);
+          least = voxel < least ? voxel : least;
+          most = voxel > most ? voxel : most;
+        }
       }
     }
     values.push_back(least);

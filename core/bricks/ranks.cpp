@@ -89,7 +89,9 @@ double agree_on_voxels(Team &team, CompressedVolume &brick) {
     double error;                            ///< -1: not known
     std::uint64_t bits = 0, num_blocks = 0;  ///< of own blocks
   };
-  Voxels own{brick.value_range, brick.max_voxel_error.value_or(-1)};
+  const bool has_data = brick.no_data.num_voxels() < brick.info.num_voxels();
+  Voxels own{has_data ? brick.value_range : std::array{kUnknownRange[1], kUnknownRange[0]},
+             brick.max_voxel_error.value_or(-1)};
   const glm::u64vec3 kept(brick.num_blocks()), begin(brick.info.brick.before),
       end = kept - glm::u64vec3(brick.info.brick.behind);
   for (std::uint64_t z = begin.z; z < end.z; ++z) {
@@ -106,7 +108,7 @@ double agree_on_voxels(Team &team, CompressedVolume &brick) {
     all.bits += each.bits;
     all.num_blocks += each.num_blocks;
   }
-  brick.value_range = all.range;
+  if (all.range[0] <= all.range[1]) brick.value_range = all.range;
   if (all.error >= 0) brick.max_voxel_error = all.error;
   return double(all.bits) / (64.0 * double(all.num_blocks));
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "core/base/parallel_for.hpp"
 #include "core/bricks/brick_volume.hpp"
@@ -16,9 +17,13 @@ glm::ivec3 cubes_along(const glm::ivec3 &blocks) {
 }
 
 bool touches(std::span<const float> voxels, std::span<const float> isovalues) {
-  const auto range = std::ranges::minmax(voxels);
-  return std::ranges::any_of(
-      isovalues, [&](float isovalue) { return range.min < isovalue && isovalue <= range.max; });
+  float least = std::numeric_limits<float>::infinity(), most = -least;
+  for (const float voxel : voxels) {  // NaN of those without data changes nothing
+    least = voxel < least ? voxel : least;
+    most = voxel > most ? voxel : most;
+  }
+  return std::ranges::any_of(isovalues,
+                             [&](float isovalue) { return least < isovalue && isovalue <= most; });
 }
 
 }  // namespace

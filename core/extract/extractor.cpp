@@ -123,7 +123,8 @@ void Extractor::count(Run &run) {
       batch.refused(size);
       continue;
     }
-    marching_cubes_.count(blocks_.frame(), blocks_.cache(), begin, begin + size, run.surface);
+    marching_cubes_.count(blocks_.frame(), blocks_.cache(), begin, begin + size, run.surface,
+                          blocks_.stream().no_data());
     begin += size;
     batch.served();
     ++run.stats.count_batches;
@@ -155,7 +156,7 @@ void Extractor::write(Run &run) {
       continue;
     }
     marching_cubes_.write(blocks_.frame(), blocks_.cache(), blocks_.listed(), begin, end,
-                          run.surface, mesh);
+                          run.surface, mesh, blocks_.stream().no_data());
     run.vertices.resize(num_in(run.vertex_offsets, end));
     run.triangles.resize(num_in(run.triangle_offsets, end));
     mesh.vertices.read(run.vertices);

@@ -144,7 +144,7 @@ void MeshRenderer::bring_all() {
 std::uint64_t MeshRenderer::count_all() {
   const auto stage = device_.timer().stage("surface");
   block_triangles_.count(blocks_.frame(), blocks_.cache(), lists_->block_ids, {0, num_listed_, 0},
-                         lists_->offsets);
+                         lists_->offsets, blocks_.stream().no_data());
   lists_->sum(lists_->offsets, num_listed_);
   if (num_listed_ > kBlocksThatSum) {  // the sums may have wrapped around
     std::vector<uint> offsets(std::size_t{num_listed_} + 1);
@@ -168,7 +168,7 @@ void MeshRenderer::make_mesh(std::uint64_t num_triangles) {
   for (std::uint32_t begin = 0; begin < num_listed_; begin += kBlocksPerLaunch) {
     const std::uint32_t end = begin + std::min(kBlocksPerLaunch, num_listed_ - begin);
     block_triangles_.write(blocks_.frame(), blocks_.cache(), lists_->block_ids, {begin, end, 0},
-                           lists_->offsets, 0, *mesh_);
+                           lists_->offsets, 0, *mesh_, blocks_.stream().no_data());
   }
 }
 
@@ -233,7 +233,7 @@ void MeshRenderer::draw_batches() {
         continue;
       }
       block_triangles_.count(blocks_.frame(), blocks_.cache(), lists_->block_ids,
-                             {first, last, first}, lists_->offsets);
+                             {first, last, first}, lists_->offsets, blocks_.stream().no_data());
       lists_->sum(lists_->offsets, size);
     }
     offsets.resize(size + 1);
@@ -246,7 +246,7 @@ void MeshRenderer::draw_batches() {
         const auto stage = device_.timer().stage("surface");
         block_triangles_.write(blocks_.frame(), blocks_.cache(), lists_->block_ids,
                                {first + begin, first + end, first}, lists_->offsets, offsets[begin],
-                               *mesh_);
+                               *mesh_, blocks_.stream().no_data());
       }
       const auto stage = device_.timer().stage("rasterise");
       blocks_.rays().frame = frame_;

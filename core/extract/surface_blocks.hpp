@@ -83,6 +83,7 @@ class SurfaceBlocks {
 
   const FrameParams &frame() const { return frame_; }  ///< grid, isovalue
   const ActiveBlocks &listed() const { return listed_; }
+  const DeviceStream &stream() const { return stream_; }
   const BlockCache &cache() const { return *cache_; }  ///< of open_cache()
   /// Slots of the cache; 0: there is none.
   std::uint32_t num_slots() const { return cache_ ? cache_->num_slots : 0; }

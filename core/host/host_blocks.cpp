@@ -108,7 +108,8 @@ EncodedBlock HostBlocks::encoded(std::size_t block) const {
           .whole_numbers = volume_->precision.whole_numbers,
           .size_x = 4,
           .size_y = 4,
-          .size_z = 4};
+          .size_z = 4,
+          .no_data = volume_->no_data.mask(block)};
 }
 
 // ---- Value ranges

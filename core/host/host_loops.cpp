@@ -22,8 +22,13 @@ namespace {
 
 inline void decode(const EncodedBlock &block, float *values) {
   zfp_decode_any_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
-  if (!block.whole_numbers) return;
-  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
+  if (block.whole_numbers) {
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
+  }
+  if (block.no_data == 0) return;
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
+    if ((block.no_data >> v & 1u) != 0) values[v] = NAN;
+  }
 }
 
 inline void widen(BlockRange &range, const BlockRange &by) {
@@ -33,13 +38,14 @@ inline void widen(BlockRange &range, const BlockRange &by) {
 
 inline void ranges_of_parts(const float *values, uint size_x, uint size_y, uint size_z,
                             BlockRange *parts) {
-  for (uint part = 0; part < 8; ++part) parts[part] = {values[0], values[0]};
+  constexpr BlockRange kNothing = {INFINITY, -INFINITY}; /* NaN widens no range */
+  for (uint part = 0; part < 8; ++part) parts[part] = kNothing;
   for (uint z = 0; z < size_z; ++z) {
     for (uint y = 0; y < size_y; ++y) {
       const float *row = values + 4 * y + 16 * z;
       const BlockRange first = {row[0], row[0]};
-      BlockRange all = first;
-      for (uint x = 1; x < size_x; ++x) widen(all, {row[x], row[x]});
+      BlockRange all = kNothing;
+      for (uint x = 0; x < size_x; ++x) widen(all, {row[x], row[x]});
       for (uint layers = 0; layers < 8; layers += 2) {
         if (((layers & 2) != 0 && y != 0) || ((layers & 4) != 0 && z != 0)) continue;
         widen(parts[layers], all);

@@ -28,6 +28,7 @@ struct EncodedBlock {
   int min_exponent;             ///< of BlockPrecision
   bool whole_numbers;           ///< of BlockPrecision
   uint size_x, size_y, size_z;  ///< voxels within the volume, 1 to 4
+  ulong no_data;                ///< bit x + 4y + 16z: the voxel has no data
 };
 
 /// Decodes blocks when the first ray comes to them. Thread-safe.
@@ -80,11 +81,11 @@ struct AmbientRays {
 };
 
 struct HostLoops {
-  /// Decodes a block to values [64].
+  /// Decodes a block to values [64], NaN of voxels without data.
   void (*decode)(const EncodedBlock &block, float *values);
-  /// The ranges of a block's voxels within the volume, in parts [8]: part 0 has all; another one,
-  /// of its first layer along each axis whose bit is set, x 1, y 2, z 4. That is what the dual
-  /// cells of the block before it along these axes have of it.
+  /// The ranges of a block's voxels with data within the volume, in parts [8]: part 0 has all;
+  /// another one, of its first layer along each axis whose bit is set, x 1, y 2, z 4. That is what
+  /// the dual cells of the block before it along these axes have of it.
   void (*ranges)(const EncodedBlock &block, BlockRange *parts);
   /// Which of 64 values, such as the voxels of a block, are inside: bit i.
   ulong (*inside)(const float *values, float isovalue);

@@ -115,9 +115,17 @@ cl::CommandQueue &Device::transfer_queue() {
   return transfer_queue_;
 }
 
+void Device::draw_no_data() {
+  if (!info_.capabilities.nan)
+    throw Error("device '{}' has no NaN, which voxels without data need: choose another device",
+                info_.name);
+  draws_no_data_ = true;
+}
+
 const cl::Program &Device::program(std::string_view stem, const Defines &defines) {
   auto key = std::make_pair(std::string(stem), defines);
   if (draws_bricks_) key.second.emplace("ISO_BRICKS", "1");
+  if (draws_no_data_) key.second.emplace("ISO_NO_DATA", "1");
   if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
   cl::Program program = build(stem, key.second);
   return programs_.emplace(std::move(key), std::move(program)).first->second;

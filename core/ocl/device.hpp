@@ -33,6 +33,7 @@ struct Capabilities {
   bool correctly_rounded_divide = false;  ///< accepts -cl-fp32-correctly-rounded-divide-sqrt
   bool denormals = false;                 ///< float32 denormals kept
   bool rounds_to_nearest = false;         ///< float32 results, as OpenCL's full profile does
+  bool nan = false;                       ///< float32 NaN, as OpenCL's full profile has it
   std::uint64_t global_memory = 0;        ///< bytes
   std::uint64_t largest_allocation = 0;   ///< bytes in one buffer
   std::uint64_t local_memory = 0;         ///< bytes per work-group
@@ -105,6 +106,11 @@ class Device {
   /// From now on programs are built that know of bricks (ISO_BRICKS), which take 1 to 2 % longer.
   /// They draw whole volumes, too.
   void draw_bricks() { draws_bricks_ = true; }
+  /// From now on programs are built that know of voxels without data (ISO_NO_DATA), which take a
+  /// little longer. They draw other volumes, too.
+  ///
+  /// Throws  Error: the device has no NaN
+  void draw_no_data();
 
   /// The programs built so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".
   std::vector<std::string> built_programs() const;
@@ -158,7 +164,7 @@ class Device {
   std::function<void(std::string_view)> on_new_kernel_;
   std::string notice_;
   double compile_ms_ = 0;
-  bool draws_bricks_ = false;
+  bool draws_bricks_ = false, draws_no_data_ = false;
   int compiling_depth_ = 0;
 };
 

@@ -104,6 +104,7 @@ Capabilities probe(const cl::Device &device, std::uint32_t version) {
   result.sub_groups = probe_sub_groups(device, extensions, version);
   result.correctly_rounded_divide = (floats & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
   result.denormals = (floats & CL_FP_DENORM) != 0;
+  result.nan = (floats & CL_FP_INF_NAN) != 0;
   result.rounds_to_nearest = (floats & CL_FP_ROUND_TO_NEAREST) != 0;
   result.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
   result.largest_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();

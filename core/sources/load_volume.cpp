@@ -94,7 +94,7 @@ std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string
   };
   check("tolerance", storage.tolerance);
   check("relative tolerance", storage.relative_tolerance);
-  InputOptions input{storage.map_nan, {}, storage.num_threads, storage.part};
+  InputOptions input{storage.map_nan, storage.no_data, {}, storage.num_threads, storage.part};
   ErrorGoal goal{storage.tolerance, storage.exact};
   if (storage.relative_tolerance) goal.tolerance = absolute_tolerance(open, what, storage, input);
   input.progress = step(storage, "measuring errors");
@@ -112,7 +112,8 @@ CompressOptions compress_options(const OpenReader &open, const VolumeInfo &info,
   options.precision = find_precision(open, what, storage);
   options.levels = storage.levels;
   options.measure_error = storage.measure_error;
-  options.input = {storage.map_nan, step(storage, "compressing"), storage.num_threads};
+  options.input = {storage.map_nan, storage.no_data, step(storage, "compressing"),
+                   storage.num_threads};
   options.device = options.precision ? nullptr : storage.device;
   return options;
 }

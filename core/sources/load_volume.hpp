@@ -23,6 +23,7 @@ struct Storage {
   std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
   bool measure_error = false;                  ///< at a fixed rate, too
   std::optional<float> map_nan{};              ///< see InputOptions
+  std::optional<double> no_data{};             ///< see InputOptions
   std::uint32_t num_threads = 0;               ///< see InputOptions
   ocl::Device *device = nullptr;               ///< encodes at a fixed rate
   const VolumePart *part = nullptr;            ///< see InputOptions

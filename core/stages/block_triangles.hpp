@@ -25,10 +25,12 @@ class BlockTriangles {
   /// frame      its grid, and schedule.table_groups of the cache
   /// cache      has the dual grids of these blocks, with `inside` of the isovalue at hand
   /// block_ids  [listed] of ActiveBlocks
+  /// no_data    of the volume, for a device that draws it
   /// Out        num_triangles [entries.begin - entries.first, entries.end - entries.first)
   /// Waits      no
   void count(const FrameParams &frame, const BlockCache &cache, const ocl::Buffer<uint> &block_ids,
-             const Entries &entries, ocl::Buffer<uint> &num_triangles);
+             const Entries &entries, ocl::Buffer<uint> &num_triangles,
+             const NoDataOnDevice &no_data = {});
 
   /// Writes the triangles of blocks.
   ///
@@ -38,16 +40,17 @@ class BlockTriangles {
   /// beginning Out      vertices, three for each triangle Waits    no
   void write(const FrameParams &frame, const BlockCache &cache, const ocl::Buffer<uint> &block_ids,
              const Entries &entries, const ocl::Buffer<uint> &offsets, std::uint32_t skipped,
-             ocl::Buffer<BlockVertex> &vertices);
+             ocl::Buffer<BlockVertex> &vertices, const NoDataOnDevice &no_data = {});
 
  private:
   ocl::Device &device_;
   ocl::Buffer<uchar> cell_triangles_;
   ocl::Kernel<FrameParams, uint, uint, uint, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<ulong>,
-              ocl::In<uchar>, ocl::Out<uint>>
+              ocl::In<uchar>, ocl::In<uint>, uint, ocl::Out<uint>>
       count_;
   ocl::Kernel<FrameParams, uint, uint, uint, uint, ocl::In<uint>, ocl::In<BlockEntry>,
-              ocl::In<float>, ocl::In<ulong>, ocl::In<uchar>, ocl::In<uint>, ocl::Out<BlockVertex>>
+              ocl::In<float>, ocl::In<ulong>, ocl::In<uchar>, ocl::In<uint>, uint, ocl::In<uint>,
+              ocl::Out<BlockVertex>>
       write_;
 };
 

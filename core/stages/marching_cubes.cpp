@@ -47,23 +47,26 @@ MarchingCubes::MarchingCubes(ocl::Device &device, Gradients gradients)
 }
 
 void MarchingCubes::count(const FrameParams &frame, const BlockCache &cache, std::uint32_t begin,
-                          std::uint32_t end, SurfaceCounts &surface) {
+                          std::uint32_t end, SurfaceCounts &surface,
+                          const NoDataOnDevice &no_data) {
   count_(ocl::Range::strided(end - begin, ocl::kGroupSize, device_), frame, begin, end,
-         surface.block_ids, cache.table, cache.inside, cell_triangles_, surface.edges,
-         surface.vertex_offsets, surface.triangle_offsets);
+         surface.block_ids, cache.table, cache.inside, cell_triangles_,
+         no_data.words_or(surface.block_ids), no_data.begin, surface.edges, surface.vertex_offsets,
+         surface.triangle_offsets);
 }
 
 void MarchingCubes::write(const FrameParams &frame, const BlockCache &cache,
                           const ActiveBlocks &listed, std::uint32_t begin, std::uint32_t end,
-                          const SurfaceCounts &surface, MeshBuffers &mesh) {
+                          const SurfaceCounts &surface, MeshBuffers &mesh,
+                          const NoDataOnDevice &no_data) {
   if (end - begin > kMaxWrittenBlocks)
     throw std::invalid_argument("MarchingCubes: more blocks than vertices can name");
   write_(
       ocl::Range::strided(std::uint64_t{end - begin} * ISO_BLOCK_VOXELS, ISO_BLOCK_VOXELS, device_),
       frame, begin, end, with_gradients_, surface.block_ids, listed.masks(), listed.offsets(),
-      cache.table, cache.values, cache.inside, cell_triangles_, surface.edges,
-      surface.vertex_offsets, surface.triangle_offsets, mesh.vertices, mesh.gradients,
-      mesh.triangles);
+      cache.table, cache.values, cache.inside, cell_triangles_, no_data.words_or(surface.block_ids),
+      no_data.begin, surface.edges, surface.vertex_offsets, surface.triangle_offsets, mesh.vertices,
+      mesh.gradients, mesh.triangles);
 }
 
 }  // namespace isowave::core

@@ -6,6 +6,7 @@
 #include "core/stages/active_blocks.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/request_surface.hpp"
+#include "core/stream/device_stream.hpp"
 #include "kernels_cl/portable/marching_cubes.h"
 
 namespace isowave::core {
@@ -47,12 +48,13 @@ class MarchingCubes {
 
   /// Counts the vertices and triangles of entries [begin, end) of the list.
   ///
-  /// frame  its grid, and schedule.table_groups of the cache
-  /// cache  has the dual grids of these blocks, with `inside` of the isovalue at hand
-  /// Out    surface.edges, .vertex_offsets, .triangle_offsets [begin, end): counts
-  /// Waits  no
+  /// frame    its grid, and schedule.table_groups of the cache
+  /// cache    has the dual grids of these blocks, with `inside` of the isovalue at hand
+  /// no_data  of the volume, for a device that draws it
+  /// Out      surface.edges, .vertex_offsets, .triangle_offsets [begin, end): counts
+  /// Waits    no
   void count(const FrameParams &frame, const BlockCache &cache, std::uint32_t begin,
-             std::uint32_t end, SurfaceCounts &surface);
+             std::uint32_t end, SurfaceCounts &surface, const NoDataOnDevice &no_data = {});
 
   /// Writes vertices and triangles of entries [begin, end), at most kMaxWrittenBlocks.
   ///
@@ -64,18 +66,19 @@ class MarchingCubes {
   /// Waits    no
   void write(const FrameParams &frame, const BlockCache &cache, const ActiveBlocks &listed,
              std::uint32_t begin, std::uint32_t end, const SurfaceCounts &surface,
-             MeshBuffers &mesh);
+             MeshBuffers &mesh, const NoDataOnDevice &no_data = {});
 
  private:
   ocl::Device &device_;
   uint with_gradients_;
   ocl::Buffer<uchar> cell_triangles_;
   ocl::Kernel<FrameParams, uint, uint, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<ulong>,
-              ocl::In<uchar>, ocl::Out<BlockEdges>, ocl::Out<uint>, ocl::Out<uint>>
+              ocl::In<uchar>, ocl::In<uint>, uint, ocl::Out<BlockEdges>, ocl::Out<uint>,
+              ocl::Out<uint>>
       count_;
   ocl::Kernel<FrameParams, uint, uint, uint, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::In<BlockEntry>, ocl::In<float>, ocl::In<ulong>, ocl::In<uchar>,
-              ocl::In<BlockEdges>, ocl::In<uint>, ocl::In<uint>, ocl::Out<MeshVertex>,
+              ocl::In<BlockEntry>, ocl::In<float>, ocl::In<ulong>, ocl::In<uchar>, ocl::In<uint>,
+              uint, ocl::In<BlockEdges>, ocl::In<uint>, ocl::In<uint>, ocl::Out<MeshVertex>,
               ocl::Out<float>, ocl::Out<MeshTriangle>>
       write_;
 };

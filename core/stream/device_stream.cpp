@@ -18,7 +18,8 @@ StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_p
           0.0f,
           0.0f,
           0,
-          volume.bounds.by_place ? 1u : 0u};
+          volume.bounds.by_place ? 1u : 0u,
+          ISO_INVALID_ID};
 }
 
 /// Throws  Error: the device drops bits of values as small as the volume's
@@ -41,11 +42,12 @@ void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffe
   }
 }
 
-/// Where blocks begin, if they have lengths of their own, and the bounds of their errors behind it;
-/// nothing of both: no buffer.
+/// Where blocks begin, if they have lengths of their own, behind it the bounds of their errors, and
+/// the table of voxels without data; nothing of all: no buffer.
 ocl::BufferSizes index_sizes(std::span<const std::uint32_t> index,
-                             std::span<const std::uint8_t> bounds) {
-  const std::uint64_t words = index.size() + (bounds.size() + 3) / 4;
+                             std::span<const std::uint8_t> bounds,
+                             std::span<const std::uint32_t> no_data) {
+  const std::uint64_t words = index.size() + (bounds.size() + 3) / 4 + no_data.size();
   if (words == 0) return {};
   return {ocl::buffer_size<uint>("block index", words)};
 }
@@ -84,14 +86,15 @@ ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, const Strea
   ocl::BufferSizes sizes;
   for (const std::uint64_t words : split.words)
     sizes.add({ocl::buffer_size<uint>("zfp stream", words)});
-  return sizes.add(index_sizes(index_of(volume), bounds_of(volume, with_bounds)));
+  return sizes.add(
+      index_sizes(index_of(volume), bounds_of(volume, with_bounds), volume.no_data.table()));
 }
 
 /// A window brings where its blocks begin.
 ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, OnHost host,
                                      bool with_bounds) {
   return StreamWindow::sizes(volume, host.window_blocks)
-      .add(index_sizes({}, bounds_of(volume, with_bounds)));
+      .add(index_sizes({}, bounds_of(volume, with_bounds), volume.no_data.table()));
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
@@ -113,7 +116,7 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
     write_words(volume, first, parts.back());
     first += split.words_per_part;
   }
-  add_index(device, index_of(volume), bounds_of(volume, with_bounds));
+  add_index(device, index_of(volume), bounds_of(volume, with_bounds), volume.no_data.table());
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host,
@@ -122,22 +125,28 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, 
       layout(layout_of(volume, 0)),
       indexed_(volume.is_indexed()) {
   check_denormals(device, volume);
-  add_index(device, {}, bounds_of(volume, with_bounds));
+  add_index(device, {}, bounds_of(volume, with_bounds), volume.no_data.table());
 }
 
 void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t> index,
-                             std::span<const std::uint8_t> bounds) {
+                             std::span<const std::uint8_t> bounds,
+                             std::span<const std::uint32_t> no_data) {
   layout.bounds_begin = static_cast<std::uint32_t>(index.size());
-  const ocl::BufferSizes sizes = index_sizes(index, bounds);
+  const ocl::BufferSizes sizes = index_sizes(index, bounds, no_data);
   if (sizes.size() == 0) return;
   block_index.emplace(device, sizes["block index"]);
-  std::vector<std::uint32_t> both;
-  if (!bounds.empty()) {
-    both.assign(index.begin(), index.end());
-    both.resize(block_index->size());
+  std::vector<std::uint32_t> all;
+  if (!bounds.empty() || !no_data.empty()) {
+    all.assign(index.begin(), index.end());
+    all.resize(block_index->size() - no_data.size());
     for (std::size_t block = 0; block < bounds.size(); ++block)
-      both[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
-    index = both;
+      all[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
+    all.insert(all.end(), no_data.begin(), no_data.end());
+    index = all;
+  }
+  if (!no_data.empty()) {
+    layout.no_data_begin = static_cast<std::uint32_t>(all.size() - no_data.size());
+    device.draw_no_data();
   }
   block_index->write(index);
 }

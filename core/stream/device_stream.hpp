@@ -28,6 +28,18 @@ struct StreamSplit {
 /// largest_part: bytes.
 StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part);
 
+/// On the device, the table of voxels without data (kernels_cl/portable/no_data.h); the default:
+/// all voxels have data.
+struct NoDataOnDevice {
+  const ocl::Buffer<uint> *words = nullptr;
+  uint begin = ISO_INVALID_ID;  ///< the table's first word
+
+  /// Kernels need a buffer in any case.
+  const ocl::Buffer<uint> &words_or(const ocl::Buffer<uint> &other) const {
+    return words != nullptr ? *words : other;
+  }
+};
+
 /// The tag of a stream that stays on the host.
 struct OnHost {
   std::uint32_t window_blocks = 0;  ///< see StreamWindow
@@ -36,8 +48,8 @@ struct OnHost {
 
 class DeviceStream {
  public:
-  /// Of a whole stream in such parts, or of one behind a window; with_bounds: and of the bounds of
-  /// its blocks.
+  /// Of a whole stream in such parts, or of one behind a window, and of the table of voxels without
+  /// data; with_bounds: and of the bounds of its blocks.
   static ocl::BufferSizes sizes(const CompressedVolume &volume, const StreamSplit &split,
                                 bool with_bounds);
   static ocl::BufferSizes sizes(const CompressedVolume &volume, OnHost host, bool with_bounds);
@@ -57,22 +69,26 @@ class DeviceStream {
   static bool is_window(const ocl::Defines &defines);
   /// Buffer i of 0..3 of a whole stream; where there are fewer, the first.
   const ocl::Buffer<uint> &part(std::size_t i) const { return parts[i < parts.size() ? i : 0]; }
-  /// Where the blocks of a whole stream begin (block_index.h), and the bounds of a level of detail;
-  /// where there is nothing to look up, any buffer. words: of the window, where there is one.
+  /// Where the blocks of a whole stream begin (block_index.h), the bounds of a level of detail, and
+  /// the table of voxels without data; where there is nothing to look up, any buffer. words: of the
+  /// window, where there is one.
   const ocl::Buffer<uint> &index() const { return block_index ? *block_index : parts[0]; }
   const ocl::Buffer<uint> &index(const ocl::Buffer<uint> &words) const {
     return block_index ? *block_index : words;
   }
+  NoDataOnDevice no_data() const {
+    return {layout.no_data_begin != ISO_INVALID_ID ? &*block_index : nullptr, layout.no_data_begin};
+  }
 
   std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none where the volume stays on the host
-  std::optional<ocl::Buffer<uint>>
-      block_index;  ///< of a volume whose blocks have lengths of their own, or bounds
+  /// Of a volume whose blocks have lengths of their own, or bounds, or voxels without data.
+  std::optional<ocl::Buffer<uint>> block_index;
   std::unique_ptr<StreamWindow> window;  ///< where the volume stays on the host
   StreamLayout layout;
 
  private:
   void add_index(ocl::Device &device, std::span<const std::uint32_t> index,
-                 std::span<const std::uint8_t> bounds);
+                 std::span<const std::uint8_t> bounds, std::span<const std::uint32_t> no_data);
 
   bool indexed_;
 };

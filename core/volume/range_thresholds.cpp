@@ -1,6 +1,7 @@
 #include "core/volume/range_thresholds.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace isowave::core {
@@ -12,6 +13,7 @@ RangeSample range_sample(std::uint64_t num_blocks) {
 }
 
 std::vector<float> range_thresholds(std::vector<float> values) {
+  std::erase_if(values, [](float value) { return !std::isfinite(value); });  // of no voxels
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
 

@@ -1,10 +1,12 @@
 #include "core/volume/voxel_chunks.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,7 +41,8 @@ class Untouched {
 
 /// What is learnt of a run of voxels.
 struct Findings {
-  std::uint64_t bad_count = 0, first_bad = ~std::uint64_t(0);  ///< NaN, Inf; linear voxel index
+  std::uint64_t bad_count = 0, first_bad = ~std::uint64_t(0);  ///< infinite; linear voxel index
+  std::uint64_t no_data_count = 0;
   std::uint64_t too_large_count = 0, first_too_large = ~std::uint64_t(0);
   float min = std::numeric_limits<float>::infinity(), max = -std::numeric_limits<float>::infinity();
   double source_min = std::numeric_limits<double>::infinity(),
@@ -51,6 +54,7 @@ struct Findings {
 
   void add(const Findings &other) {
     bad_count += other.bad_count;
+    no_data_count += other.no_data_count;
     first_bad = std::min(first_bad, other.first_bad);
     too_large_count += other.too_large_count;
     first_too_large = std::min(first_too_large, other.first_too_large);
@@ -79,13 +83,19 @@ void raise_lost(float &lost, double error) {
 }
 
 /// Sets voxels to their source as float32, and notes what that loses; of tiny ones, which will
-/// become 0, all of it. Those that will be mapped or refused become NaN, or kMaxMagnitude.
-void cast_line(const Line &line, Findings &found) {
+/// become 0, all of it. Those without data become NaN; those that will be mapped or refused stay
+/// NaN or infinite, or become kMaxMagnitude.
+void cast_line(const Line &line, const InputOptions &options, Findings &found) {
   for (std::size_t x = 0; x < line.source.size(); ++x) {
     const double source = line.source[x];
     float &value = line.voxels[x];
-    if (!std::isfinite(source)) {
+    if (source == options.no_data) {
       value = std::numeric_limits<float>::quiet_NaN();
+    } else if (!std::isfinite(source) && options.no_data && options.map_nan) {
+      value = *options.map_nan;
+      found.add_source(double{value}, double{value});
+    } else if (!std::isfinite(source)) {
+      value = static_cast<float>(source);
     } else if (std::abs(source) >= double{kMaxMagnitude}) {
       value = kMaxMagnitude;
     } else {
@@ -93,6 +103,21 @@ void cast_line(const Line &line, Findings &found) {
       const float stored = std::abs(value) < line.least ? 0.0f : value;
       raise_lost(line.lost[x / kBlockEdge], std::abs(double{stored} - source));
       found.add_source(source, source);
+    }
+  }
+}
+
+/// Sets voxels of the value that says "no data" to NaN, and maps NaN before that.
+void mark_line(std::span<float> voxels, const InputOptions &options) {
+  const double largest = double{std::numeric_limits<float>::max()};
+  const bool fits = !(std::abs(*options.no_data) > largest) || std::isinf(*options.no_data);
+  const float no_data = fits ? static_cast<float>(*options.no_data)
+                             : std::numeric_limits<float>::quiet_NaN();  // equal to none
+  for (float &value : voxels) {
+    if (value == no_data) {
+      value = std::numeric_limits<float>::quiet_NaN();
+    } else if (options.map_nan && !std::isfinite(value)) {
+      value = *options.map_nan;
     }
   }
 }
@@ -127,20 +152,24 @@ bool add_plain_values(const Line &line, Findings &found) {
   return true;
 }
 
-/// Checks a line: maps NaN, flushes tiny voxels, notes what cannot be compressed.
-void check_line(const Line &line, const std::optional<float> &map_nan, Findings &found) {
-  cast_line(line, found);
+/// Checks a line: maps NaN, flushes tiny voxels, notes what cannot be compressed. Voxels without
+/// data become NaN.
+void check_line(const Line &line, const InputOptions &options, Findings &found) {
+  cast_line(line, options, found);
+  if (line.source.empty() && options.no_data) mark_line(line.voxels, options);
   if (add_plain_values(line, found)) return;
   for (std::size_t x = 0; x < line.voxels.size(); ++x) {
     float &value = line.voxels[x];
-    const bool is_mapped = !std::isfinite(value);
+    const bool is_mapped = options.map_nan && !options.no_data && !std::isfinite(value);
     if (is_mapped) {
-      if (!map_nan) {
-        ++found.bad_count;
-        found.first_bad = std::min(found.first_bad, line.first + x);
-        continue;
-      }
-      value = *map_nan;
+      value = *options.map_nan;
+    } else if (std::isnan(value)) {
+      ++found.no_data_count;
+      continue;
+    } else if (std::isinf(value)) {
+      ++found.bad_count;
+      found.first_bad = std::min(found.first_bad, line.first + x);
+      continue;
     }
     if (is_mapped || line.source.empty()) found.add_source(double{value}, double{value});
     found.min = std::min(found.min, value);
@@ -163,8 +192,8 @@ void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
   };
   if (found.bad_count > 0) {
     throw Error(
-        "{} of {} voxels are NaN or infinite, the first at {}: give a value for them with "
-        "--map-nan",
+        "{} of {} voxels are infinite, the first at {}: replace them, or say that voxels of this "
+        "value have no data",
         found.bad_count, info.num_voxels(), position(found.first_bad));
   }
   if (found.too_large_count > 0) {
@@ -172,6 +201,114 @@ void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
         "{} of {} voxels are beyond +-{:.4g}, the first at {}: zfp cannot hold them, scale the "
         "volume down",
         found.too_large_count, info.num_voxels(), kMaxMagnitude, position(found.first_too_large));
+  }
+}
+
+/// The voxels of a block x + 4y + 16z, as far as they are known.
+struct KnownVoxels {
+  std::array<double, 64> values{};
+  std::uint64_t known = 0;
+
+  /// At (x,y,z), moved by `steps` along an axis; nothing beyond the block.
+  std::optional<double> at(std::array<int, 3> place, std::size_t axis, int steps) const {
+    place.at(axis) += steps;
+    if (place.at(axis) < 0 || place.at(axis) > 3) return {};
+    const auto voxel = static_cast<std::size_t>(place[0] + 4 * place[1] + 16 * place[2]);
+    if ((known >> voxel & 1u) == 0) return {};
+    return values.at(voxel);
+  }
+};
+
+/// What a smooth field would have at an unknown voxel: the mean, over the axes, of what continues
+/// the three other voxels of its row as a parabola; else of what lies between two neighbours; else
+/// of what two on one side lead to; else of single neighbours.
+std::optional<double> smooth_guess(const KnownVoxels &block, const std::array<int, 3> &place) {
+  std::array<double, 4> sums{};
+  std::array<int, 4> counts{};
+  const auto add = [&](std::size_t kind, double value) {
+    sums.at(kind) += value;
+    ++counts.at(kind);
+  };
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::optional<double> below = block.at(place, axis, -1), above = block.at(place, axis, 1);
+    if (below && above) add(1, 0.5 * (*below + *above));
+    for (const int side : {-1, 1}) {
+      const std::optional<double> next = side < 0 ? below : above,
+                                  second = block.at(place, axis, 2 * side),
+                                  third = block.at(place, axis, 3 * side),
+                                  other = side < 0 ? above : below;
+      if (next && second && third) add(0, 3 * (*next - *second) + *third);
+      if (next && second && other) add(0, *next + (*other - *second) / 3);
+      if (next && second) add(2, 2 * *next - *second);
+      if (next) add(3, *next);
+    }
+  }
+  for (std::size_t kind = 0; kind < counts.size(); ++kind) {
+    if (counts.at(kind) != 0) return sums.at(kind) / counts.at(kind);
+  }
+  return {};
+}
+
+/// Makes up the unknown voxels of a block, so that the others are compressed as well as they can
+/// be: a smooth continuation, not far beyond their range; whole numbers if they are.
+void fill_unknown(KnownVoxels &block) {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  bool all_whole = true;
+  const std::uint64_t given = block.known;
+  for (std::size_t voxel = 0; voxel < 64; ++voxel) {
+    if ((given >> voxel & 1u) == 0) continue;
+    const double value = block.values.at(voxel);
+    least = std::min(least, value);
+    most = std::max(most, value);
+    all_whole = all_whole && value == std::trunc(value);
+  }
+  const double slack = 0.5 * (most - least), end = double{std::nextafter(kMaxMagnitude, 0.0f)};
+  while (block.known != ~std::uint64_t{0}) {
+    KnownVoxels next = block;
+    for (int voxel = 0; voxel < 64; ++voxel) {
+      if ((block.known >> voxel & 1u) != 0) continue;
+      const std::optional<double> guess =
+          smooth_guess(block, {voxel % 4, voxel / 4 % 4, voxel / 16});
+      if (!guess) continue;
+      const double value = std::clamp(std::clamp(*guess, least - slack, most + slack), -end, end);
+      next.values.at(static_cast<std::size_t>(voxel)) = all_whole ? std::rint(value) : value;
+      next.known |= std::uint64_t{1} << voxel;
+    }
+    block = next;
+  }
+}
+
+/// Notes which voxels of a row of blocks are NaN, and fills them.
+///
+/// voxels   the row's first; a layer of the volume has nx * ny
+/// no_data  of the row's blocks
+void fill_no_data(const BlockRow &row, float *voxels, std::uint32_t nx, std::uint64_t layer,
+                  std::uint64_t *no_data) {
+  for (std::uint32_t begin = 0; begin < nx; begin += kBlockEdge) {
+    const std::uint32_t size = std::min(kBlockEdge, nx - begin);
+    const auto each = [&](const auto &use) {
+      for (std::uint32_t z = 0; z < row.nz; ++z) {
+        for (std::uint32_t y = 0; y < row.ny; ++y) {
+          for (std::uint32_t x = 0; x < size; ++x)
+            use(voxels[z * layer + std::uint64_t{y} * nx + begin + x], x + 4 * y + 16 * z);
+        }
+      }
+    };
+    std::uint64_t mask = 0;
+    KnownVoxels block;
+    each([&](float value, std::uint32_t voxel) {
+      const std::uint64_t bit = std::uint64_t{1} << voxel;
+      block.values.at(voxel) = double{value};
+      (std::isnan(value) ? mask : block.known) |= bit;
+    });
+    if (mask == 0) continue;
+    no_data[begin / kBlockEdge] = block.known == 0 ? ~std::uint64_t{0} : mask;
+    if (block.known != 0) fill_unknown(block);
+    each([&](float &value, std::uint32_t voxel) {
+      if ((mask >> voxel & 1u) == 0) return;
+      value = static_cast<float>(block.known == 0 ? 0.0 : block.values.at(voxel));
+      if (std::abs(value) < kMinMagnitude) value = 0.0f;
+    });
   }
 }
 
@@ -193,15 +330,22 @@ Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm
                z = std::uint32_t(index / rows_per_slab) * kBlockEdge;
     const std::uint64_t begin = z * layer + std::uint64_t(y) * dims.x;
     float *lost = chunk.lost.data() + index * blocks_x;
-    const BlockRow row{index, chunk.voxels.data() + begin, std::min(kBlockEdge, dims.y - y),
-                       std::min(kBlockEdge, chunk.num_layers - z), lost};
+    std::uint64_t *no_data = chunk.no_data.data() + index * blocks_x;
+    const BlockRow row{index,
+                       chunk.voxels.data() + begin,
+                       std::min(kBlockEdge, dims.y - y),
+                       std::min(kBlockEdge, chunk.num_layers - z),
+                       lost,
+                       no_data};
     Findings found;
     for (std::uint64_t i = 0; i < std::uint64_t(row.ny) * row.nz; ++i) {
       const std::uint64_t at = begin + i / row.ny * layer + i % row.ny * dims.x;
       check_line({options.keeps_tiny ? 0.0f : kMinMagnitude, chunk.voxels.subspan(at, dims.x),
                   source.empty() ? source : source.subspan(at, dims.x), first_z * layer + at, lost},
-                 options.map_nan, found);
+                 options, found);
     }
+    if (found.no_data_count != 0)
+      fill_no_data(row, chunk.voxels.data() + begin, dims.x, layer, no_data);
     if (!is_own(options.part, chunk.z + z)) {
       const bool refused = found.refused();
       found = {};
@@ -232,7 +376,9 @@ Chunk make_chunk(const glm::uvec3 &dims, std::uint32_t z, std::span<float> voxel
 void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options,
                 ChunkCoder &coder) {
   std::vector<float> lost(chunk.num_rows * ((dims.x + 3u) / 4u));
+  std::vector<std::uint64_t> no_data(lost.size());
   chunk.lost = lost;
+  chunk.no_data = no_data;
   coder.begin_chunk(chunk);
   code_rows(chunk, {}, dims, options, coder);
   coder.end_chunk(chunk);
@@ -241,7 +387,12 @@ void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options
 ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder) {
   check_volume_info(options.part != nullptr ? options.part->whole : reader.info(), "volume");
   if (options.map_nan && !(std::abs(*options.map_nan) < kMaxMagnitude)) {
-    throw Error("--map-nan {}: must be finite and below {:.4g}", *options.map_nan, kMaxMagnitude);
+    throw Error("a value for NaN of {}: must be finite and below {:.4g}", *options.map_nan,
+                kMaxMagnitude);
+  }
+  if (options.map_nan && options.no_data && !std::isfinite(*options.no_data)) {
+    throw Error("voxels of {} cannot both be replaced by {} and have no data: give one of the two",
+                *options.no_data, *options.map_nan);
   }
   const glm::uvec3 dims = reader.info().dims;
   const std::uint64_t layer = std::uint64_t(dims.x) * dims.y;
@@ -273,6 +424,7 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
   Findings total;
   Layers current, next;
   std::vector<float> lost;
+  std::vector<std::uint64_t> no_data;
   const auto read_all = [&] {
     std::future<void> pending = read_ahead(0, next);
     for (std::uint32_t z = 0; z < dims.z; z += chunk_layers) {
@@ -281,7 +433,9 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
       pending = read_ahead(std::uint64_t(z) + chunk_layers, next);
       Chunk chunk = make_chunk(dims, z, current.voxels);
       lost.assign(chunk.num_rows * ((dims.x + 3u) / 4u), 0.0f);
+      no_data.assign(lost.size(), 0);
       chunk.lost = lost;
+      chunk.no_data = no_data;
       coder.begin_chunk(chunk);
       total.add(code_rows(chunk, current.source, dims, options, coder));
       if (!total.refused()) coder.end_chunk(chunk);
@@ -298,7 +452,11 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
     total = {};
     for (const Findings &found : of_ranks) total.add(found);
     refuse_bad_voxels(total, options.part->whole);
+    if (total.no_data_count != 0)
+      throw Error("{} voxels have no data: processes cannot compress them together yet",
+                  total.no_data_count);
   }
+  if (!(total.min <= total.max)) return {};
   // + 0: not -0; of equal values, the one met first would depend on the threads
   return {{total.min + 0.0f, total.max + 0.0f}, {total.source_min + 0.0, total.source_max + 0.0}};
 }

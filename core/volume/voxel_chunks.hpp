@@ -34,8 +34,12 @@ struct VolumePart {
 
 /// How a volume is read for compression.
 struct InputOptions {
-  std::optional<float>
-      map_nan{};  ///< replaces NaN and +-Inf; unset: refused with count and first position
+  /// Replaces NaN and +-Inf. Unset: voxels that are NaN have no data, infinite ones are refused
+  /// with count and first position.
+  std::optional<float> map_nan{};
+  /// Voxels of this value have no data: a number of the source's type, or infinite. It is compared
+  /// with values as readers give them, rounded to float32 for a float32 volume.
+  std::optional<double> no_data{};
   Progress progress{};
   std::uint32_t num_threads = 0;  ///< 0: one per processor; the result is the same for any number
   /// The reader gives this part. What is found, and refused, is the whole's, at all processes.
@@ -52,6 +56,10 @@ struct Chunk {
   /// float32 cannot hold those or they were tiny and became 0. The source of a mapped NaN is what
   /// it was mapped to. Complete at end_chunk().
   std::span<float> lost{};
+  /// [num_rows][blocks along x]: bit x + 4y + 16z of a block: the voxel has no data; all bits of a
+  /// block without any. `voxels` has what continues the block's others smoothly there, or 0.
+  /// Complete at end_chunk().
+  std::span<std::uint64_t> no_data{};
 };
 
 /// Layers of the chunks that a volume is cut into, but for its last.
@@ -64,8 +72,9 @@ struct BlockRow {
   std::uint64_t index = 0;  ///< in its chunk, in the order of blocks
   const float *voxels =
       nullptr;  ///< its first; a voxel row is nx values, a layer nx * ny of the volume
-  std::uint32_t ny = 0, nz = 0;  ///< voxel rows and layers that it has, 1..4
-  const float *lost = nullptr;   ///< of its blocks: Chunk::lost
+  std::uint32_t ny = 0, nz = 0;            ///< voxel rows and layers that it has, 1..4
+  const float *lost = nullptr;             ///< of its blocks: Chunk::lost
+  const std::uint64_t *no_data = nullptr;  ///< of its blocks: Chunk::no_data
 };
 
 /// What becomes of the voxels.
@@ -85,7 +94,7 @@ class ChunkCoder {
 void code_chunk(Chunk chunk, const glm::uvec3 &dims, const InputOptions &options,
                 ChunkCoder &coder);
 
-/// [min, max] of a volume's voxels, after map_nan.
+/// [min, max] of a volume's voxels with data, after map_nan; 0 and 0 if there are none.
 struct ValueRange {
   std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
   std::array<double, 2> source{};  ///< as the source has them
@@ -93,7 +102,7 @@ struct ValueRange {
 /// Reads the volume from front to back for `coder`. Of a part, all processes make the same call.
 ///
 /// Throws  Error: voxels that cannot be compressed, after all of them were looked at; a bad grid;
-///         an unfit map_nan
+///         an unfit map_nan or no_data
 ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, ChunkCoder &coder);
 
 }  // namespace isowave::core

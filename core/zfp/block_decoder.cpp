@@ -19,8 +19,10 @@ void BlockDecoder::decode(std::uint64_t id, std::span<float, ISO_BLOCK_VOXELS> v
   const std::vector<std::uint32_t> &words = volume_.file ? read_ : volume_.words;
   zfp_decode_any_block(words.data(), volume_.block_begin(id) - first_bit_, volume_.block_bits(id),
                        volume_.precision.min_exponent, voxels.data());
-  if (!volume_.precision.whole_numbers) return;
-  for (float &voxel : voxels) voxel = std::rint(voxel) + 0.0f;  // as the kernels do
+  if (volume_.precision.whole_numbers) {
+    for (float &voxel : voxels) voxel = std::rint(voxel) + 0.0f;  // as the kernels do
+  }
+  clear_no_data(volume_.no_data.mask(id), voxels);
 }
 
 }  // namespace isowave::core

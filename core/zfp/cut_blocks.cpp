@@ -89,6 +89,7 @@ CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box) 
     }
   }
   CompressedVolume cut = cutter.finish();
+  cut.no_data = cut_no_data(whole.no_data, whole.num_blocks(), box, cut.info.dims);
   if (whole.bounds.codes.empty()) return cut;
   BoundsCutter bounds(whole.num_blocks(), box);
   bounds.add(whole.bounds.codes);

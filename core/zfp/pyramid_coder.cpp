@@ -62,8 +62,11 @@ class FixedRateCoder : public LevelCoder {
       for (std::uint32_t y = 0; y < row.ny; ++y) {
         const std::ptrdiff_t begin = z * layer_size() + std::ptrdiff_t(y) * dims_.x;
         const float *source = row.voxels + begin, *value = decoded + begin;
-        for (std::uint32_t x = 0; x < dims_.x; ++x)
-          errors[x / 4].add(x % 4 + 4 * y + 16 * z, std::abs(double(value[x]) - double(source[x])));
+        for (std::uint32_t x = 0; x < dims_.x; ++x) {
+          const std::uint32_t voxel = x % 4 + 4 * y + 16 * z;
+          if ((row.no_data[x / 4] >> voxel & 1u) == 0)
+            errors[x / 4].add(voxel, std::abs(double(value[x]) - double(source[x])));
+        }
       }
     }
   }
@@ -191,7 +194,7 @@ PyramidCoder::PyramidCoder(const CompressOptions &options,
                            std::span<CompressedVolume *const> volumes,
                            std::span<const PayloadSink> sinks, bool is_finest, bool keep_errors,
                            NextLevel next_level)
-    : volume_(*volumes[0]), is_finest_(is_finest) {
+    : volume_(*volumes[0]), is_finest_(is_finest), no_data_(volumes[0]->info.dims) {
   const glm::uvec3 dims = volume_.info.dims;
   if (volume_.is_indexed()) {
     coder_ = std::make_unique<BoundedCoder>(dims, volume_.precision, sinks[0], keep_errors);
@@ -216,7 +219,10 @@ PyramidCoder::PyramidCoder(const CompressOptions &options,
 
 void PyramidCoder::end_chunk(const Chunk &chunk) {
   coder_->end_chunk(chunk);
+  for (const std::uint64_t mask : chunk.no_data) no_data_.add(mask);
   if (!next_) return;
+  if (std::ranges::any_of(chunk.no_data, [](std::uint64_t mask) { return mask != 0; }))
+    throw Error("voxels without data: levels of detail cannot be made of them yet");
   if (bounds_) {
     bounds_->add_fine(chunk.voxels);
     if (is_finest_) keep_lost(chunk.lost);

@@ -64,7 +64,10 @@ class PyramidCoder : public ChunkCoder {
   // What finish() does, for callers who put parts of volumes together: each once, in this order.
 
   /// Completes this level's volume but for its bounds. Returns the errors that were to be kept.
-  std::vector<float> finish_level() { return coder_->finish(volume_); }
+  std::vector<float> finish_level() {
+    volume_.no_data = no_data_.finish();
+    return coder_->finish(volume_);
+  }
   /// How far the next level's blocks are from the source; made: the same of this one's, as they
   /// were made.
   LevelBounds::Off finish_bounds(std::span<const float> made);
@@ -75,6 +78,7 @@ class PyramidCoder : public ChunkCoder {
 
   CompressedVolume &volume_;
   bool is_finest_;
+  NoDataBuilder no_data_;
   std::unique_ptr<LevelCoder> coder_;
   std::unique_ptr<PyramidCoder> next_;
   std::optional<Downsampler> downsampler_;

@@ -69,8 +69,10 @@ void check_stated_errors(const CompressedVolume &volume, const Progress &progres
       const std::uint32_t end = std::min(z + kBlockEdge, dims.z);
       const std::vector<float> voxels = decode_layers(fine, dims, z, end);
       if (i == 0) {
-        const auto [least, largest] = std::ranges::minmax_element(voxels);
-        range = {std::min(range[0], *least), std::max(range[1], *largest)};
+        for (const float voxel : voxels) {  // NaN of those without data changes nothing
+          range[0] = voxel < range[0] ? voxel : range[0];
+          range[1] = voxel > range[1] ? voxel : range[1];
+        }
         if (progress) progress(end, dims.z);
       }
       if (!between) continue;

@@ -25,7 +25,7 @@ void append_block(const CompressedVolume &volume, std::uint32_t id, std::vector<
   const glm::uvec3 size = glm::min(volume.info.dims - at, glm::uvec3(4));
   for (std::uint32_t i = 0; i < ISO_BLOCK_VOXELS; ++i) {
     if (i % 4 >= size.x || i / 4 % 4 >= size.y || i / 16 >= size.z) continue;
-    voxels.push_back(values.at(i));
+    if (!is_no_data(values.at(i))) voxels.push_back(values.at(i));
   }
 }
 

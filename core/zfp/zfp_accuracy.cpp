@@ -67,7 +67,8 @@ class BlockCodec {
   ZfpBits bits_;
 };
 
-/// Of block bx of a row; with `rounded`, of the decoded values' nearest integers.
+/// Of the voxels with data of block bx of a row; with `rounded`, of the decoded values' nearest
+/// integers.
 BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, const BlockRow &row,
                           std::uint32_t bx, std::ptrdiff_t nx, std::ptrdiff_t layer, bool rounded) {
   const std::uint32_t num_x =
@@ -78,6 +79,7 @@ BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, co
       const float *source = row.voxels + z * layer + y * nx + std::ptrdiff_t{bx} * kBlockEdge;
       for (std::uint32_t x = 0; x < num_x; ++x) {
         const std::uint32_t voxel = x + 4 * y + 16 * z;
+        if ((row.no_data[bx] >> voxel & 1u) != 0) continue;
         const float value = rounded ? std::rint(decoded[voxel]) : decoded[voxel];
         error.add(voxel, std::abs(double{value} - double{source[x]}));
       }

@@ -42,6 +42,7 @@ void Deflater::deflate(std::span<const std::byte> bytes, bool last) {
 }
 
 std::uint32_t zfp_version(const CompressedVolume &volume, bool has_levels) {
+  if (!volume.no_data.empty()) return kNoDataVersion;
   return has_levels ? kPyramidVersion : volume.is_indexed() ? kIndexedVersion : kVersion;
 }
 
@@ -60,11 +61,11 @@ void ZfpFileWriter::write(std::span<const std::byte> payload, std::size_t level)
 
 void ZfpFileWriter::commit(const CompressedVolume &volume) {
   Part &all = parts_.front();
-  ZfpLayout layout{all.write_index(volume), all.write_bounds(volume)};
+  ZfpLayout layout = all.write_parts(volume);
   for (std::size_t level = 1; level < parts_.size(); ++level) {
     Part &part = parts_[level];
     const CompressedVolume &coarse = volume.coarser_levels[level - 1];
-    const ZfpLayout part_layout{part.write_index(coarse), part.write_bounds(coarse)};
+    const ZfpLayout part_layout = part.write_parts(coarse);
     part.write_trailer(zfp_trailer_text(coarse, part_layout), zfp_version(coarse, false));
     layout.level_bytes.push_back(part.size);
     part.file.read_back([&all](std::span<const std::byte> bytes) { all.write(bytes); });
@@ -115,6 +116,35 @@ std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) 
     deflater.add(std::as_bytes(left.first(std::min(kDeflatedAtOnce, left.size()))));
   deflater.finish();
   return size - begin;
+}
+
+/// Behind the bounds; returns its size, 0 where all voxels have data.
+std::uint64_t ZfpFileWriter::Part::write_no_data(const CompressedVolume &volume) {
+  const std::span<const std::uint32_t> table = volume.no_data.table();
+  if (table.empty()) return 0;
+  const std::uint64_t begin = size;
+  Deflater deflater([this](std::span<const std::byte> bytes) { write(bytes); });
+  std::vector<std::uint32_t> some;
+  const auto add = [&](std::uint32_t word) {
+    some.push_back(word);
+    if (some.size() < kDeflatedAtOnce) return;
+    deflater.add(std::as_bytes(std::span(some)));
+    some.clear();
+  };
+  for (const std::uint32_t word : no_data_groups(table, volume.block_count())) add(word);
+  for (const std::uint32_t word : no_data_masks(table, volume.block_count())) add(word);
+  deflater.add(std::as_bytes(std::span(some)));
+  deflater.finish();
+  return size - begin;
+}
+
+/// All that is between the payload and the levels of detail.
+ZfpLayout ZfpFileWriter::Part::write_parts(const CompressedVolume &volume) {
+  ZfpLayout layout;
+  layout.index_bytes = write_index(volume);
+  layout.bounds_bytes = write_bounds(volume);
+  layout.no_data_bytes = write_no_data(volume);
+  return layout;
 }
 
 void write_zfp_file(const CompressedVolume &volume, const fs::path &path) {

@@ -14,10 +14,12 @@
 
 #include "core/io/atomic_file.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "core/zfp/zfp_trailer.hpp"
 
 namespace isowave::core {
 
-/// What index and bounds are deflated by. The same bytes come in the same pieces, whoever writes.
+/// What index, bounds and masks are deflated by. The same bytes come in the same pieces, whoever
+/// writes.
 class Deflater {
  public:
   using Sink = std::function<void(std::span<const std::byte>)>;
@@ -59,6 +61,8 @@ class ZfpFileWriter {
     void write(std::span<const std::byte> bytes);
     std::uint64_t write_index(const CompressedVolume &volume);
     std::uint64_t write_bounds(const CompressedVolume &volume);
+    std::uint64_t write_no_data(const CompressedVolume &volume);
+    ZfpLayout write_parts(const CompressedVolume &volume);
     void write_trailer(const std::string &text, std::uint32_t version);
 
     AtomicFile file;

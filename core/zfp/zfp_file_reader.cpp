@@ -114,7 +114,7 @@ class ZfpFileReader {
     check_volume_info(volume_.info, what());
     if (layout_.level_bytes.size() > (is_level_ ? 0 : max_levels(volume_.info.dims) - 1))
       refuse_level();
-    std::uint64_t begin = begin_ + stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes;
+    std::uint64_t begin = begin_ + bytes_before_levels();
     for (const std::uint64_t bytes : layout_.level_bytes) {
       levels_.push_back(ZfpFileReader(levels_.empty() ? *this : levels_.back(), begin, bytes));
       begin += bytes;
@@ -123,7 +123,10 @@ class ZfpFileReader {
 
   std::uint64_t bytes_before_trailer() const {
     return std::accumulate(layout_.level_bytes.begin(), layout_.level_bytes.end(),
-                           stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes);
+                           bytes_before_levels());
+  }
+  std::uint64_t bytes_before_levels() const {
+    return stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes + layout_.no_data_bytes;
   }
 
   /// That of everything before the trailer.
@@ -144,6 +147,10 @@ class ZfpFileReader {
     volume_.file_first_bit = 8 * begin_ + header_bits_;
     if (volume_.is_indexed()) read_index(keep);
     if (layout_.bounds_bytes != 0) read_bounds(keep);
+    if (layout_.no_data_bytes != 0) {
+      NoData no_data = read_no_data();
+      if (keep) volume_.no_data = std::move(no_data);
+    }
     check_errors(volume_);
     for (ZfpFileReader &level : levels_) volume_.coarser_levels.push_back(level.take(keep));
     if (!keep) volume_.file.reset();
@@ -196,6 +203,8 @@ class ZfpFileReader {
       inflate_bounds([&](std::span<const std::uint8_t> some) { bounds.add(some); });
       if (layout_.counts_casts) cut.bounds = bounds.finish(volume_.bounds);
     }
+    if (layout_.no_data_bytes != 0)
+      cut.no_data = cut_no_data(read_no_data(), volume_.num_blocks(), box, cut.info.dims);
     check_errors(cut);
     return cut;
   }
@@ -268,6 +277,42 @@ class ZfpFileReader {
         });
     const std::int32_t exponent = volume_.bounds.exponent;
     if (!whole || exponent < kMinBoundExponent || exponent > kMaxBoundExponent) refuse_bounds();
+  }
+
+  /// Bits of all groups, then the masks that they promise (kernels_cl/portable/no_data.h).
+  NoData read_no_data() const {
+    const auto refuse = [this] {
+      fail("damaged: its voxels without data are not those of its stream");
+    };
+    const std::uint64_t num_blocks = volume_.block_count(),
+                        num_groups = (num_blocks + ISO_NO_DATA_BLOCKS - 1) / ISO_NO_DATA_BLOCKS;
+    if (8 * num_groups / kMaxDeflateRatio > layout_.no_data_bytes) refuse();
+    InflateSource source(
+        {file_, begin_ + bytes_before_levels() - layout_.no_data_bytes, layout_.no_data_bytes},
+        Packing::kZlib);
+    std::vector<std::uint32_t> groups(2 * num_groups);
+    const auto bytes = std::as_writable_bytes(std::span(groups));
+    if (source.read(bytes) != bytes.size()) refuse();
+    NoDataBuilder no_data(volume_.info.dims);
+    for (std::uint64_t block = 0; block < 32 * num_groups; ++block) {
+      const bool some = (groups[2 * (block / 32)] >> (block % 32) & 1u) != 0,
+                 all = (groups[2 * (block / 32) + 1] >> (block % 32) & 1u) != 0;
+      std::uint64_t mask = all ? ~std::uint64_t{0} : 0;
+      if (some && source.read(std::as_writable_bytes(std::span(&mask, 1))) != sizeof(mask))
+        refuse();
+      const bool is_there = block < num_blocks;
+      const std::uint64_t voxels = is_there && some ? voxels_of_block(volume_.info.dims, block) : 0;
+      if ((some && (all || (mask & ~voxels) != 0 || mask == 0 || mask == voxels)) ||
+          (all && !is_there))
+        refuse();
+      if (is_there) no_data.add(mask);
+    }
+    std::byte another{};
+    NoData result = no_data.finish();
+    if (source.read(std::span(&another, 1)) != 0 ||
+        result.num_voxels() != volume_.no_data.num_voxels())
+      refuse();
+    return result;
   }
 
   [[noreturn]] void refuse_bounds() const {
@@ -351,9 +396,9 @@ class ZfpFileReader {
     }
     const std::uint32_t known = volume_.is_indexed() ? kIndexedVersion : kVersion;
     if (footer.version != known && footer.version != kBoundlessPyramidVersion &&
-        footer.version != kPyramidVersion) {
-      fail("its trailer has version {}, this program knows {}, {} and {}", footer.version, known,
-           kBoundlessPyramidVersion, kPyramidVersion);
+        footer.version != kPyramidVersion && footer.version != kNoDataVersion) {
+      fail("its trailer has version {}, this program knows {}, {}, {} and {}", footer.version,
+           known, kBoundlessPyramidVersion, kPyramidVersion, kNoDataVersion);
     }
     const std::uint64_t json_end = file_size_ - sizeof(ZfpFooter);
     std::string text;
@@ -391,7 +436,8 @@ class ZfpFileReader {
       return true;
     };
     if (!take(stream_bytes_) || !take(layout_.index_bytes) || !take(layout_.bounds_bytes) ||
-        !std::ranges::all_of(layout_.level_bytes, take) || left != 0)
+        !take(layout_.no_data_bytes) || !std::ranges::all_of(layout_.level_bytes, take) ||
+        left != 0)
       fail("damaged: its parts are not as long as its trailer says");
   }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -178,6 +179,17 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double vox
   }
   if (bound.whole_numbers) {
     for (float &value : voxels) value = std::rint(value) + 0.0f;  // as the kernels do
+  }
+  for (std::uint64_t id = 0; !volume.no_data.empty() && id < volume.block_count(); ++id) {
+    const glm::uvec3 at =
+        4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);
+    for (std::uint64_t left = volume.no_data.mask(id) & voxels_of_block(dims, id); left != 0;
+         left &= left - 1) {
+      const auto bit = static_cast<std::uint32_t>(std::countr_zero(left));
+      const glm::u64vec3 place = at + glm::uvec3(bit & 3, bit >> 2 & 3, bit >> 4);
+      voxels[place.x + dims.x * (place.y + dims.y * place.z)] =
+          std::numeric_limits<float>::quiet_NaN();
+    }
   }
   return voxels;
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/volume/voxel_chunks.hpp"
+#include "core/zfp/no_data.hpp"
 #include "kernels_cl/portable/block_index.h"
 
 namespace isowave::core {
@@ -88,10 +89,13 @@ struct CompressedVolume {
   std::vector<std::uint32_t> words;
   std::shared_ptr<const InputFile> file{};  ///< which holds the payload instead,
   std::uint64_t file_first_bit = 0;         ///< from this bit on.
-  /// [min, max] of the source's voxels, as float32 and after map_nan.
+  NoData no_data{};                         ///< its voxels without data
+  /// [min, max] of the source's voxels with data, as float32 and after map_nan.
   std::array<float, 2> value_range = kUnknownRange;
-  std::optional<double> max_voxel_error{};  ///< largest |decoded - source| when it was measured
-  BlockBounds bounds{};                     ///< of a level of detail; no codes: not known
+  /// Largest |decoded - source| of voxels with data, when it was measured. What a device measured
+  /// may be larger: it counts the other voxels, too.
+  std::optional<double> max_voxel_error{};
+  BlockBounds bounds{};  ///< of a level of detail; no codes: not known
   /// max_voxel_error and bounds, of all levels, are what a file says: its writer may be wrong, or
   /// lie. false: this process measured them.
   bool errors_are_stated = false;
@@ -160,8 +164,8 @@ CompressedVolume check_zfp_file(const std::filesystem::path &path);
 /// As check_zfp_file(), but neither reads nor checks the payload, index and bounds.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
-/// Decodes everything with libzfp: [nz][ny][nx] float32, by as few bit planes as voxel_error
-/// allows: see with_fewer_planes(). The ground truth of every decoder here.
+/// Decodes everything with libzfp: [nz][ny][nx] float32, NaN of voxels without data, by as few bit
+/// planes as voxel_error allows: see with_fewer_planes(). The ground truth of every decoder here.
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double voxel_error = 0);
 
 }  // namespace isowave::core

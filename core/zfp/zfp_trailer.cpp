@@ -95,6 +95,14 @@ ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
     // Of another rule, all voxels of a block have its whole bound.
     volume.bounds.by_place = trailer.value("bounds_by_place", json(0)) == ISO_BOUND_PLACES_RULE;
   }
+  if (trailer.contains("no_data_bytes")) {
+    layout.no_data_bytes = number_from<std::uint64_t>(trailer["no_data_bytes"]);
+    volume.no_data = NoData(number_from<std::uint64_t>(trailer.at("no_data_voxels")));
+    if (layout.no_data_bytes == 0 || volume.no_data.empty() ||
+        volume.no_data.num_voxels() > volume.info.num_voxels())
+      throw Error("{} voxels without data, in {} bytes", volume.no_data.num_voxels(),
+                  layout.no_data_bytes);
+  }
   if (!volume.is_indexed()) return layout;
   volume.indexed_bits = number_from<std::uint64_t>(trailer.at("payload_bits"));
   volume.precision.whole_numbers = trailer.at("whole_numbers").get<bool>();
@@ -143,6 +151,10 @@ std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &la
     trailer["bounds_bytes"] = layout.bounds_bytes;
     trailer["bounds_exponent"] = volume.bounds.exponent;
     if (volume.bounds.by_place) trailer["bounds_by_place"] = ISO_BOUND_PLACES_RULE;
+  }
+  if (layout.no_data_bytes != 0) {
+    trailer["no_data_bytes"] = layout.no_data_bytes;
+    trailer["no_data_voxels"] = volume.no_data.num_voxels();
   }
   if (!layout.level_bytes.empty()) trailer["level_bytes"] = layout.level_bytes;
   return trailer.dump();

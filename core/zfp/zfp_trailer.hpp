@@ -13,7 +13,8 @@
 
 namespace isowave::core {
 
-inline constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2, kPyramidVersion = 4;
+inline constexpr std::uint32_t kVersion = 1, kIndexedVersion = 2, kPyramidVersion = 4,
+                               kNoDataVersion = 5;
 inline constexpr std::uint32_t kBoundlessPyramidVersion =
     3;  ///< before levels had bounds: is read, not written
 inline constexpr std::array<char, 8> kZfpFooterMagic{'I', 'S', 'O', 'W', 'A', 'V', 'E', '\n'};
@@ -33,7 +34,7 @@ std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer);
 
 /// What the JSON text says of the file itself.
 struct ZfpLayout {
-  std::uint64_t index_bytes = 0, bounds_bytes = 0;
+  std::uint64_t index_bytes = 0, bounds_bytes = 0, no_data_bytes = 0;
   std::vector<std::uint64_t> level_bytes{};  ///< of the coarser levels' files
   /// Whether the errors are those against the source. In older files they leave out the cast to
   /// float32.

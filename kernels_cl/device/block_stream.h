@@ -14,6 +14,7 @@
 
 #include "portable/block_bound.h"
 #include "portable/block_index.h"
+#include "portable/no_data.h"
 #include "portable/zfp_codec.h"
 
 #ifndef ISO_STREAM_PARTS
@@ -26,7 +27,8 @@
 #define ISO_STREAM_REVERSIBLE 0
 #endif
 
-/// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z.
+/// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z; NaN of
+/// voxels without data.
 ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_1,
                              global const uint *part_2, global const uint *part_3,
                              global const uint *index, StreamLayout layout, uint block_id,
@@ -72,6 +74,14 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
       const float share = layout.bounds_by_place != 0u ? bound_share(bound_place(v)) : 1.0f;
       values[v] += layout.value_offset + bound * share;
+    }
+  }
+  if (ISO_NO_DATA && layout.no_data_begin != ISO_INVALID_ID) {
+    const ulong missing = no_data_mask(index + layout.no_data_begin, block_id);
+    if (missing != 0) {
+      ISO_UNROLL
+      for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+        values[v] = (missing >> v & 1u) != 0 ? as_float(0x7FC00000u) : values[v];
     }
   }
 }

@@ -19,13 +19,14 @@ ISO_INLINE void dual_grid_inside(const FrameParams *frame, global const BlockEnt
   }
 }
 
-/// Triangles of block b's cells.
+/// Triangles of cells of a block.
 ///
+/// cells           cells_with_data()
 /// bits            dual_grid_inside(); v: corners_inside() of these
 /// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
-ISO_INLINE uint count_triangles(const BlockGrid *grid, BlockCoords b, const ulong *bits,
-                                const ulong *v, global const uchar *cell_triangles) {
-  const ulong changing = changing_cells(bits) & domain_of_block(grid, b, 1, 1, 1);
+ISO_INLINE uint count_triangles(ulong cells, const ulong *bits, const ulong *v,
+                                global const uchar *cell_triangles) {
+  const ulong changing = changing_cells(bits) & cells;
   uint triangles = 0;
   for (uint cell = 0; cell < 64; ++cell) {
     if ((changing >> cell & 1) != 0)
@@ -34,12 +35,11 @@ ISO_INLINE uint count_triangles(const BlockGrid *grid, BlockCoords b, const ulon
   return triangles;
 }
 
-/// cell_signs() of cell (x,y,z) of block b, by a work-item for itself; 0 of one that there is not.
-/// bits: dual_grid_inside().
-ISO_INLINE uint signs_of_cell(const BlockGrid *grid, BlockCoords b, local const ulong *bits, uint x,
-                              uint y, uint z) {
+/// cell_signs() of cell (x,y,z) of a block, by a work-item for itself; 0 of one that is not among
+/// `cells`, cells_with_data(). bits: dual_grid_inside().
+ISO_INLINE uint signs_of_cell(ulong cells, local const ulong *bits, uint x, uint y, uint z) {
   uint signs = 0;
-  if ((domain_of_block(grid, b, 1, 1, 1) >> (x + 4 * y + 16 * z) & 1) == 0) return 0;
+  if ((cells >> (x + 4 * y + 16 * z) & 1) == 0) return 0;
   for (uint corner = 0; corner < 8; ++corner) {
     const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
     const ulong of_block = bits[(cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2)];

@@ -18,6 +18,7 @@
 
 #include "block_grid.h"
 #include "grid_dda.h"
+#include "no_data.h"
 #include "solver.h"
 
 ISO_NAMESPACE_BEGIN
@@ -95,12 +96,14 @@ ISO_INLINE PreciseCubic precise_segment_cubic(const float *w, CellPoint a, CellP
   return c;
 }
 
-/// 1 if the corners [8] are not all on one side: only then can `inside` change in the cell.
+/// 1 if the corners [8] are not all on one side, and all have data: only then can `inside` change
+/// in the cell.
 ISO_INLINE int corners_differ(const float *w) {
   const int in = w[0] >= 0.0f;
-  return (w[1] >= 0.0f) != in || (w[2] >= 0.0f) != in || (w[3] >= 0.0f) != in ||
-         (w[4] >= 0.0f) != in || (w[5] >= 0.0f) != in || (w[6] >= 0.0f) != in ||
-         (w[7] >= 0.0f) != in;
+  const int differ = (w[1] >= 0.0f) != in || (w[2] >= 0.0f) != in || (w[3] >= 0.0f) != in ||
+                     (w[4] >= 0.0f) != in || (w[5] >= 0.0f) != in || (w[6] >= 0.0f) != in ||
+                     (w[7] >= 0.0f) != in;
+  return ISO_NO_DATA ? differ && !lacks_data(w) : differ;
 }
 
 /// A change of inside in a cell, not yet refined.

@@ -13,6 +13,7 @@
 #define ISOWAVE_MARCHING_CUBES_H
 
 #include "block_cells.h"
+#include "no_data.h"
 #include "smooth_gradient.h"
 
 ISO_NAMESPACE_BEGIN
@@ -110,6 +111,15 @@ ISO_INLINE float edge_crossing(float lower, float upper, float isovalue) {
 /// voxel; last_plane: of the domain.
 ISO_INLINE float voxel_derivative(float below, float above, int place, int last_plane) {
   return (above - below) * (place == 0 || place == last_plane ? 1.0f : 0.5f);
+}
+
+/// The difference at a voxel along an axis: voxel_derivative(); beside a voxel without data it is
+/// one-sided, between two such voxels 0.
+ISO_INLINE float derivative_with_data(float below, float at, float above, int place,
+                                      int last_plane) {
+  if (ISO_NO_DATA && is_no_data(below)) return is_no_data(above) ? 0.0f : above - at;
+  if (ISO_NO_DATA && is_no_data(above)) return at - below;
+  return voxel_derivative(below, above, place, last_plane);
 }
 
 /// The gradient at a vertex from those of its edge's voxels: the one of smooth_gradient.h.

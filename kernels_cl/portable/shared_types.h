@@ -77,6 +77,14 @@ inline uint popcount(uint x) {
 #endif
 #endif
 
+#ifndef ISO_NO_DATA /* by -D, of devices that draw such volumes: ocl::Device::draw_no_data() */
+#ifdef __OPENCL_C_VERSION__
+#define ISO_NO_DATA 0 /* no voxel is NaN */
+#else
+#define ISO_NO_DATA 1
+#endif
+#endif
+
 #ifndef ISO_LEVELS /* by -D */
 #define ISO_LEVELS \
   0 /* 1: frames are drawn in bands of several levels of detail (core/view/detail.hpp) */
@@ -230,8 +238,10 @@ typedef struct StreamLayout {
   float value_offset, bound_unit;
   uint bounds_begin;
   uint bounds_by_place;  ///< not 0: of its block's bound, a voxel has bound_share() of its place
+  uint no_data_begin;    ///< word of the index that the table of no_data.h begins with;
+                         ///< ISO_INVALID_ID: all voxels have data. Only read where ISO_NO_DATA is 1
 } StreamLayout;
-ISO_CHECK_SIZE(StreamLayout, 32);
+ISO_CHECK_SIZE(StreamLayout, 36);
 
 #define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
 #define ISO_REVERSIBLE (-1075)  ///< the same of a reversible stream: other blocks (zfp_codec.h)

@@ -6,8 +6,9 @@
 /// four voxels alone. Of 4^3 voxels around the cell it needs 32: those beyond the cell along one
 /// axis. Along each axis they lie in at most two blocks.
 ///
-/// At the domain's border a difference is one-sided. Where all differences vanish, as in a sheet
-/// one voxel thick, there is no smooth gradient, and the cell's own stays.
+/// At the domain's border, and beside a voxel without data, a difference is one-sided. Where all
+/// differences vanish, as in a sheet one voxel thick, there is no smooth gradient, and the cell's
+/// own stays.
 #ifndef ISOWAVE_SMOOTH_GRADIENT_H
 #define ISOWAVE_SMOOTH_GRADIENT_H
 
@@ -85,7 +86,7 @@ ISO_INLINE uint stencil_blocks(const Stencil *s) {
 
 /// The derivative along one axis at a position in the cell.
 ///
-/// corners [8]  the cell's voxels, corner x + 2y + 4z
+/// corners [8]  the cell's voxels, corner x + 2y + 4z; all have data
 /// beyond [8]   the voxel beyond each of these along the axis, away from the cell
 /// step         1, 2 or 4: from corner to corner along the axis
 ISO_INLINE float smooth_derivative(const float *corners, const float *beyond, uint step,
@@ -96,6 +97,7 @@ ISO_INLINE float smooth_derivative(const float *corners, const float *beyond, ui
   for (i = 0; i < 8u; ++i) {
     d[i] = (i & step) == 0u ? (corners[i + step] - beyond[i]) * axis.low
                             : (beyond[i] - corners[i - step]) * axis.high;
+    if (ISO_NO_DATA && is_no_data(beyond[i])) d[i] = corners[i | step] - corners[i & ~step];
   }
   return without_zero_sign(lerp(at.z, lerp(at.y, lerp(at.x, d[0], d[1]), lerp(at.x, d[2], d[3])),
                                 lerp(at.y, lerp(at.x, d[4], d[5]), lerp(at.x, d[6], d[7]))));

@@ -122,6 +122,7 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
                            .measure_error = !options.no_verify,
                            .levels = options.compression.levels,
                            .input = options.input};
+  compress.input.no_data = options.compression.no_data;
   Team *team = MpiJob::team();
   const CompressedVolume volume = team != nullptr
                                       ? convert_together(options, overrides, compress, *team)

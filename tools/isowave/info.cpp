@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <system_error>
 
@@ -29,6 +30,7 @@ using nlohmann::ordered_json;
 struct InfoArgs {
   std::string input;
   VolumeOptions volume;
+  std::optional<double> no_data;
   bool json = false, no_scan = false;
 };
 
@@ -81,6 +83,7 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
   }
   result["rate"] = volume.rate();
   if (std::isfinite(volume.value_range[0])) result["value_range"] = volume.value_range;
+  if (!volume.no_data.empty()) result["no_data_voxels"] = volume.no_data.num_voxels();
   if (volume.max_voxel_error) result["max_voxel_error"] = *volume.max_voxel_error;
   for (const CompressedVolume &level : volume.coarser_levels) {
     result["coarser"].push_back({level.info.dims.x, level.info.dims.y, level.info.dims.z});
@@ -99,22 +102,28 @@ void read(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::
 
 /// Reads all voxels, a few layers at a time, as what holds them.
 template <class Value>
-void add_value_range(VolumeReader &reader, ordered_json &result) {
+void add_value_range(VolumeReader &reader, const std::optional<double> &no_data,
+                     ordered_json &result) {
   const glm::uvec3 dims = reader.info().dims;
   const std::uint64_t layer_size = std::uint64_t(dims.x) * dims.y;
   const auto chunk = std::uint32_t(std::clamp<std::uint64_t>((1u << 22) / layer_size, 1, dims.z));
   const Progress progress = make_progress_bar("reading");
   const auto memory = std::make_unique_for_overwrite<Value[]>(
       layer_size * chunk);  // a file may have fewer than it claims
-  std::uint64_t bad_count = 0;
+  const auto no_data_value = static_cast<Value>(no_data.value_or(0));
+  std::uint64_t no_data_count = 0, infinite_count = 0;
   Value min = std::numeric_limits<Value>::infinity(), max = -min;
   for (std::uint32_t z = 0; z < dims.z; z += chunk) {
     const std::uint32_t layers = std::min(chunk, dims.z - z);
     const std::span voxels(memory.get(), layer_size * layers);
     read(reader, z, layers, voxels);
     for (const Value value : voxels) {
-      if (!std::isfinite(value)) {
-        ++bad_count;
+      if (std::isnan(value) || (no_data && value == no_data_value)) {
+        ++no_data_count;
+        continue;
+      }
+      if (std::isinf(value)) {
+        ++infinite_count;
         continue;
       }
       min = std::min(min, value);
@@ -123,7 +132,8 @@ void add_value_range(VolumeReader &reader, ordered_json &result) {
     if (progress) progress(z + layers, dims.z);
   }
   if (min <= max) result["value_range"] = {min, max};
-  if (bad_count > 0) result["nan_or_inf"] = bad_count;
+  if (no_data_count > 0) result["no_data_voxels"] = no_data_count;
+  if (infinite_count > 0) result["infinite_voxels"] = infinite_count;
 }
 
 std::string to_text(const ordered_json &value) {
@@ -147,15 +157,17 @@ void run(const InfoArgs &options) {
   if (std::filesystem::is_regular_file(options.input, failure))
     result["file_bytes"] = std::filesystem::file_size(options.input, failure);
   if (is_zfp_name(options.input)) {
+    if (options.no_data)
+      throw Error("--no-data: {} is compressed already: leave out the option", options.input);
     result.update(describe_zfp(options.input, overrides, options.no_scan));
   } else {
     const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);
     result["format"] = "voxels";
     result.update(describe_grid(reader->info()));
     if (!options.no_scan && fits_float32(reader->info().type))
-      add_value_range<float>(*reader, result);
+      add_value_range<float>(*reader, options.no_data, result);
     if (!options.no_scan && !fits_float32(reader->info().type))
-      add_value_range<double>(*reader, result);
+      add_value_range<double>(*reader, options.no_data, result);
   }
   if (options.json) {
     fmt::print("{}", json_text(result));
@@ -176,6 +188,7 @@ void add_info(CLI::App &app) {
       "look at the header only: no value range, no checksum of the data, no check of what "
       "a .zfp file says of its voxels");
   add_volume_options(*command, options->volume);
+  add_no_data_option(*command, options->no_data);
   command->callback([options] { run(*options); });
 }
 

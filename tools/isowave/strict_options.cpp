@@ -119,6 +119,17 @@ CLI::Validator fits_float32() {
       "");
 }
 
+CLI::Validator any_number() {
+  return CLI::Validator(
+      [](std::string &value) -> std::string {
+        std::string name = lower_case(value);
+        if (name.starts_with('-') || name.starts_with('+')) name.erase(0, 1);
+        if (parse_finite(value) || name == "nan" || name == "inf") return {};
+        return fmt::format("'{}' is no number that float64 holds, nor nan, inf or -inf", value);
+      },
+      "");
+}
+
 CLI::Validator byte_count() {
   return CLI::Validator(
       [](std::string &value) -> std::string {

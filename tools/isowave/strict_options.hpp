@@ -28,6 +28,8 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text);
 
 /// A validator: a number that float32 can hold without becoming infinite.
 CLI::Validator fits_float32();
+/// A number that float64 holds, or nan, inf, -inf; for an option of type_name("NUMBER").
+CLI::Validator any_number();
 /// A transformer: a number of bytes above 0, such as 600MB (1000^2) or 1GiB (1024^3), to digits.
 CLI::Validator byte_count();
 /// A transformer: a whole number above 0, or "all" to 0.

@@ -50,6 +50,15 @@ RawOverrides to_overrides(const VolumeOptions &options) {
   return overrides;
 }
 
+CLI::Option *add_no_data_option(CLI::App &command, std::optional<double> &no_data) {
+  return command
+      .add_option("--no-data", no_data,
+                  "voxels of this value have no data, as NaN voxels have none: no surface touches "
+                  "them. Compared in the volume's own type, after scaling; may be inf or -inf")
+      ->check(any_number())
+      ->type_name("NUMBER");
+}
+
 void add_compression_options(CLI::App &command, CompressionOptions &options) {
   CLI::Option *rate =
       command.add_option("--rate", options.rate,
@@ -71,10 +80,11 @@ void add_compression_options(CLI::App &command, CompressionOptions &options) {
                             ->transform(count_or_all())
                             ->type_name("N|all")
                             ->capture_default_str();
+  CLI::Option *no_data = add_no_data_option(command, options.no_data);
   tolerance->excludes(rate, relative, exact);
   relative->excludes(rate, exact);
   exact->excludes(rate);
-  options.options = {rate, tolerance, relative, exact, levels};
+  options.options = {rate, tolerance, relative, exact, no_data, levels};
 }
 
 void refuse_compression(const CompressionOptions &options, const std::string &path) {
@@ -100,6 +110,7 @@ Storage to_storage(const CompressionOptions &options) {
   storage.exact = options.exact;
   storage.levels = options.levels;
   storage.measure_error = options.measure_error;
+  storage.no_data = options.no_data;
   storage.progress = make_progress_bar;
   return storage;
 }

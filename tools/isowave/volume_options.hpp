@@ -38,12 +38,15 @@ struct CompressionOptions {
   bool exact = false;
   std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
   bool measure_error = false;                  ///< at a fixed rate, too
+  std::optional<double> no_data{};             ///< see InputOptions
   std::vector<const CLI::Option *> options{};  ///< those on the command line that say all this
 };
 
-/// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given, and
-/// --levels.
+/// Adds --rate, --tolerance, --tolerance-relative and --exact, of which one may be given, --levels
+/// and --no-data.
 void add_compression_options(CLI::App &command, CompressionOptions &options);
+/// Adds --no-data.
+CLI::Option *add_no_data_option(CLI::App &command, std::optional<double> &no_data);
 /// Throws Error where an option of how to compress was given for volumes that are compressed
 /// already.
 void refuse_compression(const CompressionOptions &options, const std::string &path);

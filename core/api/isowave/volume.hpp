@@ -57,8 +57,11 @@ struct Compression {
   bool exact = false;          ///< as by default, but voxels that float32 does not hold are refused
   bool measure_error = false;  ///< for Volume::max_voxel_error() also at a rate: decodes all
   std::uint32_t levels = 1;    ///< of detail, the volume itself among them; 0: all it can have
-  std::optional<float> map_nan{};  ///< what replaces NaN and infinities; refused without
-  std::uint32_t num_threads = 0;   ///< 0: one per processor. The result is the same for any number
+  std::optional<float> map_nan{};  ///< what replaces NaN and infinite voxels
+  /// Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
+  /// compared in the volume's own type. Infinite voxels are refused without one of these two.
+  std::optional<double> no_data{};
+  std::uint32_t num_threads = 0;  ///< 0: one per processor. The result is the same for any number
   /// Called from the calling thread: what is done, and how much of it, 0 to 1.
   std::function<void(std::string_view what, double done)> progress{};
 };
@@ -137,7 +140,7 @@ std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
 /// Compresses voxels in memory.
 ///
 /// voxels  [nz][ny][nx] of `type`, x fastest; not needed afterwards
-/// Throws  Error: a bad grid, NaN without map_nan, a tolerance that cannot be kept
+/// Throws  Error: a bad grid, infinite voxels, a tolerance that cannot be kept
 std::shared_ptr<const Volume> compress(const void *voxels, VoxelType type, const Grid &grid,
                                        const Compression &compression = {});
 
