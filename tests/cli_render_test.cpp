@@ -112,9 +112,9 @@ TEST(CliRender, StreamOnTheHost) {
 
 TEST(CliRender, WritesPictureDepthStatisticsAndProgress) {
   const TemporaryFolder folder;
-  const auto run = render(kHead + " --isovalue 80 --size 64x48 -o " + quoted(folder / "a.png") +
-                          " --depth " + quoted(folder / "a.npy") + " --stats " +
-                          quoted(folder / "a.json") + " --progress-dir " +
+  const auto run = render(kHead + " --isovalue 80 --rate 8 --size 64x48 -o " +
+                          quoted(folder / "a.png") + " --depth " + quoted(folder / "a.npy") +
+                          " --stats " + quoted(folder / "a.json") + " --progress-dir " +
                           quoted(folder / "passes") + " --max-speculation 2 --pipeline blocks");
   EXPECT_NE(run.out.find("device "), std::string::npos) << run.out;
   EXPECT_NE(run.out.find("isovalue 80, view 0"), std::string::npos) << run.out;
