@@ -27,8 +27,6 @@ _LEAST_DETERMINANT = 1e-6
 """Of a direction matrix that can be inverted, as in core/volume."""
 _UNIT_TOLERANCE = 1e-3
 """How far the length of a given direction's columns may be from 1: they come rounded."""
-_MOST_COSINE = 1e-4
-"""Between two axes of an affine that has no shear, as in core/io's NIfTI reader."""
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -119,6 +117,17 @@ def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def of_steps(steps: Vector, origin: Vector) -> Placement:
+    """Returns the placement of a grid along the world's axes; a negative step is a direction of -1,
+    so that every voxel stays where the steps put it."""
+    x, y, z = (-1.0 if step < 0 else 1.0 for step in steps)
+    return Placement(
+        (abs(steps[0]), abs(steps[1]), abs(steps[2])),
+        origin,
+        ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)),
+    )
+
+
 def moved(placement: Placement, index: Vector) -> Vector:
     """Returns the world position (x, y, z) of an index (x, y, z)."""
     spacing = placement.spacing
@@ -134,8 +143,7 @@ def moved(placement: Placement, index: Vector) -> Vector:
 def placement_of_affine(rows: Matrix, origin: Vector, what: str) -> Placement:
     """Splits an affine transform of indices (x, y, z) into spacing, origin and direction.
 
-    Raises ArrayValueError where an axis has no length or two axes are not at right angles: a
-    direction has columns of length 1, and no known writer means shear.
+    Its axes need not be at right angles. Raises ArrayValueError if an axis has no length.
     """
     units: list[Vector] = []
     lengths: list[float] = []
@@ -148,13 +156,6 @@ def placement_of_affine(rows: Matrix, origin: Vector, what: str) -> Placement:
             raise bad_value(what, f"the affine's column of axis {axis} has length {length}")
         units.append(unit)
         lengths.append(length)
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        if not abs(dot(units[a], units[b])) <= _MOST_COSINE:
-            raise bad_value(
-                what,
-                f"the affine has shear (axes {'xyz'[a]} and {'xyz'[b]} are not at right angles): "
-                "resample the image first",
-            )
     return Placement(
         (lengths[0], lengths[1], lengths[2]), origin, columns((units[0], units[1], units[2]))
     )
