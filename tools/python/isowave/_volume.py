@@ -6,6 +6,7 @@ import html
 import os
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -26,8 +27,10 @@ from isowave._renderer import (
     cast_rays,
     draw,
     needed_options,
+    positions_of,
     request_for,
     size_of,
+    warn_of_isovalue,
 )
 
 #: Called with what is done ("compressing") and how much of it, 0 to 1.
@@ -88,9 +91,9 @@ def compression_options(
 ) -> dict[str, Any]:
     return {
         "tolerance": None if tolerance is None else number("tolerance", tolerance),
-        "relative_tolerance": None
-        if relative_tolerance is None
-        else number("relative_tolerance", relative_tolerance),
+        "relative_tolerance": (
+            None if relative_tolerance is None else number("relative_tolerance", relative_tolerance)
+        ),
         "rate": None if rate is None else whole("rate", rate),
         "exact": flag("exact", exact),
         "levels": whole("levels", levels),
@@ -271,19 +274,20 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
         options["measure_error"] = False
     shown = make_progress(progress)
     try:
-        return Volume(
-            _core.open(
-                path,
-                options,
-                None if shape is None else dims_of(shape),
-                None if dtype is None else np.dtype(dtype).name,
-                None if spacing is None else reversed_axes(spacing),
-                shown,
-            )
+        volume = _core.open(
+            path,
+            options,
+            None if shape is None else dims_of(shape),
+            None if dtype is None else np.dtype(dtype).name,
+            None if spacing is None else reversed_axes(spacing),
+            shown,
         )
     finally:
         if isinstance(shown, TqdmProgress):
             shown.close()
+    for notice in volume.notices:
+        warnings.warn(notice, RuntimeWarning, stacklevel=2)
+    return Volume(volume)
 
 
 class Volume(Placed[_core.Volume]):
@@ -535,7 +539,8 @@ class Volume(Placed[_core.Volume]):
             else:
                 renderer = self._renderer_for({"device": device, "rays": True})
                 return renderer.cast_rays(rays, isovalue, normals=normals)
-        return cast_rays(host, rays, isovalue, normals)
+        warn_of_isovalue(self._core, number("isovalue", isovalue))
+        return cast_rays(host, self._core, rays, isovalue, normals)
 
     def _fits_host(self) -> bool:
         try:
@@ -550,6 +555,7 @@ class Volume(Placed[_core.Volume]):
         *,
         level: int = 0,
         normals: bool = True,
+        vertices: str = "apart",
         device: str | int | None = None,
         memory_budget: int | None = None,
         progress: Progress | None = None,
@@ -566,6 +572,10 @@ class Volume(Placed[_core.Volume]):
             Of detail; each has half the voxels of the last along each axis.
         normals
             Of vertices: central differences of voxels. Without, fewer blocks are decoded.
+        vertices
+            "apart": at least 1/1024 of an edge from its voxels, so that no triangle is without
+            area, and programs that merge vertices by position find the mesh closed. "exact": where
+            the isovalue is crossed; on a voxel that equals it, vertices meet.
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
         memory_budget
@@ -573,15 +583,20 @@ class Volume(Placed[_core.Volume]):
         progress
             Called with what is done and how much of it, 0 to 1.
         """
+        if vertices not in ("apart", "exact"):
+            raise ValueError(f"vertices={vertices!r:.60}: there are apart and exact")
+        warn_of_isovalue(self._core, number("isovalue", isovalue))
         found = self._core.extract(
             "" if device is None else str(device),
             number("isovalue", isovalue),
             self._checked(level),
             flag("normals", normals),
+            vertices == "exact",
             0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
             function("progress", progress),
         )
-        return Mesh(found["vertices"], found["faces"], found["normals"] if normals else None)
+        places = positions_of(self._core, found["vertices"])
+        return Mesh(places, found["faces"], found["normals"] if normals else None)
 
     def verify(
         self,
