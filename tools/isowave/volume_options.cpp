@@ -146,7 +146,8 @@ CompressedVolume load_brick(const std::string &path, const RawOverrides &overrid
 
 void warn_of_header(const std::string &path, const RawOverrides &overrides) {
   if (path.starts_with(kGenerate)) return;
-  for (const std::string &notice : open_volume(path, overrides)->notices()) warn(notice);
+  const std::unique_ptr<VolumeReader> reader = open_volume(path, overrides);
+  for (const std::string &notice : reader->notices()) warn(notice);
 }
 
 void warn_of_isovalue(const CompressedVolume &volume, float isovalue) {
