@@ -183,10 +183,11 @@ BlockMesh extract_scalar(const glm::uvec3 &dims, std::span<const float> voxels, 
   return MeshTwin(dims, voxels, isovalue).run();
 }
 
-Mesh extract_scalar(const CompressedVolume &volume, float isovalue, bool with_normals) {
+Mesh extract_scalar(const CompressedVolume &volume, float isovalue, bool with_normals,
+                    VertexPlaces places) {
   const std::vector<float> voxels = decode_with_libzfp(volume);
   const BlockMesh blocks = extract_scalar(volume.info.dims, voxels, isovalue);
-  const MeshPlacement placement(volume.info);
+  const MeshPlacement placement(volume.info, places);
   Mesh mesh;
   for (std::size_t i = 0; i < blocks.vertices.size(); ++i) {
     mesh.vertices.push_back(placement.position(blocks.blocks[i], blocks.vertices[i]));

@@ -25,6 +25,7 @@ struct BlockMesh {
 BlockMesh extract_scalar(const glm::uvec3 &dims, std::span<const float> voxels, float isovalue);
 
 /// The mesh, bit for bit, that an extractor gives of a volume, or a level of detail.
-Mesh extract_scalar(const CompressedVolume &volume, float isovalue, bool with_normals = true);
+Mesh extract_scalar(const CompressedVolume &volume, float isovalue, bool with_normals = true,
+                    VertexPlaces places = VertexPlaces::kApart);
 
 }  // namespace isowave::core

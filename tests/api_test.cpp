@@ -248,7 +248,7 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
       const double spacing = volume->grid().spacing[axis];
       const double world =
           volume->grid().origin[axis] + spacing * (double{hit.position[axis]} + hit.cell[axis]);
-      EXPECT_FLOAT_EQ(frame.positions[i][axis], static_cast<float>(world));
+      EXPECT_FLOAT_EQ(static_cast<float>(frame.positions[i][axis]), static_cast<float>(world));
       outwards[axis] = (world - centre[axis]) / (spacing * spacing);
       norm += outwards[axis] * outwards[axis];
       cosine += outwards[axis] * double{normal[axis]};

@@ -75,7 +75,8 @@ TEST_F(CliExtract, TheNameIsMadeUp) {
                   quoted(kFuel) + " -i 300");
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("0 vertices, 0 triangles"));
-  EXPECT_THAT(result.out, HasSubstr("isovalue 300 is outside the volume's values, 0 to 255\n"));
+  EXPECT_THAT(result.err,
+              HasSubstr("warning: isovalue 300 is outside the volume's values, 0 to 255"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "fuel_64x33x32_uint8_iso300.ply"));
 }
 

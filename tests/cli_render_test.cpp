@@ -435,8 +435,10 @@ TEST(CliRender, NothingHitIsABackgroundPicture) {
   const TemporaryFolder folder;
   const std::string said =
       render(kGyroid + " -i 1e9 --size 16x8 --background '#102030' -o " + quoted(folder / "a.png"))
-          .out;
-  EXPECT_NE(said.find("is outside the volume's values, 0 to 255\n"), std::string::npos) << said;
+          .err;
+  EXPECT_NE(said.find("warning: isovalue 1000000000 is outside the volume's values, 0 to 255: "),
+            std::string::npos)
+      << said;
   const Image8 picture = read_png(folder / "a.png");
   for (std::size_t i = 0; i < picture.pixels.size(); ++i)
     ASSERT_EQ(picture.pixels[i], 0x10 * (i % picture.channels + 1));

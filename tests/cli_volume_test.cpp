@@ -47,6 +47,26 @@ TEST(Cli, ConvertAndInfo) {
   EXPECT_NE(text.out.find("value_range     0.0 228.0"), std::string::npos) << text.out;
 }
 
+TEST(Cli, WhatWasDoneToAHeaderIsOneLine) {
+  const TemporaryFolder folder;
+  const std::string volume = quoted(folder / "a.nrrd");
+  write_file(folder / "a.nrrd",
+             "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 3 4 5\nencoding: raw\nspacings: 2 2 2\n"
+             "units: \"um\" \"um\" \"um\"\n\n" +
+                 std::string(60, 'x'));
+  const std::string zfp = " --exact -o " + quoted(folder / "a.zfp");
+  for (const std::string &command : {"info " + volume, "convert " + volume + zfp}) {
+    const auto result = run_isowave(command);
+    EXPECT_EQ(result.status, 0) << command;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_NE(result.err.find("isowave: warning: "), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("converted to millimetres; units: um"), std::string::npos)
+        << result.err;
+  }
+  const auto info = nlohmann::json::parse(run_isowave("info --json " + volume).out);
+  EXPECT_EQ(info["spacing"], (std::array{0.002, 0.002, 0.002}));
+}
+
 TEST(Cli, ConvertWithinAnError) {
   const TemporaryFolder folder;
   const std::string zfp = quoted(folder / "n.zfp");

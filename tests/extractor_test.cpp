@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -123,16 +125,64 @@ TEST_P(ExtractorOnDevice, ASphereIsClosedAndLooksOutwards) {
   // Euler's formula for a sphere; each triangle has three halves of edges.
   EXPECT_EQ(2 * mesh.vertices.size(), mesh.triangles.size() + 4);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    const glm::vec3 outwards = glm::normalize(mesh.vertices[i] - middle);
+    const glm::vec3 outwards = glm::normalize(glm::vec3(mesh.vertices[i]) - middle);
     // Linear interpolation of a distance that bends by 1 / r over a voxel: at most 1 / 8 r off;
     // compression at 16 bits a voxel is finer.
-    EXPECT_NEAR(glm::distance(mesh.vertices[i], middle), 0.4f * 33, 0.02f);
+    EXPECT_NEAR(glm::distance(glm::vec3(mesh.vertices[i]), middle), 0.4f * 33, 0.02f);
     EXPECT_GT(glm::dot(mesh.normals[i], outwards), 0.99f);
   }
   for (const Triangle &t : mesh.triangles) {
     const glm::vec3 a = mesh.vertices[t[0]], b = mesh.vertices[t[1]], c = mesh.vertices[t[2]];
-    EXPECT_GE(glm::dot(glm::cross(b - a, c - a), a - middle), 0.0f);
+    EXPECT_GT(glm::dot(glm::cross(b - a, c - a), a - middle), 0.0f);
   }
+}
+
+/// Integers, of which many equal the isovalue: vertices meet on these voxels, unless they are kept
+/// apart.
+TEST_P(ExtractorOnDevice, SmallTiesLeaveNoTriangleWithoutArea) {
+  const glm::uvec3 dims(13, 14, 11);
+  std::vector<float> voxels = random_voxels(dims, 0, 4, 7);
+  for (float &voxel : voxels) voxel = std::floor(voxel);
+  const CompressedVolume volume = compress_with_libzfp(voxels, dims, 2048);
+  std::size_t num_flat[2] = {0, 0}, num_places[2] = {0, 0};
+  Mesh meshes[2];
+  for (const VertexPlaces places : {VertexPlaces::kApart, VertexPlaces::kExact}) {
+    const std::size_t i = places == VertexPlaces::kApart ? 0 : 1;
+    meshes[i] = extract(volume, 2, {.vertices = places});
+    expect_same_mesh(meshes[i], extract_scalar(volume, 2, true, places));
+    expect_closed(meshes[i], dims);
+    std::vector<std::array<double, 3>> vertices;
+    for (const glm::dvec3 &v : meshes[i].vertices) vertices.push_back({v.x, v.y, v.z});
+    std::ranges::sort(vertices);
+    num_places[i] = vertices.size() - std::ranges::unique(vertices).size();
+    for (const Triangle &t : meshes[i].triangles) {
+      const glm::dvec3 a = meshes[i].vertices[t[0]];
+      const glm::dvec3 side = meshes[i].vertices[t[1]] - a, other = meshes[i].vertices[t[2]] - a;
+      if (glm::length(glm::cross(side, other)) == 0) ++num_flat[i];
+    }
+  }
+  EXPECT_EQ(num_flat[0], 0u);
+  EXPECT_EQ(num_places[0], meshes[0].vertices.size()) << "no two vertices meet";
+  EXPECT_GT(num_flat[1], 1000u);
+  EXPECT_LT(num_places[1], meshes[1].vertices.size() * 3 / 4);
+  for (std::size_t i = 0; i < meshes[0].vertices.size(); ++i)
+    EXPECT_LE(glm::distance(meshes[0].vertices[i], meshes[1].vertices[i]), kLeastGap);
+}
+
+/// At the coordinates of maps, float32 would have a few distinct places.
+TEST_P(ExtractorOnDevice, SmallMeshFarFromTheOriginLosesNothing) {
+  CompressedVolume volume = noise_volume({7, 6, 8}, 4);
+  volume.info.spacing = glm::dvec3(0.125);
+  const Mesh near_mesh = extract(volume, 0.1f);
+  volume.info.origin = {4500000, 6700000, 120};
+  const Mesh far_mesh = extract(volume, 0.1f);
+  ASSERT_EQ(far_mesh.vertices.size(), near_mesh.vertices.size());
+  for (std::size_t i = 0; i < near_mesh.vertices.size(); ++i) {
+    const glm::dvec3 v = near_mesh.vertices[i];
+    EXPECT_EQ(v, rounded_to_float32(v)) << "near the origin, float32 holds positions";
+    EXPECT_LT(glm::distance(far_mesh.vertices[i] - volume.info.origin, v), 1e-7);
+  }
+  EXPECT_EQ(far_mesh.triangles, near_mesh.triangles);
 }
 
 /// Spacing, origin, and axes that are turned and mirrored.
@@ -147,7 +197,7 @@ TEST_P(ExtractorOnDevice, AMeshLiesInTheWorld) {
   for (std::size_t i = 0; i < plain.vertices.size(); ++i) {
     const glm::vec3 p = plain.vertices[i];
     const glm::vec3 expected(100 + 0.5f * p.y, -20 + 2 * p.x, 7 + 3 * p.z);
-    EXPECT_LT(glm::distance(placed.vertices[i], expected), 2e-5f);  // an ulp of 128
+    EXPECT_LT(glm::distance(glm::vec3(placed.vertices[i]), expected), 2e-5f);  // an ulp of 128
     const glm::vec3 n = plain.normals[i];
     const glm::vec3 normal = glm::normalize(glm::vec3(n.y / 0.5f, n.x / 2, n.z / 3));
     EXPECT_LT(glm::distance(placed.normals[i], normal), 1e-6f);

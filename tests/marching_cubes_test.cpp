@@ -22,7 +22,7 @@ namespace {
 Mesh unplaced(const BlockMesh &blocks, const glm::uvec3 &dims) {
   VolumeInfo info;
   info.dims = dims;
-  const MeshPlacement placement(info);
+  const MeshPlacement placement(info, VertexPlaces::kApart);
   Mesh mesh;
   for (std::size_t i = 0; i < blocks.vertices.size(); ++i)
     mesh.vertices.push_back(placement.position(blocks.blocks[i], blocks.vertices[i]));

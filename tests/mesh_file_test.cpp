@@ -23,10 +23,15 @@ using testing::HasSubstr;
 using testing::StartsWith;
 using testing::ThrowsMessage;
 
+/// Positions as a file of float32 has them.
+std::vector<glm::vec3> to_float32(const std::vector<glm::dvec3> &positions) {
+  return {positions.begin(), positions.end()};
+}
+
 /// A tetrahedron, given in two parts; the first names vertices of the second.
 Mesh tetrahedron(bool with_normals) {
   Mesh mesh;
-  mesh.vertices = {{0, 0, 0}, {1.5f, 0, 0}, {0, 2, 0}, {0.1f, 0, 3e-7f}};
+  mesh.vertices = {{0, 0, 0}, {1.5, 0, 0}, {0, 2, 0}, {double{0.1f}, 0, double{3e-7f}}};
   if (with_normals) mesh.normals = {{-1, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
   return mesh;
@@ -40,12 +45,15 @@ class MeshFiles : public testing::Test {
     MeshFile file(path);
     file.begin({mesh.vertices.size(), mesh.triangles.size(), !mesh.normals.empty()});
     const std::size_t half = mesh.vertices.size() / 2;
-    const std::span<const glm::vec3> vertices = mesh.vertices, normals = mesh.normals;
+    const std::span<const glm::dvec3> vertices = mesh.vertices;
+    const std::span<const glm::vec3> normals = mesh.normals;
     const std::span<const Triangle> triangles = mesh.triangles;
     file.add({vertices.first(half), normals.first(normals.empty() ? 0 : half), triangles});
     file.add({vertices.subspan(half), normals.subspan(normals.empty() ? 0 : half), {}});
     EXPECT_FALSE(std::filesystem::exists(path)) << "half-written";
     file.commit();
+    offset_ = file.offset();
+    notice_ = file.notice();
     return read_file(path);
   }
 
@@ -66,6 +74,8 @@ class MeshFiles : public testing::Test {
   }
 
   test::TemporaryFolder folder_;
+  glm::dvec3 offset_{0};  ///< of the file that was written last
+  std::string notice_;
 };
 
 TEST_F(MeshFiles, Ply) {
@@ -79,7 +89,7 @@ TEST_F(MeshFiles, Ply) {
     std::string_view rest = file;
     rest.remove_prefix(file.find("end_header\n") + 11);
     for (std::size_t i = 0; i < 4; ++i) {
-      EXPECT_EQ(take<glm::vec3>(rest), mesh.vertices[i]);
+      EXPECT_EQ(take<glm::vec3>(rest), glm::vec3(mesh.vertices[i]));
       if (with_normals) {
         EXPECT_EQ(take<glm::vec3>(rest), mesh.normals[i]);
       }
@@ -102,7 +112,8 @@ TEST_F(MeshFiles, Stl) {
   for (const Triangle &triangle : mesh.triangles) {
     const auto normal = take<glm::vec3>(rest);
     const auto corners = take_all<glm::vec3>(rest, 3);
-    for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(corners[i], mesh.vertices[triangle[i]]);
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_EQ(corners[i], glm::vec3(mesh.vertices[triangle[i]]));
     EXPECT_NEAR(glm::length(normal), 1, 1e-6);
     EXPECT_NEAR(glm::dot(normal, corners[1] - corners[0]), 0, 1e-6);
     EXPECT_NEAR(glm::dot(normal, corners[2] - corners[0]), 0, 1e-6);
@@ -123,7 +134,10 @@ TEST_F(MeshFiles, Obj) {
       if (kind == "v" || kind == "vn") {
         glm::vec3 v;
         words >> v.x >> v.y >> v.z;
-        (kind == "v" ? got.vertices : got.normals).push_back(v);
+        if (kind == "v")
+          got.vertices.emplace_back(v);
+        else
+          got.normals.push_back(v);
       } else if (kind == "f") {
         Triangle &triangle = got.triangles.emplace_back();
         for (std::uint32_t &vertex : triangle) {
@@ -155,7 +169,7 @@ TEST_F(MeshFiles, Vtp) {
       return rest;
     };
     std::string_view points = array_at("Name=\"Points\"", 48);
-    EXPECT_EQ(take_all<glm::vec3>(points, 4), mesh.vertices);
+    EXPECT_EQ(take_all<glm::vec3>(points, 4), to_float32(mesh.vertices));
     if (with_normals) {
       std::string_view normals = array_at("Name=\"Normals\"", 48);
       EXPECT_EQ(take_all<glm::vec3>(normals, 4), mesh.normals);
@@ -182,7 +196,8 @@ void expect_gltf(const nlohmann::json &document, std::string_view data, const Me
     return bytes == std::string_view(reinterpret_cast<const char *>(values.data()),
                                      values.size() * sizeof(values[0]));
   };
-  EXPECT_TRUE(holds(bytes_of(primitive["attributes"]["POSITION"], 4), mesh.vertices));
+  EXPECT_TRUE(holds(bytes_of(primitive["attributes"]["POSITION"], 4), to_float32(mesh.vertices)));
+  EXPECT_FALSE(document["nodes"][0].contains("translation"));
   EXPECT_EQ(primitive["attributes"].contains("NORMAL"), !mesh.normals.empty());
   if (!mesh.normals.empty()) {
     EXPECT_TRUE(holds(bytes_of(primitive["attributes"]["NORMAL"], 4), mesh.normals));
@@ -223,6 +238,70 @@ TEST_F(MeshFiles, Gltf) {
     for (const int shift : {16, 8, 0}) data += static_cast<char>(bits >> shift & 255);
   }
   expect_gltf(document, data, tetrahedron(true));
+}
+
+/// As the coordinates of maps: float32 has steps of 1/2 there, the mesh has sides of 1.
+Mesh far_mesh() {
+  Mesh mesh = tetrahedron(false);
+  for (glm::dvec3 &vertex : mesh.vertices) vertex += glm::dvec3(4500000.3, 6700000.7, 120.45);
+  return mesh;
+}
+
+TEST_F(MeshFiles, FarFromTheOriginPositionsKeepTheirBits) {
+  const Mesh mesh = far_mesh();
+  const std::string ply = write("a.ply", mesh);
+  EXPECT_THAT(ply, HasSubstr("property double x\nproperty double y\nproperty double z\n"));
+  std::string_view rest = ply;
+  rest.remove_prefix(ply.find("end_header\n") + 11);
+  EXPECT_EQ(take_all<glm::dvec3>(rest, 4), mesh.vertices);
+  EXPECT_EQ(rest.size(), 4 * 13u);
+
+  std::istringstream obj(write("a.obj", mesh));
+  std::vector<glm::dvec3> of_obj;
+  for (std::string line; std::getline(obj, line);) {
+    std::istringstream words(line);
+    glm::dvec3 v;
+    if (words.get() == 'v' && words >> v.x >> v.y >> v.z) of_obj.push_back(v);
+  }
+  EXPECT_EQ(of_obj, mesh.vertices);
+
+  const std::string vtp = write("a.vtp", mesh);
+  EXPECT_THAT(vtp, HasSubstr("<DataArray type=\"Float64\" Name=\"Points\""));
+  rest = vtp;
+  rest.remove_prefix(vtp.find("encoding=\"raw\">\n_") + 17);
+  EXPECT_EQ(take<std::uint64_t>(rest), 96u);
+  EXPECT_EQ(take_all<glm::dvec3>(rest, 4), mesh.vertices);
+  EXPECT_EQ(take<std::uint64_t>(rest), 48u) << "connectivity";
+  EXPECT_EQ(offset_, glm::dvec3(0));
+  EXPECT_EQ(notice_, "");
+}
+
+TEST_F(MeshFiles, FarFromTheOriginFormatsOfFloat32HaveAnOffset) {
+  const Mesh mesh = far_mesh();
+  const std::string stl = write("a.stl", mesh);
+  EXPECT_EQ(offset_, glm::dvec3(4500001, 6700002, 120));
+  EXPECT_STREQ(stl.substr(0, 80).c_str(), "isowave STL, add 4500001 6700002 120 to x y z");
+  EXPECT_THAT(notice_, HasSubstr("add 4500001 6700002 120 to x y z"));
+  std::string_view rest = stl;
+  rest.remove_prefix(84);
+  for (const Triangle &triangle : mesh.triangles) {
+    take<glm::vec3>(rest);
+    const auto corners = take_all<glm::vec3>(rest, 3);
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_EQ(corners[i], glm::vec3(mesh.vertices[triangle[i]] - offset_));
+    take<std::uint16_t>(rest);
+  }
+  for (const char *name : {"a.gltf", "a.glb"}) {
+    const std::string file = write(name, mesh);
+    const std::size_t begin = file.find('{');
+    const auto document = nlohmann::json::parse(
+        name == std::string("a.gltf")
+            ? file
+            : file.substr(begin, file.rfind('}', file.find("BIN")) + 1 - begin));
+    EXPECT_EQ(document["nodes"][0]["translation"], (nlohmann::json{4500001.0, 6700002.0, 120.0}));
+    EXPECT_EQ(document["accessors"][0]["max"][0], glm::vec3(mesh.vertices[1] - offset_).x) << name;
+    EXPECT_EQ(notice_, "") << "readers of glTF know of nodes";
+  }
 }
 
 TEST_F(MeshFiles, AnEmptyMeshIsAFileToo) {

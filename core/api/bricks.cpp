@@ -16,6 +16,7 @@
 #include "core/bricks/ranks.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/volume/range_thresholds.hpp"
+#include "core/zfp/isovalue_notice.hpp"
 #include "isowave/version.hpp"
 
 namespace isowave {
@@ -115,6 +116,7 @@ struct BrickRenderer::Implementation {
   std::unique_ptr<Device::Implementation> device{};
   core::VolumeInfo whole{};
   Grid grid{};
+  std::vector<std::string> notices{};
   std::optional<core::Cuts> cuts{};
   core::CompressedVolume volume{};
   std::optional<core::BrickRenderer> renderer{};
@@ -135,6 +137,7 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
     storage.measure_error |= options.with_bounds;
     overrides = to_overrides(raw);
     levels = core::read_levels(path, overrides);
+    if (!core::is_zfp_name(path)) notices = core::open_any_volume(path, overrides)->notices();
     print = core::fingerprint(path, levels.front());
     device = std::make_unique<Device::Implementation>(
         core::choose_local_device(wanted.device, processes.local_rank()), DeviceOptions{});
@@ -227,6 +230,14 @@ Camera BrickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
                                               core::gather_box(self.team, self.volume.info, own),
                                               core_size(size.value_or(self.options.largest))));
   });
+}
+
+const std::vector<std::string> &BrickRenderer::notices() const {
+  return implementation_->notices;
+}
+std::string BrickRenderer::isovalue_notice(float isovalue) const {
+  return guarded("looking at an isovalue",
+                 [&] { return core::isovalue_notice(implementation_->volume, isovalue); });
 }
 
 const Grid &BrickRenderer::grid() const {

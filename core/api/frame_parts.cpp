@@ -8,6 +8,7 @@
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
+#include "core/volume/world_positions.hpp"
 
 namespace isowave {
 
@@ -68,27 +69,26 @@ class HitCells {
 };
 
 /// Where hits are.
-class WorldPositions {
+class HitPositions {
  public:
-  WorldPositions(const core::CompressedVolume &volume, bool with_levels)
-      : cells_(volume, with_levels), infos_(core::level_infos(volume, with_levels)) {}
+  HitPositions(const core::CompressedVolume &volume, bool with_levels)
+      : cells_(volume, with_levels), to_world_(volume.info) {}
 
-  std::array<float, 3> operator()(const core::HitRecord &record) const {
+  Vector3 operator()(const core::HitRecord &record) const {
     if (std::isinf(record.t)) {
-      constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+      constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
       return {kNone, kNone, kNone};
     }
     const Hit hit = cells_(record);
-    const core::VolumeInfo &info = infos_[hit.level];
     const glm::dvec3 index = glm::dvec3(hit.cell[0], hit.cell[1], hit.cell[2]) +
                              glm::dvec3(hit.position[0], hit.position[1], hit.position[2]);
-    const glm::vec3 world(info.origin + info.index_to_world() * index);
-    return {world.x, world.y, world.z};
+    // Voxel k of a level lies where voxel 2k of the finer one does.
+    return from_glm(to_world_(std::ldexp(1.0, static_cast<int>(hit.level)) * index));
   }
 
  private:
   HitCells cells_;
-  std::vector<core::VolumeInfo> infos_;
+  core::WorldPositions to_world_;
 };
 
 /// Away from larger values, of length 1.
@@ -231,7 +231,7 @@ void fill_frame(const FrameRequest &request, const std::vector<core::HitRecord> 
   };
   if (request.want_depth) frame.depth = core::depth_of(records);
   if (request.want_normals) to_each(frame.normals, WorldNormals(volume.info));
-  if (request.want_positions) to_each(frame.positions, WorldPositions(volume, with_levels));
+  if (request.want_positions) to_each(frame.positions, HitPositions(volume, with_levels));
   if (request.want_hits) to_each(frame.hits, HitCells(volume, with_levels));
 }
 

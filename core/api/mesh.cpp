@@ -2,6 +2,7 @@
 
 #include <mutex>
 
+#include "core/api/convert.hpp"
 #include "core/api/device_implementation.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
@@ -14,6 +15,10 @@ namespace isowave {
 namespace {
 
 using core::guarded;
+
+// The two enumerations have the same values.
+static_assert(static_cast<int>(VertexPlaces::kExact) ==
+              static_cast<int>(core::VertexPlaces::kExact));
 
 std::array<float, 3> from_vec3(const glm::vec3 &v) {
   return {v.x, v.y, v.z};
@@ -29,7 +34,7 @@ class MeshOfUser : public core::MeshSink {
     mesh_.triangles.reserve(size.num_triangles);
   }
   void add(const core::MeshPart &part) override {
-    for (const glm::vec3 &vertex : part.vertices) mesh_.vertices.push_back(from_vec3(vertex));
+    for (const glm::dvec3 &vertex : part.vertices) mesh_.vertices.push_back(from_glm(vertex));
     for (const glm::vec3 &normal : part.normals) mesh_.normals.push_back(from_vec3(normal));
     mesh_.triangles.insert(mesh_.triangles.end(), part.triangles.begin(), part.triangles.end());
   }
@@ -60,6 +65,7 @@ void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<con
   const KernelWatch watch(device->implementation().device, before_kernel);
   core::Extractor extractor(device->implementation().device, *levels[options.level],
                             {.with_normals = options.with_normals,
+                             .vertices = static_cast<core::VertexPlaces>(options.vertices),
                              .memory_budget = options.memory_budget,
                              .cache_slots = options.cache_blocks});
   extractor.extract(isovalue, sink, progress_of(options, "extracting"));
@@ -77,18 +83,19 @@ Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const 
   });
 }
 
-void extract_to_file(const std::shared_ptr<Device> &device,
-                     const std::shared_ptr<const Volume> &volume, float isovalue,
-                     const std::filesystem::path &path, const ExtractOptions &options) {
-  guarded("extracting a surface", [&] {
+std::string extract_to_file(const std::shared_ptr<Device> &device,
+                            const std::shared_ptr<const Volume> &volume, float isovalue,
+                            const std::filesystem::path &path, const ExtractOptions &options) {
+  return guarded("extracting a surface", [&] {
     core::MeshFile file(path);
     extract_to(device, volume, isovalue, options, file);
     file.commit(progress_of(options, "writing"));
+    return file.notice();
   });
 }
 
-void save_mesh(const Mesh &mesh, const std::filesystem::path &path) {
-  guarded("saving a mesh", [&] {
+std::string save_mesh(const Mesh &mesh, const std::filesystem::path &path) {
+  return guarded("saving a mesh", [&] {
     if (!mesh.normals.empty() && mesh.normals.size() != mesh.vertices.size())
       throw core::Error("{}: a mesh of {} vertices and {} normals", path.string(),
                         mesh.vertices.size(), mesh.normals.size());
@@ -99,16 +106,16 @@ void save_mesh(const Mesh &mesh, const std::filesystem::path &path) {
                             mesh.vertices.size());
       }
     }
-    const auto to_vec3 = [](const std::vector<std::array<float, 3>> &values) {
-      std::vector<glm::vec3> result;
-      result.reserve(values.size());
-      for (const auto &[x, y, z] : values) result.emplace_back(x, y, z);
-      return result;
-    };
-    const std::vector<glm::vec3> vertices = to_vec3(mesh.vertices), normals = to_vec3(mesh.normals);
+    std::vector<glm::dvec3> vertices;
+    std::vector<glm::vec3> normals;
+    vertices.reserve(mesh.vertices.size());
+    normals.reserve(mesh.normals.size());
+    for (const Vector3 &vertex : mesh.vertices) vertices.push_back(to_glm(vertex));
+    for (const auto &[x, y, z] : mesh.normals) normals.emplace_back(x, y, z);
     core::MeshFile file(path);
     file.add({vertices, normals, mesh.triangles});
     file.commit();
+    return file.notice();
   });
 }
 

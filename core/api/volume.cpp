@@ -8,6 +8,8 @@
 #include "core/sources/memory_reader.hpp"
 #include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
+#include "core/volume/world_positions.hpp"
+#include "core/zfp/isovalue_notice.hpp"
 #include "core/zfp/voxel_region.hpp"
 #include "core/zfp/voxel_sample.hpp"
 
@@ -88,9 +90,10 @@ core::OpenReader open_layers(const ReadLayers &read, VoxelType type, const Grid 
   return [source] { return std::make_unique<core::LayerReader>(source); };
 }
 
-std::shared_ptr<const Volume> make_volume(core::CompressedVolume volume) {
+std::shared_ptr<const Volume> make_volume(core::CompressedVolume volume,
+                                          std::vector<std::string> notices = {}) {
   return std::make_shared<const Volume>(
-      std::make_unique<const Volume::Implementation>(std::move(volume)));
+      std::make_unique<const Volume::Implementation>(std::move(volume), std::move(notices)));
 }
 
 }  // namespace
@@ -118,8 +121,11 @@ core::Storage storage_for(const std::string &path, const Compression &compressio
   return to_storage(compression);
 }
 
-Volume::Implementation::Implementation(core::CompressedVolume compressed)
-    : volume(std::move(compressed)), grid(public_grid(volume.info)) {}
+Volume::Implementation::Implementation(core::CompressedVolume compressed,
+                                       std::vector<std::string> of_header)
+    : volume(std::move(compressed)),
+      grid(public_grid(volume.info)),
+      notices(std::move(of_header)) {}
 
 Volume::Volume(std::unique_ptr<const Implementation> implementation)
     : implementation_(std::move(implementation)) {}
@@ -133,6 +139,13 @@ VoxelType Volume::source_type() const {
 }
 std::array<float, 2> Volume::value_range() const {
   return implementation_->volume.value_range;
+}
+std::string Volume::isovalue_notice(float isovalue) const {
+  return guarded("looking at an isovalue",
+                 [&] { return core::isovalue_notice(implementation_->volume, isovalue); });
+}
+const std::vector<std::string> &Volume::notices() const {
+  return implementation_->notices;
 }
 double Volume::bits_per_voxel() const {
   return implementation_->volume.rate();
@@ -148,6 +161,9 @@ bool Volume::errors_are_stated() const {
 }
 std::uint32_t Volume::num_levels() const {
   return static_cast<std::uint32_t>(implementation_->volume.coarser_levels.size() + 1);
+}
+bool Volume::float32_positions() const {
+  return core::float32_holds_positions(implementation_->volume.info);
 }
 
 Grid Volume::level_grid(std::uint32_t level) const {
@@ -191,8 +207,14 @@ std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
     const core::RawOverrides overrides = to_overrides(raw);
     const core::Storage storage = storage_for(name, compression);
     if (core::is_zfp_name(name)) return make_volume(core::open_compressed_volume(name, overrides));
-    return make_volume(core::compress_volume([&] { return core::open_any_volume(name, overrides); },
-                                             name, storage));
+    std::vector<std::string> notices;
+    const auto open = [&] {
+      std::unique_ptr<core::VolumeReader> reader = core::open_any_volume(name, overrides);
+      notices = reader->notices();
+      return reader;
+    };
+    core::CompressedVolume volume = core::compress_volume(open, name, storage);
+    return make_volume(std::move(volume), std::move(notices));
   });
 }
 

@@ -2,6 +2,7 @@
 // Private to core/api: what is behind isowave::Volume, and what opening one asks for.
 
 #include <string>
+#include <vector>
 
 #include "core/sources/load_volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -10,10 +11,11 @@
 namespace isowave {
 
 struct Volume::Implementation {
-  explicit Implementation(core::CompressedVolume compressed);
+  Implementation(core::CompressedVolume compressed, std::vector<std::string> of_header);
 
   core::CompressedVolume volume;
   Grid grid;
+  std::vector<std::string> notices;
 };
 
 Grid public_grid(const core::VolumeInfo &info);

@@ -176,9 +176,10 @@ void Extractor::write(Run &run) {
 /// Turns a part of the mesh, of entries from `begin` on, to the world, and hands it on.
 void Extractor::give(Run &run, std::uint32_t begin) {
   constexpr std::size_t kAtOnce = 1u << 14;
-  const MeshPlacement placement(info_);
+  const MeshPlacement placement(info_, options_.vertices);
   const std::size_t num_vertices = run.vertices.size(), num_triangles = run.triangles.size();
-  std::vector<glm::vec3> positions(num_vertices), normals(options_.with_normals ? num_vertices : 0);
+  std::vector<glm::dvec3> positions(num_vertices);
+  std::vector<glm::vec3> normals(options_.with_normals ? num_vertices : 0);
   std::vector<Triangle> triangles(num_triangles);
   const auto each = [&](std::size_t count, const auto &work) {
     parallel_for((count + kAtOnce - 1) / kAtOnce, 0, [&](std::uint64_t piece, std::uint32_t) {

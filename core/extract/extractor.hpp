@@ -17,7 +17,8 @@
 namespace isowave::core {
 
 struct ExtractorOptions {
-  bool with_normals = true;         ///< takes more blocks around the surface
+  bool with_normals = true;  ///< takes more blocks around the surface
+  VertexPlaces vertices = VertexPlaces::kApart;
   std::uint64_t memory_budget = 0;  ///< bound on all device memory [bytes]; 0: 3/4 of the device's
   /// Decoded blocks kept at most; 0: as many as the surface needs, if the budget allows.
   std::uint32_t cache_slots = 0;

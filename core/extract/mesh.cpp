@@ -20,17 +20,18 @@ void Mesh::add(const MeshPart &part) {
   triangles.insert(triangles.end(), part.triangles.begin(), part.triangles.end());
 }
 
-MeshPlacement::MeshPlacement(const VolumeInfo &info)
-    : origin_(info.origin),
-      to_world_(info.index_to_world()),
-      gradient_to_world_(glm::transpose(glm::inverse(to_world_))),
-      mirrored_(glm::determinant(to_world_) < 0) {}
+MeshPlacement::MeshPlacement(const VolumeInfo &info, VertexPlaces places)
+    : positions_(info),
+      least_gap_(places == VertexPlaces::kApart ? kLeastGap : 0),
+      gradient_to_world_(glm::transpose(glm::inverse(info.index_to_world()))),
+      mirrored_(glm::determinant(info.index_to_world()) < 0) {}
 
-glm::vec3 MeshPlacement::position(const glm::uvec3 &block, const MeshVertex &vertex) const {
+glm::dvec3 MeshPlacement::position(const glm::uvec3 &block, const MeshVertex &vertex) const {
   const glm::uvec3 voxel(vertex.edge & 3u, vertex.edge >> 2 & 3u, vertex.edge >> 4 & 3u);
   glm::dvec3 index(4u * block + voxel);
-  index[static_cast<int>(vertex.edge >> 6 & 3u)] += double{vertex.t};
-  return glm::vec3(origin_ + to_world_ * index);
+  index[static_cast<int>(vertex.edge >> 6 & 3u)] +=
+      std::clamp(double{vertex.t}, least_gap_, 1 - least_gap_);
+  return positions_(index);
 }
 
 glm::vec3 MeshPlacement::normal(const Gradient &gradient) const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/volume/volume.hpp"
+#include "core/volume/world_positions.hpp"
 #include "kernels_cl/portable/marching_cubes.h"
 
 namespace isowave::core {
@@ -20,9 +21,19 @@ struct MeshSize {
   bool has_normals = false;
 };
 
+/// Where vertices are on the edges between voxels.
+enum class VertexPlaces {
+  /// At least kLeastGap from the edge's voxels. So no two vertices meet, no triangle is without
+  /// area, and the mesh stays closed for programs that merge vertices by their positions.
+  kApart,
+  kExact  ///< where the isovalue is crossed; on a voxel that equals it, vertices meet
+};
+/// Of an edge's length. Twice what positions in float32 may be off by (kPositionError), twice.
+inline constexpr double kLeastGap = 4 * kPositionError;
+
 /// Some vertices and triangles of a mesh.
 struct MeshPart {
-  std::span<const glm::vec3> vertices;  ///< world space
+  std::span<const glm::dvec3> vertices;  ///< world space, as WorldPositions rounds them
   /// One for each vertex, or none: of length 1, away from larger values, world space.
   std::span<const glm::vec3> normals;
   std::span<const Triangle> triangles;  ///< of vertices of any part, also of a later one
@@ -38,7 +49,8 @@ class MeshSink {
 
 /// A mesh in memory.
 struct Mesh : MeshSink {
-  std::vector<glm::vec3> vertices, normals;
+  std::vector<glm::dvec3> vertices;
+  std::vector<glm::vec3> normals;
   std::vector<Triangle> triangles;
 
   void begin(const MeshSize &size) override;
@@ -48,13 +60,11 @@ struct Mesh : MeshSink {
 /// From the index space of a volume to the world.
 class MeshPlacement {
  public:
-  explicit MeshPlacement(const VolumeInfo &info);
+  MeshPlacement(const VolumeInfo &info, VertexPlaces places);
 
-  /// Computed in float64, then rounded.
-  ///
   /// block   whose vertex it is
   /// vertex  its edge's bits 0..7 and t are used
-  glm::vec3 position(const glm::uvec3 &block, const MeshVertex &vertex) const;
+  glm::dvec3 position(const glm::uvec3 &block, const MeshVertex &vertex) const;
   /// gradient: index space. 0 where that is 0.
   glm::vec3 normal(const Gradient &gradient) const;
   /// Turned round where the volume's axes are left-handed, so that it is seen from the same side.
@@ -64,8 +74,9 @@ class MeshPlacement {
   }
 
  private:
-  glm::dvec3 origin_;
-  glm::dmat3 to_world_, gradient_to_world_;
+  WorldPositions positions_;
+  double least_gap_;
+  glm::dmat3 gradient_to_world_;
   bool mirrored_;
 };
 

@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <iterator>
@@ -23,18 +24,21 @@ namespace isowave::core {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary files are little endian");
-static_assert(sizeof(glm::vec3) == 12 && sizeof(Triangle) == 12);
+static_assert(sizeof(glm::vec3) == 12 && sizeof(glm::dvec3) == 24 && sizeof(Triangle) == 12);
 
 constexpr std::array kEndings = {
     std::pair(".ply", MeshFormat::kPly),   std::pair(".stl", MeshFormat::kStl),
     std::pair(".obj", MeshFormat::kObj),   std::pair(".vtp", MeshFormat::kVtp),
     std::pair(".gltf", MeshFormat::kGltf), std::pair(".glb", MeshFormat::kGlb)};
 
-glm::vec3 facet_normal(const glm::vec3 &a, const glm::vec3 &b, const glm::vec3 &c) {
-  const glm::dvec3 normal =
-      glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a));
+glm::vec3 facet_normal(const glm::dvec3 &a, const glm::dvec3 &b, const glm::dvec3 &c) {
+  const glm::dvec3 normal = glm::cross(b - a, c - a);
   const double length = glm::length(normal);
   return length > 0 ? glm::vec3(normal / length) : glm::vec3(0);
+}
+
+std::string offset_text(const glm::dvec3 &offset) {
+  return fmt::format("{} {} {} to x y z", offset.x, offset.y, offset.z);
 }
 
 }  // namespace
@@ -70,6 +74,7 @@ void Spool<T>::unmap() noexcept {
   if (mapped_ != nullptr) ::munmap(const_cast<void *>(mapped_), count_ * sizeof(T));
 }
 
+template class Spool<glm::dvec3>;
 template class Spool<glm::vec3>;
 template class Spool<Triangle>;
 
@@ -80,6 +85,8 @@ class MeshFile::Writer {
       : file_(mesh.file_),
         path_(mesh.path_),
         progress_(progress),
+        is_float32_(mesh.is_float32_),
+        offset_(mesh.offset()),
         vertices_(mesh.vertices_.all()),
         normals_(mesh.normals_.all()),
         triangles_(mesh.triangles_.all()) {}
@@ -136,19 +143,28 @@ class MeshFile::Writer {
     for_each(values.size(), [&](std::size_t i) { put(values[i]); });
   }
   bool has_normals() const { return !normals_.empty(); }
+  /// In as many bits as positions need.
+  void put_position(std::size_t i) {
+    if (is_float32_)
+      put(glm::vec3(vertices_[i]));
+    else
+      put(vertices_[i]);
+  }
+  /// From offset_, for formats that have float32 alone.
+  glm::vec3 local(std::size_t i) const { return glm::vec3(vertices_[i] - offset_); }
 
   void write_ply() {
     std::string header = fmt::format(
-        "ply\nformat binary_little_endian 1.0\ncomment by isowave\nelement vertex {}\n"
-        "property float x\nproperty float y\nproperty float z\n",
-        vertices_.size());
+        "ply\nformat binary_little_endian 1.0\ncomment by isowave\nelement vertex {0}\n"
+        "property {1} x\nproperty {1} y\nproperty {1} z\n",
+        vertices_.size(), is_float32_ ? "float" : "double");
     if (has_normals()) header += "property float nx\nproperty float ny\nproperty float nz\n";
     const bool fits_int = vertices_.size() <= std::numeric_limits<std::int32_t>::max();
     header += fmt::format("element face {}\nproperty list uchar {} vertex_indices\nend_header\n",
                           triangles_.size(), fits_int ? "int" : "uint");
     file_.write(header);
     for_each(vertices_.size(), [&](std::size_t i) {
-      put(vertices_[i]);
+      put_position(i);
       if (has_normals()) put(normals_[i]);
     });
     for_each(triangles_.size(), [&](std::size_t i) { put(std::uint8_t{3}, triangles_[i]); });
@@ -159,22 +175,29 @@ class MeshFile::Writer {
       throw Error("{}: an STL file has at most 2^32 - 1 triangles, the surface {}: take .ply",
                   path_.string(), triangles_.size());
     std::array<char, 80> title{};
-    std::strcpy(title.data(), "binary STL by isowave");
+    std::string text = "binary STL by isowave";  // "solid" would say that it is text
+    if (offset_ != glm::dvec3(0)) text = fmt::format("isowave STL, add {}", offset_text(offset_));
+    text.copy(title.data(), title.size());
     put(title, static_cast<std::uint32_t>(triangles_.size()));
     flush();
     for_each(triangles_.size(), [&](std::size_t i) {
       const auto &[a, b, c] = triangles_[i];
-      put(facet_normal(vertices_[a], vertices_[b], vertices_[c]), vertices_[a], vertices_[b],
-          vertices_[c], std::uint16_t{0});
+      put(facet_normal(vertices_[a], vertices_[b], vertices_[c]), local(a), local(b), local(c),
+          std::uint16_t{0});
     });
   }
 
   void write_obj() {
     file_.write("# by isowave\n");
-    const auto line = [this](std::string_view name, const glm::vec3 &v) {
+    const auto line = [this](std::string_view name, const auto &v) {
       fmt::format_to(std::back_inserter(pending_), "{} {} {} {}\n", name, v.x, v.y, v.z);
     };
-    for_each(vertices_.size(), [&](std::size_t i) { line("v", vertices_[i]); });
+    for_each(vertices_.size(), [&](std::size_t i) {
+      if (is_float32_)
+        line("v", glm::vec3(vertices_[i]));
+      else
+        line("v", vertices_[i]);
+    });
     for_each(normals_.size(), [&](std::size_t i) { line("vn", normals_[i]); });
     for_each(triangles_.size(), [&](std::size_t i) {
       pending_ += 'f';
@@ -212,7 +235,9 @@ class MeshFile::Writer {
         "NumberOfPolys=\"{}\">\n",
         num_vertices, num_triangles);
     head += "<Points>\n";
-    head += array("Float32", "Name=\"Points\" NumberOfComponents=\"3\"", 12 * num_vertices);
+    const std::uint64_t position_bytes = (is_float32_ ? 12 : 24) * num_vertices;
+    head += array(is_float32_ ? "Float32" : "Float64", "Name=\"Points\" NumberOfComponents=\"3\"",
+                  position_bytes);
     head += "</Points>\n";
     if (has_normals()) {
       head += "<PointData Normals=\"Normals\">\n";
@@ -231,8 +256,8 @@ class MeshFile::Writer {
       else
         put(static_cast<std::int32_t>(value));
     };
-    put(12 * num_vertices);
-    write_all(vertices_);
+    put(position_bytes);
+    for_each(num_vertices, [&](std::size_t i) { put_position(i); });
     if (has_normals()) put(12 * num_vertices);
     write_all(normals_);
     put(3 * integer_bytes * num_triangles);
@@ -254,10 +279,10 @@ class MeshFile::Writer {
     if (gltf_bytes() > std::numeric_limits<std::uint32_t>::max() - 4096)
       throw Error("{}: glTF holds at most 4 GiB, and the surface has {} bytes: take .ply or .vtp",
                   path_.string(), gltf_bytes());
-    glm::vec3 least(vertices_[0]), largest(vertices_[0]);
-    for (const glm::vec3 &vertex : vertices_) {
-      least = glm::min(least, vertex);
-      largest = glm::max(largest, vertex);
+    glm::vec3 least = local(0), largest = least;
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      least = glm::min(least, local(i));
+      largest = glm::max(largest, local(i));
     }
     constexpr int kFloat = 5126, kUint = 5125, kVertices = 34962, kIndices = 34963;
     nlohmann::ordered_json views = nlohmann::ordered_json::array(), accessors = views;
@@ -284,6 +309,8 @@ class MeshFile::Writer {
     document["scene"] = 0;
     document["scenes"] = {{{"nodes", {0}}}};
     document["nodes"] = {{{"mesh", 0}}};
+    if (offset_ != glm::dvec3(0))
+      document["nodes"][0]["translation"] = {offset_.x, offset_.y, offset_.z};
     document["meshes"] = {
         {{"primitives", {{{"attributes", attributes}, {"indices", accessors.size() - 1}}}}}};
     document["buffers"] = {{{"byteLength", offset}}};
@@ -303,21 +330,23 @@ class MeshFile::Writer {
     if (data_bytes != 0)
       put(static_cast<std::uint32_t>(data_bytes), std::array{'B', 'I', 'N', '\0'});
     flush();
-    write_all(vertices_);
+    for_each(vertices_.size(), [&](std::size_t i) { put(local(i)); });
     write_all(normals_);
     write_all(triangles_);
   }
 
   /// Three bytes are four characters; all arrays are multiples of three bytes.
-  template <class T>
-  void write_base64(std::span<const T> values) {
+  template <class Value>
+  void write_base64(std::size_t count, const Value &value_of) {
     constexpr std::string_view kDigits =
         "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    static_assert(sizeof(T) % 3 == 0);
-    for_each(values.size(), [&](std::size_t i) {
-      std::array<unsigned char, sizeof(T)> bytes{};
-      std::memcpy(bytes.data(), &values[i], sizeof(T));
-      for (std::size_t k = 0; k < sizeof(T); k += 3) {
+    constexpr std::size_t kBytes = sizeof(value_of(0));
+    static_assert(kBytes % 3 == 0);
+    for_each(count, [&](std::size_t i) {
+      const auto value = value_of(i);
+      std::array<unsigned char, kBytes> bytes{};
+      std::memcpy(bytes.data(), &value, kBytes);
+      for (std::size_t k = 0; k < kBytes; k += 3) {
         const unsigned bits = bytes[k] << 16 | bytes[k + 1] << 8 | bytes[k + 2];
         for (const unsigned shift : {18u, 12u, 6u, 0u}) pending_ += kDigits[bits >> shift & 63u];
       }
@@ -334,16 +363,19 @@ class MeshFile::Writer {
     const std::size_t mark = text.find(kMark);
     file_.write(std::string_view(text).substr(0, mark));
     if (mark == std::string::npos) return;
-    write_base64(vertices_);
-    write_base64(normals_);
-    write_base64(triangles_);
+    write_base64(vertices_.size(), [this](std::size_t i) { return local(i); });
+    write_base64(normals_.size(), [this](std::size_t i) { return normals_[i]; });
+    write_base64(triangles_.size(), [this](std::size_t i) { return triangles_[i]; });
     file_.write(std::string_view(text).substr(mark + kMark.size()));
   }
 
   AtomicFile &file_;
   const std::filesystem::path &path_;
   const Progress &progress_;
-  std::span<const glm::vec3> vertices_, normals_;
+  const bool is_float32_;
+  const glm::dvec3 offset_;
+  std::span<const glm::dvec3> vertices_;
+  std::span<const glm::vec3> normals_;
   std::span<const Triangle> triangles_;
   std::string pending_;
   std::size_t done_ = 0, total_ = 0;
@@ -358,6 +390,11 @@ MeshFile::MeshFile(const std::filesystem::path &path)
       triangles_(path) {}
 
 void MeshFile::add(const MeshPart &part) {
+  for (const glm::dvec3 &vertex : part.vertices) {
+    is_float32_ = is_float32_ && rounded_to_float32(vertex) == vertex;
+    least_ = glm::min(least_, vertex);
+    largest_ = glm::max(largest_, vertex);
+  }
   vertices_.add(part.vertices);
   if (format_ != MeshFormat::kStl) normals_.add(part.normals);  // it has those of facets
   triangles_.add(part.triangles);
@@ -366,6 +403,28 @@ void MeshFile::add(const MeshPart &part) {
 void MeshFile::commit(const Progress &progress) {
   Writer(*this, progress).write(format_);
   file_.commit();
+}
+
+glm::dvec3 MeshFile::offset() const {
+  const bool has_float32_alone =
+      format_ != MeshFormat::kPly && format_ != MeshFormat::kObj && format_ != MeshFormat::kVtp;
+  if (is_float32_ || !has_float32_alone) return glm::dvec3(0);
+  const auto largest_of = [](const glm::dvec3 &v) { return std::max({v.x, v.y, v.z}); };
+  const glm::dvec3 sides = largest_ - least_, middle = 0.5 * least_ + 0.5 * largest_;
+  const double side = largest_of(sides);
+  constexpr double kFar = 8;  // sides; nearer, float32 would win fewer than 3 bits
+  if (!(largest_of(glm::abs(middle)) > kFar * side && side > 0)) return glm::dvec3(0);
+  // The middle of the mesh, in as few digits as bring it there.
+  const double digits = -std::floor(std::log10(side)), scale = std::pow(10.0, std::abs(digits));
+  return digits > 0 ? glm::round(middle * scale) / scale : glm::round(middle / scale) * scale;
+}
+
+std::string MeshFile::notice() const {
+  if (format_ != MeshFormat::kStl || offset() == glm::dvec3(0)) return {};
+  return fmt::format(
+      "{}: STL has float32 positions, too coarse so far from the origin: add {}, as its header "
+      "says",
+      path_.string(), offset_text(offset()));
 }
 
 }  // namespace isowave::core

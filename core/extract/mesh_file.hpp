@@ -3,7 +3,9 @@
 // that write them (Assimp, VTK) want the whole mesh in memory, and a surface may be larger.
 
 #include <filesystem>
+#include <limits>
 #include <span>
+#include <string>
 
 #include "core/extract/mesh.hpp"
 #include "core/io/atomic_file.hpp"
@@ -53,7 +55,9 @@ class Spool {
   const void *mapped_ = nullptr;
 };
 
-/// Takes a mesh, however large, and writes it to a file that appears whole or not at all. Takes
+/// Takes a mesh, however large, and writes it to a file that appears whole or not at all. Positions
+/// that float32 does not hold are float64 in PLY, OBJ and VTP; in glTF and STL they are float32
+/// from offset() on, which glTF has as a node's translation and STL in its header's comment. Takes
 /// disk space for the mesh twice while it is at work, and memory for what the system likes to keep
 /// of it.
 class MeshFile : public MeshSink {
@@ -69,13 +73,22 @@ class MeshFile : public MeshSink {
   /// Throws  Error: it cannot be written, or the mesh is larger than the format allows
   void commit(const Progress &progress = {});
 
+  /// What is to be added to the file's positions [world units]; 0 if they are world positions. Ask
+  /// after all parts.
+  glm::dvec3 offset() const;
+  /// One line for users if programs that read the file do not know of its offset; else empty.
+  std::string notice() const;
+
  private:
   class Writer;
 
   std::filesystem::path path_;
   MeshFormat format_;
   AtomicFile file_;
-  Spool<glm::vec3> vertices_, normals_;
+  bool is_float32_ = true;  ///< all positions so far
+  glm::dvec3 least_{std::numeric_limits<double>::infinity()}, largest_ = -least_;
+  Spool<glm::dvec3> vertices_;
+  Spool<glm::vec3> normals_;
   Spool<Triangle> triangles_;
 };
 

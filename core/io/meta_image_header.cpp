@@ -154,7 +154,12 @@ std::size_t read_meta_dims(const HeaderFields &fields, const std::string &what, 
 }
 
 /// The matrix has a row for each axis of the volume.
-void set_meta_geometry(const HeaderFields &fields, std::size_t num_axes, VolumeInfo &info) {
+void set_meta_geometry(const HeaderFields &fields, std::size_t num_axes, const std::string &what,
+                       VolumeHeader &header) {
+  VolumeInfo &info = header.info;
+  double unit = 1;
+  if (fields.has("DistanceUnits"))
+    unit = millimetres_in(std::array{fields["DistanceUnits"]}, "DistanceUnits", what, header)[0];
   const auto offset =
       numbers_of(fields, {"Position", "Offset", "Origin", "ImagePosition"}, num_axes);
   const auto matrix =
@@ -168,8 +173,8 @@ void set_meta_geometry(const HeaderFields &fields, std::size_t num_axes, VolumeI
     if (matrix)
       direction = {(*matrix)[i * num_axes], (*matrix)[i * num_axes + 1],
                    (*matrix)[i * num_axes + 2]};
-    set_axis(info, int(i), spacing ? (*spacing)[i] : 1.0, direction);
-    if (offset) info.origin[int(i)] = (*offset)[i] + 0.0;
+    set_axis(info, int(i), spacing ? (*spacing)[i] * unit : 1.0, direction);
+    if (offset) info.origin[int(i)] = (*offset)[i] * unit + 0.0;
   }
 }
 
@@ -240,7 +245,7 @@ VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file
   VolumeHeader header;
   VoxelLayout &voxels = header.voxels;
   const std::size_t num_axes = read_meta_dims(fields, what, header.info);
-  set_meta_geometry(fields, num_axes, header.info);
+  set_meta_geometry(fields, num_axes, what, header);
   check_other_meta_fields(fields, num_axes);
   header.info.type = voxels.type = meta_voxel_type(fields);
   set_meta_encoding(fields, voxels);

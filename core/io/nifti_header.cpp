@@ -132,10 +132,15 @@ glm::dvec3 read_nifti_spacing(const NiftiHeader &header) {
 /// From index space to RAS, in the file's units.
 struct Placement {
   glm::dmat3 direction;  ///< column a: unit direction of index axis a
+  glm::dvec3 spacing;
   glm::dvec3 origin;
+
+  glm::dvec3 operator()(const glm::dvec3 &index) const {
+    return origin + direction * (spacing * index);
+  }
 };
 
-Placement read_qform(const NiftiHeader &header) {
+Placement read_qform(const NiftiHeader &header, const glm::dvec3 &spacing) {
   const double b = header.get_finite(256, "quatern_b"), c = header.get_finite(260, "quatern_c"),
                d = header.get_finite(264, "quatern_d");
   const double flip = header.get_finite(76, "pixdim[0]") < 0 ? -1.0 : 1.0;
@@ -147,6 +152,7 @@ Placement read_qform(const NiftiHeader &header) {
   const double length = std::sqrt(a * a + squares);
   const double w = a / length, x = b / length, y = c / length, z = d / length;
   Placement placement;
+  placement.spacing = spacing;
   placement.direction[0] = {w * w + x * x - y * y - z * z, 2 * (x * y + w * z),
                             2 * (x * z - w * y)};
   placement.direction[1] = {2 * (x * y - w * z), w * w + y * y - x * x - z * z,
@@ -158,7 +164,9 @@ Placement read_qform(const NiftiHeader &header) {
   return placement;
 }
 
-/// Empty where its axes are not at right angles or its spacings are not those given.
+/// Nothing if it is singular.
+///
+/// spacing  by pixdim: taken if the sform's is the same but for rounding
 std::optional<Placement> read_sform(const NiftiHeader &header, const glm::dvec3 &spacing) {
   Placement placement;
   for (int row = 0; row < 3; ++row) {
@@ -168,37 +176,63 @@ std::optional<Placement> read_sform(const NiftiHeader &header, const glm::dvec3 
     }
     placement.origin[row] = header.get_finite(at + 12, "the sform");
   }
-  // Writers round to float32 and from other forms.
-  constexpr double kSpacingTolerance = 1e-3, kSpacingRatio = 1e-2, kAngleTolerance = 1e-4;
+  constexpr double kRounding = 1e-4;  // writers round to float32 and from other forms
   for (int axis = 0; axis < 3; ++axis) {
     const double length = glm::length(placement.direction[axis]);
-    if (std::abs(length - spacing[axis]) >
-        std::min(kSpacingTolerance, kSpacingRatio * spacing[axis]))
-      return std::nullopt;
+    if (!(length > 0)) return std::nullopt;
     placement.direction[axis] /= length;
+    const bool is_same = std::abs(length - spacing[axis]) <= kRounding * spacing[axis];
+    placement.spacing[axis] = is_same ? spacing[axis] : length;
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    const double cosine = glm::dot(placement.direction[axis], placement.direction[(axis + 1) % 3]);
-    if (!(std::abs(cosine) <= kAngleTolerance)) return std::nullopt;
-  }
+  if (!(std::abs(glm::determinant(placement.direction)) > kLeastDeterminant)) return std::nullopt;
   return placement;
 }
 
-std::optional<Placement> read_placement(const NiftiHeader &header, const glm::dvec3 &spacing) {
-  constexpr int kLastCode = 5, kScanner = 1;
+/// The largest distance between where two placements have a corner of the volume [voxels].
+double distance_in_voxels(const Placement &a, const Placement &b, const glm::uvec3 &dims) {
+  double largest = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 ends(corner & 1, corner >> 1 & 1, corner >> 2);
+    const glm::dvec3 index = ends * glm::dvec3(dims - 1u);
+    largest = std::max(largest, glm::distance(a(index), b(index)));
+  }
+  return largest / std::min({a.spacing.x, a.spacing.y, a.spacing.z});
+}
+
+/// The sform if there is one, else the qform, as nibabel does.
+///
+/// spacing  by pixdim
+std::optional<Placement> read_placement(const NiftiHeader &header, const std::string &what,
+                                        const glm::dvec3 &spacing, VolumeHeader &result) {
+  constexpr int kLastCode = 5;
   const int qform = header.get<std::int16_t>(252), sform = header.get<std::int16_t>(254);
   for (const int code : {qform, sform}) {
     if (code < 0 || code > kLastCode)
       header.fail("broken header: code {} of a qform or sform", code);
   }
-  if (qform == 0 && sform == 0) return std::nullopt;
-  const std::optional<Placement> by_qform =
-      qform > 0 ? std::optional(read_qform(header)) : std::nullopt;
-  const std::optional<Placement> by_sform = sform > 0 ? read_sform(header, spacing) : std::nullopt;
-  if (by_sform && (!by_qform || sform == kScanner)) return by_sform;
-  if (by_qform) return by_qform;
-  header.fail(
-      "its sform has shear or other spacings than pixdim, and there is no qform: not supported");
+  const auto tell = [&](const std::string &text) {
+    result.notices.push_back(fmt::format("{}: {}", what, text));
+  };
+  std::optional<Placement> by_qform, by_sform;
+  if (qform > 0) by_qform = read_qform(header, spacing);
+  if (sform == 0) return by_qform;
+  by_sform = read_sform(header, spacing);
+  if (!by_sform) {
+    if (!by_qform) header.fail("its sform is singular, and there is no qform");
+    tell("its sform is singular: its qform says where the volume lies");
+    return by_qform;
+  }
+  if (by_sform->spacing != spacing) {
+    const auto text = [](const glm::dvec3 &v) {
+      return fmt::format("{:.6g} {:.6g} {:.6g}", v.x, v.y, v.z);
+    };
+    tell(fmt::format("spacing {} of its sform is taken; its pixdim says {}",
+                     text(by_sform->spacing), text(spacing)));
+  }
+  constexpr double kSame = 0.1;  // voxels
+  if (by_qform && distance_in_voxels(*by_sform, *by_qform, result.info.dims) > kSame)
+    tell("its sform says where the volume lies; its qform says otherwise");
+  return by_sform;
 }
 
 /// Millimetres in the unit of lengths.
@@ -217,12 +251,18 @@ double length_unit(const NiftiHeader &header) {
   }
 }
 
-void set_nifti_geometry(const NiftiHeader &header, VolumeInfo &info) {
+void set_nifti_geometry(const NiftiHeader &header, const std::string &what, VolumeHeader &result) {
+  VolumeInfo &info = result.info;
   const glm::dvec3 spacing = read_nifti_spacing(header);
   const double millimetres = length_unit(header);
+  if (millimetres != 1) {
+    result.notices.push_back(fmt::format("{}: lengths are converted to millimetres; xyzt_units: {}",
+                                         what, millimetres > 1 ? "metres" : "micrometres"));
+  }
   info.spacing = spacing * millimetres;
-  const std::optional<Placement> placement = read_placement(header, spacing);
+  const std::optional<Placement> placement = read_placement(header, what, spacing, result);
   if (!placement) return;
+  info.spacing = placement->spacing * millimetres;
   const glm::dvec3 to_lps(-1, -1, 1);
   for (int axis = 0; axis < 3; ++axis)
     info.direction[axis] = placement->direction[axis] * to_lps + 0.0;
@@ -262,7 +302,7 @@ VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, boo
   set_nifti_scale(bytes, voxels);
   // Scaled values may be any that float64 has.
   header.info.type = voxels.is_scaled() ? VoxelType::kFloat64 : voxels.type;
-  set_nifti_geometry(bytes, header.info);
+  set_nifti_geometry(bytes, file->what(), header);
 
   const double offset = bytes.get_finite(108, "vox_offset");
   constexpr double kLeastOffset = 352, kMostOffset = 1e9;

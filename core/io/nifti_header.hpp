@@ -1,10 +1,11 @@
 #pragma once
 // Headers of NIfTI-1 in one file (.nii, .nii.gz): https://nifti.nimh.nih.gov/nifti-1
 //
-// The grid lies where the sform puts it if it is the only one or the scanner's, and otherwise where
-// the qform does; an sform counts only without shear and with the spacings of pixdim. Refused,
-// besides what is broken: NIfTI-2, Analyze, headers whose voxels lie in an .img file, 64-bit
-// integers, more than one value per voxel.
+// The grid lies where the sform puts it, if there is one, and otherwise where the qform does, as
+// nibabel has it. (ITK takes the qform if both are there and the sform is not the scanner's.) An
+// sform may have shear, and spacings that are not those of pixdim. Refused, besides what is broken:
+// NIfTI-2, Analyze, headers whose voxels lie in an .img file, 64-bit integers, more than one value
+// per voxel.
 
 #include <memory>
 

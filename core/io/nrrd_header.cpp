@@ -141,7 +141,7 @@ VoxelType nrrd_voxel_type(const HeaderFields &fields) {
   fields.fail("type", "not supported: need an integer, float or double");
 }
 
-/// Vectors of three numbers like (1,0,0.5), or `none`.
+/// Vectors of three numbers like (1,0,0.5), or `none`, for which (nan,nan,nan) stands, too.
 std::vector<std::optional<glm::dvec3>> parse_vectors(const HeaderFields &fields,
                                                      std::string_view name) {
   constexpr std::string_view kNoVector = "none";
@@ -164,34 +164,40 @@ std::vector<std::optional<glm::dvec3>> parse_vectors(const HeaderFields &fields,
       const std::size_t comma = i < 2 ? inside.find(',') : inside.size();
       const std::optional<double> value =
           comma == inside.npos ? std::nullopt : parse_number(trim(inside.substr(0, comma)));
-      if (!value || !std::isfinite(*value)) fields.fail(name, "need vectors of 3 finite numbers");
+      if (!value || std::isinf(*value)) fields.fail(name, "need vectors of 3 finite numbers");
       vector[i] = *value;
       inside.remove_prefix(std::min(comma + 1, inside.size()));
     }
-    vectors.emplace_back(vector);
+    const bool is_none = std::isnan(vector.x) && std::isnan(vector.y) && std::isnan(vector.z);
+    if (!is_none && (std::isnan(vector.x) || std::isnan(vector.y) || std::isnan(vector.z)))
+      fields.fail(name, "need vectors of 3 finite numbers, or of 3 nan for none");
+    vectors.push_back(is_none ? std::nullopt : std::optional(vector));
     text.remove_prefix(end + 1);
   }
   return vectors;
 }
 
 /// `count` texts in quotes, which may have \" in them.
-void check_quoted(const HeaderFields &fields, std::string_view name, std::size_t count) {
+std::vector<std::string> parse_quoted(const HeaderFields &fields, std::string_view name,
+                                      std::size_t count) {
   std::string_view text = fields[name];
-  std::size_t found = 0;
-  for (; !(text = trim(text)).empty(); ++found) {
+  std::vector<std::string> found;
+  while (!(text = trim(text)).empty()) {
     std::size_t end = 1;
     while (end < text.size() && text[end] != '"') end += text[end] == '\\' ? 2 : 1;
     if (text.front() != '"' || end >= text.size()) fields.fail(name, "need texts in quotes");
+    found.emplace_back(text.substr(1, end - 1));
     text.remove_prefix(end + 1);
   }
-  if (found != count) fields.fail(name, fmt::format("need {} texts in quotes", count));
+  if (found.size() != count) fields.fail(name, fmt::format("need {} texts in quotes", count));
+  return found;
 }
 
 struct NrrdAxis {
   std::int64_t size = 0;
   double spacing = kUnknown, min = kUnknown, max = kUnknown;
   bool is_cell_centered = true;
-  std::string kind = "???";
+  std::string kind = "???", unit;
   std::optional<glm::dvec3> direction;
 
   /// Along which one may resample; else the values of a voxel.
@@ -234,8 +240,10 @@ std::vector<NrrdAxis> read_nrrd_axes(const HeaderFields &fields) {
     const std::vector<std::string_view> words = fields.words("kinds", count);
     for (std::size_t i = 0; i < count; ++i) axes[i].kind = lower_case(words[i]);
   }
-  for (const std::string_view name : {"labels", "units"}) {
-    if (fields.has(name)) check_quoted(fields, name, count);
+  if (fields.has("labels")) parse_quoted(fields, "labels", count);
+  if (fields.has("units")) {
+    const std::vector<std::string> units = parse_quoted(fields, "units", count);
+    for (std::size_t i = 0; i < count; ++i) axes[i].unit = units[i];
   }
   return axes;
 }
@@ -294,7 +302,15 @@ std::vector<NrrdAxis> volume_axes(const HeaderFields &fields, std::vector<NrrdAx
 }
 
 void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxis> &axes,
-                           const glm::dvec3 &to_lps, VolumeInfo &info) {
+                           const glm::dvec3 &to_lps, const std::string &what,
+                           VolumeHeader &header) {
+  VolumeInfo &info = header.info;
+  glm::dvec3 unit(1.0);  // of the space's axes
+  if (fields.has("space units")) {
+    const std::vector<std::string> names = parse_quoted(fields, "space units", 3);
+    const std::vector<double> millimetres = millimetres_in(names, "space units", what, header);
+    unit = {millimetres[0], millimetres[1], millimetres[2]};
+  }
   for (int i = 0; i < 3; ++i) {
     const NrrdAxis &axis = axes[std::size_t(i)];
     if (!std::isnan(axis.spacing))
@@ -304,39 +320,43 @@ void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxi
     if (!std::isnan(axis.max))
       fields.fail("axis maxs", "not with a space: its 'space origin' says them");
     if (!axis.direction) continue;  // no axis has one: a unit grid
-    const double length = glm::length(*axis.direction);
-    set_axis(info, i, length, *axis.direction * (1.0 / length) * to_lps);
+    const glm::dvec3 step = *axis.direction * unit;
+    const double length = glm::length(step);
+    set_axis(info, i, length, step * (1.0 / length) * to_lps);
   }
   if (fields.has("space origin")) {
     const auto origin = parse_vectors(fields, "space origin");
     if (origin.size() != 1) fields.fail("space origin", "need one vector");
-    if (origin[0]) info.origin = *origin[0] * to_lps + 0.0;
+    if (origin[0]) info.origin = *origin[0] * unit * to_lps + 0.0;
   }
   if (fields.has("measurement frame") && parse_vectors(fields, "measurement frame").size() != 3) {
     fields.fail("measurement frame", "need 3 vectors");
   }
-  if (fields.has("space units")) check_quoted(fields, "space units", 3);
 }
 
 /// Spacing from the field or from where the axis begins and ends; the first sample lies at its
 /// beginning or, where samples are cells, half a spacing further.
 void set_geometry_by_axes(const HeaderFields &fields, const std::vector<NrrdAxis> &axes,
-                          VolumeInfo &info) {
+                          const std::string &what, VolumeHeader &header) {
   for (const std::string_view name :
        {"space directions", "space origin", "measurement frame", "space units"}) {
     if (fields.has(name)) fields.fail(name, "needs 'space' or 'space dimension'");
   }
+  VolumeInfo &info = header.info;
+  const std::array<std::string, 3> names{axes[0].unit, axes[1].unit, axes[2].unit};
+  const std::vector<double> millimetres = millimetres_in(names, "units", what, header);
   for (int i = 0; i < 3; ++i) {
     const NrrdAxis &axis = axes[std::size_t(i)];
+    const double unit = millimetres[std::size_t(i)];
     double spacing = axis.spacing;
     if (std::isnan(spacing) && !std::isnan(axis.min) && !std::isnan(axis.max)) {
       spacing = (axis.max - axis.min) / double(axis.is_cell_centered ? axis.size : axis.size - 1);
     }
     glm::dvec3 direction(0.0);
     direction[i] = 1.0;
-    set_axis(info, i, std::isnan(spacing) ? 1.0 : spacing, direction);
+    set_axis(info, i, std::isnan(spacing) ? 1.0 : spacing * unit, direction);
     if (!std::isnan(axis.min) && !std::isnan(spacing)) {
-      info.origin[i] = axis.min + (axis.is_cell_centered ? spacing / 2 : 0.0);
+      info.origin[i] = (axis.min + (axis.is_cell_centered ? spacing / 2 : 0.0)) * unit;
     }
   }
 }
@@ -400,9 +420,9 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   const std::vector<NrrdAxis> axes = volume_axes(fields, read_nrrd_axes(fields), what);
   for (int i = 0; i < 3; ++i) header.info.dims[i] = std::uint32_t(axes[std::size_t(i)].size);
   if (const std::optional<glm::dvec3> to_lps = read_nrrd_space(fields)) {
-    set_geometry_in_space(fields, axes, *to_lps, header.info);
+    set_geometry_in_space(fields, axes, *to_lps, what, header);
   } else {
-    set_geometry_by_axes(fields, axes, header.info);
+    set_geometry_by_axes(fields, axes, what, header);
   }
   check_other_nrrd_fields(fields, header.info);
 

@@ -59,6 +59,7 @@ class RawReader : public VolumeReader {
   RawReader(const VolumeHeader &header, std::unique_ptr<ByteSource> source)
       : voxels_(header.voxels), source_(std::move(source)) {
     info_ = header.info;
+    notices_ = header.notices;
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {

@@ -5,12 +5,16 @@
 //
 // World space of all formats: millimetres, and where the format is anatomical LPS (+x left, +y
 // posterior, +z superior), so that the same head has the same world coordinates from any of the
-// formats. A negative spacing is stored as a flipped direction.
+// formats. Lengths in a unit that the file names are converted. A negative spacing is stored as a
+// flipped direction.
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/io/input_file.hpp"
 #include "core/volume/volume.hpp"
@@ -42,7 +46,19 @@ struct VolumeHeader {
   VolumeInfo info;  ///< type: of the values: float32, or of 32 bits float64, where stored integers
                     ///< are scaled
   VoxelLayout voxels;
+  std::vector<std::string> notices;  ///< VolumeReader::notices()
 };
+
+/// The millimetres in a unit of lengths by its name or symbol: "um", "micrometer", "mm". Nothing
+/// for other words.
+std::optional<double> millimetres_in(std::string_view unit);
+
+/// Millimetres in each of the units that a header names; 1 for what names no unit of lengths. Adds
+/// a line to notices() unless all are millimetres or unknown.
+///
+/// field  of the header: "space units"
+std::vector<double> millimetres_in(std::span<const std::string> units, std::string_view field,
+                                   const std::string &what, VolumeHeader &header);
 
 /// Sets direction and spacing of index axis `axis` from a spacing that may be negative and a world
 /// direction.

@@ -76,7 +76,7 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
   }
   if (!finite(info.origin)) throw Error("{}: the origin is not finite", what);
   const double determinant = glm::determinant(info.direction);
-  if (!(std::abs(determinant) > 1e-6) || !std::isfinite(determinant)) {
+  if (!(std::abs(determinant) > kLeastDeterminant) || !std::isfinite(determinant)) {
     throw Error("{}: the direction matrix is singular or not finite", what);
   }
 }

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace isowave::core {
 
@@ -93,12 +94,15 @@ struct VolumeInfo {
 ///         the origin is not finite, or the direction is not invertible
 void check_volume_info(const VolumeInfo &info, std::string_view what);
 inline constexpr std::uint32_t kMaxDim = 1u << 16;
+inline constexpr double kLeastDeterminant = 1e-6;  ///< of a direction that can be inverted
 
 /// Reads a volume as float32 without holding all of it. Not thread-safe.
 class VolumeReader {
  public:
   virtual ~VolumeReader() = default;
   const VolumeInfo &info() const { return info_; }
+  /// What a user should know of how the file's header was understood: a line each.
+  const std::vector<std::string> &notices() const { return notices_; }
 
   /// Reads voxel layers [z_begin, z_begin + num_layers) to `out` [num_layers * ny * nx]. Calls must
   /// ask for ascending, non-overlapping layers (gzip streams cannot go back). Integer types are
@@ -116,6 +120,7 @@ class VolumeReader {
 
  protected:
   VolumeInfo info_;
+  std::vector<std::string> notices_;
 };
 
 }  // namespace isowave::core

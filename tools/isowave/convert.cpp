@@ -56,6 +56,7 @@ CompressedVolume convert_together(const ConvertArgs &options, const RawOverrides
       compress.device = &device.emplace(choose_local_device(*options.device, MpiJob::local_rank()));
     }
     info = open_any_volume(options.path, overrides, compress.device)->info();
+    warn_of_header(options.path, overrides);
   });
   agree_on(team, "volume", fingerprint(options.path, info));
   const VolumePart part = own_part(team, info);
@@ -76,6 +77,7 @@ CompressedVolume convert_alone(const ConvertArgs &options, const RawOverrides &o
   if (options.device) compress.device = &device.emplace(ocl::choose_device(*options.device));
   const std::unique_ptr<VolumeReader> reader =
       open_any_volume(options.path, overrides, compress.device);
+  warn_of_header(options.path, overrides);
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);
   compress.precision = find_precision(options.path, overrides, options.compression, options.input);

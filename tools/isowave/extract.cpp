@@ -33,7 +33,7 @@ struct ExtractArgs {
   CompressionOptions compression;
   float isovalue = 0;
   std::uint32_t level = 0;
-  std::string normals = "smooth", stream = "auto";
+  std::string normals = "smooth", vertices = "apart", stream = "auto";
   ExtractorOptions extractor;
 };
 
@@ -52,6 +52,7 @@ nlohmann::ordered_json stats_json(const ExtractArgs &options, const VolumeInfo &
           {"isovalue", options.isovalue},
           {"level", options.level},
           {"normals", options.normals},
+          {"vertex_places", options.vertices},
           {"vertices", stats.size.num_vertices},
           {"triangles", stats.size.num_triangles},
           {"listed_blocks", stats.listed_blocks},
@@ -78,6 +79,8 @@ void run_extract(ExtractArgs options) {
   outputs.write("--stats", options.stats);
   check_json_name(options.stats);
   options.extractor.with_normals = options.normals == "smooth";
+  options.extractor.vertices =
+      options.vertices == "apart" ? VertexPlaces::kApart : VertexPlaces::kExact;
   options.extractor.stream = stream_place_from_string(options.stream);
   if (options.level > 0) want_levels(options.compression);
 
@@ -99,7 +102,8 @@ void run_extract(ExtractArgs options) {
              options.isovalue, with_commas(stats.size.num_vertices),
              with_commas(stats.size.num_triangles), with_commas(stats.decoded_blocks),
              stats.total_ms);
-  print_if_outside(volume, options.isovalue);
+  warn_of_isovalue(volume, options.isovalue);
+  if (const std::string notice = file.notice(); !notice.empty()) warn(notice);
   fmt::print("wrote {}: {} bytes; device memory: peak {:.1f} MiB{}\n", one_line(options.output),
              with_commas(OutputGroup::current()->bytes_of(options.output)),
              double(device.ledger().peak()) / (1 << 20),
@@ -136,6 +140,12 @@ void add_extract(CLI::App &app) {
           "of vertices: smooth (central differences of voxels), or none, which needs fewer blocks")
       ->check(CLI::IsMember({"smooth", "none"}))
       ->capture_default_str();
+  command
+      ->add_option("--vertices", options->vertices,
+                   "apart: at least 1/1024 of a voxel's edge from voxels, so that no triangle is "
+                   "without area; exact: where the isovalue is crossed, on voxels too")
+      ->check(CLI::IsMember({"apart", "exact"}))
+      ->capture_default_str();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
   add_volume_options(*command, options->volume);
@@ -159,9 +169,9 @@ void add_extract(CLI::App &app) {
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
   command->add_option("--stats", options->stats, "JSON: blocks, batches, times, device memory");
-  group_options(
-      *command, "Options of every day",
-      {"--help", "--isovalue", "--output", "--level", "--normals", "--device", "--stats"});
+  group_options(*command, "Options of every day",
+                {"--help", "--isovalue", "--output", "--level", "--normals", "--vertices",
+                 "--device", "--stats"});
   group_volume_options(*command);
   group_compression_options(*command);
   group_options(*command, "Memory", {"--memory-budget", "--cache-slots", "--stream"});

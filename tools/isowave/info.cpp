@@ -162,6 +162,7 @@ void run(const InfoArgs &options) {
     result.update(describe_zfp(options.input, overrides, options.no_scan));
   } else {
     const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);
+    warn_of_header(options.input, overrides);
     result["format"] = "voxels";
     result.update(describe_grid(reader->info()));
     if (!options.no_scan && fits_float32(reader->info().type))

@@ -310,7 +310,7 @@ nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene
       write_outputs(options, scene, frames, isovalue, view);
       fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", isovalue, view,
                  with_commas(stats.rays_hit), stats.passes.size(), stats.total_ms);
-      print_if_outside(scene.volume, isovalue);
+      warn_of_isovalue(scene.volume, isovalue);
       result.push_back(frame_json(isovalue, view, camera, stats));
       frames.report(frame_path(options.error_map, scene.cameras.size(), options, isovalue, view),
                     result.back());
@@ -584,6 +584,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
       const double ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
       fmt::print("isovalue {}, view {}: {} rays hit, {} bricks, {:.1f} ms\n", isovalue, view,
                  with_commas(renderer.num_hits()), team.size(), ms);
+      warn_of_isovalue(scene.volume, isovalue);
       frames.push_back({{"isovalue", isovalue},
                         {"view", view},
                         {"rays_hit", renderer.num_hits()},
@@ -626,6 +627,7 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
     if (team.rank() == 0) outputs = check_outputs(options, views.count);
     device = open_device(options, choose_local_device(options.device, MpiJob::local_rank()));
     levels = read_levels(options.input, overrides);
+    if (!is_zfp_name(options.input)) warn_of_header(options.input, overrides);
   });
   const VolumeInfo &whole = levels.front();
   agree_on(team, "volume", fingerprint(options.input, whole));

@@ -15,7 +15,9 @@
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
+#include "core/zfp/isovalue_notice.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
+#include "tools/isowave/program.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::core::tools {
@@ -101,6 +103,8 @@ bool says_levels(const CompressionOptions &options) {
 
 namespace {
 
+constexpr std::string_view kGenerate = "generate:";
+
 Storage to_storage(const CompressionOptions &options) {
   Storage storage;
   if (!options.tolerance && !options.relative_tolerance && !options.exact)
@@ -137,6 +141,7 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
     refuse_compression(compression, path);
     return open_compressed_volume(path, overrides);
   }
+  warn_of_header(path, overrides);
   Storage storage = to_storage(compression);
   storage.device = device;
   return compress_volume([&] { return open_any_volume(path, overrides, device); }, path, storage);
@@ -151,15 +156,17 @@ CompressedVolume load_brick(const std::string &path, const RawOverrides &overrid
   return core::load_brick(path, overrides, storage, info, num_levels, own);
 }
 
-void print_if_outside(const CompressedVolume &volume, float isovalue) {
-  const auto [least, most] = volume.value_range;
-  if (!std::isfinite(least) || !std::isfinite(most) || (least <= isovalue && isovalue <= most))
-    return;
-  fmt::print("  isovalue {} is outside the volume's values, {} to {}\n", isovalue, least, most);
+void warn_of_header(const std::string &path, const RawOverrides &overrides) {
+  if (path.starts_with(kGenerate)) return;
+  const std::unique_ptr<VolumeReader> reader = open_volume(path, overrides);
+  for (const std::string &notice : reader->notices()) warn(notice);
+}
+
+void warn_of_isovalue(const CompressedVolume &volume, float isovalue) {
+  if (const std::string notice = isovalue_notice(volume, isovalue); !notice.empty()) warn(notice);
 }
 
 std::string volume_stem(const std::string &path) {
-  constexpr std::string_view kGenerate = "generate:";
   std::string name = path.starts_with(kGenerate) ? path.substr(kGenerate.size())
                                                  : std::filesystem::path(path).filename().string();
   for (const std::string_view ending :

@@ -61,8 +61,11 @@ std::optional<BlockPrecision> find_precision(const std::string &path, const RawO
 /// generator without the word "generate".
 std::string volume_stem(const std::string &path);
 
-/// Prints the range of the volume's values, if it is known and the isovalue is outside.
-void print_if_outside(const CompressedVolume &volume, float isovalue);
+/// Warns of what VolumeReader::notices() says of a file's header; of a generator, nothing.
+void warn_of_header(const std::string &path, const RawOverrides &overrides);
+
+/// Warns of an isovalue without a surface: see isovalue_notice().
+void warn_of_isovalue(const CompressedVolume &volume, float isovalue);
 
 /// The help text of an argument that open_any_volume() takes.
 inline constexpr const char *kVolumeHelp =

@@ -398,11 +398,14 @@ nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
 // ---- Meshes ----
 
 nb::dict extract(const PyVolume &self, const std::string &device, float isovalue,
-                 std::uint32_t level, bool normals, std::uint64_t memory_budget,
-                 const std::optional<nb::callable> &progress) {
+                 std::uint32_t level, bool normals, bool exact_vertices,
+                 std::uint64_t memory_budget, const std::optional<nb::callable> &progress) {
   Callbacks callbacks;
   isowave::ExtractOptions options{
-      .level = level, .with_normals = normals, .memory_budget = memory_budget};
+      .level = level,
+      .with_normals = normals,
+      .vertices = exact_vertices ? isowave::VertexPlaces::kExact : isowave::VertexPlaces::kApart,
+      .memory_budget = memory_budget};
   options.progress = [&](std::string_view what, double done) {
     const bool goes_on = callbacks.run([&] {
       if (progress) call(*progress, std::string(what), done);
@@ -414,7 +417,7 @@ nb::dict extract(const PyVolume &self, const std::string &device, float isovalue
   });
   nb::dict result;
   const std::size_t num_vertices = mesh.vertices.size(), num_faces = mesh.triangles.size();
-  result["vertices"] = to_numpy<float>(std::move(mesh.vertices), {num_vertices, 3});
+  result["vertices"] = to_numpy<double>(std::move(mesh.vertices), {num_vertices, 3});
   result["faces"] = to_numpy<std::uint32_t>(std::move(mesh.triangles), {num_faces, 3});
   if (normals) result["normals"] = to_numpy<float>(std::move(mesh.normals), {num_vertices, 3});
   return result;
@@ -431,14 +434,15 @@ std::vector<std::array<T, 3>> to_vector(const Rows<T> &rows) {
   return result;
 }
 
-void save_mesh(const Rows<float> &vertices, const Rows<std::uint32_t> &faces,
-               const std::optional<Rows<float>> &normals, const std::filesystem::path &path) {
+std::string save_mesh(const Rows<double> &vertices, const Rows<std::uint32_t> &faces,
+                      const std::optional<Rows<float>> &normals,
+                      const std::filesystem::path &path) {
   const isowave::Mesh mesh{
       .vertices = to_vector(vertices),
       .normals = normals ? to_vector(*normals) : std::vector<std::array<float, 3>>{},
       .triangles = to_vector(faces)};
   const WithoutGil no_gil;
-  isowave::save_mesh(mesh, path);
+  return isowave::save_mesh(mesh, path);
 }
 
 // ---- Devices and renderers ----
@@ -548,7 +552,7 @@ nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
   if (is_of_rays || !frame.normals.empty())
     result["normals"] = to_numpy<float>(std::move(frame.normals), {rows, columns, 3});
   if (is_of_rays || !frame.positions.empty())
-    result["positions"] = to_numpy<float>(std::move(frame.positions), {rows, columns, 3});
+    result["positions"] = to_numpy<double>(std::move(frame.positions), {rows, columns, 3});
   if (!frame.bounds.empty())
     result["bounds"] = to_numpy<float>(std::move(frame.bounds), {rows, columns});
   if (is_of_rays || !frame.hits.empty()) add_hits(frame, result);
@@ -866,6 +870,8 @@ class PyBrickRenderer {
   }
   nb::dict device() const { return device_dict(renderer_->device()); }
   const isowave::Grid &grid() const { return renderer_->grid(); }
+  const std::vector<std::string> &notices() const { return renderer_->notices(); }
+  std::string isovalue_notice(float isovalue) const { return renderer_->isovalue_notice(isovalue); }
 
  private:
   PyProcesses processes_;  // which the renderer does not call when it goes
@@ -933,6 +939,13 @@ NB_MODULE(_core, m) {
       .def_prop_ro("source_type",
                    [](const PyVolume &v) { return type_name(v.volume->source_type()); })
       .def_prop_ro("value_range", [](const PyVolume &v) { return v.volume->value_range(); })
+      .def_prop_ro("float32_positions",
+                   [](const PyVolume &v) { return v.volume->float32_positions(); })
+      .def_prop_ro("notices", [](const PyVolume &v) { return v.volume->notices(); })
+      .def(
+          "isovalue_notice",
+          [](const PyVolume &v, float isovalue) { return v.volume->isovalue_notice(isovalue); },
+          "isovalue"_a)
       .def_prop_ro("bits_per_voxel", [](const PyVolume &v) { return v.volume->bits_per_voxel(); })
       .def_prop_ro("compressed_bytes",
                    [](const PyVolume &v) { return v.volume->compressed_bytes(); })
@@ -950,8 +963,8 @@ NB_MODULE(_core, m) {
           "save",
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
           "path"_a, nb::call_guard<WithoutGil>())
-      .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a, "memory_budget"_a,
-           "progress"_a.none());
+      .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a,
+           "exact_vertices"_a, "memory_budget"_a, "progress"_a.none());
   m.def("save_mesh", &save_mesh, "vertices"_a, "faces"_a, "normals"_a.none(), "path"_a);
   m.def("compress", &compress, "read"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a, "direction"_a,
         "options"_a, "keep"_a, "path"_a.none(), "progress"_a.none());
@@ -987,6 +1000,8 @@ NB_MODULE(_core, m) {
       .def("render", &PyBrickRenderer::render, "request"_a)
       .def("camera", &PyBrickRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
       .def_prop_ro("device", &PyBrickRenderer::device)
+      .def_prop_ro("notices", &PyBrickRenderer::notices)
+      .def("isovalue_notice", &PyBrickRenderer::isovalue_notice, "isovalue"_a)
       .def_prop_ro("dims", [](const PyBrickRenderer &r) { return r.grid().dims; })
       .def_prop_ro("spacing", [](const PyBrickRenderer &r) { return r.grid().spacing; })
       .def_prop_ro("origin", [](const PyBrickRenderer &r) { return r.grid().origin; })

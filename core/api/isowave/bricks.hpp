@@ -74,6 +74,10 @@ class BrickRenderer {
   /// As Renderer's.
   Camera camera(float isovalue, std::optional<ImageSize> size = {});
 
+  /// As Volume::notices() and Volume::isovalue_notice(), in each process.
+  const std::vector<std::string> &notices() const;
+  std::string isovalue_notice(float isovalue) const;
+
   const Grid &grid() const;          ///< of the whole volume
   const DeviceInfo &device() const;  ///< this process's
 

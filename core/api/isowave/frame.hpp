@@ -134,8 +134,8 @@ struct Frame {
   std::vector<float> depth{};                   ///< [rows][columns] world units; infinity: no hit
   std::vector<std::array<float, 3>> normals{};  ///< [rows][columns] world space, of length 1, away
                                                 ///< from larger values; 0 0 0: no hit
-  /// [rows][columns] of the hits, world space; NaN: no hit
-  std::vector<std::array<float, 3>> positions{};
+  /// [rows][columns] of the hits, world space, rounded if Volume::float32_positions(); NaN: no hit
+  std::vector<Vector3> positions{};
   std::vector<Hit> hits{};  ///< [rows][columns]
   /// [rows][columns] how far the surface may be from the true one along the ray, at most [pixels];
   /// infinity: nothing is certain. They hold if the volume's errors do: see

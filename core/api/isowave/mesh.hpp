@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -14,9 +15,18 @@
 
 namespace isowave {
 
+/// Where vertices are on the edges between voxels.
+enum class VertexPlaces {
+  /// At least 1/1024 of the edge away from its voxels. So no two vertices meet, no triangle is
+  /// without area, and programs that merge vertices by position find the mesh closed.
+  kApart,
+  kExact  ///< where the isovalue is crossed; on a voxel that equals it, vertices meet
+};
+
 struct ExtractOptions {
-  std::uint32_t level = 0;          ///< of detail; 0: the volume itself
-  bool with_normals = true;         ///< needs more blocks around the surface
+  std::uint32_t level = 0;   ///< of detail; 0: the volume itself
+  bool with_normals = true;  ///< needs more blocks around the surface
+  VertexPlaces vertices = VertexPlaces::kApart;
   std::uint64_t memory_budget = 0;  ///< of device memory [bytes]; 0: three quarters of it
   /// Decoded blocks of 4^3 voxels that are kept at most, 17 and more (without normals 8); 0: as
   /// many as the surface needs and the budget allows. The mesh does not depend on it.
@@ -29,7 +39,8 @@ struct ExtractOptions {
 /// Triangles that share their vertices. Each edge of a triangle belongs to another one, too, but
 /// for those in the volume's border.
 struct Mesh {
-  std::vector<std::array<float, 3>> vertices{};  ///< world space
+  /// World space; rounded if Volume::float32_positions().
+  std::vector<Vector3> vertices{};
   /// Of vertices: length 1, away from larger values, world space; empty without normals.
   std::vector<std::array<float, 3>> normals{};
   /// Numbers of vertices, counter-clockwise seen from where values are lower.
@@ -48,17 +59,20 @@ Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const 
 /// The same to a file, for surfaces larger than memory: parts go to disk as they come, in the
 /// file's folder, which holds the mesh twice for a while. The file appears whole or not at all.
 ///
-/// path    ends in .ply, .stl, .obj, .vtp, .gltf or .glb
-/// Throws  Error: as above; the file cannot be written, or the format does not hold so much
-void extract_to_file(const std::shared_ptr<Device> &device,
-                     const std::shared_ptr<const Volume> &volume, float isovalue,
-                     const std::filesystem::path &path, const ExtractOptions &options = {});
+/// path     ends in .ply, .stl, .obj, .vtp, .gltf or .glb. Positions that float32 does not hold are
+///          float64 in .ply, .obj and .vtp; in glTF they are a node's, which has a translation
+/// Returns  a line for users, or nothing. STL has float32 alone: far from the origin, the line says
+///          what is to be added to its positions, as the file's header does
+/// Throws   Error: as above; the file cannot be written, or the format does not hold so much
+std::string extract_to_file(const std::shared_ptr<Device> &device,
+                            const std::shared_ptr<const Volume> &volume, float isovalue,
+                            const std::filesystem::path &path, const ExtractOptions &options = {});
 
 /// Writes a mesh to such a file.
 ///
-/// Throws  Error: as many normals as vertices, or none, are needed; triangles of vertices that
-/// there
-///         are not; the file cannot be written
-void save_mesh(const Mesh &mesh, const std::filesystem::path &path);
+/// Returns  as extract_to_file()
+/// Throws   Error: as many normals as vertices, or none, are needed; triangles of vertices that
+///          there are not; the file cannot be written
+std::string save_mesh(const Mesh &mesh, const std::filesystem::path &path);
 
 }  // namespace isowave

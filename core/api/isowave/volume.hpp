@@ -10,6 +10,7 @@
 #include <optional>
 #include <ranges>
 #include <span>
+#include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
@@ -89,11 +90,20 @@ class Volume {
   std::uint64_t compressed_bytes() const;
   /// Largest |decoded - source|, where it was measured.
   std::optional<double> max_voxel_error() const;
+  /// A line for users if the volume has no surface at this isovalue: it says the range of values.
+  /// Else nothing.
+  std::string isovalue_notice(float isovalue) const;
+  /// Lines for users, of how the header of the opened file was understood: units that were
+  /// converted, a qform that says otherwise than the sform. None for what is compressed already.
+  const std::vector<std::string> &notices() const;
   /// The errors of voxels and levels, and value_range(), are those that a `.zfp` file states. The
   /// source is not there to check them, so bounds of frames hold if the file's writer is right.
   /// false: they were measured when this volume was compressed.
   bool errors_are_stated() const;
   std::uint32_t num_levels() const;  ///< of detail, the volume itself among them
+  /// Whether float32 holds positions in the volume's box within 1/4096 of a voxel. If so, vertices
+  /// of meshes and positions of hits are rounded to float32, and files of meshes have float32.
+  bool float32_positions() const;
 
   /// The grid of a level of detail; 0: that of the volume.
   ///

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -12,7 +13,16 @@ import numpy.typing as npt
 from isowave import _core
 from isowave._checked import flag, names, number, whole
 from isowave._placed import Placed
-from isowave._renderer import Camera, Color, Image, bytes_of, camera_of, request_for, size_of
+from isowave._renderer import (
+    Camera,
+    Color,
+    Image,
+    bytes_of,
+    camera_of,
+    request_for,
+    size_of,
+    warn_of_isovalue,
+)
 from isowave._volume import compression_options
 
 OUTPUTS = ("rgb", "depth", "normals")
@@ -140,6 +150,9 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
 
         self.size, compression, options = self._processes.together(read)
         self._core = _core.BrickRenderer(self._processes, os.fsdecode(path), compression, options)
+        if self._processes.rank == 0:
+            for notice in self._core.notices:
+                warnings.warn(notice, RuntimeWarning, stacklevel=2)
 
     @property
     def device(self) -> dict[str, Any]:
@@ -215,4 +228,5 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         frame = self._core.render(request)
         if self._processes.rank != 0:
             return None
+        warn_of_isovalue(self._core, request["isovalue"])
         return Image(frame, camera_of(request), isovalue, samples, background)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,19 +17,28 @@ from isowave import _core
 class Mesh:
     """Triangles that share their vertices, as Volume.extract gives them.
 
-    Each edge of a triangle belongs to another one, too, but for those in the volume's border.
+    Each edge of a triangle belongs to another one, too, but for those in the volume's border. No
+    triangle is without area, unless vertices were asked for exactly.
     """
 
-    #: float32 (n, 3): world space, (x, y, z).
-    vertices: npt.NDArray[np.float32]
+    #: float32 (n, 3): world space, (x, y, z). float64 if float32 would lose more than 1/4096 voxel,
+    #: as it does far from the origin.
+    vertices: npt.NDArray[np.float32] | npt.NDArray[np.float64]
     #: uint32 (m, 3): numbers of vertices, counter-clockwise seen from where values are lower.
     faces: npt.NDArray[np.uint32]
     #: float32 (n, 3), world space: of length 1, away from larger values. None: not asked for.
     normals: npt.NDArray[np.float32] | None
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a .ply, .stl, .obj, .vtp, .gltf or .glb file; whole, or not at all."""
-        _core.save_mesh(self.vertices, self.faces, self.normals, os.fsdecode(path))
+        """Writes a .ply, .stl, .obj, .vtp, .gltf or .glb file; whole, or not at all.
+
+        Vertices that float32 does not hold are float64 in .ply, .obj and .vtp. In the others they
+        have an offset: a node's translation in glTF. STL's header says what to add, and so does a
+        RuntimeWarning.
+        """
+        notice = _core.save_mesh(self.vertices, self.faces, self.normals, os.fsdecode(path))
+        if notice:
+            warnings.warn(notice, RuntimeWarning, stacklevel=2)
 
     def to_pyvista(self) -> Any:
         """A pyvista.PolyData with the normals as point data. Needs pyvista."""

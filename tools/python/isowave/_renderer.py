@@ -114,7 +114,9 @@ class Image:
     normals: npt.NDArray[np.float32] | None
     """(rows, columns, 3), (x, y, z) in world space, of length 1, away from larger values; 0 where
     there is no surface."""
-    position: npt.NDArray[np.float32] | None  #: (rows, columns, 3), world space; nan: no surface
+    position: npt.NDArray[np.float32] | npt.NDArray[np.float64] | None
+    """(rows, columns, 3), world space; nan: no surface. float64 if float32 would lose more than
+    1/4096 voxel, as it does far from the origin."""
     bounds: npt.NDArray[np.float32] | None
     """How far the surface is from that of the volume before compression, at most [pixels]; inf:
     nothing is certain. They hold if the volume's errors do, which a file may state wrongly:
@@ -285,6 +287,12 @@ def request_for(
     }
 
 
+def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) -> None:
+    """Warns the caller's caller of an isovalue without a surface."""
+    if notice := core.isovalue_notice(isovalue):
+        warnings.warn(notice, RuntimeWarning, stacklevel=3)
+
+
 def camera_of(request: dict[str, Any]) -> Camera:
     return Camera(request["eye"], request["at"], request["up"], request["fovy_degrees"])
 
@@ -307,8 +315,14 @@ def draw(
     return renderer.render(request, None if on_pass is None else callback, interrupts and is_main)
 
 
+def positions_of(volume: _core.Volume, positions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+    """World positions in float32, if that holds them."""
+    return positions.astype(np.float32) if volume.float32_positions else positions
+
+
 def cast_rays(
     renderer: _core.Renderer | _core.HostRenderer,
+    volume: _core.Volume,
     rays: npt.ArrayLike,
     isovalue: float,
     normals: str,
@@ -327,7 +341,7 @@ def cast_rays(
     return {
         "t_hit": found["depth"].reshape(lead),
         "normals": found["normals"].reshape(*lead, 3),
-        "position": found["positions"].reshape(*lead, 3),
+        "position": positions_of(volume, found["positions"]).reshape(*lead, 3),
         "cell": found["cells"][..., ::-1].reshape(*lead, 3),
     }
 
@@ -388,6 +402,7 @@ class Renderer:
             "time_budget": flag("time_budget", time_budget),
             "rays": flag("rays", rays),
         }
+        self._volume = volume._core
         self._iterating: int | None = None  # the thread that looks at a picture of passes()
         self._core = _core.Renderer(
             "" if device is None else str(device),
@@ -516,7 +531,10 @@ class Renderer:
         # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
         # pass would cost time.
         interrupts = self.device["type"] != "gpu"
+        warn_of_isovalue(self._volume, request["isovalue"])
         frame = draw(self._core, request, on_pass, interrupts)
+        if "positions" in frame:
+            frame["positions"] = positions_of(self._volume, frame["positions"])
         return Image(frame, camera_of(request), isovalue, samples, background)
 
     def _check(
@@ -549,7 +567,8 @@ class Renderer:
         self._check_turn()
         if not self._can["rays"]:
             raise _core.Error("cast_rays needs a renderer that was made with rays=True")
-        return cast_rays(self._core, rays, isovalue, normals)
+        warn_of_isovalue(self._volume, number("isovalue", isovalue))
+        return cast_rays(self._core, self._volume, rays, isovalue, normals)
 
     def __repr__(self) -> str:
         width, height = self.size

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import threading
 import uuid
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -29,8 +30,10 @@ from isowave._renderer import (
     cast_rays,
     draw,
     needed_options,
+    positions_of,
     request_for,
     size_of,
+    warn_of_isovalue,
 )
 
 #: Called with what is done ("compressing") and how much of it, 0 to 1.
@@ -283,12 +286,14 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
             None if spacing is None else reversed_axes(spacing),
             shown,
         )
-        if not is_compressed:
-            return Volume(core)
-        return Volume(core, os.path.abspath(name), None if spacing is None else tuple(spacing))
     finally:
         if isinstance(shown, TqdmProgress):
             shown.close()
+    for notice in core.notices:
+        warnings.warn(notice, RuntimeWarning, stacklevel=2)
+    if not is_compressed:
+        return Volume(core)
+    return Volume(core, os.path.abspath(name), None if spacing is None else tuple(spacing))
 
 
 class Volume(Placed[_core.Volume]):
@@ -569,7 +574,8 @@ class Volume(Placed[_core.Volume]):
             else:
                 renderer = self._renderer_for({"device": device, "rays": True})
                 return renderer.cast_rays(rays, isovalue, normals=normals)
-        return cast_rays(host, rays, isovalue, normals)
+        warn_of_isovalue(self._core, number("isovalue", isovalue))
+        return cast_rays(host, self._core, rays, isovalue, normals)
 
     def _fits_host(self) -> bool:
         try:
@@ -584,6 +590,7 @@ class Volume(Placed[_core.Volume]):
         *,
         level: int = 0,
         normals: bool = True,
+        vertices: str = "apart",
         device: str | int | None = None,
         memory_budget: int | None = None,
         progress: Progress | None = None,
@@ -600,6 +607,10 @@ class Volume(Placed[_core.Volume]):
             Of detail; each has half the voxels of the last along each axis.
         normals
             Of vertices: central differences of voxels. Without, fewer blocks are decoded.
+        vertices
+            "apart": at least 1/1024 of an edge from its voxels, so that no triangle is without
+            area, and programs that merge vertices by position find the mesh closed. "exact": where
+            the isovalue is crossed; on a voxel that equals it, vertices meet.
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
         memory_budget
@@ -607,15 +618,20 @@ class Volume(Placed[_core.Volume]):
         progress
             Called with what is done and how much of it, 0 to 1.
         """
+        if vertices not in ("apart", "exact"):
+            raise ValueError(f"vertices={vertices!r:.60}: there are apart and exact")
+        warn_of_isovalue(self._core, number("isovalue", isovalue))
         found = self._core.extract(
             "" if device is None else str(device),
             number("isovalue", isovalue),
             self._checked(level),
             flag("normals", normals),
+            vertices == "exact",
             0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
             function("progress", progress),
         )
-        return Mesh(found["vertices"], found["faces"], found["normals"] if normals else None)
+        places = positions_of(self._core, found["vertices"])
+        return Mesh(places, found["faces"], found["normals"] if normals else None)
 
     def verify(
         self,

@@ -86,7 +86,7 @@ def test_meshes_of_real_volumes_are_those_of_vtk(path):
 
 def expect_mesh_of_vtk(volume, isovalue):
     voxels = volume.decode()
-    mesh = volume.extract(isovalue)
+    mesh = volume.extract(isovalue, vertices="exact")
     vertices, num_triangles = with_vtk("vtkFlyingEdges3D", voxels, isovalue)
     assert len(mesh.faces) == num_triangles
     assert len(mesh.vertices) == len(vertices)
@@ -134,6 +134,88 @@ def test_budget_level_and_normals():
     assert volume.extract(12, normals=False).normals is None
     coarse = volume.extract(12, level=1)
     assert 0 < len(coarse.faces) < len(mesh.faces) / 2
+
+
+def test_vertices_are_apart_unless_asked_for_exactly():
+    """Integers, many at the isovalue: what merges vertices by position finds the mesh closed."""
+    volume = isowave.compress(noise((9, 10, 11), 7, values=4).astype(np.uint8), exact=True)
+    meshes = {places: volume.extract(2, vertices=places) for places in ("apart", "exact")}
+    assert len(meshes["apart"].faces) == len(meshes["exact"].faces)
+    num_flat = {}
+    for places, mesh in meshes.items():
+        a, b, c = (mesh.vertices[mesh.faces[:, i]].astype(np.float64) for i in range(3))
+        num_flat[places] = (np.linalg.norm(np.cross(b - a, c - a), axis=1) == 0).sum()
+    assert num_flat["apart"] == 0 and num_flat["exact"] > 100
+    merged = np.unique(meshes["apart"].vertices, axis=0)
+    assert len(merged) == len(meshes["apart"].vertices)
+    assert np.abs(meshes["apart"].vertices - meshes["exact"].vertices).max() <= 1 / 1024
+    np.testing.assert_array_equal(volume.extract(2).vertices, meshes["apart"].vertices)
+    with pytest.raises(ValueError, match="apart and exact"):
+        volume.extract(2, vertices="merged")
+
+
+def test_far_from_the_origin(tmp_path):
+    """At the coordinates of maps, float32 would keep a few places of each axis."""
+    z, y, x = np.mgrid[:16, :18, :20].astype(np.float32)
+    field = np.sqrt((x - 9) ** 2 + (y - 9) ** 2 + (z - 8) ** 2)
+    origin = (120.0, 6_700_000.0, 4_500_000.0)
+    near = isowave.compress(field, rate=16, spacing=0.125)
+    far = isowave.compress(field, rate=16, spacing=0.125, origin=origin)
+    meshes = near.extract(5), far.extract(5)
+    assert meshes[0].vertices.dtype == np.float32 and meshes[1].vertices.dtype == np.float64
+    moved = meshes[1].vertices - origin[::-1]
+    np.testing.assert_allclose(moved, meshes[0].vertices, rtol=0, atol=1e-7)
+
+    images = [volume.render(5, size=(40, 30)) for volume in (near, far)]
+    assert images[0].position.dtype == np.float32 and images[1].position.dtype == np.float64
+    np.testing.assert_array_equal(images[0].rgb, images[1].rgb)
+    np.testing.assert_allclose(
+        images[1].position - origin[::-1], images[0].position, rtol=0, atol=1e-6
+    )
+    rays = np.array([[-1, 1.1, 1.05, 1, 0, 0]], np.float64)
+    hits = near.cast_rays(rays, 5), far.cast_rays(rays + [*origin[::-1], 0, 0, 0], 5)
+    np.testing.assert_allclose(hits[1]["t_hit"], hits[0]["t_hit"], rtol=1e-6)
+    np.testing.assert_allclose(
+        hits[1]["position"] - origin[::-1], hits[0]["position"], rtol=0, atol=1e-6
+    )
+
+    meshes[1].save(tmp_path / "a.ply")
+    head, data = (tmp_path / "a.ply").read_bytes().split(b"end_header\n", 1)
+    assert b"property double x" in head
+    row = np.dtype([("place", "<f8", 3), ("normal", "<f4", 3)])
+    vertices = np.frombuffer(data, row, len(meshes[1].vertices))["place"]
+    np.testing.assert_array_equal(vertices, meshes[1].vertices)
+    with pytest.warns(RuntimeWarning, match=r"add 4500001 6700001 121 to x y z"):
+        meshes[1].save(tmp_path / "a.stl")
+    assert b"add 4500001 6700001 121 to x y z" in (tmp_path / "a.stl").read_bytes()[:80]
+
+
+def test_an_isovalue_outside_the_values_is_a_warning():
+    volume = isowave.compress(np.arange(1000, dtype=np.uint16).reshape(10, 10, 10), exact=True)
+    rays = np.zeros((1, 6)) + [0, 0, 0, 0, 0, 1]
+    for isovalue in (-5, 1000):
+        text = f"isovalue {isovalue} is outside the volume's values, 0 to 999"
+        for draw in (
+            lambda value: volume.render(value, size=(16, 8)),
+            lambda value: volume.cast_rays(rays, value),
+            lambda value: volume.cast_rays(rays, value, device="cpu"),
+            volume.extract,
+        ):
+            with pytest.warns(RuntimeWarning, match=text) as caught:
+                draw(isovalue)
+            assert caught[0].filename == __file__
+
+
+def test_what_was_done_to_a_header_is_a_warning(tmp_path):
+    header = (
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: raw\nspace: LPS\n"
+        'space directions: (2,0,0) (0,2,0) (0,0,2)\nspace units: "um" "um" "um"\n\n'
+    )
+    (tmp_path / "a.nrrd").write_bytes(header.encode() + bytes(range(64)))
+    with pytest.warns(RuntimeWarning, match="space units: um") as caught:
+        volume = isowave.open(tmp_path / "a.nrrd", exact=True)
+    assert caught[0].filename == __file__
+    assert volume.spacing == (0.002, 0.002, 0.002)
 
 
 def test_progress_and_errors():

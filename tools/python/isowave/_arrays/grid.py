@@ -120,6 +120,17 @@ def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def of_steps(steps: Vector, origin: Vector) -> Placement:
+    """Returns the placement of a grid along the world's axes; a negative step is a direction of -1,
+    so that every voxel stays where the steps put it."""
+    x, y, z = (-1.0 if step < 0 else 1.0 for step in steps)
+    return Placement(
+        (abs(steps[0]), abs(steps[1]), abs(steps[2])),
+        origin,
+        ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)),
+    )
+
+
 def moved(placement: Placement, index: Vector) -> Vector:
     """Returns the world position (x, y, z) of an index (x, y, z)."""
     spacing = placement.spacing

@@ -10,7 +10,7 @@ import numpy as np
 
 from .errors import bad_value, short
 from .found import Found, named
-from .grid import Placement, checked_shape
+from .grid import checked_shape, of_steps
 from .layers import even_rows
 from .stores import uneven_rows
 
@@ -62,23 +62,18 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
     sizes = array.shape if order is None else tuple(array.shape[axis] for axis in order)
     shape = checked_shape(sizes, what)
 
-    spacing, origin, signs = [1.0] * 3, [0.0] * 3, [1.0] * 3
+    steps, origin = [1.0] * 3, [0.0] * 3
     for axis, dim in enumerate(dims):
         if dim not in array.coords:
             continue
         try:
-            spacing[axis], origin[axis], signs[axis] = _even_steps(
+            steps[axis], origin[axis] = _even_steps(
                 array.coords[dim].values, shape[axis], dim, what
             )
         except ValueError:
             if not has_spacing:
                 raise
-    sz, sy, sx = signs
-    placement = Placement(
-        (spacing[2], spacing[1], spacing[0]),
-        (origin[2], origin[1], origin[0]),
-        ((sx, 0.0, 0.0), (0.0, sy, 0.0), (0.0, 0.0, sz)),
-    )
+    placement = of_steps((steps[2], steps[1], steps[0]), (origin[2], origin[1], origin[0]))
 
     def fetch(begin: int, end: int) -> Any:
         # Of the variable, because indexing an array indexes all its coordinates, too.
@@ -120,8 +115,8 @@ def _axis(array: Any, dim: Any) -> str | None:
     return _AXES.get(dim.lower()) if isinstance(dim, str) else None
 
 
-def _even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, float, float]:
-    """Returns the step's length, the first coordinate, and the step's sign.
+def _even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, float]:
+    """Returns the step, negative if coordinates fall, and the first coordinate.
 
     Raises ArrayValueError, with the dimension's name, if there is no such step.
     """
@@ -143,7 +138,7 @@ def _even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, fl
         off = float(np.abs(positions - even).max())
     if step == 0 or not off <= _EVEN_TOLERANCE * abs(step):
         raise bad_value(what, f"{name} is not evenly spaced: {ways}")
-    return abs(step), float(positions[0]), -1.0 if step < 0 else 1.0
+    return step, float(positions[0])
 
 
 def _rows(array: Any, dim: Any, axis: int, num_layers: int, what: str) -> Sequence[int] | None:

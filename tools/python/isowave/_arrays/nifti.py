@@ -1,6 +1,9 @@
 """nibabel's images lie where their affine says, in the unit of lengths that their header names.
 
-nibabel's world is RAS (right, anterior, superior); ours is ITK's LPS. Its arrays are (x, y, z).
+nibabel's world is RAS (right, anterior, superior), in the unit that a NIfTI header names; ours is
+ITK's LPS in millimetres. Its arrays are (x, y, z). From an image's file, our NIfTI reader (core/io)
+gives the same volume, by the same choice between sform and qform. Only if the file has neither, it
+lies at the origin, while nibabel makes up an affine.
 """
 
 from __future__ import annotations

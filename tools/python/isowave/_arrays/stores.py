@@ -9,7 +9,7 @@ from typing import Any
 
 from .errors import bad_type, bad_value, short, type_name
 from .found import Found, chunk_size, named
-from .grid import Placement, checked_shape, finite_numbers
+from .grid import checked_shape, finite_numbers, of_steps
 from .layers import even_rows
 from .voxels import read_type
 
@@ -112,7 +112,8 @@ def group(obj: Any, has_spacing: bool) -> Found:
 def zarr_group(obj: Any, has_spacing: bool) -> Found:
     """Adapts the finest level of an OME-Zarr image, metadata 0.4 or 0.5.
 
-    Scale and translation of the spatial axes give spacing and origin. Further axes (t, c) must
+    Scale and translation of the spatial axes give spacing and origin; a negative scale gives a
+    direction of -1, so that every voxel stays where the metadata says. Further axes (t, c) must
     have one entry.
 
     Raises ArrayValueError for metadata that is not as the format says.
@@ -166,7 +167,7 @@ def zarr_group(obj: Any, has_spacing: bool) -> Found:
         index[z], index[y], index[x] = slice(begin, end), slice(None), slice(None)
         return array[tuple(index)]
 
-    placement = Placement(
+    placement = of_steps(
         (scale[x], scale[y], scale[z]), (translation[x], translation[y], translation[z])
     )
     return Found(

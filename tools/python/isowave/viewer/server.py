@@ -23,6 +23,7 @@ import secrets
 import struct
 import sys
 import threading
+import warnings
 import webbrowser
 from collections.abc import Coroutine, Sequence
 from dataclasses import dataclass
@@ -554,6 +555,8 @@ def _argument(parse: Any) -> Any:
 def main(argv: Sequence[str] | None = None) -> int:
     """The command `isowave view`. Returns its exit status."""
     arguments = make_parser().parse_args(argv)
+    # As the program's other warnings: a line each.
+    warnings.formatwarning = lambda message, *_, **__: f"isowave: warning: {message}\n"
     try:
         import isowave
 

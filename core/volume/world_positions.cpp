@@ -1,0 +1,44 @@
+#include "core/volume/world_positions.hpp"
+
+#include <cmath>
+
+namespace isowave::core {
+
+bool float32_holds_positions(const VolumeInfo &info) {
+  const glm::dmat3 to_world = info.index_to_world(), to_index = glm::inverse(to_world);
+  const glm::dvec3 last(info.dims - 1u);
+  constexpr double kHalfUlp = 0x1p-24;  // of a number, as a part of it at most
+  glm::dvec3 error(0.0);                // of a coordinate in the world
+  for (int row = 0; row < 3; ++row) {
+    double extent = 0;  // largest distance from the origin of the box along this axis
+    for (int axis = 0; axis < 3; ++axis) extent += std::abs(to_world[axis][row]) * last[axis];
+    error[row] = kHalfUlp * (std::abs(info.origin[row]) + extent);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    double voxels = 0;
+    for (int row = 0; row < 3; ++row) voxels += std::abs(to_index[row][axis]) * error[row];
+    if (!(voxels <= kPositionError)) return false;
+  }
+  return true;
+}
+
+glm::dvec3 rounded_to_float32(const glm::dvec3 &position) {
+  // GCC 12 leaves out both conversions, to float32 and back, where it makes vectors of them.
+  const auto rounded = [](double value) {
+    const volatile float result = static_cast<float>(value);
+    return double{result};
+  };
+  return {rounded(position.x), rounded(position.y), rounded(position.z)};
+}
+
+WorldPositions::WorldPositions(const VolumeInfo &info)
+    : origin_(info.origin),
+      to_world_(info.index_to_world()),
+      is_float32_(float32_holds_positions(info)) {}
+
+glm::dvec3 WorldPositions::operator()(const glm::dvec3 &index) const {
+  const glm::dvec3 position = origin_ + to_world_ * index;
+  return is_float32_ ? rounded_to_float32(position) : position;
+}
+
+}  // namespace isowave::core
