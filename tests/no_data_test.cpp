@@ -159,13 +159,13 @@ TEST(NoData, ValuesAreComparedInTheSourcesType) {
   voxels[5] = 0.1;
   voxels[6] = double{0.1f};
   ArrayReader doubles(dims, voxels, VoxelType::kFloat64), floats(dims, voxels);
-  EXPECT_EQ(compress(doubles, {.input = {.no_data = 0.1}}).no_data.num_voxels(), 1u);
-  EXPECT_EQ(compress(floats, {.input = {.no_data = 0.1}}).no_data.num_voxels(), 2u);
-  EXPECT_TRUE(compress(floats, {.input = {.no_data = 1e300}}).no_data.empty());
+  EXPECT_EQ(compress(doubles, {.rate = 16, .input = {.no_data = 0.1}}).no_data.num_voxels(), 1u);
+  EXPECT_EQ(compress(floats, {.rate = 16, .input = {.no_data = 0.1}}).no_data.num_voxels(), 2u);
+  EXPECT_TRUE(compress(floats, {.rate = 16, .input = {.no_data = 1e300}}).no_data.empty());
   voxels[5] = -1024;
   voxels[6] = 40000;
   ArrayReader integers(dims, voxels, VoxelType::kInt32);
-  const CompressedVolume volume = compress(integers, {.input = {.no_data = -1024.0}});
+  const CompressedVolume volume = compress(integers, {.rate = 16, .input = {.no_data = -1024.0}});
   EXPECT_EQ(volume.no_data.num_voxels(), 1u);
   EXPECT_EQ(volume.value_range, (std::array{1.0f, 40000.0f}));
 }
@@ -177,7 +177,9 @@ TEST(NoData, OtherInfiniteVoxelsAreRefused) {
   voxels[7] = kNone;
   EXPECT_THAT([&] { compressed(dims, voxels); },
               ThrowsMessage<Error>(HasSubstr("1 of 64 voxels are infinite, the first at (2,1,0)")));
-  EXPECT_EQ(compressed(dims, voxels, {.input = {.no_data = -INFINITY}}).no_data.num_voxels(), 2u);
+  EXPECT_EQ(
+      compressed(dims, voxels, {.rate = 16, .input = {.no_data = -INFINITY}}).no_data.num_voxels(),
+      2u);
   EXPECT_TRUE(compressed(dims, voxels, {.input = {.map_nan = 3.0f}}).no_data.empty());
   const CompressedVolume both =
       compressed(dims, voxels, {.rate = 32, .input = {.map_nan = 3.0f, .no_data = 1.0}});
@@ -207,7 +209,7 @@ TEST(NoData, NeighboursKeepTheirError) {
     EXPECT_LE(
         bounded.payload_bits(),
         1.15 * static_cast<double>(TestVolume(test::grid_info(dims), source, {.tolerance = 1e-3})
-                                      .compressed.payload_bits()));
+                                       .compressed.payload_bits()));
   }
 }
 

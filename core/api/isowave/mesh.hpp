@@ -31,8 +31,8 @@ struct ExtractOptions {
   /// Decoded blocks of 4^3 voxels that are kept at most, 17 and more (without normals 8); 0: as
   /// many as the surface needs and the budget allows. The mesh does not depend on it.
   std::uint32_t cache_blocks = 0;
-  /// Called from the calling thread: what is done, and how much of it, 0 to 1; before each kernel is
-  /// compiled, too. What it throws ends the extraction.
+  /// Called from the calling thread: what is done, and how much of it, 0 to 1; before each kernel
+  /// is compiled, too. What it throws ends the extraction.
   std::function<void(std::string_view what, double done)> progress{};
 };
 
