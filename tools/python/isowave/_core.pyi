@@ -165,7 +165,7 @@ class BrickRenderer:
     def isovalue_notice(self, isovalue: float) -> str: ...
 
 def save_mesh(
-    vertices: NDArray[np.float64],
+    vertices: NDArray[np.float32] | NDArray[np.float64],
     faces: NDArray[np.uint32],
     normals: NDArray[np.float32] | None,
     path: str | PathLike[str],
