@@ -207,7 +207,7 @@ TEST(NoData, NeighboursKeepTheirError) {
     EXPECT_LE(
         bounded.payload_bits(),
         1.15 * static_cast<double>(TestVolume(test::grid_info(dims), source, {.tolerance = 1e-3})
-                                      .compressed.payload_bits()));
+                                       .compressed.payload_bits()));
   }
 }
 
@@ -458,6 +458,11 @@ TEST_P(NoDataMeshes, SmallOtherVolumesAreDrawnAsBefore) {
     Renderer other(device, holed.compressed, {.size = kSize});
     EXPECT_EQ(device.ledger().current(), 2 * bytes + holed.compressed.no_data.table().size_bytes());
   }
+  EXPECT_THAT([&] { Renderer(device, holed.compressed, {.size = kSize, .with_bounds = true}); },
+              ThrowsMessage<Error>(HasSubstr("bounds of a frame's error cannot be given")));
+  EXPECT_THAT(
+      [&] { compressed(dims, with_hole(dims, source, holes(dims)[1].hole), {.levels = 2}); },
+      ThrowsMessage<Error>(HasSubstr("cannot have levels of detail yet")));
   ocl::DeviceInfo without = GetParam();
   without.capabilities.nan = false;
   ocl::Device plain(without);
