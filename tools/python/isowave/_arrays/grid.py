@@ -30,6 +30,9 @@ _UNIT_TOLERANCE = 1e-3
 _MOST_COSINE = 1e-4
 """Between two axes of an affine that has no shear, as in core/io's NIfTI reader."""
 
+_MOST_CHANNELS = 4
+"""A last axis of so few entries, behind three longer ones, is one of channels."""
+
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -191,6 +194,8 @@ def _advice_on_axes(sizes: tuple[int, ...]) -> str:
     surplus = len(sizes) - 3
     if surplus <= 0:
         return need
+    if surplus == 1 and 1 < sizes[-1] <= _MOST_CHANNELS < min(sizes[:-1]):
+        return f"{need}: take one channel of it, for example array[..., 0]"
     if sum(size != 1 for size in sizes) > 3:
         return f"{need}: take one volume of it, for example array[{', '.join('0' * surplus)}]"
     leading = 0

@@ -24,6 +24,9 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
     A dimension's coordinate gives spacing and origin; a falling one a direction of -1, so that
     every voxel stays where its coordinates say. Without a coordinate: spacing 1, origin 0.
 
+    The attribute _FillValue, or missing_value, names voxels without data; xarray has replaced them
+    by NaN where it decoded the file, and rioxarray's nodata is the same attribute.
+
     Raises ArrayValueError for a coordinate that is not of numbers, not even or not moving, unless
     the caller gave a spacing; then such a coordinate is ignored.
     """
@@ -61,7 +64,9 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
         # Of the variable, because indexing an array indexes all its coordinates, too.
         return array.variable.isel({dims[0]: slice(begin, end)}).values
 
-    return Found(what, shape, array.dtype, fetch, _rows(array, dims, shape, what), placement)
+    no_data = array.attrs.get("_FillValue", array.attrs.get("missing_value"))
+    rows = _rows(array, dims, shape, what)
+    return Found(what, shape, array.dtype, fetch, rows, placement, no_data=no_data)
 
 
 def _even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, float, float]:

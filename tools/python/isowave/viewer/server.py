@@ -506,6 +506,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--relative-tolerance", type=float, help="the same, as a part of the range of values")
     add("--exact", action="store_true", help="instead: keep the bits of integers")
     add("--levels", type=int, help="levels of detail; 0: all")
+    add("--no-data", type=float, help="voxels of this value have no data, as NaN voxels have none")
     add("--host", default="127.0.0.1", help="to listen at; others than loopback are not encrypted")
     add("--port", type=int, default=0, help="0: a free one")
     add("--max-clients", type=int, default=16, help="that look at the same time")
@@ -538,7 +539,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         import isowave
 
-        ways = ("rate", "tolerance", "relative_tolerance", "levels")
+        ways = ("rate", "tolerance", "relative_tolerance", "levels", "no_data")
         given = {w: getattr(arguments, w) for w in ways if getattr(arguments, w) is not None}
         if arguments.exact:
             given["exact"] = True
