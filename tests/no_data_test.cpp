@@ -460,6 +460,11 @@ TEST_P(NoDataMeshes, SmallOtherVolumesAreDrawnAsBefore) {
     Renderer other(device, holed.compressed, {.size = kSize});
     EXPECT_EQ(device.ledger().current(), 2 * bytes + holed.compressed.no_data.table().size_bytes());
   }
+  EXPECT_THAT([&] { Renderer(device, holed.compressed, {.size = kSize, .with_bounds = true}); },
+              ThrowsMessage<Error>(HasSubstr("bounds of a frame's error cannot be given")));
+  EXPECT_THAT(
+      [&] { compressed(dims, with_hole(dims, source, holes(dims)[1].hole), {.levels = 2}); },
+      ThrowsMessage<Error>(HasSubstr("cannot have levels of detail yet")));
   ocl::DeviceInfo without = GetParam();
   without.capabilities.nan = false;
   ocl::Device plain(without);

@@ -222,7 +222,7 @@ void PyramidCoder::end_chunk(const Chunk &chunk) {
   for (const std::uint64_t mask : chunk.no_data) no_data_.add(mask);
   if (!next_) return;
   if (std::ranges::any_of(chunk.no_data, [](std::uint64_t mask) { return mask != 0; }))
-    throw Error("voxels without data: levels of detail cannot be made of them yet");
+    throw Error("some voxels have no data: such a volume cannot have levels of detail yet");
   if (bounds_) {
     bounds_->add_fine(chunk.voxels);
     if (is_finest_) keep_lost(chunk.lost);

@@ -295,6 +295,7 @@ isowave::Compression compression_of(const nb::dict &options) {
   get("measure_error", result.measure_error);
   get("levels", result.levels);
   get("map_nan", result.map_nan);
+  get("no_data", result.no_data);
   get("num_threads", result.num_threads);
   return result;
 }

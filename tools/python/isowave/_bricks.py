@@ -96,7 +96,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         measured then.
     bricks
         How many along x, y and z; None: as fits.
-    tolerance, relative_tolerance, rate, exact, map_nan
+    tolerance, relative_tolerance, rate, exact, map_nan, no_data
         As isowave.open()'s.
 
     Raises
@@ -125,13 +125,14 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         rate: int | None = None,
         exact: bool = False,
         map_nan: float | None = None,
+        no_data: float | None = None,
     ) -> None:
         self._processes = Processes(comm)
 
         def read() -> tuple[tuple[int, int], dict[str, Any], dict[str, Any]]:
             width, height = size_of(size)
             compression = compression_options(
-                tolerance, relative_tolerance, rate, exact, 1, map_nan, 0
+                tolerance, relative_tolerance, rate, exact, 1, map_nan, no_data, 0
             )
             compression["measure_error"] = False
             options = {

@@ -90,6 +90,7 @@ def compression_options(
     exact: bool,
     levels: int,
     map_nan: float | None,
+    no_data: float | None,
     num_threads: int,
 ) -> dict[str, Any]:
     return {
@@ -101,6 +102,7 @@ def compression_options(
         "exact": flag("exact", exact),
         "levels": whole("levels", levels),
         "map_nan": None if map_nan is None else number("map_nan", map_nan),
+        "no_data": None if no_data is None else number("no_data", no_data),
         "num_threads": whole("num_threads", num_threads),
         # Where nothing bounds it, the error is measured: people ask.
         "measure_error": not exact and tolerance is None and relative_tolerance is None,
@@ -154,6 +156,7 @@ def compress(
     direction: npt.ArrayLike | None = None,
     levels: int = 1,
     map_nan: float | None = None,
+    no_data: float | None = None,
     fill_value: float | None = None,
     path: str | os.PathLike[str] | None = None,
     progress: bool | Progress | None = None,
@@ -187,9 +190,14 @@ def compress(
     levels
         Levels of detail, the volume itself among them; 0: all that it can have.
     map_nan
-        What replaces NaN and infinities, which are refused without.
+        What replaces NaN and infinite voxels.
+    no_data
+        Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
+        compared in the array's own type, and may be infinite; other infinite voxels are refused.
+        Where None, what the array says itself: _FillValue or missing_value of xarray, fill_value of
+        zarr unless it is 0.
     fill_value
-        What replaces masked values of masked arrays.
+        What replaces masked values of masked arrays; where None, they have no data.
     path
         A .zfp file that the volume is written to, layer by layer, and opened from: then the result
         need not fit into memory. None: into memory.
@@ -211,8 +219,10 @@ def compress(
         direction=direction,
         fill_value=fill_value,
     )
+    if no_data is None:
+        no_data = source.no_data
     options = compression_options(
-        tolerance, relative_tolerance, rate, exact, levels, map_nan, num_threads
+        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
     )
     nz, ny, nx = source.shape
     columns: list[_core.Vector] = [column.tolist() for column in source.direction.T]
@@ -252,6 +262,7 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     spacing: Sequence[float] | None = None,
     levels: int = 1,
     map_nan: float | None = None,
+    no_data: float | None = None,
     progress: bool | Progress | None = None,
     num_threads: int = 0,
 ) -> Volume:
@@ -272,7 +283,7 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     name = os.fsdecode(path)
     is_compressed = name.endswith(".zfp")
     options = compression_options(
-        tolerance, relative_tolerance, rate, exact, levels, map_nan, num_threads
+        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
     )
     if is_compressed:
         options["measure_error"] = False

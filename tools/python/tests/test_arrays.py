@@ -165,6 +165,8 @@ def test_structured_voxels_name_a_field():
         ((2, 7, 5, 6), "for example array[0]"),
         ((9, 7, 5, 3), "pass one channel: array[..., 0]"),
         ((2, 2, 7, 5, 3), "for example array[0, 0]"),
+        ((20, 22, 24, 3), "take one channel of it, for example array[..., 0]"),
+        ((3, 22, 24, 20), "for example array[0]"),
         ((0, 5, 3), "0 voxels along z"),
         ((7, 1, 3), "1 voxels along y"),
         ((7, 5, 0), "0 voxels along x"),
@@ -274,12 +276,23 @@ def test_masks():
     check_source(as_source(np.ma.array(voxels, mask=mask)), voxels)
     mask[5, 1, 2] = True
     masked = np.ma.array(voxels, mask=mask)
-    check_refused(masked, "fill_value=")
+    check_source(as_source(masked), np.where(mask, np.float32(np.nan), voxels))
     for fill_value in (-7, np.nan):
         expected = np.where(mask, np.float32(fill_value), voxels)
         check_source(as_source(masked, fill_value=fill_value), expected)
     np.testing.assert_array_equal(voxels, make_voxels("float32"))  # the caller's, as it was
     check_refused(masked, "not a value of float32", fill_value=1e300)
+
+
+@pytest.mark.parametrize(
+    ("stored", "read"), [("uint8", "f4"), ("int16", "f4"), ("uint32", "f8"), ("int64", "f8")]
+)
+def test_masked_whole_numbers_have_no_data(stored, read):
+    voxels = make_voxels("int16").astype(stored)
+    mask = np.zeros(voxels.shape, bool)
+    mask[5, 1, 2] = True
+    masked = np.ma.array(voxels, mask=mask)
+    check_source(as_source(masked), np.where(mask, np.nan, voxels).astype(read))
 
 
 def test_masked_voxels_may_be_inexact():
@@ -572,6 +585,13 @@ def test_zarr_2():
     assert as_source(made).chunk_layers == 4
 
 
+def test_zarr_names_voxels_without_data(tmp_path):
+    zarr = pytest.importorskip("zarr", minversion="3")
+    for dtype, fill_value, expected in [("i2", -9, -9), ("i2", 0, None), ("f4", np.nan, None)]:
+        made = zarr.create_array({}, shape=(7, 5, 3), dtype=dtype, fill_value=fill_value)
+        assert as_source(made).no_data == expected
+
+
 @pytest.mark.parametrize("chunks", [None, (4, 2, 3), (3, 5, 1)])
 @pytest.mark.parametrize("dtype", ["uint16", "float16", "bool", ">i4"])
 def test_h5py(tmp_path, chunks, dtype):
@@ -792,6 +812,19 @@ def test_xarray_axes_of_the_cf_conventions():
         as_source(given.transpose("c", "a", "b")), make_voxels(), spacing=SPACING, origin=ORIGIN
     )
     check_refused(labelled(xarray, dims=("x", "y", "lon")), "two of them are x")
+
+
+def test_xarray_names_voxels_without_data():
+    xarray = pytest.importorskip("xarray")
+    given = labelled(xarray)
+    assert as_source(given).no_data is None
+    for name in ("missing_value", "_FillValue"):
+        given.attrs[name] = np.array([-9999], "f4")
+        assert as_source(given).no_data == -9999
+    given.attrs["_FillValue"] = np.float32(np.nan)
+    assert as_source(given).no_data is None
+    given.attrs["_FillValue"] = "none"
+    assert as_source(given).no_data is None
 
 
 @pytest.mark.parametrize("falling", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])

@@ -30,6 +30,7 @@ class Found:
     placement    where it lies, unchecked: what a caller gives replaces parts of it
     first_index  index (x, y, z), in the placement, of its first voxel
     is_masked    whether some of its voxels are known to be masked
+    no_data      value of voxels without data, as its metadata says; None: it says none
     """
 
     what: str
@@ -40,6 +41,7 @@ class Found:
     placement: Placement = field(default_factory=Placement)
     first_index: Vector = (0.0, 0.0, 0.0)
     is_masked: bool = False
+    no_data: Any = None
 
 
 Adapter = Callable[[Any, bool], Found]

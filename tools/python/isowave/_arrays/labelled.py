@@ -43,6 +43,9 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
     gives spacing and origin; a falling one a direction of -1, so that every voxel stays where its
     coordinates say. Without a coordinate: spacing 1, origin 0.
 
+    The attribute _FillValue, or missing_value, names voxels without data; xarray has replaced them
+    by NaN where it decoded the file, and rioxarray's nodata is the same attribute.
+
     Raises ArrayValueError for two dims of one axis, and for a coordinate that is not of numbers,
     not even or not moving, unless the caller gave a spacing; then such a coordinate is ignored.
     """
@@ -80,9 +83,10 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
         layers = array.variable.isel({dims[0]: slice(begin, end)}).values
         return layers if order is None else layers.transpose(order)
 
+    no_data = array.attrs.get("_FillValue", array.attrs.get("missing_value"))
     along_z = 0 if order is None else order[0]
     rows = _rows(array, dims[0], along_z, shape[0], what)
-    return Found(what, shape, array.dtype, fetch, rows, placement)
+    return Found(what, shape, array.dtype, fetch, rows, placement, no_data=no_data)
 
 
 def _order(array: Any, dims: tuple[Any, ...], what: str) -> tuple[int, int, int] | None:

@@ -27,7 +27,7 @@ class LayerReader:
     fetch       reads layers of the store
     shape       (nz, ny, nx)
     stored      type of the store's voxels
-    dtype       type of what is returned: read_type() of it
+    dtype       type of what is returned: read_type() of it, or type_with_nan() of that
     row_edges   layers at which chunk rows begin: 0 first, then ascending, all below nz. None
                 where any layers are as cheap as any others (memory, files without chunks)
     fill_value  of masked voxels, a number of dtype; None: they are refused
@@ -122,7 +122,7 @@ class LayerReader:
                 f"layers {z_begin} to {z_end} came with shape {getattr(layers, 'shape', None)}, "
                 f"expected {expected}",
             )
-        if read_type(layers.dtype, self._what) != self._dtype:
+        if read_type(layers.dtype, self._what) != read_type(self._stored, self._what):
             raise bad_value(
                 self._what,
                 f"layers {z_begin} to {z_end} came as {layers.dtype}, expected {self._stored}",

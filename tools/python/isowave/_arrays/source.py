@@ -21,7 +21,7 @@ from .grid import (
     vector,
 )
 from .layers import LayerReader, most_layers
-from .voxels import checked_fill, masked_without_fill, read_type
+from .voxels import checked_fill, no_data_of, read_type, type_with_nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +40,7 @@ class ArraySource:
                   axis a, a in the order x, y, z; can be inverted, may mirror
     chunk_layers  layers along z of the store's largest chunks, 1 where there are none: slabs of a
                   multiple of it hold whole chunks
+    no_data       value of voxels without data, as the array's metadata says; None: it says none
     """
 
     shape: tuple[int, int, int]
@@ -48,6 +49,7 @@ class ArraySource:
     origin: tuple[float, float, float]
     direction: NDArray[np.float64]
     chunk_layers: int
+    no_data: float | None
     _what: str = field(repr=False)
     _reader: LayerReader = field(repr=False)
 
@@ -59,7 +61,8 @@ class ArraySource:
         Holds at most one row of chunks between calls. Not for several threads at a time.
 
         Raises ValueError or TypeError, one line, if there are no such layers, if the store cannot
-        be read, or if a voxel cannot be read exactly or is masked without a fill_value.
+        be read, or if a voxel cannot be read exactly; of a lazy array of whole numbers, also if a
+        voxel is masked and there is no fill_value.
         """
         begin, end = operator.index(z_begin), operator.index(z_end)
         if not 0 <= begin < end <= self.shape[0]:
@@ -111,7 +114,7 @@ def as_source(
     spacing     (z, y, x) or one number, world units between voxels; None: what obj says, else 1
     origin      (z, y, x), world position of voxel (0, 0, 0); None: what obj says, else 0
     direction   3 x 3, columns of length 1 in (x, y, z); None: what obj says, else the identity
-    fill_value  what masked voxels become; needed if there are some
+    fill_value  what masked voxels become; None: NaN
 
     bool is read as uint8, float16 as float32, other types as they are. A 64-bit integer that
     float64 does not hold is refused, with its position, when its layer is read.
@@ -145,9 +148,11 @@ def _source(
     found = _adapter(obj)(obj, spacing is not None)
     what = found.what
     dtype = read_type(found.stored, what)
-    if found.is_masked and fill_value is None:
-        raise masked_without_fill(what)
     fill = None if fill_value is None else checked_fill(fill_value, dtype, what)
+    if fill is None and found.is_masked:
+        dtype = type_with_nan(dtype)
+    if fill is None and dtype.kind == "f":
+        fill = dtype.type(np.nan)
 
     placement = found.placement
     if spacing is not None:
@@ -172,6 +177,7 @@ def _source(
         origin=(placement.origin[2], placement.origin[1], placement.origin[0]),
         direction=rows,
         chunk_layers=most_layers(found.row_edges, nz),
+        no_data=no_data_of(found.no_data),
         _what=what,
         _reader=LayerReader(found.fetch, found.shape, stored, dtype, found.row_edges, fill, what),
     )

@@ -52,7 +52,14 @@ def zarr_array(array: Any, has_spacing: bool) -> Found:
         array.dtype,
         lambda begin, end: array[begin:end],
         _rows_of_zarr(array, 0, shape[0], what),
+        no_data=_no_data_of_zarr(array),
     )
+
+
+def _no_data_of_zarr(array: Any) -> Any:
+    """Returns the fill_value unless it is 0: that is zarr's default, and means background."""
+    fill_value = getattr(array, "fill_value", None)
+    return fill_value if fill_value is not None and fill_value != 0 else None
 
 
 def _rows_of_zarr(array: Any, axis: int, num_layers: int, what: str) -> Sequence[int]:
@@ -171,7 +178,13 @@ def zarr_group(obj: Any, has_spacing: bool) -> Found:
         (scale[x], scale[y], scale[z]), (translation[x], translation[y], translation[z])
     )
     return Found(
-        what, shape, array.dtype, fetch, _rows_of_zarr(array, z, shape[0], what), placement
+        what,
+        shape,
+        array.dtype,
+        fetch,
+        _rows_of_zarr(array, z, shape[0], what),
+        placement,
+        no_data=_no_data_of_zarr(array),
     )
 
 

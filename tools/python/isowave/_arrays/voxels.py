@@ -6,13 +6,16 @@
 | uint64, int64 | the same; a value that float64 does not hold is refused with its position |
 | bool | uint8, 0 and 1 |
 | float16 | float32 |
+| an integer of up to 16 bits, with masked voxels | float32, NaN where masked |
+| a longer integer, with masked voxels | float64, NaN where masked |
 
-The type of what is read follows from the stored type alone, never from the values: a lazy array
-is not read to find it, and each time step of a series has the same one.
+The type of what is read follows from the stored type and from masks in memory, never from the
+values: a lazy array is not read to find it, and each time step of a series has the same one.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -60,6 +63,26 @@ def read_type(stored: Any, what: str) -> np.dtype[Any]:
     elif dtype.kind == "f" or dtype.name == "bfloat16":
         help_text = "convert them, for example with array.astype('float32')"
     raise bad_type(what, f"voxels of type {dtype} are not supported: {help_text}")
+
+
+def type_with_nan(dtype: np.dtype[Any]) -> np.dtype[Any]:
+    """Returns a type of float that holds all values of what read_type() returns, and NaN."""
+    if dtype.kind == "f":
+        return dtype
+    return np.dtype("f4" if dtype.itemsize < 4 else "f8")
+
+
+def no_data_of(value: Any) -> float | None:
+    """Returns the number that metadata gives for voxels without data.
+
+    None where it gives none, and for NaN: such voxels have no data in any case.
+    """
+    try:
+        (number,) = np.asarray(value).ravel().tolist()
+        number = math.nan if isinstance(number, (bool, str, bytes)) else float(number)
+    except Exception:
+        return None
+    return None if math.isnan(number) else number
 
 
 def checked_fill(fill_value: Any, dtype: np.dtype[Any], what: str) -> Any:
@@ -117,7 +140,9 @@ def to_voxels(
 def masked_without_fill(what: str) -> Exception:
     """Returns the error of masked voxels for which the caller gave no value."""
     return bad_value(
-        what, "some voxels are masked: pass fill_value=, the value that they shall have"
+        what,
+        "some voxels are masked, which whole numbers of a lazy array cannot say: pass fill_value=, "
+        "the value that they shall have, or convert the array to float32 or float64",
     )
 
 

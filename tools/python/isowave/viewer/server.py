@@ -526,6 +526,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--dims", type=int, nargs="+", help="voxels of a raw file: X Y Z, or N for a cube")
     add("--type", help="voxel type of a raw file: uint8, int8, ... float32, float64")
     add("--spacing", type=float, nargs="+", help="world units between voxels: X Y Z, or one")
+    add("--no-data", type=float, help="voxels of this value have no data, as NaN voxels have none")
     add("--host", default="127.0.0.1", help="to listen at; others than loopback are not encrypted")
     add("--port", type=int, default=0, help="0: a free one")
     add("--max-clients", type=int, default=16, help="that look at the same time")
@@ -566,6 +567,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "relative_tolerance": arguments.tolerance_relative,
             "exact": arguments.exact or None,
             "levels": arguments.levels,
+            "no_data": arguments.no_data,
             "shape": reversed_axes("--dims", arguments.dims),
             "dtype": arguments.type,
             "spacing": reversed_axes("--spacing", arguments.spacing),

@@ -1,0 +1,85 @@
+"""Voxels without data, from arrays of every kind: no surface touches them."""
+
+import numpy as np
+import pytest
+
+import isowave
+
+SHAPE = (20, 18, 22)
+HOLE = np.s_[6:9, :, 4:7]
+
+
+def ramp(dtype="f4"):
+    z, y, x = np.indices(SHAPE)
+    return (x + 2 * y + 3 * z).astype(dtype)
+
+
+def holed(value, dtype="f4"):
+    array = ramp(dtype)
+    array[HOLE] = value
+    return array
+
+
+def missing(volume):
+    return np.isnan(np.asarray(volume[...]))
+
+
+def expected():
+    mask = np.zeros(SHAPE, bool)
+    mask[HOLE] = True
+    return mask
+
+
+@pytest.mark.parametrize(
+    "array, options",
+    [
+        (holed(np.nan), {}),
+        (holed(1e20), {"no_data": 1e20}),
+        (holed(np.inf), {"no_data": np.inf}),
+        (holed(-1, "i2"), {"no_data": -1, "exact": True}),
+        (np.ma.array(ramp("u1"), mask=expected()), {}),
+        (np.ma.array(ramp(), mask=expected()), {}),
+    ],
+    ids=["nan", "value", "inf", "int16", "masked uint8", "masked float32"],
+)
+def test_voxels_of_any_kind(array, options):
+    volume = isowave.compress(array, **options)
+    np.testing.assert_array_equal(missing(volume), expected())
+    low, high = volume.value_range
+    assert 0 <= low and high <= ramp().max()
+
+
+def test_meshes_have_no_triangle_there():
+    whole = isowave.compress(ramp(), tolerance=1e-3).extract(60.5)
+    mesh = isowave.compress(holed(np.nan), tolerance=1e-3).extract(60.5)
+    assert 0 < len(mesh.faces) < len(whole.faces)
+    x, _, z = mesh.vertices.T
+    assert not ((x > 3) & (x < 7) & (z > 5) & (z < 9)).any()
+
+
+def test_files_say_it(tmp_path):
+    path = tmp_path / "a_22x18x20_float32.raw"
+    path.write_bytes(holed(-9).tobytes())
+    np.testing.assert_array_equal(missing(isowave.open(path, no_data=-9)), expected())
+    packed = isowave.compress(holed(-9), no_data=-9, path=tmp_path / "a.zfp")
+    np.testing.assert_array_equal(missing(packed), expected())
+    np.testing.assert_array_equal(missing(isowave.open(tmp_path / "a.zfp")), expected())
+
+
+def test_labels_of_packages():
+    xarray = pytest.importorskip("xarray")
+    array = xarray.DataArray(holed(-9), dims=("z", "y", "x"), attrs={"_FillValue": -9.0})
+    np.testing.assert_array_equal(missing(isowave.compress(array)), expected())
+    assert not missing(isowave.compress(array, no_data=-8)).any()
+
+
+def test_what_cannot_be():
+    with pytest.raises(isowave.Error, match="are infinite, the first at"):
+        isowave.compress(holed(np.inf))
+    with pytest.raises(isowave.Error, match="give one of the two"):
+        isowave.compress(holed(np.inf), no_data=np.inf, map_nan=0)
+    with pytest.raises(isowave.Error, match="levels of detail"):
+        isowave.compress(holed(np.nan), levels=2)
+    with pytest.raises(TypeError, match="no_data"):
+        isowave.compress(holed(np.nan), no_data="5")
+    assert not missing(isowave.compress(holed(np.nan), map_nan=0)).any()
