@@ -76,7 +76,7 @@ def test_floats_keep_their_bits_among_outliers():
     voxels[3, 3] = -0.0
     voxels[4, 4] *= np.float32(1e-38)
     assert isowave.compress(voxels).decode().tobytes() == voxels.tobytes()
-    doubles = voxels / 3.0
+    doubles = voxels.astype(np.float64) / 3
     volume = isowave.compress(doubles)
     assert 0 < volume.max_error <= 1e20 / 3 * 2**-24
     with pytest.raises(isowave.Error, match="float64"):
