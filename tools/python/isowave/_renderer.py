@@ -7,6 +7,7 @@ import math
 import os
 import queue
 import re
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -288,9 +289,14 @@ def request_for(
 
 
 def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) -> None:
-    """Warns the caller's caller of an isovalue without a surface."""
-    if notice := core.isovalue_notice(isovalue):
-        warnings.warn(notice, RuntimeWarning, stacklevel=3)
+    """Warns of an isovalue without a surface, at the line that called the package."""
+    notice = core.isovalue_notice(isovalue)
+    if not notice:
+        return
+    level, caller = 1, sys._getframe()
+    while caller.f_back is not None and str(caller.f_globals["__name__"]).startswith("isowave"):
+        level, caller = level + 1, caller.f_back
+    warnings.warn(notice, RuntimeWarning, stacklevel=level)
 
 
 def camera_of(request: dict[str, Any]) -> Camera:
