@@ -180,13 +180,14 @@ TEST(NoData, OtherInfiniteVoxelsAreRefused) {
   EXPECT_EQ(
       compressed(dims, voxels, {.rate = 16, .input = {.no_data = -INFINITY}}).no_data.num_voxels(),
       2u);
-  EXPECT_TRUE(compressed(dims, voxels, {.input = {.map_nan = 3.0f}}).no_data.empty());
+  EXPECT_TRUE(compressed(dims, voxels, {.rate = 16, .input = {.map_nan = 3.0f}}).no_data.empty());
   const CompressedVolume both =
       compressed(dims, voxels, {.rate = 32, .input = {.map_nan = 3.0f, .no_data = 1.0}});
   EXPECT_EQ(both.no_data.num_voxels(), 62u);
   EXPECT_EQ(both.value_range, (std::array{3.0f, 3.0f}));
-  EXPECT_THAT([&] { compressed(dims, voxels, {.input = {.map_nan = 3.0f, .no_data = NAN}}); },
-              ThrowsMessage<Error>(HasSubstr("give one of the two")));
+  EXPECT_THAT(
+      [&] { compressed(dims, voxels, {.rate = 16, .input = {.map_nan = 3.0f, .no_data = NAN}}); },
+      ThrowsMessage<Error>(HasSubstr("give one of the two")));
 }
 
 /// A block with voxels without data is not worse than with ordinary ones in their place.
@@ -463,7 +464,9 @@ TEST_P(NoDataMeshes, SmallOtherVolumesAreDrawnAsBefore) {
   EXPECT_THAT([&] { Renderer(device, holed.compressed, {.size = kSize, .with_bounds = true}); },
               ThrowsMessage<Error>(HasSubstr("bounds of a frame's error cannot be given")));
   EXPECT_THAT(
-      [&] { compressed(dims, with_hole(dims, source, holes(dims)[1].hole), {.levels = 2}); },
+      [&] {
+        compressed(dims, with_hole(dims, source, holes(dims)[1].hole), {.rate = 16, .levels = 2});
+      },
       ThrowsMessage<Error>(HasSubstr("cannot have levels of detail yet")));
   ocl::DeviceInfo without = GetParam();
   without.capabilities.nan = false;
