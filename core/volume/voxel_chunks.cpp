@@ -213,9 +213,9 @@ struct KnownVoxels {
   std::optional<double> at(std::array<int, 3> place, std::size_t axis, int steps) const {
     place.at(axis) += steps;
     if (place.at(axis) < 0 || place.at(axis) > 3) return {};
-    const auto voxel = static_cast<std::size_t>(place[0] + 4 * place[1] + 16 * place[2]);
+    const int voxel = place[0] + 4 * place[1] + 16 * place[2];
     if ((known >> voxel & 1u) == 0) return {};
-    return values.at(voxel);
+    return values.at(static_cast<std::size_t>(voxel));
   }
 };
 
