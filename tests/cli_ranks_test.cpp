@@ -99,6 +99,11 @@ class CliRanks : public testing::Test {
     EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
   }
 
+  /// What the program printed, but for the line that comes when compiling kernels takes long.
+  static std::string without_compiling(const std::string &out) {
+    return out.starts_with("compiling kernels for ") ? out.substr(out.find('\n') + 1) : out;
+  }
+
   /// Compresses with one process, and with so many.
   void expect_same_file(const std::string &volume, const std::string &options, int count) {
     const std::filesystem::path path = folder_ / "v.zfp";
@@ -110,7 +115,7 @@ class CliRanks : public testing::Test {
     const ProgramResult several = run_command(on_ranks(count, arguments));
     ASSERT_EQ(several.status, 0) << several.err;
     EXPECT_TRUE(read_file(path) == expected) << arguments << " with " << count << " ranks";
-    EXPECT_EQ(several.out, one.out);
+    EXPECT_EQ(without_compiling(several.out), without_compiling(one.out));
     std::filesystem::remove(path);
     EXPECT_EQ(folder_.num_files(), num_inputs_);
   }
