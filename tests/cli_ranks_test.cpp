@@ -497,7 +497,7 @@ TEST_F(CliRanks, AnEndedJobLeavesNoFile) {
       const std::string command = fmt::format(
           "exec sh -c 'echo job $$ >> {}; exec \"$0\" \"$@\"' env {} {} -n 2 sh -c 'echo "
           "$OMPI_COMM_WORLD_RANK $$ >> {}; exec \"$0\" \"$@\"' {} convert "
-          "generate:turbulence_2048x2048x1024_uint8 -o {}",
+          "generate:turbulence_2048x2048x1024_uint8 --rate 8 -o {}",
           ids, hosts, kMpirun, ids, test::isowave_program(), quoted(folder_ / "x.zfp"));
       ProgramResult result;
       std::thread job([&] { result = run_command(command); });
