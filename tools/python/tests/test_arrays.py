@@ -165,7 +165,7 @@ def test_structured_voxels_name_a_field():
         ((2, 7, 5, 6), "for example array[0]"),
         ((9, 7, 5, 3), "pass one channel: array[..., 0]"),
         ((2, 2, 7, 5, 3), "for example array[0, 0]"),
-        ((20, 22, 24, 3), "take one channel of it, for example array[..., 0]"),
+        ((20, 22, 24, 3), "pass one channel: array[..., 0]"),
         ((3, 22, 24, 20), "for example array[0]"),
         ((0, 5, 3), "0 voxels along z"),
         ((7, 1, 3), "1 voxels along y"),

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 
 NUM_INPUTS = int(os.environ.get("ISOWAVE_FUZZ_INPUTS", "10000"))
 REAL_SHARE = 20
-TYPES = {np.dtype(name) for name in "u1 i1 u2 i2 u4 i4 f4 f8".split()}
+TYPES = {np.dtype(name) for name in "u1 i1 u2 i2 u4 i4 u8 i8 f4 f8".split()}
 
 WILD = [
     math.nan,
