@@ -1,5 +1,5 @@
 #pragma once
-// Which voxels of a compressed volume have no data: nothing is known there, so cells that touch
+// The voxels of a compressed volume without data: nothing is known there, so cells that touch
 // them have no surface. The stream has an ordinary value for them, which is never used.
 
 #include <cstdint>
