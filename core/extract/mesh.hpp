@@ -28,8 +28,8 @@ enum class VertexPlaces {
   kApart,
   kExact  ///< where the isovalue is crossed; on a voxel that equals it, vertices meet
 };
-/// A part of an edge's length. Twice what positions in float32 may be off by (kPositionError),
-/// twice.
+/// Least distance of a vertex from the voxels of its edge [edge lengths]. Two neighbours that are
+/// rounded to float32, each off by kPositionError at most, stay apart.
 inline constexpr double kLeastGap = 4 * kPositionError;
 
 /// Some vertices and triangles of a mesh.

@@ -48,8 +48,8 @@ struct OnHost {
 
 class DeviceStream {
  public:
-  /// Of a whole stream in such parts, or of one behind a window, and of the table of voxels without
-  /// data; with_bounds: and of the bounds of its blocks.
+  /// Buffers of a whole stream in such parts, or of one behind a window. The table of voxels
+  /// without data is counted; with_bounds: the bounds of blocks, too.
   static ocl::BufferSizes sizes(const CompressedVolume &volume, const StreamSplit &split,
                                 bool with_bounds);
   static ocl::BufferSizes sizes(const CompressedVolume &volume, OnHost host, bool with_bounds);
@@ -81,7 +81,8 @@ class DeviceStream {
   }
 
   std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none where the volume stays on the host
-  /// Of a volume whose blocks have lengths of their own, or bounds, or voxels without data.
+  /// Where blocks begin, their bounds, and the table of voxels without data; empty if the volume
+  /// has none of the three.
   std::optional<ocl::Buffer<uint>> block_index;
   std::unique_ptr<StreamWindow> window;  ///< where the volume stays on the host
   StreamLayout layout;

@@ -16,7 +16,7 @@ namespace isowave::core {
 class NoData {
  public:
   NoData() = default;
-  /// So many voxels, of which nothing else is kept.
+  /// Keeps the number of voxels alone.
   explicit NoData(std::uint64_t num_voxels) : num_voxels_(num_voxels) {}
 
   bool empty() const { return num_voxels_ == 0; }
@@ -52,8 +52,8 @@ class NoDataBuilder {
   std::vector<std::uint32_t> masks_{};
 };
 
-/// In a table of so many blocks, for each group of 32 the two words of bits, one group after the
-/// other; and the words of all masks.
+/// The two parts of a table: two words of bits for each group of 32 blocks, without the places of
+/// masks; and the words of all masks.
 std::vector<std::uint32_t> no_data_groups(std::span<const std::uint32_t> table,
                                           std::uint64_t num_blocks);
 std::span<const std::uint32_t> no_data_masks(std::span<const std::uint32_t> table,

@@ -67,8 +67,8 @@ class BlockCodec {
   ZfpBits bits_;
 };
 
-/// Of the voxels with data of block bx of a row; with `rounded`, of the decoded values' nearest
-/// integers.
+/// The error of block bx of a row, over its voxels with data. rounded: decoded values are rounded
+/// to integers first.
 BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, const BlockRow &row,
                           std::uint32_t bx, std::ptrdiff_t nx, std::ptrdiff_t layer, bool rounded) {
   const std::uint32_t num_x =
