@@ -80,6 +80,25 @@ TEST_F(CliExtract, TheNameIsMadeUp) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "fuel_64x33x32_uint8_iso300.ply"));
 }
 
+// 0.7 has no float32: the nearest, which the voxel has, is below.
+TEST_F(CliExtract, AnIsovalueIsComparedAsItWasGiven) {
+  std::vector<float> voxels(5 * 5 * 5);
+  voxels[62] = 0.7f;
+  const std::filesystem::path file = folder_ / "a_5x5x5_float32.raw";
+  test::write_file(file, voxels);
+  for (const auto &[isovalue, triangles] :
+       {std::pair("0.7", "0 triangles"), {"0.69999998", "8 triangles"}}) {
+    const ProgramResult result =
+        run_isowave("extract " + quoted(file) + " -i " + isovalue + " --stats " +
+                    quoted(folder_ / "a.json") + " -o " + quoted(folder_ / "a.ply"));
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr(std::string("isovalue ") + isovalue + ": "));
+    EXPECT_THAT(result.out, HasSubstr(triangles));
+    EXPECT_EQ(nlohmann::json::parse(read_file(folder_ / "a.json"))["isovalue"],
+              std::stod(isovalue));
+  }
+}
+
 TEST_F(CliExtract, WrongInputIsOneLine) {
   const std::string fuel = "extract " + quoted(kFuel);
   const std::string ply = " -o " + quoted(folder_ / "a.ply");

@@ -16,7 +16,7 @@
 #include "core/bricks/ranks.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/volume/range_thresholds.hpp"
-#include "core/zfp/isovalue_notice.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "isowave/version.hpp"
 
 namespace isowave {
@@ -177,7 +177,7 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
 Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {
   core::agree_on(team, "request", text_of(request));
   check_for_bricks(request, options);
-  core::FrameRequest wanted = core_request(request);
+  core::FrameRequest wanted = core_request(request, volume);
   Frame frame;
   if (request.max_surface_error) {
     const core::DetailChoice choice =
@@ -220,12 +220,13 @@ Frame BrickRenderer::render(const FrameRequest &request) {
   });
 }
 
-Camera BrickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
+Camera BrickRenderer::camera(double isovalue, std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
     Implementation &self = *implementation_;
     const std::lock_guard turn(self.turns);
     std::optional<core::BlockBox> own;
-    core::together(self.team, [&] { own = self.renderer->surface_box({&isovalue, 1}); });
+    const float drawn = core::drawn_isovalue(self.volume, isovalue);
+    core::together(self.team, [&] { own = self.renderer->surface_box({&drawn, 1}); });
     return public_camera(core::surface_camera(self.whole,
                                               core::gather_box(self.team, self.volume.info, own),
                                               core_size(size.value_or(self.options.largest))));
@@ -235,7 +236,7 @@ Camera BrickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
 const std::vector<std::string> &BrickRenderer::notices() const {
   return implementation_->notices;
 }
-std::string BrickRenderer::isovalue_notice(float isovalue) const {
+std::string BrickRenderer::isovalue_notice(double isovalue) const {
   return guarded("looking at an isovalue",
                  [&] { return core::isovalue_notice(implementation_->volume, isovalue); });
 }

@@ -9,6 +9,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 #include "core/volume/world_positions.hpp"
+#include "core/zfp/isovalue.hpp"
 
 namespace isowave {
 
@@ -126,11 +127,11 @@ core::Appearance core_appearance(const Appearance &appearance) {
           appearance.diffuse,         appearance.specular,           appearance.above};
 }
 
-core::FrameRequest core_request(const FrameRequest &request) {
+core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume) {
   core::FrameRequest result;
   const Camera &camera = request.camera;
   result.camera = {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees};
-  result.isovalue = request.isovalue;
+  result.isovalue = core::drawn_isovalue(volume, request.isovalue);
   result.size = core_size(request.size);
   result.voxel_pixels = request.voxel_pixels;
   result.voxel_error = request.voxel_error;

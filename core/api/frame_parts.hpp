@@ -19,8 +19,8 @@ namespace isowave {
 core::ImageSize core_size(const ImageSize &size);
 Camera public_camera(const core::Camera &camera);
 core::Appearance core_appearance(const Appearance &appearance);
-/// What is drawn, and how precisely; without on_pass.
-core::FrameRequest core_request(const FrameRequest &request);
+/// What is drawn of the volume, and how precisely; without on_pass.
+core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume);
 
 /// Throws  core::Error: bounds, or a choice of detail, that cannot be had
 void check_bounds(const FrameRequest &request, const RendererOptions &options);

@@ -10,6 +10,7 @@
 #include "core/api/turns.hpp"
 #include "core/api/volume_implementation.hpp"
 #include "core/host/host_renderer.hpp"
+#include "core/zfp/isovalue.hpp"
 
 namespace isowave {
 
@@ -24,7 +25,7 @@ void check(const FrameRequest &request) {
     throw core::Error("bounds of the error are for devices alone: leave out want_bounds");
   if (request.time_budget_ms)
     throw core::Error("a time budget is for devices alone: leave out time_budget_ms");
-  core::HostRenderer::check(core_request(request));
+  core::HostRenderer::check(core_request(request, {}));
 }
 
 /// The frame at work, for on_pass.
@@ -62,7 +63,7 @@ struct HostRenderer::Implementation {
 
 Frame HostRenderer::Implementation::draw(const FrameRequest &request) {
   check(request);
-  core::FrameRequest wanted = core_request(request);
+  core::FrameRequest wanted = core_request(request, volume->implementation().volume);
   HostProgress progress(renderer, request);
   if (request.on_pass) {
     wanted.on_pass = [&](const core::PassStats &pass) {
@@ -97,12 +98,14 @@ Frame HostRenderer::render(const FrameRequest &request) {
   });
 }
 
-Frame HostRenderer::cast_rays(std::span<const Ray> rays, float isovalue, Normals normals) {
+Frame HostRenderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
   return guarded("casting rays", [&] {
     const std::lock_guard lock(implementation_->mutex);
-    return frame_of_rays(implementation_->renderer.cast_rays(world_rays(rays), isovalue,
-                                                             static_cast<core::Normals>(normals)),
-                         volume()->implementation().volume, false);
+    const core::CompressedVolume &compressed = volume()->implementation().volume;
+    return frame_of_rays(implementation_->renderer.cast_rays(
+                             world_rays(rays), core::drawn_isovalue(compressed, isovalue),
+                             static_cast<core::Normals>(normals)),
+                         compressed, false);
   });
 }
 
@@ -115,10 +118,11 @@ bool HostRenderer::can_draw(const FrameRequest &request) {
   }
 }
 
-Camera HostRenderer::camera(float isovalue, const ImageSize &size) const {
+Camera HostRenderer::camera(double isovalue, const ImageSize &size) const {
   return guarded("looking for the surface", [&] {
     const std::lock_guard lock(implementation_->mutex);
-    return public_camera(implementation_->renderer.camera(isovalue, core_size(size)));
+    const float drawn = core::drawn_isovalue(volume()->implementation().volume, isovalue);
+    return public_camera(implementation_->renderer.camera(drawn, core_size(size)));
   });
 }
 

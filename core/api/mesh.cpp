@@ -9,6 +9,7 @@
 #include "core/extract/extractor.hpp"
 #include "core/extract/mesh_file.hpp"
 #include "core/view/detail.hpp"
+#include "core/zfp/isovalue.hpp"
 
 namespace isowave {
 
@@ -51,7 +52,7 @@ core::Progress progress_of(const ExtractOptions &options, std::string_view what)
 }
 
 void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
-                float isovalue, const ExtractOptions &options, core::MeshSink &sink) {
+                double isovalue, const ExtractOptions &options, core::MeshSink &sink) {
   if (!device || !volume) throw core::Error("extracting needs a device and a volume");
   const std::vector<const core::CompressedVolume *> levels =
       core::levels_of(volume->implementation().volume, true);
@@ -68,13 +69,14 @@ void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<con
                              .vertices = static_cast<core::VertexPlaces>(options.vertices),
                              .memory_budget = options.memory_budget,
                              .cache_slots = options.cache_blocks});
-  extractor.extract(isovalue, sink, progress_of(options, "extracting"));
+  extractor.extract(core::drawn_isovalue(*levels[0], isovalue), sink,
+                    progress_of(options, "extracting"));
 }
 
 }  // namespace
 
 Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
-             float isovalue, const ExtractOptions &options) {
+             double isovalue, const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
     Mesh mesh;
     MeshOfUser sink(mesh);
@@ -84,7 +86,7 @@ Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const 
 }
 
 std::string extract_to_file(const std::shared_ptr<Device> &device,
-                            const std::shared_ptr<const Volume> &volume, float isovalue,
+                            const std::shared_ptr<const Volume> &volume, double isovalue,
                             const std::filesystem::path &path, const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
     core::MeshFile file(path);

@@ -120,14 +120,14 @@ Frame QuickRenderer::render(const FrameRequest &request) {
   return implementation_->draw(request);
 }
 
-Frame QuickRenderer::cast_rays(std::span<const Ray> rays, float isovalue, Normals normals) {
+Frame QuickRenderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
   const std::lock_guard lock(implementation_->mutex);
   if (HostRenderer *on_host = implementation_->host_renderer())
     return on_host->cast_rays(rays, isovalue, normals);
   return implementation_->device_renderer().cast_rays(rays, isovalue, normals);
 }
 
-Camera QuickRenderer::camera(float isovalue, std::optional<ImageSize> size) {
+Camera QuickRenderer::camera(double isovalue, std::optional<ImageSize> size) {
   const std::lock_guard lock(implementation_->mutex);
   if (const HostRenderer *on_host = implementation_->host_renderer())
     return on_host->camera(isovalue, size.value_or(implementation_->size));

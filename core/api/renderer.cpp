@@ -18,6 +18,7 @@
 #include "core/render/renderer.hpp"
 #include "core/render/renderer_options.hpp"
 #include "core/render/time_budget.hpp"
+#include "core/zfp/isovalue.hpp"
 
 namespace isowave {
 
@@ -147,7 +148,7 @@ void Renderer::Implementation::fetch(const FrameRequest &request, const core::Fr
 
 Frame Renderer::Implementation::draw(const FrameRequest &request) {
   check(request, options);
-  core::FrameRequest wanted = core_request(request);
+  core::FrameRequest wanted = core_request(request, volume->implementation().volume);
   Frame frame;
   draw_hits(request, wanted, frame);
   frame.statistics.errors_are_stated = volume->errors_are_stated();
@@ -207,24 +208,27 @@ Frame Renderer::render(const FrameRequest &request) {
   });
 }
 
-Frame Renderer::cast_rays(std::span<const Ray> rays, float isovalue, Normals normals) {
+Frame Renderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
   return guarded("casting rays", [&] {
     if (!implementation_->options.with_rays)
       throw core::Error("rays of any origin need a renderer that was made with_rays");
     const std::lock_guard lock(implementation_->device->implementation().mutex);
     core::Renderer &renderer = implementation_->renderer;
+    const core::CompressedVolume &compressed = volume()->implementation().volume;
     const std::vector<core::HitRecord> hits =
-        renderer.cast_rays(world_rays(rays), isovalue, static_cast<core::Normals>(normals));
+        renderer.cast_rays(world_rays(rays), core::drawn_isovalue(compressed, isovalue),
+                           static_cast<core::Normals>(normals));
     implementation_->note_memory();
-    return frame_of_rays(hits, volume()->implementation().volume, renderer.options().with_levels);
+    return frame_of_rays(hits, compressed, renderer.options().with_levels);
   });
 }
 
-Camera Renderer::camera(float isovalue, std::optional<ImageSize> size) {
+Camera Renderer::camera(double isovalue, std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
     const std::lock_guard lock(implementation_->device->implementation().mutex);
+    const float drawn = core::drawn_isovalue(volume()->implementation().volume, isovalue);
     return public_camera(implementation_->renderer.camera(
-        {&isovalue, 1}, size ? std::optional(core_size(*size)) : std::nullopt));
+        {&drawn, 1}, size ? std::optional(core_size(*size)) : std::nullopt));
   });
 }
 

@@ -9,7 +9,7 @@
 #include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/world_positions.hpp"
-#include "core/zfp/isovalue_notice.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "core/zfp/voxel_region.hpp"
 #include "core/zfp/voxel_sample.hpp"
 
@@ -140,7 +140,7 @@ VoxelType Volume::source_type() const {
 std::array<float, 2> Volume::value_range() const {
   return implementation_->volume.value_range;
 }
-std::string Volume::isovalue_notice(float isovalue) const {
+std::string Volume::isovalue_notice(double isovalue) const {
   return guarded("looking at an isovalue",
                  [&] { return core::isovalue_notice(implementation_->volume, isovalue); });
 }

@@ -13,6 +13,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
 #include "core/view/detail.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/help_groups.hpp"
@@ -31,7 +32,7 @@ struct ExtractArgs {
   std::string input, output, device, stats;
   VolumeOptions volume;
   CompressionOptions compression;
-  float isovalue = 0;
+  double isovalue = 0;
   std::uint32_t level = 0;
   std::string normals = "smooth", vertices = "apart", stream = "auto";
   ExtractorOptions extractor;
@@ -94,8 +95,8 @@ void run_extract(ExtractArgs options) {
   const CompressedVolume &level = level_of(volume, options.level);
   Extractor extractor(device, level, options.extractor);
   MeshFile file(options.output);
-  const ExtractStats stats =
-      extractor.extract(options.isovalue, file, make_progress_bar("extracting"));
+  const ExtractStats stats = extractor.extract(drawn_isovalue(volume, options.isovalue), file,
+                                               make_progress_bar("extracting"));
   compiling.finish();
   file.commit(make_progress_bar("writing"));
   fmt::print("isovalue {}: {} vertices, {} triangles; {} blocks decoded, {:.1f} ms\n",

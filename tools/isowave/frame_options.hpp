@@ -17,7 +17,7 @@ namespace isowave::core::tools {
 /// Options as typed; read_views() and load_scene() check them.
 struct FrameOptions {
   CompressionOptions compression;  ///< of a volume that is not
-  std::vector<float> isovalues;
+  std::vector<double> isovalues;
   double voxel_error = 0;     ///< see FrameRequest::voxel_error
   std::string size;           ///< WxH
   std::uint32_t samples = 1;  ///< ImageSize::samples

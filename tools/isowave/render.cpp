@@ -25,6 +25,7 @@
 #include "core/view/detail.hpp"
 #include "core/volume/pyramid.hpp"
 #include "core/volume/range_thresholds.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
@@ -80,7 +81,7 @@ glm::vec3 parse_color(const char *option, const std::string &text) {
 /// Where a frame's file goes: the name as given for a single frame, else NAME_isoV_viewK.EXT. Empty
 /// for an empty name.
 fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArgs &options,
-                    float isovalue, std::size_t view) {
+                    double isovalue, std::size_t view) {
   if (path.empty() || num_views * options.frame.isovalues.size() == 1) return path;
   fs::path result = path;
   result.replace_filename(fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view,
@@ -92,7 +93,7 @@ fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArg
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  virtual FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) = 0;
+  virtual FrameStats render(const Camera &camera, double isovalue, const OnPass &on_pass) = 0;
   /// Draws the last frame once more, however long it takes.
   virtual FrameStats refine() { return {}; }
   virtual std::vector<HitRecord> hits() = 0;
@@ -193,9 +194,9 @@ class DeviceFrames : public FrameSource {
     base_.ambient_rays = args.ambient_rays;
     if (time_budget_) timed_frames_.emplace(renderer_);
   }
-  FrameStats render(const Camera &camera, float isovalue, const OnPass &on_pass) override {
+  FrameStats render(const Camera &camera, double isovalue, const OnPass &on_pass) override {
     request_ = seen_from(camera, base_);
-    request_.isovalue = isovalue;
+    request_.isovalue = drawn_isovalue(volume_, isovalue);
     if (timed_frames_) {
       timed_ = timed_frames_->render(request_, *time_budget_);
       return timed_.stats;
@@ -209,7 +210,9 @@ class DeviceFrames : public FrameSource {
     return renderer_.render(watched);
   }
   FrameStats refine() override { return renderer_.render(request_); }
-  Camera surface_camera(std::span<const float> isovalues) { return renderer_.camera(isovalues); }
+  Camera surface_camera(std::span<const double> isovalues) {
+    return renderer_.camera(drawn_isovalues(volume_, isovalues));
+  }
   void report(const fs::path &error_map, nlohmann::ordered_json &frame) override {
     if (max_surface_error_) {
       frame["error"] = report_error(*max_surface_error_, volume_, choice_,
@@ -243,7 +246,8 @@ class TwinFrames : public FrameSource {
         normals_(normals_from_string(args.normals)),
         num_ambient_(args.ambient_rays),
         twin_(scene.volume, args.voxel_pixels, args.frame.voxel_error) {}
-  FrameStats render(const Camera &camera, float isovalue, const OnPass &) override {
+  FrameStats render(const Camera &camera, double given, const OnPass &) override {
+    const float isovalue = drawn_isovalue(scene_.volume, given);
     const auto begin = Clock::now();
     frame_ = make_frame_params(scene_.volume.info, camera, scene_.size, isovalue);
     hits_ = twin_.render(camera, scene_.size, isovalue, solver_, normals_);
@@ -273,7 +277,7 @@ class TwinFrames : public FrameSource {
 };
 
 void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &frames,
-                   float isovalue, std::size_t view) {
+                   double isovalue, std::size_t view) {
   if (!options.image.empty()) {
     write_png(frames.shade(),
               frame_path(options.image, scene.cameras.size(), options, isovalue, view));
@@ -287,7 +291,7 @@ void write_outputs(const RenderArgs &options, const Scene &scene, FrameSource &f
 /// Writes the picture after every pass to --progress-dir, if that was asked for. shade: gives it,
 /// or none where this process has none to write.
 OnPass progress_writer(const RenderArgs &options, const Scene &scene,
-                       const std::function<Image8()> &shade, float isovalue, std::size_t view) {
+                       const std::function<Image8()> &shade, double isovalue, std::size_t view) {
   if (options.progress_dir.empty()) return {};
   return [&options, &scene, shade, isovalue, view, pass = 0](const PassStats &) mutable {
     const fs::path name = fs::path(options.progress_dir) / fmt::format("pass{:04}.png", ++pass);
@@ -301,7 +305,7 @@ OnPass progress_writer(const RenderArgs &options, const Scene &scene,
 nlohmann::ordered_json draw_frames(const RenderArgs &options, const Scene &scene,
                                    FrameSource &frames) {
   nlohmann::ordered_json result = nlohmann::ordered_json::array();
-  for (const float isovalue : options.frame.isovalues) {
+  for (const double isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const OnPass on_pass = progress_writer(
@@ -362,7 +366,7 @@ Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
   outputs.read_volume(options.input);
   if (!options.frame.cameras.empty()) outputs.read(options.frame.cameras);
   outputs.write("--stats", options.stats);
-  for (const float isovalue : options.frame.isovalues) {
+  for (const double isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < num_views; ++view) {
       const auto write = [&](const char *option, const std::string &name) {
         outputs.write(option, frame_path(name, num_views, options, isovalue, view));
@@ -453,7 +457,8 @@ bool chooses_levels(const RenderArgs &options) {
 Camera reference_camera(const RenderArgs &options, const Scene &scene) {
   if (ocl::list_devices().empty()) return scene.cameras.front();
   ocl::Device device(ocl::choose_device());
-  return surface_camera(device, scene.volume, options.frame.isovalues, scene.size);
+  return surface_camera(device, scene.volume,
+                        drawn_isovalues(scene.volume, options.frame.isovalues), scene.size);
 }
 
 /// Whether a file was asked for.
@@ -502,7 +507,7 @@ void check_brick_levels(const RenderArgs &options, const std::vector<VolumeInfo>
 /// All ranks: writes what rank 0 has got.
 void write_brick_outputs(const RenderArgs &options, const Scene &scene,
                          const Appearance &appearance, BrickRenderer &renderer, Team &team,
-                         float isovalue, std::size_t view) {
+                         double isovalue, std::size_t view) {
   const std::size_t num_views = scene.cameras.size();
   Image8 image;
   std::vector<float> depth;
@@ -536,13 +541,12 @@ TimedFrame within_time(BrickRenderer &renderer, Team &team, const FrameRequest &
 /// --refined: draws the frame once more, however long that takes.
 void write_refined(const RenderArgs &options, const Scene &scene, const Appearance &appearance,
                    BrickRenderer &renderer, Team &team, const FrameRequest &request,
-                   std::size_t view) {
+                   double isovalue, std::size_t view) {
   const FrameStats refined = renderer.render(request);
   const Image8 image = renderer.shade(appearance);
   together(team, [&] {
     if (team.rank() != 0) return;
-    write_png(image,
-              frame_path(options.refined, scene.cameras.size(), options, request.isovalue, view));
+    write_png(image, frame_path(options.refined, scene.cameras.size(), options, isovalue, view));
   });
   fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(renderer.num_hits()),
              refined.total_ms);
@@ -558,13 +562,13 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
   base.voxel_error = options.frame.voxel_error;
   base.normals = normals_from_string(options.normals);
   base.ambient_rays = options.ambient_rays;
-  for (const float isovalue : options.frame.isovalues) {
+  for (const double isovalue : options.frame.isovalues) {
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];
       const auto begin = Clock::now();
       const double composed_before = renderer.composition().ms;
       FrameRequest request = seen_from(camera, base);
-      request.isovalue = isovalue;
+      request.isovalue = drawn_isovalue(scene.volume, isovalue);
       request.on_pass = progress_writer(
           options, scene, [&] { return renderer.shade(appearance); }, isovalue, view);
       DetailChoice choice;
@@ -602,7 +606,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
       if (options.time_budget)
         frames.back()["time_budget"] = timed_steps(timed, *options.time_budget);
       if (!options.refined.empty())
-        write_refined(options, scene, appearance, renderer, team, request, view);
+        write_refined(options, scene, appearance, renderer, team, request, isovalue, view);
     }
   }
 }
@@ -640,8 +644,9 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
     return load_brick(options.input, overrides, compression, whole, of_detail, box, device.get());
   };
   const int unit = cut_unit(num_levels);
+  const std::vector<float> nearest(options.frame.isovalues.begin(), options.frame.isovalues.end());
   const Cuts cuts = options.bricks == "active"
-                        ? cut_by_surfaces(team, whole, options.frame.isovalues, unit,
+                        ? cut_by_surfaces(team, whole, nearest, unit,
                                           [&](const BlockBox &box) { return load(box, 1, false); })
                         : cut_for(team, whole, options.bricks, unit);
   const BlockBox &own = cuts.bricks()[team.rank()];
@@ -673,7 +678,9 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   if (wanted.with_bounds) bounded.emplace(*renderer, scene.volume, rate);
   if (options.frame.orbit == 0 && options.frame.cameras.empty()) {
     scene.cameras = {surface_camera(
-        whole, gather_box(team, scene.volume.info, renderer->surface_box(options.frame.isovalues)),
+        whole,
+        gather_box(team, scene.volume.info,
+                   renderer->surface_box(drawn_isovalues(scene.volume, options.frame.isovalues))),
         scene.size)};
   }
   nlohmann::ordered_json frames = nlohmann::ordered_json::array(), own_frames = frames;

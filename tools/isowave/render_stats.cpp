@@ -63,7 +63,7 @@ ordered_json device_json(const ocl::DeviceInfo &info) {
           {"compute_units", can.compute_units}};
 }
 
-ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera,
+ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
                         const FrameStats &stats) {
   ordered_json result = {{"isovalue", isovalue},
                          {"view", view},

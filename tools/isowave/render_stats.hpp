@@ -16,7 +16,7 @@ inline constexpr int kChartsSchema =
 nlohmann::ordered_json device_json(const ocl::DeviceInfo &info);
 
 /// One frame: isovalue, view, camera, totals and passes.
-nlohmann::ordered_json frame_json(float isovalue, std::size_t view, const Camera &camera,
+nlohmann::ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
                                   const FrameStats &stats);
 
 /// Bytes of device memory: current, peak, and by buffer name.

@@ -4,6 +4,7 @@
 
 #include "core/accuracy/choose_detail.hpp"
 #include "core/base/error.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "reference/accuracy.hpp"
 #include "reference/bound_check.hpp"
 #include "reference/cell_oracle.hpp"
@@ -41,7 +42,8 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view",
              "px chosen", "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");
   std::uint64_t exceeded = 0;
-  for (const float isovalue : options.frame.isovalues) {
+  for (const double given : options.frame.isovalues) {
+    const float isovalue = drawn_isovalue(scene.volume, given);
     const CellOracle truth(source, {dims.x, dims.y, dims.z}, isovalue);
     for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
       const Camera &camera = scene.cameras[view];

@@ -9,6 +9,7 @@
 
 #include "core/base/error.hpp"
 #include "core/render/renderer.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "reference/cell_oracle.hpp"
 #include "reference/embree_reach.hpp"
 #include "reference/mesh_oracle.hpp"
@@ -148,7 +149,8 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
                                              ? std::vector<std::string>{"roots", "cells", "mesh"}
                                              : options.oracles;
   Totals totals;
-  for (const float isovalue : options.frame.isovalues) {
+  for (const double given : options.frame.isovalues) {
+    const float isovalue = drawn_isovalue(scene.volume, given);
     std::vector<FrameJudge> judges;
     for (const std::string &name : names) {
       const auto begin = Clock::now();

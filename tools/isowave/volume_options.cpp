@@ -15,7 +15,7 @@
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
-#include "core/zfp/isovalue_notice.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -162,7 +162,7 @@ void warn_of_header(const std::string &path, const RawOverrides &overrides) {
   for (const std::string &notice : reader->notices()) warn(notice);
 }
 
-void warn_of_isovalue(const CompressedVolume &volume, float isovalue) {
+void warn_of_isovalue(const CompressedVolume &volume, double isovalue) {
   if (const std::string notice = isovalue_notice(volume, isovalue); !notice.empty()) warn(notice);
 }
 

@@ -65,7 +65,7 @@ std::string volume_stem(const std::string &path);
 void warn_of_header(const std::string &path, const RawOverrides &overrides);
 
 /// Warns of an isovalue without a surface: see isovalue_notice().
-void warn_of_isovalue(const CompressedVolume &volume, float isovalue);
+void warn_of_isovalue(const CompressedVolume &volume, double isovalue);
 
 /// The help text of an argument that open_any_volume() takes.
 inline constexpr const char *kVolumeHelp =

@@ -398,7 +398,7 @@ nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
 
 // ---- Meshes ----
 
-nb::dict extract(const PyVolume &self, const std::string &device, float isovalue,
+nb::dict extract(const PyVolume &self, const std::string &device, double isovalue,
                  std::uint32_t level, bool normals, bool exact_vertices,
                  std::uint64_t memory_budget, const std::optional<nb::callable> &progress) {
   Callbacks callbacks;
@@ -637,7 +637,7 @@ nb::dict draw(AnyRenderer &renderer, const nb::dict &options,
 
 /// By any of the library's renderers. rays [count][6]: origin and direction.
 template <class AnyRenderer>
-nb::dict cast(AnyRenderer &renderer, const RayArray &rays, float isovalue, bool smooth) {
+nb::dict cast(AnyRenderer &renderer, const RayArray &rays, double isovalue, bool smooth) {
   static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
   const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
   isowave::Frame frame;
@@ -714,11 +714,11 @@ class PyRenderer {
     return draw(*renderer_, options, on_pass, interrupts);
   }
 
-  nb::dict cast_rays(const RayArray &rays, float isovalue, bool smooth) {
+  nb::dict cast_rays(const RayArray &rays, double isovalue, bool smooth) {
     return cast(*renderer_, rays, isovalue, smooth);
   }
 
-  nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
+  nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
     isowave::Camera camera;
     {
       const WithoutGil no_gil;
@@ -767,11 +767,11 @@ class PyHostRenderer {
     return draw(*renderer_, options, on_pass, interrupts);
   }
 
-  nb::dict cast_rays(const RayArray &rays, float isovalue, bool smooth) {
+  nb::dict cast_rays(const RayArray &rays, double isovalue, bool smooth) {
     return cast(*renderer_, rays, isovalue, smooth);
   }
 
-  nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
+  nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
     isowave::Camera camera;
     {
       const WithoutGil no_gil;
@@ -864,7 +864,7 @@ class PyBrickRenderer {
     const isowave::FrameRequest request = request_of(options);
     return frame_dict(processes_.without_gil([&] { return renderer_->render(request); }));
   }
-  nb::tuple camera(float isovalue, std::uint32_t width, std::uint32_t height) {
+  nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
     return camera_tuple(processes_.without_gil([&] {
       return renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
     }));
@@ -872,7 +872,9 @@ class PyBrickRenderer {
   nb::dict device() const { return device_dict(renderer_->device()); }
   const isowave::Grid &grid() const { return renderer_->grid(); }
   const std::vector<std::string> &notices() const { return renderer_->notices(); }
-  std::string isovalue_notice(float isovalue) const { return renderer_->isovalue_notice(isovalue); }
+  std::string isovalue_notice(double isovalue) const {
+    return renderer_->isovalue_notice(isovalue);
+  }
 
  private:
   PyProcesses processes_;  // which the renderer does not call when it goes
@@ -945,7 +947,7 @@ NB_MODULE(_core, m) {
       .def_prop_ro("notices", [](const PyVolume &v) { return v.volume->notices(); })
       .def(
           "isovalue_notice",
-          [](const PyVolume &v, float isovalue) { return v.volume->isovalue_notice(isovalue); },
+          [](const PyVolume &v, double isovalue) { return v.volume->isovalue_notice(isovalue); },
           "isovalue"_a)
       .def_prop_ro("bits_per_voxel", [](const PyVolume &v) { return v.volume->bits_per_voxel(); })
       .def_prop_ro("compressed_bytes",

@@ -72,11 +72,11 @@ class BrickRenderer {
   Frame render(const FrameRequest &request);
 
   /// As Renderer's.
-  Camera camera(float isovalue, std::optional<ImageSize> size = {});
+  Camera camera(double isovalue, std::optional<ImageSize> size = {});
 
   /// As Volume::notices() and Volume::isovalue_notice(), in each process.
   const std::vector<std::string> &notices() const;
-  std::string isovalue_notice(float isovalue) const;
+  std::string isovalue_notice(double isovalue) const;
 
   const Grid &grid() const;          ///< of the whole volume
   const DeviceInfo &device() const;  ///< this process's

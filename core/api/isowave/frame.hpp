@@ -59,7 +59,9 @@ class Progress {
 /// again gives the same bits, whatever was drawn before, unless there is a time budget.
 struct FrameRequest {
   Camera camera{};
-  float isovalue = 0;
+  /// The surface separates voxels below it from the others. Voxels are float32: of a lossless
+  /// volume, each is compared as if in double; of any other, with the nearest float32.
+  double isovalue = 0;
   ImageSize size{};
   Appearance appearance{};
 

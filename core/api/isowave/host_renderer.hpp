@@ -50,10 +50,10 @@ class HostRenderer {
   /// Throws   Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more
   ///          than 1e7 voxels from the volume's origin; a hit is so many lengths of the direction
   ///          away that float32 does not hold the depth; a file cannot be read
-  Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
+  Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals = Normals::kSmooth);
 
   /// The view that Renderer::camera() takes, for a picture of that size.
-  Camera camera(float isovalue, const ImageSize &size = {}) const;
+  Camera camera(double isovalue, const ImageSize &size = {}) const;
 
   const std::shared_ptr<const Volume> &volume() const;
   /// At present, of value ranges and decoded blocks; a frame's rays take 36 each.

@@ -54,7 +54,7 @@ struct Mesh {
 /// would),
 ///         2^32 vertices and more
 Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
-             float isovalue, const ExtractOptions &options = {});
+             double isovalue, const ExtractOptions &options = {});
 
 /// The same to a file, for surfaces larger than memory: parts go to disk as they come, in the
 /// file's folder, which holds the mesh twice for a while. The file appears whole or not at all.
@@ -65,7 +65,7 @@ Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const 
 ///          what is to be added to its positions, as the file's header does
 /// Throws   Error: as above; the file cannot be written, or the format does not hold so much
 std::string extract_to_file(const std::shared_ptr<Device> &device,
-                            const std::shared_ptr<const Volume> &volume, float isovalue,
+                            const std::shared_ptr<const Volume> &volume, double isovalue,
                             const std::filesystem::path &path, const ExtractOptions &options = {});
 
 /// Writes a mesh to such a file.

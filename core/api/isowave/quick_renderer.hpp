@@ -41,12 +41,12 @@ class QuickRenderer {
   Frame render(const FrameRequest &request);
 
   /// As Renderer::cast_rays() does, by whichever renderer there is.
-  Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
+  Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals = Normals::kSmooth);
 
   /// The view that Renderer::camera() takes, from whichever renderer there is.
   ///
   /// Throws  Error: NaN; as render() does
-  Camera camera(float isovalue, std::optional<ImageSize> size = {});
+  Camera camera(double isovalue, std::optional<ImageSize> size = {});
 
   /// Makes the device's renderer no longer: the kernel that is being compiled is the last. Returns
   /// at once; afterwards, unless it was ready, calls that need it throw Error.

@@ -52,11 +52,11 @@ class Renderer {
   /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
   ///         1e7 voxels away from the volume's origin; a hit is so many lengths of the direction
   ///         away that float32 does not hold the depth
-  Frame cast_rays(std::span<const Ray> rays, float isovalue, Normals normals = Normals::kSmooth);
+  Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals = Normals::kSmooth);
 
   /// A view from the front right and above in which the isosurface fills a picture of that size
   /// (none: of the largest); the volume, where there is no surface.
-  Camera camera(float isovalue, std::optional<ImageSize> size = {});
+  Camera camera(double isovalue, std::optional<ImageSize> size = {});
 
   const std::shared_ptr<Device> &device() const;
   const std::shared_ptr<const Volume> &volume() const;

@@ -92,7 +92,7 @@ class Volume {
   std::optional<double> max_voxel_error() const;
   /// A line for users if the volume has no surface at this isovalue: it says the range of values.
   /// Else nothing.
-  std::string isovalue_notice(float isovalue) const;
+  std::string isovalue_notice(double isovalue) const;
   /// Lines for users, of how the header of the opened file was understood: units that were
   /// converted, a qform that says otherwise than the sform. None for what is compressed already.
   const std::vector<std::string> &notices() const;

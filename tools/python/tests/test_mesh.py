@@ -190,6 +190,18 @@ def test_far_from_the_origin(tmp_path):
     assert b"add 4500001 6700001 121 to x y z" in (tmp_path / "a.stl").read_bytes()[:80]
 
 
+def test_an_isovalue_is_compared_as_it_was_given():
+    voxels = np.zeros((5, 5, 5), np.float32)
+    voxels[2, 2, 2] = 0.7  # the nearest float32, which is below
+    volume = isowave.compress(voxels)
+    with pytest.warns(RuntimeWarning, match="isovalue 0.7 is outside"):
+        assert len(volume.extract(0.7).triangles) == 0
+        assert not np.isfinite(volume.render(0.7, size=(32, 32)).depth).any()
+    inside = float(np.float32(0.7))
+    assert len(volume.extract(inside).triangles) == 8
+    assert np.isfinite(volume.render(inside, size=(32, 32)).depth).any()
+
+
 def test_an_isovalue_outside_the_values_is_a_warning():
     volume = isowave.compress(np.arange(1000, dtype=np.uint16).reshape(10, 10, 10), exact=True)
     rays = np.zeros((1, 6)) + [0, 0, 0, 0, 0, 1]

@@ -1,0 +1,40 @@
+#include "core/zfp/isovalue.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.hpp"
+
+namespace isowave::core {
+
+std::string isovalue_notice(const CompressedVolume &volume, double isovalue) {
+  const auto [least, most] = volume.value_range;
+  const bool is_known = std::isfinite(least) && std::isfinite(most);
+  if (!is_known || (least < isovalue && isovalue <= most)) return {};
+  return fmt::format("isovalue {} is {} the volume's values, {} to {}: there is no surface",
+                     isovalue, isovalue == least ? "the least of" : "outside", least, most);
+}
+
+float drawn_isovalue(const CompressedVolume &volume, double isovalue) {
+  constexpr float kMost = std::numeric_limits<float>::max();
+  if (!(std::abs(isovalue) <= kMost))
+    throw Error("isovalue {}: give a finite number that float32 holds", isovalue);
+  const float nearest = static_cast<float>(isovalue);
+  const BlockPrecision &precision = volume.precision;
+  const bool equals_source =
+      fits_float32(volume.info.type) && (precision.is_reversible() || precision.whole_numbers);
+  return equals_source && nearest < isovalue ? std::nextafter(nearest, kMost) : nearest;
+}
+
+std::vector<float> drawn_isovalues(const CompressedVolume &volume,
+                                   std::span<const double> isovalues) {
+  std::vector<float> result(isovalues.size());
+  std::ranges::transform(isovalues, result.begin(),
+                         [&](double isovalue) { return drawn_isovalue(volume, isovalue); });
+  return result;
+}
+
+}  // namespace isowave::core

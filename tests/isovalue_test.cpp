@@ -1,0 +1,57 @@
+// core/zfp/isovalue.hpp: which float32 decoded voxels are compared with.
+
+#include "core/zfp/isovalue.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.hpp"
+
+namespace isowave::core {
+namespace {
+
+CompressedVolume volume_of(VoxelType type, const BlockPrecision &precision) {
+  CompressedVolume volume;
+  volume.info.type = type;
+  volume.precision = precision;
+  return volume;
+}
+
+constexpr BlockPrecision kReversible{.min_exponent = ISO_REVERSIBLE};
+constexpr BlockPrecision kWhole{.min_exponent = -1, .whole_numbers = true};
+
+TEST(DrawnIsovalue, VoxelsOfALosslessVolumeAreInsideAsTheirSourceIs) {
+  const CompressedVolume floats = volume_of(VoxelType::kFloat32, kReversible);
+  for (const double isovalue : {0.1, 0.7, -0.1, -0.7, 1e-31, 1e-46, -1e-46, 2.5, 0.0, 3e38}) {
+    const float nearest = static_cast<float>(isovalue);
+    for (const float voxel :
+         {std::nextafter(nearest, -1e30f), nearest, std::nextafter(nearest, 1e30f)})
+      EXPECT_EQ(voxel >= drawn_isovalue(floats, isovalue), voxel >= isovalue)
+          << voxel << " at " << isovalue;
+  }
+  EXPECT_GT(drawn_isovalue(floats, 0.7), 0.7);
+  EXPECT_EQ(drawn_isovalue(volume_of(VoxelType::kUint16, kWhole), 100.00000001),
+            std::nextafter(100.0f, 101.0f));
+}
+
+// A float64 voxel at the isovalue was rounded as the isovalue is.
+TEST(DrawnIsovalue, OtherVolumesHaveTheNearest) {
+  for (const CompressedVolume &volume :
+       {volume_of(VoxelType::kFloat64, kReversible), volume_of(VoxelType::kFloat32, {}),
+        volume_of(VoxelType::kUint32, kReversible)})
+    EXPECT_EQ(drawn_isovalue(volume, 0.7), 0.7f);
+}
+
+TEST(DrawnIsovalue, OneThatFloat32DoesNotHoldIsRefused) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double bad : {1e39, -1e39, kInfinity, -kInfinity, std::nan("")}) {
+    EXPECT_THAT([&] { drawn_isovalue(volume_of(VoxelType::kFloat32, kReversible), bad); },
+                testing::ThrowsMessage<Error>(testing::HasSubstr("give a finite number")));
+  }
+}
+
+}  // namespace
+}  // namespace isowave::core
