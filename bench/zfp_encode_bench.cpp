@@ -5,7 +5,7 @@
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
 #include "core/sources/generate.hpp"
-#include "core/zfp/zfp_encode.hpp"
+#include "core/stages/zfp_encode.hpp"
 
 namespace isowave::core::bench {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/base/parallel_for.hpp"
-#include "core/stages/ambient.hpp"
+#include "core/frame/ambient_rays.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/smooth_gradient.h"

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "core/volume/volume.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 #include "reference/accuracy.hpp"
 

@@ -1,6 +1,6 @@
 #include "reference/twin.hpp"
 
-#include "core/stages/ambient.hpp"
+#include "core/frame/ambient_rays.hpp"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave::core {

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "core/stages/shade.hpp"
-#include "core/stages/smooth_normals.hpp"
-#include "core/stages/solvers.hpp"
+#include "core/frame/appearance.hpp"
+#include "core/frame/normals.hpp"
+#include "core/frame/solvers.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 
 namespace isowave::core {
 

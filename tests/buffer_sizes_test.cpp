@@ -24,7 +24,7 @@
 #include "core/stages/resident.hpp"
 #include "core/stages/shade.hpp"
 #include "core/stages/traverse.hpp"
-#include "core/zfp/zfp_encode.hpp"
+#include "core/stages/zfp_encode.hpp"
 #include "tests/stage_world.hpp"
 #include "tests/test_devices.hpp"
 

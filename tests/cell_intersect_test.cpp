@@ -13,7 +13,7 @@
 #include <random>
 #include <vector>
 
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "tests/cubic_oracle.hpp"
 #include "tests/stage_support.hpp"
 

@@ -10,9 +10,9 @@
 #include "core/base/error.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/sources/generate.hpp"
+#include "core/stages/zfp_encode.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
-#include "core/zfp/zfp_encode.hpp"
 #include "kernels_cl/portable/block_bound.h"
 #include "reference/cell_oracle.hpp"
 #include "reference/random.hpp"
@@ -356,7 +356,7 @@ TEST_P(SourceErrorOnDevice, SmallErrorsAreTheHosts) {
     ArrayReader reader = source.reader();
     CompressOptions options{.rate = 7, .measure_error = true, .levels = 0};
     const CompressedVolume host = compress(reader, options);
-    options.device = &device;
+    options.encoder = encoder_on(device);
     const CompressedVolume got = compress(reader, options);
     EXPECT_EQ(got.words, host.words);
     EXPECT_EQ(got.max_voxel_error, host.max_voxel_error);

@@ -1,7 +1,7 @@
 // kernels_cl/portable/zfp_encode.h, on the host and through core/zfp_encode, against libzfp: the
 // same bits. Then whole volumes compressed on a device against the host.
 
-#include "core/zfp/zfp_encode.hpp"
+#include "core/stages/zfp_encode.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -242,7 +242,7 @@ class CompressOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     const test::TemporaryFolder folder;
     const CompressedVolume host = compress(reader, options);
     compress_to_file(reader, options, folder / "host.zfp");
-    options.device = &device_;
+    options.encoder = encoder_on(device_);
     const CompressedVolume device = compress(reader, options);
     compress_to_file(reader, options, folder / "device.zfp");
     EXPECT_EQ(device.bits_per_block, host.bits_per_block);
@@ -305,7 +305,7 @@ TEST_P(CompressOnDevice, RefusesAndMapsAsTheHost) {
   voxels[9] = -0.0f;
   voxels[10] = 1e-40f;
   CompressOptions options{.rate = 8};
-  options.device = &device_;
+  options.encoder = encoder_on(device_);
   const test::TemporaryFolder folder;
   ArrayReader reader(dims, voxels);
   EXPECT_THAT([&] { compress_to_file(reader, options, folder / "a.zfp"); },
@@ -338,7 +338,7 @@ TEST_P(CompressOnDevice, FailuresOnTheWayAreReported) {
   const glm::uvec3 dims(1100, 1000, 8);
   const std::vector<float> voxels(std::size_t{1100} * 1000 * 8, 1.0f);
   CompressOptions options{.rate = 8};
-  options.device = &device_;
+  options.encoder = encoder_on(device_);
   FailingReader failing(dims, voxels);
   EXPECT_THAT([&] { compress(failing, options); }, ThrowsMessage<Error>("no more layers"));
   ArrayReader reader(dims, voxels);

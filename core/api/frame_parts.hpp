@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/accuracy/choose_detail.hpp"
-#include "core/render/frame_request.hpp"
-#include "core/stages/shade.hpp"
+#include "core/frame/appearance.hpp"
+#include "core/frame/frame_request.hpp"
 #include "core/view/given_rays.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/frame.hpp"

@@ -9,6 +9,7 @@
 #include "core/base/error.hpp"
 #include "core/bricks/cuts.hpp"
 #include "core/ocl/device.hpp"
+#include "core/stages/zfp_encode.hpp"
 #include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/range_thresholds.hpp"
@@ -129,7 +130,7 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
   options.precision = find_precision(open, what, storage);
   options.measure_error = storage.measure_error;
   options.input = {storage.map_nan, storage.no_data, {}, storage.num_threads};
-  options.device = options.precision ? nullptr : storage.device;
+  if (storage.device && !options.precision) options.encoder = encoder_on(*storage.device);
   CroppedReader reader(std::move(whole), info);
   CompressedVolume volume = compress(reader, options);
   if (storage.device) storage.device->timer().collect();  // they belong to no frame

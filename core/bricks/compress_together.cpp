@@ -276,7 +276,7 @@ CodedSlab TeamCompressor::code(std::uint64_t begin, LevelData &next) {
   const std::uint32_t rank = team_.rank();
   const bool has_next = level_ + 1 < levels_.size() && !cuts_[level_ + 1].own[rank].empty();
   CompressOptions options = options_;
-  if (worked().empty()) options.device = nullptr;
+  if (worked().empty()) options.encoder = {};
   CodedSlab slab;
   CompressedVolume coarse;
   std::optional<PyramidCoder> coder;

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
 // Compilers split vectors that are too wide for a function's processor before they inline it. So

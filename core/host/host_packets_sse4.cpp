@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
 #if defined(__clang__)

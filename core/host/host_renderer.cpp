@@ -9,9 +9,9 @@
 #include "core/base/host_memory.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
-#include "core/render/surface_camera.hpp"
-#include "core/stages/ambient.hpp"
-#include "core/stages/shade.hpp"
+#include "core/frame/ambient_rays.hpp"
+#include "core/frame/appearance.hpp"
+#include "core/frame/surface_camera.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 

@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
+#include "core/frame/appearance.hpp"
+#include "core/frame/frame_request.hpp"
 #include "core/host/host_blocks.hpp"
-#include "core/render/frame_request.hpp"
-#include "core/stages/shade.hpp"
 #include "core/view/given_rays.hpp"
 
 namespace isowave::core {

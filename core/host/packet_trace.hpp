@@ -8,7 +8,7 @@
 
 #include "core/host/float8.hpp"
 #include "core/host/host_loops.hpp"
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {

@@ -17,7 +17,7 @@
 #include "core/stages/block_cache.hpp"
 #include "core/stages/group.hpp"
 #include "core/stages/macrocells.hpp"
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/stages/zfp_decode.hpp"
 #include "core/zfp/level_bounds.hpp"

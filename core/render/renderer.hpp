@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/render/frame_request.hpp"
+#include "core/frame/frame_request.hpp"
 #include "core/render/memory_plan.hpp"
 #include "core/render/pass_readback.hpp"
 #include "core/render/pipeline.hpp"
@@ -22,6 +22,7 @@
 #include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
+#include "core/stages/smooth_normals.hpp"
 #include "core/view/given_rays.hpp"
 #include "core/zfp/zfp_stream.hpp"
 

@@ -24,13 +24,6 @@ std::optional<BlockBox> surface_box(Macrocells &macrocells, const VolumeInfo &in
   return box;
 }
 
-Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size) {
-  const glm::dvec3 last(info.dims - 1u);
-  const glm::dvec3 begin = box ? 4.0 * glm::dvec3(box->begin) : glm::dvec3(0);
-  const glm::dvec3 end = box ? glm::min(4.0 * glm::dvec3(box->end), last) : last;
-  return camera_of_box(info, begin, end, double(size.width) / size.height);
-}
-
 Camera surface_camera(ocl::Device &device, const CompressedVolume &volume,
                       std::span<const float> isovalues, ImageSize size) {
   constexpr std::uint32_t kWindowBlocks = 4096;

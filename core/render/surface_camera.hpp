@@ -1,12 +1,11 @@
 #pragma once
-// The view that is taken where nobody asks for another.
+// Where isosurfaces may be, by the value ranges that a device computes.
 
 #include <optional>
 #include <span>
 
+#include "core/frame/surface_camera.hpp"
 #include "core/stages/macrocells.hpp"
-#include "core/view/camera.hpp"
-#include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
@@ -21,11 +20,7 @@ namespace isowave::core {
 std::optional<BlockBox> surface_box(Macrocells &macrocells, const VolumeInfo &info,
                                     std::span<const float> isovalues);
 
-/// A view in which that box fills a picture of that size; none: the whole volume. From where
-/// orbit_cameras() begins.
-Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size);
-
-/// Both without a renderer: builds the blocks' ranges on the device, and forgets them.
+/// The view that the surfaces fill. Builds the blocks' ranges on the device, and forgets them.
 Camera surface_camera(ocl::Device &device, const CompressedVolume &volume,
                       std::span<const float> isovalues, ImageSize size);
 

@@ -8,6 +8,7 @@
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
+#include "core/stages/zfp_encode.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 
@@ -114,7 +115,7 @@ CompressOptions compress_options(const OpenReader &open, const VolumeInfo &info,
   options.measure_error = storage.measure_error;
   options.input = {storage.map_nan, storage.no_data, step(storage, "compressing"),
                    storage.num_threads};
-  options.device = options.precision ? nullptr : storage.device;
+  if (storage.device && !options.precision) options.encoder = encoder_on(*storage.device);
   return options;
 }
 

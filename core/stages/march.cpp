@@ -1,5 +1,7 @@
 #include "core/stages/march.hpp"
 
+#include "core/stages/solver_defines.hpp"
+
 namespace isowave::core {
 
 namespace {

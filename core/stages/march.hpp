@@ -5,7 +5,7 @@
 #include "core/stages/block_cache.hpp"
 #include "core/stages/levelled_kernel.hpp"
 #include "core/stages/macrocells.hpp"
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 
 namespace isowave::core {
 

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "core/stages/solver_defines.hpp"
+
 namespace isowave::core {
 
 namespace {

@@ -4,7 +4,7 @@
 
 #include "core/stages/block_cache.hpp"
 #include "core/stages/macrocells.hpp"
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/stream/device_stream.hpp"
 

@@ -1,10 +1,12 @@
 #include "core/stages/resident.hpp"
-#include "core/base/ms_since.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
+
+#include "core/base/ms_since.hpp"
+#include "core/stages/solver_defines.hpp"
 
 namespace isowave::core {
 

@@ -1,46 +1,14 @@
 #pragma once
-// Hit buffer -> framebuffer: a headlight, Blinn-Phong, and a light above it, on the hits'
-// gradients.
+// Hit buffer -> framebuffer (core/frame/appearance.hpp, kernels_cl/shade.cl).
 
-#include <glm/glm.hpp>
+#include <cstdint>
 #include <vector>
 
-#include "core/io/png.hpp"
+#include "core/frame/appearance.hpp"
 #include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
-#include "kernels_cl/portable/shade.h"
 
 namespace isowave::core {
-
-/// Colours are display values, [0,1].
-struct Appearance {
-  glm::vec3 surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
-  glm::vec3 background{1.0f, 1.0f, 1.0f};
-  float ambient = 0.15f;                  ///< light from all around
-  float diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
-  float above = 0.45f;                    ///< diffuse, of a light above it
-};
-
-/// How many of a frame's ambient rays met nothing.
-struct OpenCounts {
-  std::vector<uchar> counts;      ///< [height * width] by ray
-  std::uint32_t num_ambient = 0;  ///< of so many; 0: there are none
-};
-
-/// GLM's columns -> rows [9], scaled so that the largest entry is 1: only directions count.
-void store_rows(const glm::dmat3 &m, float *rows);
-
-ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
-
-/// The same on the host, with the same bits.
-///
-/// hits     [height * width] of the frame's rays
-/// samples  rays a pixel along each axis
-/// open     how much of the sky hits see
-/// Returns  RGB
-Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
-                    const std::vector<HitRecord> &hits, std::uint32_t samples = 1,
-                    const OpenCounts &open = {});
 
 class Shade {
  public:

@@ -1,23 +1,10 @@
 #pragma once
 // The last wave of a frame: hits get smooth gradients (kernels_cl/smooth_normals.cl).
 
-#include <string_view>
-
 #include "core/stages/block_cache.hpp"
 #include "core/stages/levelled_kernel.hpp"
 
 namespace isowave::core {
-
-/// Which gradient hits have.
-enum class Normals {
-  kSmooth,  ///< central differences, trilinear between voxels (portable/smooth_gradient.h)
-  kCell     ///< of the trilinear field itself, which jumps from cell to cell
-};
-
-/// "smooth", "cell".
-std::string_view to_string(Normals normals);
-/// Throws  Error naming both
-Normals normals_from_string(std::string_view name);
 
 class SmoothNormals {
  public:

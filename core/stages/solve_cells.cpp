@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "core/stages/solver_defines.hpp"
+
 namespace isowave::core {
 
 SolveCells::SolveCells(ocl::Device &device, Solver solver)

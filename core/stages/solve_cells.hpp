@@ -3,7 +3,7 @@
 // same headers.
 
 #include "core/ocl/kernel.hpp"
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 
 namespace isowave::core {
 

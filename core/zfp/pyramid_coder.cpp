@@ -1,7 +1,7 @@
-// Compression of whole volumes by libzfp, or by a device. With a whole number of bits per voxel a
+// Compression of whole volumes by libzfp. With a whole number of bits per voxel a
 // block is a whole number of 64-bit words, so rows of blocks are compressed apart, in parallel, and
-// laid end to end: the same bytes as one call for the whole array. A device gets whole layers
-// (zfp_encode). Blocks of lengths of their own: zfp_accuracy.
+// laid end to end: the same bytes as one call for the whole array. Blocks of lengths of their own:
+// zfp_accuracy.
 
 #include "core/zfp/pyramid_coder.hpp"
 
@@ -13,7 +13,6 @@
 #include "core/volume/block_errors.hpp"
 #include "core/zfp/libzfp.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
-#include "core/zfp/zfp_encode.hpp"
 
 namespace isowave::core {
 
@@ -99,35 +98,6 @@ class FixedRateCoder : public LevelCoder {
   BlockErrors errors_;
 };
 
-/// Has a device compress whole chunks; what they become is not read back.
-class DeviceCoder : public LevelCoder {
- public:
-  DeviceCoder(const glm::uvec3 &dims, const CompressOptions &options, const PayloadSink &sink,
-              bool keep)
-      : encoder_(*options.device, dims, 64 * options.rate, options.measure_error,
-                 BlockErrors(keep)),
-        measure_error_(options.measure_error),
-        sink_(sink) {}
-
-  void end_chunk(const Chunk &chunk) override {
-    if (measure_error_) encoder_.errors().add_lost(chunk.lost);
-    encoder_.encode(chunk.voxels, chunk.num_layers, sink_);
-  }
-
-  std::vector<float> finish(CompressedVolume &volume) override {
-    encoder_.finish(sink_);
-    if (measure_error_) volume.max_voxel_error = encoder_.errors().max();
-    return encoder_.errors().take();
-  }
-
-  std::span<const float> decoded() const override { return {}; }
-
- private:
-  LayerEncoder encoder_;
-  bool measure_error_;
-  const PayloadSink &sink_;
-};
-
 /// Compresses blocks of lengths of their own.
 class BoundedCoder : public LevelCoder {
  public:
@@ -163,7 +133,7 @@ InputOptions input_of(const CompressOptions &options) {
 }
 
 CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options) {
-  if (options.precision && options.device)
+  if (options.precision && options.encoder)
     throw Error("a device compresses at a fixed rate only: leave the device, or the error bound");
   if (!options.precision && (options.rate < 1 || options.rate > 32))
     throw Error("rate {}: must be 1 to 32 bits per voxel", options.rate);
@@ -198,8 +168,8 @@ PyramidCoder::PyramidCoder(const CompressOptions &options,
   const glm::uvec3 dims = volume_.info.dims;
   if (volume_.is_indexed()) {
     coder_ = std::make_unique<BoundedCoder>(dims, volume_.precision, sinks[0], keep_errors);
-  } else if (options.device && is_finest) {
-    coder_ = std::make_unique<DeviceCoder>(dims, options, sinks[0], keep_errors);
+  } else if (options.encoder && is_finest) {
+    coder_ = options.encoder(dims, options, sinks[0], keep_errors);
   } else {
     coder_ = std::make_unique<FixedRateCoder>(dims, options, sinks[0], keep_errors);
   }

@@ -15,9 +15,6 @@
 
 namespace isowave::core {
 
-/// Takes a level's payload in order.
-using PayloadSink = std::function<void(std::span<const std::byte>)>;
-
 /// A volume of that grid and its coarser levels, as they will be compressed: all but what the
 /// voxels decide.
 ///

@@ -22,9 +22,15 @@
 namespace isowave::core {
 
 class InputFile;
-namespace ocl {
-class Device;
-}
+class LevelCoder;
+struct CompressOptions;
+
+/// Takes a level's payload in order.
+using PayloadSink = std::function<void(std::span<const std::byte>)>;
+/// Makes what compresses a level of those dims. keep_errors: of each block.
+using CoderMaker = std::function<std::unique_ptr<LevelCoder>(
+    const glm::uvec3 &dims, const CompressOptions &options, const PayloadSink &sink,
+    bool keep_errors)>;
 
 /// How much of its voxels a volume keeps whose blocks have lengths of their own.
 struct BlockPrecision {
@@ -45,8 +51,9 @@ struct CompressOptions {
   std::uint32_t rate = 0;  ///< bits per voxel, 1..32; or
   std::optional<BlockPrecision>
       precision{};  ///< as many bits as each block needs: see choose_precision()
-  /// At a fixed rate, encodes instead of libzfp: the same result, bit for bit.
-  ocl::Device *device = nullptr;
+  /// Compresses the finest level at a fixed rate, with libzfp's bits: encoder_on() of a device
+  /// (core/stages/zfp_encode.hpp). None: libzfp.
+  CoderMaker encoder{};
   bool measure_error =
       false;  ///< at a fixed rate: decode everything again for CompressedVolume::max_voxel_error
   std::uint32_t levels =

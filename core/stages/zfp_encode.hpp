@@ -11,6 +11,7 @@
 #include "core/ocl/in_flight.hpp"
 #include "core/ocl/kernel.hpp"
 #include "core/volume/block_errors.hpp"
+#include "core/zfp/zfp_stream.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
 namespace isowave::core {
@@ -102,5 +103,8 @@ class LayerEncoder {
   ocl::InFlight<Result> current_, previous_;
   bool in_flight_ = false;  ///< current_ is to come
 };
+
+/// CompressOptions::encoder by a device, which must outlive it.
+CoderMaker encoder_on(ocl::Device &device);
 
 }  // namespace isowave::core

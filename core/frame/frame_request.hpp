@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/stages/smooth_normals.hpp"
+#include "core/frame/normals.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/level_bounds.hpp"

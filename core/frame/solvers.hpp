@@ -5,7 +5,6 @@
 #include <array>
 #include <string_view>
 
-#include "core/ocl/device.hpp"
 #include "kernels_cl/portable/solver.h"
 
 namespace isowave::core {
@@ -28,9 +27,5 @@ Solver solver_from_string(std::string_view name);
 inline bool finds_all(Solver solver) {
   return solver.kind == kDefaultSolver.kind && solver.max_steps >= kDefaultSolver.max_steps;
 }
-
-/// What a kernel that includes solver.h is built with: it is built for one solver, so that the
-/// others cost it nothing.
-ocl::Defines solver_defines(Solver solver);
 
 }  // namespace isowave::core

@@ -1,4 +1,4 @@
-#include "core/stages/solvers.hpp"
+#include "core/frame/solvers.hpp"
 
 #include <fmt/ranges.h>
 
@@ -17,11 +17,6 @@ Solver solver_from_string(std::string_view name) {
     if (kSolverNames[i] == name) return {kind, kSteps[i]};
   }
   throw Error("no solver is called '{}'; there are: {}", name, fmt::join(kSolverNames, ", "));
-}
-
-ocl::Defines solver_defines(Solver solver) {
-  return {{"ISO_SOLVER", std::to_string(solver.kind)},
-          {"ISO_ROOT_STEPS", std::to_string(solver.max_steps)}};
 }
 
 }  // namespace isowave::core

@@ -1,10 +1,11 @@
-#include "core/zfp/zfp_encode.hpp"
+#include "core/stages/zfp_encode.hpp"
 
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "core/zfp/pyramid_coder.hpp"
 
 namespace isowave::core {
 
@@ -173,6 +174,45 @@ void LayerEncoder::hand_over(const Result &result, const Sink &sink) {
   }
   errors_.end();
   sink(std::as_bytes(std::span<const uint>(result.words)));
+}
+
+namespace {
+
+/// Has a device compress whole chunks; what they become is not read back.
+class DeviceCoder : public LevelCoder {
+ public:
+  DeviceCoder(ocl::Device &device, const glm::uvec3 &dims, const CompressOptions &options,
+              const PayloadSink &sink, bool keep)
+      : encoder_(device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
+        measure_error_(options.measure_error),
+        sink_(sink) {}
+
+  void end_chunk(const Chunk &chunk) override {
+    if (measure_error_) encoder_.errors().add_lost(chunk.lost);
+    encoder_.encode(chunk.voxels, chunk.num_layers, sink_);
+  }
+
+  std::vector<float> finish(CompressedVolume &volume) override {
+    encoder_.finish(sink_);
+    if (measure_error_) volume.max_voxel_error = encoder_.errors().max();
+    return encoder_.errors().take();
+  }
+
+  std::span<const float> decoded() const override { return {}; }
+
+ private:
+  LayerEncoder encoder_;
+  bool measure_error_;
+  const PayloadSink &sink_;
+};
+
+}  // namespace
+
+CoderMaker encoder_on(ocl::Device &device) {
+  return [&device](const glm::uvec3 &dims, const CompressOptions &options, const PayloadSink &sink,
+                   bool keep_errors) {
+    return std::make_unique<DeviceCoder>(device, dims, options, sink, keep_errors);
+  };
 }
 
 }  // namespace isowave::core

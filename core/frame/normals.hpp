@@ -1,0 +1,18 @@
+#pragma once
+// Which gradients, and so which normals, the hits of a frame have.
+
+#include <string_view>
+
+namespace isowave::core {
+
+enum class Normals {
+  kSmooth,  ///< central differences, trilinear between voxels (portable/smooth_gradient.h)
+  kCell     ///< of the trilinear field itself, which jumps from cell to cell
+};
+
+/// "smooth", "cell".
+std::string_view to_string(Normals normals);
+/// Throws  Error naming both
+Normals normals_from_string(std::string_view name);
+
+}  // namespace isowave::core

@@ -1,0 +1,17 @@
+#pragma once
+// The view that is taken if a user asks for no other.
+
+#include <optional>
+
+#include "core/view/camera.hpp"
+#include "core/view/frame.hpp"
+#include "core/zfp/voxel_region.hpp"
+
+namespace isowave::core {
+
+/// A view in which a box of blocks fills a picture of that size, from where orbit_cameras() begins.
+///
+/// box  around the blocks that the surface may be in; none: the whole volume
+Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size);
+
+}  // namespace isowave::core
