@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "core/frame/normals.hpp"
-#include "core/frame/normals.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_stream.hpp"
