@@ -13,8 +13,9 @@
 #include <string>
 #include <tuple>
 
+#include "core/render/blocks_wave.hpp"
 #include "core/render/pass_readback.hpp"
-#include "core/render/pipeline.hpp"
+#include "core/render/ray_waves.hpp"
 #include "core/stages/active_blocks.hpp"
 #include "core/stages/ambient.hpp"
 #include "core/stages/block_triangles.hpp"
@@ -270,19 +271,22 @@ void check_pipelines(ocl::Device &device) {
                     std::move(macrocells), std::move(decode)});
   for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
     const Group::Limits limits{100, 20, 8, grouping};
-    FrameState state{device, std::move(levels), Wavefront(device, {limits.num_rays}),
-                     BlockCache(device, BlockCache::limits_for(grid.grid, 20, 100), 8)};
-    for (const PipelineKind kind : {PipelineKind::kBlocks, PipelineKind::kRays})
-      expect_books(device, pipeline_sizes(kind, limits), [&] {
-        return make_pipeline(kind, state, limits, kDefaultSolver, kDefaultClosestHit);
+    BlockStore blocks(device, std::move(levels),
+                      BlockCache(device, BlockCache::limits_for(grid.grid, 20, 100), 8));
+    Wavefront rays(device, {limits.num_rays});
+    const auto make_blocks_wave = [&] {
+      return std::make_unique<BlocksWave>(blocks, rays, limits, kDefaultSolver, kDefaultClosestHit);
+    };
+    expect_books(device, pipeline_sizes(PipelineKind::kBlocks, limits), make_blocks_wave);
+    for (const RaySource source : {RaySource::kCamera, RaySource::kGiven}) {
+      expect_books(device, pipeline_sizes(PipelineKind::kRays, limits), [&] {
+        return std::make_unique<RaysWave>(blocks, rays, 8, kDefaultSolver, source,
+                                          RayPackets::kAuto, DecodeOnDemand::kAuto);
       });
-    expect_books(device, {}, [&] { return make_given_pipeline(state, 8, kDefaultSolver); });
-    state.rays = Wavefront(device, {.num_rays = limits.num_rays, .scanned_pairs = true});
-    expect_books(device, pipeline_sizes(PipelineKind::kBlocks, limits, true), [&] {
-      return make_pipeline(PipelineKind::kBlocks, state, limits, kDefaultSolver,
-                           kDefaultClosestHit);
-    });
-    levels = std::move(state.levels);
+    }
+    rays = Wavefront(device, {.num_rays = limits.num_rays, .scanned_pairs = true});
+    expect_books(device, pipeline_sizes(PipelineKind::kBlocks, limits, true), make_blocks_wave);
+    levels = std::move(blocks.levels);
   }
 }
 

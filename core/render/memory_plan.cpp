@@ -11,7 +11,9 @@
 #include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
+#include "core/stages/zfp_decode.hpp"
 #include "core/view/detail.hpp"
+#include "core/zfp/level_bounds.hpp"
 
 namespace isowave::core {
 

@@ -10,6 +10,9 @@
 #include "core/ocl/buffer_sizes.hpp"
 #include "core/ocl/device.hpp"
 #include "core/render/pipeline.hpp"
+#include "core/stages/block_cache.hpp"
+#include "core/stages/macrocells.hpp"
+#include "core/stages/wavefront.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {

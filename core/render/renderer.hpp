@@ -1,10 +1,8 @@
 #pragma once
 // Draws isosurfaces of one compressed volume on one device: the main loop of the program.
 //
-// camera -> rays -> [ pass of a pipeline ]* -> hits -> [ pass for smooth normals ]*
-//        -> [ ambient rays -> [ pass of a pipeline ]* ]* -> picture
-//
-// core/render/pipeline.hpp has the pipelines.
+// A frame is a row of waves: camera rays, hits that get smooth normals, rounds of ambient rays.
+// run() has the only loop over passes. Waves: ray_waves.hpp, blocks_wave.hpp.
 
 #include <array>
 #include <chrono>
@@ -15,9 +13,10 @@
 #include <vector>
 
 #include "core/frame/frame_request.hpp"
+#include "core/render/block_store.hpp"
 #include "core/render/memory_plan.hpp"
-#include "core/render/pass_readback.hpp"
-#include "core/render/pipeline.hpp"
+#include "core/render/passes.hpp"
+#include "core/render/ray_waves.hpp"
 #include "core/render/renderer_options.hpp"
 #include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
@@ -153,23 +152,25 @@ class Renderer {
   const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
   const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that there is
   const Macrocells &macrocells() const {
-    return state_.levels[0].macrocells;
+    return blocks_.levels[0].macrocells;
   }  ///< of the finest level
   double setup_ms() const {
     return setup_ms_;
   }  ///< upload, macrocell ranges; without Device::compile_ms()
 
  private:
-  /// What voxels of a level are decoded to.
-  struct DecodedValues {
-    StreamLayout layout;
-    double range_error;  ///< of voxels of fewer bit planes, at most
+  /// The frame at work.
+  struct Frame {
+    const OnPass &on_pass;
+    std::uint32_t waves_left;  ///< that follow the one at work
+    FrameStats stats{};
   };
 
+  void run(Wave &wave, Frame &frame, Wave *next = nullptr);
   void compile_kernels();
   void check_has_picture() const;
   void check_has_given() const;
-  bool is_brick() const { return state_.levels[0].info.brick != BrickOf{}; }
+  bool is_brick() const { return blocks_.levels[0].info.brick != BrickOf{}; }
   KeptPicture &kept();
   void begin_frame(const FrameRequest &request);
   void open_frame(std::vector<FrameParams> frames, const std::vector<DecodedValues> &values,
@@ -177,18 +178,8 @@ class Renderer {
   std::vector<FrameParams> frames_of_rays(std::uint32_t columns, std::uint32_t rows,
                                           float isovalue) const;
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
-  void decode_as(const std::vector<DecodedValues> &values, FieldBound bound);
-  struct Uploads {
-    std::uint64_t blocks = 0, bytes = 0;
-  };
-  Uploads uploads() const;
   PassStats stats_of(const PassCounts &counts);
-  void enqueue_normals(bool begins, RaySource of = RaySource::kCamera);
-  void finish_normals(const OnPass &on_pass, bool has_begun, bool more_follows, FrameStats &stats,
-                      RaySource of = RaySource::kCamera);
-  void add_ambient(const FrameRequest &request, FrameStats &stats);
-  bool trace_given(const OnPass &on_pass, LaterPasses &stats);
-  void answer_requests();
+  void cast_round(std::uint32_t round, Frame &frame);
   void plan_growth(std::uint64_t recycled);
   void grow_cache();
   bool in_step(const OnPass &on_pass) const {
@@ -202,29 +193,25 @@ class Renderer {
   MemoryPlan plan_;
   std::uint32_t wanted_slots_ = 0;  ///< of the cache from the next frame on
   bool is_small_cache_ = false;     ///< slots may run out within one pass
-  FrameState state_;
-  /// Parameters of the levels of detail that draw the frame at work.
-  ocl::InFlight<std::vector<FrameParams>> level_frames_;
+  BlockStore blocks_;
+  Wavefront rays_;
   std::array<float, 2> value_range_;  ///< of the volume before compression
   ImageSize size_;                    ///< of the frame at work, or the last
   bool has_picture_ = false;          ///< the hit buffer has the frame's hits so far
-  std::optional<float>
-      cached_isovalue_;  ///< of the cache's bits of voxels inside; none: it is empty
   /// Of the last frame: camera and isovalue.
   std::optional<std::pair<Camera, float>> last_view_;
   /// Whether a single pass was enough: for the last frame that showed a new view [0], and for the
   /// last that showed the same view again [1].
   std::array<bool, 2> took_one_pass_{};
-  /// Levels whose block requests are still unanswered because a pass for normals or ambient rays
-  /// was cut short; empty when none are.
-  std::optional<LevelRange> open_requests_;
-  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<Wave> camera_rays_;
   SmoothNormals smooth_normals_;
+  SmoothNormalsWave normals_of_camera_, normals_of_given_;
   Shade shade_;
   std::optional<KeptPicture> kept_;
-  std::unique_ptr<Pipeline> given_pipeline_;  ///< with given rays; as is
+  std::optional<RaysWave> given_rays_;  ///< with given rays; as are
   std::optional<Ambient> ambient_;
-  PassReadback readback_;
+  std::optional<AmbientRound> ambient_round_;
+  Passes passes_;
   double setup_ms_ = 0;
 };
 

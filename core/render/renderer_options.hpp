@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/frame/solvers.hpp"
 #include "core/render/memory_plan.hpp"
 
 namespace isowave::core {

@@ -1,0 +1,164 @@
+#include "core/render/block_store.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <memory>
+#include <utility>
+
+#include "core/base/error.hpp"
+#include "core/view/detail.hpp"
+#include "core/zfp/stated_errors.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volume,
+                               const RendererOptions &options, const MemoryPlan &plan) {
+  if (volume.info.brick != BrickOf{}) device.draw_bricks();
+  if (options.with_bounds && !volume.no_data.empty())  // a ray may begin anew behind each of them
+    throw Error(
+        "{} voxels have no data: bounds of a frame's error cannot be given for such a volume",
+        volume.no_data.num_voxels());
+  const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.with_levels);
+  const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.with_levels));
+  const bool has_levels = volumes.size() > 1;
+  const auto buffers = std::make_shared<MacrocellBuffers>(device, plan.limits.macrocells);
+  std::vector<DeviceStream> streams;
+  std::vector<Macrocells> macrocells;  // of all levels before any decoder, see plan.setup_bytes
+  // Bounds need the range of values (value_offset()), which a file may get wrong.
+  const bool checks_range = options.with_bounds && volume.errors_are_stated;
+  std::array<float, 2> extremes{};
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    streams.push_back(
+        plan.stream == StreamPlace::kHost
+            ? DeviceStream(device, *volumes[i], OnHost{plan.window_blocks}, options.with_bounds)
+            : DeviceStream(device, *volumes[i], options.largest_stream_part, options.with_bounds));
+    macrocells.emplace_back(device, grids[i], streams.back(), buffers,
+                            i == 0 ? options.range_thresholds : std::vector<float>(),
+                            i == 0 && checks_range ? &extremes : nullptr);
+  }
+  if (checks_range) check_value_range(volume, extremes);
+  std::vector<Level> levels;
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const CompressedVolume &level = *volumes[i];
+    ZfpDecode decode(device, plan.limits.cache.max_requests(), streams[i].defines(), has_levels);
+    levels.push_back({level.info, level.precision, LevelError(level, i == 0), std::move(streams[i]),
+                      std::move(macrocells[i]), std::move(decode)});
+  }
+  return levels;
+}
+
+}  // namespace
+
+BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
+                       const RendererOptions &options, const MemoryPlan &plan)
+    : BlockStore(of, make_levels(of, volume, options, plan),
+                 BlockCache(of, plan.limits.cache, options.group_size,
+                            levels_of(volume, options.with_levels).size() > 1)) {
+  schedule_ = {.max_spec_count = options.max_speculation,
+               .per_ray_speculation = options.per_ray_speculation,
+               .table_groups = cache.table_groups,
+               .scanned_pairs = options.scanned_pairs};
+  level_frames->reserve(levels.size());  // they never move while they are written
+}
+
+void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
+                      const std::vector<DecodedValues> &values, FieldBound bound,
+                      RaySource source) {
+  const float isovalue = frames.front().surface.isovalue;
+  levels[0].macrocells.use(static_cast<std::size_t>(bound));
+  decode_as(values);
+  const auto first = std::ranges::find_if(frames, draws);
+  const auto end = std::find_if_not(first, frames.end(), draws);
+  drawing = {static_cast<std::size_t>(first - frames.begin()),
+             static_cast<std::size_t>(end - frames.begin())};
+  const bool has_bands = end - first > 1;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    Level &level = levels[i];
+    FrameParams &frame = frames[i];
+    frame.schedule = schedule_;
+    frame.schedule.table_groups = cache.table_groups;
+    if (draws(frame)) {
+      const auto stage = device.timer().stage("macrocells");
+      level.macrocells.select(frame, level.range_error, &level.stream);
+      frame.surface = level.macrocells.surface(frame);
+      // If there are several bands, a ray may begin at a border that lies outside the box.
+      if (!has_bands && source == RaySource::kCamera) frame.screen = make_screen_box(frame);
+    }
+    level.frame = frame;
+  }
+  level_frames->assign(first, end);
+  rays.frame = level_frames->front();
+  rays.num_level_frames = static_cast<std::uint32_t>(level_frames->size());
+  if (levels.size() > 1) rays.level_frames.write_async(*level_frames);
+  if (cached_isovalue_.value_or(isovalue) != isovalue) {
+    const auto stage = device.timer().stage("macrocells");
+    cache.classify(rays);
+  }
+  cached_isovalue_ = isovalue;
+}
+
+/// Has blocks decoded to these values, and forgets those of others.
+void BlockStore::decode_as(const std::vector<DecodedValues> &values) {
+  bool changes = false;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    Level &level = levels[i];
+    if (std::memcmp(&values[i].layout, &level.stream.layout, sizeof(StreamLayout)) == 0) continue;
+    changes = true;
+    level.stream.layout = values[i].layout;
+    level.range_error = values[i].range_error;
+  }
+  if (changes) clear();
+}
+
+void BlockStore::provide(const CountsBuffer &asked, LevelRange of, Wavefront &rays) {
+  {
+    const auto stage = device.timer().stage("cache");
+    if (slots_are_scarce) cache.evict(asked, rays);
+    cache.assign(asked, rays);
+  }
+  const auto stage = device.timer().stage("decode");
+  try {
+    for (std::size_t i = of.first; i < of.end; ++i) {
+      Level &level = levels[i];
+      // Two in one launch: it takes as long as one block, mostly.
+      if (i + 1 < of.end && level.decode.can_join(levels[i + 1].stream)) ++i;
+      level.decode({level.stream, level.frame}, {levels[i].stream, levels[i].frame}, rays.counts,
+                   cache);
+    }
+  } catch (...) {  // blocks have slots, but no values, and the next pass is not opened
+    clear();
+    rays.reset_counts();
+    forget_requests();
+    throw;
+  }
+}
+
+void BlockStore::clear() {
+  cache.clear();
+  cached_isovalue_.reset();
+}
+
+void BlockStore::resize(const BlockCache::Limits &limits, Wavefront &rays) {
+  cache.resize(limits);
+  for (Level &level : levels) level.decode.resize(limits.max_requests());
+  rays.reset_counts();
+  slots_are_scarce = true;
+  cached_isovalue_.reset();
+  forget_requests();
+}
+
+Uploads BlockStore::uploads() const {
+  Uploads sum;
+  for (const Level &level : levels) {
+    if (const StreamWindow *window = level.stream.window.get()) {
+      sum.blocks += window->uploaded_blocks();
+      sum.bytes += window->uploaded_bytes();
+    }
+  }
+  return sum;
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,116 @@
+#pragma once
+// The blocks of a volume on a device: compressed, by level of detail, and decoded, in a cache. The
+// store remembers what the last pass asked for, so that the next one finds it decoded, whichever
+// wave both belong to.
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/ocl/in_flight.hpp"
+#include "core/render/memory_plan.hpp"
+#include "core/render/renderer_options.hpp"
+#include "core/stages/block_cache.hpp"
+#include "core/stages/macrocells.hpp"
+#include "core/stages/wavefront.hpp"
+#include "core/stages/zfp_decode.hpp"
+#include "core/zfp/level_bounds.hpp"
+
+namespace isowave::core {
+
+/// The volume on the device, or one of its levels of detail.
+struct Level {
+  VolumeInfo info;
+  BlockPrecision precision;  ///< of its blocks
+  LevelError error;          ///< of its field against the volume's
+  DeviceStream stream;
+  Macrocells macrocells;
+  ZfpDecode decode;
+  FrameParams frame{};     ///< its part of the frame at work
+  double range_error = 0;  ///< of voxels of fewer bit planes, at most
+};
+
+/// Levels of detail: from `first` to below `end`.
+struct LevelRange {
+  std::size_t first = 0, end = 1;
+};
+
+/// What voxels of a level are decoded to.
+struct DecodedValues {
+  StreamLayout layout;
+  double range_error;  ///< of voxels of fewer bit planes, at most
+};
+
+struct Uploads {
+  std::uint64_t blocks = 0, bytes = 0;
+};
+
+class BlockStore {
+ public:
+  /// made: the finest level first.
+  BlockStore(ocl::Device &of, std::vector<Level> made, BlockCache empty)
+      : device(of), levels(std::move(made)), cache(std::move(empty)) {}
+
+  /// Uploads the volume, if it goes to the device, and computes the value ranges of its blocks.
+  ///
+  /// Throws  Error: the device's memory does not suffice; a file states wrong ranges of values
+  /// Waits   yes
+  BlockStore(ocl::Device &of, const CompressedVolume &volume, const RendererOptions &options,
+             const MemoryPlan &plan);
+
+  /// Opens a frame: levels and their active blocks become the frame's, decoded values those that it
+  /// asks for. Sets rays.frame and rays.level_frames.
+  ///
+  /// frames  of all levels
+  /// values  of all levels; if others are cached, the cache is cleared
+  /// source  of the frame's first wave
+  /// Waits   no
+  void open(Wavefront &rays, std::vector<FrameParams> frames,
+            const std::vector<DecodedValues> &values, FieldBound bound, RaySource source);
+
+  /// Begins a pass: the blocks that the pass before asked for get slots and values.
+  ///
+  /// rays    after Wavefront::open_pass()
+  /// Throws  Error: a file that blocks are read from has become shorter. The cache is empty then.
+  /// Waits   if the stream stays on the host: see ZfpDecode
+  void provide(Wavefront &rays) {
+    if (asked_) provide(rays.previous_counts, *asked_, rays);
+  }
+  /// The same for requests that `asked` counts, of those levels.
+  void provide(const CountsBuffer &asked, LevelRange of, Wavefront &rays);
+
+  /// The pass that was just enqueued may have asked for blocks.
+  void expect_requests() { asked_ = drawing; }
+  /// No ray is left that waits for a block.
+  void forget_requests() { asked_.reset(); }
+  /// Blocks may have been asked for that have not been provided.
+  bool has_requests() const { return asked_.has_value(); }
+
+  /// Empties the cache.
+  ///
+  /// Waits  no
+  void clear();
+  /// As BlockCache::resize(), with what depends on it. No ray of the frame before is left.
+  void resize(const BlockCache::Limits &limits, Wavefront &rays);
+  /// What was uploaded since the store was made, of a volume that stays on the host.
+  Uploads uploads() const;
+
+  ocl::Device &device;
+  std::vector<Level> levels;
+  BlockCache cache;
+  LevelRange drawing{};  ///< the frame at work
+  /// Parameters of the levels that draw the frame at work.
+  ocl::InFlight<std::vector<FrameParams>> level_frames{device};
+  bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
+  bool counts_touched = false;   ///< passes count the blocks that they touch, see BlockCache
+
+ private:
+  void decode_as(const std::vector<DecodedValues> &values);
+
+  Schedule schedule_{};                   ///< of every frame, but for table_groups
+  std::optional<LevelRange> asked_;       ///< levels whose blocks the last pass may have asked for
+  std::optional<float> cached_isovalue_;  ///< of the cache's bits of voxels inside; none: empty
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,72 @@
+#include "core/render/ray_waves.hpp"
+
+namespace isowave::core {
+
+RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size, Solver solver,
+                   RaySource source, RayPackets packets, DecodeOnDemand on_demand)
+    : blocks_(blocks),
+      rays_(rays),
+      start_rays_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1, source),
+      march_(blocks.device, rays.num_rays, group_size, solver, blocks.levels.size() > 1, source),
+      request_ahead_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1, source) {
+  const ocl::DeviceInfo &device = blocks.device.info();
+  const bool in_packets =
+      packets == RayPackets::kAuto ? MarchPackets::suits(device) : packets == RayPackets::kOn;
+  const bool decodes = on_demand == DecodeOnDemand::kAuto ? MarchPackets::may_decode(device)
+                                                          : on_demand == DecodeOnDemand::kOn;
+  const DeviceStream &stream = blocks.levels[0].stream;
+  if (in_packets && MarchPackets::has(solver) && source == RaySource::kCamera) {
+    march_packets_.emplace(blocks.device, rays.num_rays, solver,
+                           decodes && !stream.window ? &stream : nullptr);
+  }
+}
+
+void RaysWave::begin() {
+  const auto stage = blocks_.device.timer().stage("start_rays");
+  if (blocks_.has_requests()) rays_.forget_rays();
+  if (in_packets()) {
+    march_packets_->begin_frame();
+  } else {
+    start_rays_(macrocells(), rays_);
+  }
+}
+
+void RaysWave::enqueue_pass() {
+  ocl::StageTimer &timer = blocks_.device.timer();
+  rays_.open_pass();
+  blocks_.provide(rays_);
+  {
+    const auto stage = timer.stage("march");
+    if (in_packets()) {
+      (*march_packets_)(macrocells(), blocks_.levels[0].stream, blocks_.cache, rays_);
+    } else {
+      march_(macrocells(), blocks_.cache, rays_);
+    }
+  }
+  if (blocks_.counts_touched) {  // before more blocks are stamped, as needed
+    const auto stage = timer.stage("touched");
+    blocks_.cache.count_touched(rays_, true);
+  }
+  const auto stage = timer.stage("request");
+  request_ahead_(macrocells(), blocks_.cache, rays_);
+  blocks_.expect_requests();
+}
+
+void SmoothNormalsWave::enqueue_pass() {
+  rays_.open_pass();
+  if (!begins_) blocks_.provide(rays_);
+  const auto stage = blocks_.device.timer().stage("normals");
+  normals_(blocks_.cache, rays_, begins_, source_);
+  begins_ = false;
+  blocks_.expect_requests();
+}
+
+void AmbientRound::begin() {
+  {
+    const auto stage = blocks_.device.timer().stage("ambient");
+    ambient_(rays_, round_);
+  }
+  given_.begin();
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,90 @@
+#pragma once
+// Waves of rays that walk from block to block by themselves, and intersect what is cached:
+//
+//   start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
+//
+// On CPUs march_packets does the work of start_rays and march, and of cache and decode if there
+// are free slots.
+
+#include <cstdint>
+#include <optional>
+
+#include "core/frame/solvers.hpp"
+#include "core/render/block_store.hpp"
+#include "core/render/pipeline.hpp"
+#include "core/render/wave.hpp"
+#include "core/stages/ambient.hpp"
+#include "core/stages/march.hpp"
+#include "core/stages/march_packets.hpp"
+#include "core/stages/request_ahead.hpp"
+#include "core/stages/smooth_normals.hpp"
+#include "core/stages/start_rays.hpp"
+
+namespace isowave::core {
+
+/// Rays of the camera: pipeline `rays`; or the rays of Wavefront::given, whose hits are in
+/// given_hits, and of which the frame has as many as a picture has pixels.
+class RaysWave : public Wave {
+ public:
+  /// blocks, rays: must outlive the wave.
+  RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size, Solver solver,
+           RaySource source, RayPackets packets = RayPackets::kOff,
+           DecodeOnDemand on_demand = DecodeOnDemand::kOff);
+
+  void begin() override;
+  void enqueue_pass() override;
+
+ private:
+  const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
+  /// Whether the frame at work goes in packets.
+  bool in_packets() const { return march_packets_ && !draws_levels(rays_); }
+
+  BlockStore &blocks_;
+  Wavefront &rays_;
+  StartRays start_rays_;
+  March march_;
+  std::optional<MarchPackets> march_packets_;  ///< instead of both
+  RequestAhead request_ahead_;
+};
+
+/// Hits get smooth gradients.
+class SmoothNormalsWave : public Wave {
+ public:
+  /// source: whose hits.
+  SmoothNormalsWave(BlockStore &blocks, Wavefront &rays, SmoothNormals &normals, RaySource source)
+      : blocks_(blocks), rays_(rays), normals_(normals), source_(source) {}
+
+  void begin() override { begins_ = true; }
+  /// The first pass does nothing if the wave before has rays left.
+  void enqueue_pass() override;
+  LaterPasses *sum_in(FrameStats &stats) const override { return &stats.normals; }
+
+ private:
+  BlockStore &blocks_;
+  Wavefront &rays_;
+  SmoothNormals &normals_;
+  RaySource source_;
+  bool begins_ = false;  ///< the next pass is the first
+};
+
+/// A round of ambient rays: one of each hit.
+class AmbientRound : public Wave {
+ public:
+  /// given: traces RaySource::kGiven.
+  AmbientRound(BlockStore &blocks, Wavefront &rays, Ambient &ambient, RaysWave &given)
+      : blocks_(blocks), rays_(rays), ambient_(ambient), given_(given) {}
+
+  void set_round(std::uint32_t round) { round_ = round; }
+  void begin() override;
+  void enqueue_pass() override { given_.enqueue_pass(); }
+  LaterPasses *sum_in(FrameStats &stats) const override { return &stats.ambient; }
+
+ private:
+  BlockStore &blocks_;
+  Wavefront &rays_;
+  Ambient &ambient_;
+  RaysWave &given_;
+  std::uint32_t round_ = 0;
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,30 @@
+#pragma once
+// A frame is a row of waves. A wave is rays, or hits, that go through passes until none of them is
+// left: camera rays, hits that get smooth normals, rounds of ambient rays.
+
+#include <cstdint>
+
+#include "core/frame/frame_request.hpp"
+
+namespace isowave::core {
+
+class Wave {
+ public:
+  virtual ~Wave() = default;
+
+  /// Makes the wave's rays, of the frame that the block store has opened.
+  ///
+  /// Waits  if a frame before was stopped
+  virtual void begin() = 0;
+  /// Enqueues one pass: a chain of launches whose sizes live on the device.
+  ///
+  /// Throws  Error: as BlockStore::provide()
+  /// Waits   no, but for a stream that stays on the host
+  virtual void enqueue_pass() = 0;
+  /// Sum of the wave's passes in the statistics; none: FrameStats::passes lists each.
+  virtual LaterPasses *sum_in(FrameStats & /*stats*/) const { return nullptr; }
+  /// For a cache of so many slots from now on: as BlockCache::resize(). Between frames.
+  virtual void resize_cache(std::uint32_t /*num_slots*/) {}
+};
+
+}  // namespace isowave::core
