@@ -194,10 +194,10 @@ def compress(
     no_data
         Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
         compared in the array's own type, and may be infinite; other infinite voxels are refused.
-        Where None, what the array says itself: _FillValue or missing_value of xarray, fill_value of
-        zarr unless it is 0.
+        If None, what the array says itself: the attributes _FillValue or missing_value of xarray
+        and h5py, the fill value of zarr, h5py and tensorstore unless it is 0.
     fill_value
-        What replaces masked values of masked arrays; where None, they have no data.
+        What replaces masked values of masked arrays; if None, they have no data.
     path
         A .zfp file that the volume is written to, layer by layer, and opened from: then the result
         need not fit into memory. None: into memory.

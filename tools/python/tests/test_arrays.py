@@ -522,10 +522,19 @@ def test_dask(chunks):
 def test_dask_that_is_masked_or_unknown():
     da = pytest.importorskip("dask.array")
     voxels = make_voxels()
+    mask = voxels == voxels[6, 4, 2]
     lazy = da.ma.masked_equal(da.from_array(voxels, chunks=3), voxels[6, 4, 2])
-    check_refused(lazy, "fill_value=", read=True)
-    expected = np.where(voxels == voxels[6, 4, 2], 1000, voxels)
-    check_source(as_source(lazy, fill_value=1000), expected)
+    expected = np.where(mask, np.float32(np.nan), voxels)
+    check_source(as_source(lazy), expected)
+    check_source(as_source(lazy[2:]), expected[2:])
+    check_source(as_source(lazy.astype("i4")), expected.astype("f8"))
+    check_source(as_source(lazy.astype("f4")), expected)
+    check_source(as_source(lazy, fill_value=1000), np.where(mask, 1000, voxels))
+    # No voxel needs to be masked.
+    check_source(as_source(da.ma.masked_equal(voxels, 30000)), voxels.astype("f4"))
+    says_not = lazy.map_blocks(lambda block: block, meta=voxels[:0])
+    check_refused(says_not, "fill_value=", read=True)
+    check_source(as_source(says_not, fill_value=1000), np.where(mask, 1000, voxels))
     unknown = da.from_array(np.arange(7), chunks=3)
     unknown = unknown[unknown > 2][:, None, None] * da.ones((1, 5, 3))
     check_refused(unknown, "compute_chunk_sizes()")
@@ -617,6 +626,35 @@ def test_h5py_that_is_refused(tmp_path):
         check_refused(file.create_dataset("t", (2, 2, 2), h5py.string_dtype()), error=TypeError)
 
 
+def test_h5py_names_voxels_without_data(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for dtype, fill_value, expected in [
+            ("i2", -9, -9),
+            ("u1", 255, 255),
+            ("f8", np.inf, np.inf),
+            ("i2", 0, None),
+            ("i2", None, None),
+            ("?", True, None),
+            ("f4", np.nan, None),
+        ]:
+            name = f"{dtype} {fill_value}"
+            made = file.create_dataset(name, (7, 5, 3), dtype, fillvalue=fill_value)
+            assert as_source(made).no_data == expected
+        made = file.create_dataset("attributes", (7, 5, 3), "f4", fillvalue=1e20)
+        for name, value in [("missing_value", -9999), ("_FillValue", 0)]:
+            made.attrs[name] = np.array([value], "f4")
+            assert as_source(made).no_data == value
+    with h5py.File(tmp_path / "a.nc", "w") as file:
+        file.attrs["_NCProperties"] = "version=2"
+        ct = file.create_dataset("ct", (7, 5, 3), "i2", fillvalue=-32767)
+        photo = file.create_dataset("photo", (7, 5, 3), "u1", fillvalue=255)
+        assert as_source(ct).no_data == -32767
+        assert as_source(photo).no_data is None
+        photo.attrs["_FillValue"] = np.uint8(255)
+        assert as_source(photo).no_data == 255
+
+
 @pytest.mark.parametrize("driver", ["zarr", "zarr3", "n5"])
 def test_tensorstore(driver):
     ts = pytest.importorskip("tensorstore")
@@ -639,8 +677,25 @@ def test_tensorstore(driver):
     check_source(as_source(store[::2]), voxels[::2])
 
 
+@pytest.mark.parametrize("driver", ["zarr", "zarr3"])
+def test_tensorstore_names_voxels_without_data(driver):
+    ts = pytest.importorskip("tensorstore")
+    spec = {"driver": driver, "kvstore": {"driver": "memory"}}
+    for dtype, fill_value, expected in [
+        (ts.int16, -9, -9),
+        (ts.int16, 0, None),
+        (ts.int16, None, None),
+        (ts.float32, np.nan, None),
+    ]:
+        options = {} if fill_value is None else {"fill_value": fill_value}
+        store = ts.open(spec, create=True, shape=(7, 5, 3), dtype=dtype, **options).result()
+        assert as_source(store).no_data == expected
+        assert as_source(store[2:]).no_data == expected
+
+
 def test_tensorstore_without_chunks():
     ts = pytest.importorskip("tensorstore")
+    assert as_source(ts.array(make_voxels())).no_data is None
     check_source(as_source(ts.array(make_voxels())), make_voxels())
     check_refused(ts.array(np.zeros((NZ, NY, NX), "complex64")), error=TypeError)
 

@@ -180,6 +180,8 @@ def check_invariants(source):
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     assert math.isfinite(determinant) and abs(determinant) > 1e-6
     assert type(source.chunk_layers) is int and 1 <= source.chunk_layers <= source.shape[0]
+    no_data = source.no_data
+    assert no_data is None or (type(no_data) is float and not math.isnan(no_data))
 
 
 def check_line(error):
@@ -415,8 +417,15 @@ def test_h5py():
     FakeDataset.__name__, FakeDataset.__module__ = "Dataset", "h5py._hl.dataset"
 
     def make(fuzzer):
+        space = types.SimpleNamespace
         chunks = fuzzer.maybe(fuzzer.rng.choice([None, (3, 2, 2), (100, 1, 1)]))
+        attributes = {name: fuzzer.wild() for name in ("missing_value", "_FillValue")}
+        created = space(fill_value_defined=lambda: fuzzer.rng.randrange(3))
         return FakeDataset(
+            attrs=fuzzer.maybe(attributes if fuzzer.one_in(4) else {}),
+            file=space(attrs={"_NCProperties": "version=2"} if fuzzer.one_in(4) else {}),
+            id=space(get_create_plist=lambda: created),
+            fillvalue=fuzzer.maybe(np.float32(-9), 4),
             shape=fuzzer.shape(),
             dtype=fuzzer.dtype(),
             chunks=chunks,
@@ -442,6 +451,7 @@ def test_tensorstore():
             fuzzer.rng.choice([(4, 2, 2), (None,) * 3, (1, 1, 1), None, (9, 9, 9)])
         )
         return FakeStore(
+            fill_value=fuzzer.maybe(np.array(-9, "i2"), 4),
             shape=fuzzer.shape(),
             dtype=space(numpy_dtype=fuzzer.dtype()),
             domain=space(origin=fuzzer.maybe(origin)),

@@ -73,6 +73,23 @@ def test_labels_of_packages():
     assert not missing(isowave.compress(array, no_data=-8)).any()
 
 
+def test_stores_say_it(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        dataset = file.create_dataset("a", data=holed(-9, "i2"), fillvalue=-9)
+        np.testing.assert_array_equal(missing(isowave.compress(dataset)), expected())
+        assert not missing(isowave.compress(dataset, no_data=-8)).any()
+
+
+@pytest.mark.parametrize("dtype", ["u1", "i4", "f4"])
+def test_lazy_masks(dtype):
+    dask_array = pytest.importorskip("dask.array")
+    lazy = dask_array.from_array(np.ma.array(ramp(dtype), mask=expected()), chunks=(7, 9, 22))
+    volume = isowave.compress(lazy)
+    np.testing.assert_array_equal(missing(volume), expected())
+    np.testing.assert_array_equal(volume[...][~expected()], ramp(dtype)[~expected()])
+
+
 def test_what_cannot_be():
     with pytest.raises(isowave.Error, match="are infinite, the first at"):
         isowave.compress(holed(np.inf))

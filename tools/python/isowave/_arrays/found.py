@@ -29,7 +29,7 @@ class Found:
     row_edges    layers at which chunk rows begin (LayerReader), None without chunks
     placement    where it lies, unchecked: what a caller gives replaces parts of it
     first_index  index (x, y, z), in the placement, of its first voxel
-    is_masked    whether some of its voxels are known to be masked
+    is_masked    whether some of its voxels are masked; of a lazy array, whether some may be
     no_data      value of voxels without data, as its metadata says; None: it says none
     """
 
@@ -52,6 +52,11 @@ def named(obj: Any) -> str:
     """Returns the class of an object and its name, where it has one: "h5py.Dataset '/ct'"."""
     name = getattr(obj, "name", None)
     return f"{type_name(obj)} {short(name)}" if isinstance(name, str) and name else type_name(obj)
+
+
+def no_data_in(attributes: Any) -> Any:
+    """Returns the value that attributes of netCDF name for voxels without data, None for none."""
+    return attributes.get("_FillValue", attributes.get("missing_value"))
 
 
 def chunk_size(size: Any, what: str) -> int:

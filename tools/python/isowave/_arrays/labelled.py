@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .errors import bad_value, short
-from .found import Found, named
+from .found import Found, named, no_data_in
 from .grid import checked_shape, of_steps
 from .layers import even_rows
 from .stores import uneven_rows
@@ -83,10 +83,9 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
         layers = array.variable.isel({dims[0]: slice(begin, end)}).values
         return layers if order is None else layers.transpose(order)
 
-    no_data = array.attrs.get("_FillValue", array.attrs.get("missing_value"))
     along_z = 0 if order is None else order[0]
     rows = _rows(array, dims[0], along_z, shape[0], what)
-    return Found(what, shape, array.dtype, fetch, rows, placement, no_data=no_data)
+    return Found(what, shape, array.dtype, fetch, rows, placement, no_data=no_data_in(array.attrs))
 
 
 def _order(array: Any, dims: tuple[Any, ...], what: str) -> tuple[int, int, int] | None:

@@ -61,8 +61,8 @@ class ArraySource:
         Holds at most one row of chunks between calls. Not for several threads at a time.
 
         Raises ValueError or TypeError, one line, if there are no such layers, if the store cannot
-        be read, or if a voxel cannot be read exactly; of a lazy array of whole numbers, also if a
-        voxel is masked and there is no fill_value.
+        be read, or if a voxel cannot be read exactly. A masked whole number raises it, too, if a
+        lazy array did not say that it has masks, and there is no fill_value.
         """
         begin, end = operator.index(z_begin), operator.index(z_end)
         if not 0 <= begin < end <= self.shape[0]:

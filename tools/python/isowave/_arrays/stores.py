@@ -7,15 +7,20 @@ from collections.abc import Mapping, Sequence
 from itertools import accumulate, islice
 from typing import Any
 
+import numpy as np
+
 from .errors import bad_type, bad_value, short, type_name
-from .found import Found, chunk_size, named
+from .found import Found, chunk_size, named, no_data_in
 from .grid import checked_shape, finite_numbers, of_steps
 from .layers import even_rows
-from .voxels import read_type
+from .voxels import no_data_of, read_type
 
 
 def dask_array(array: Any, has_spacing: bool) -> Found:
-    """Adapts a dask.array.Array. Chunks along z may have different sizes."""
+    """Adapts a dask.array.Array. Chunks along z may have different sizes.
+
+    Its _meta says whether chunks will be masked arrays; masks themselves come with the chunks.
+    """
     what = type_name(array)  # its name is a hash
     shape = checked_shape(array.shape, what)
     return Found(
@@ -24,6 +29,7 @@ def dask_array(array: Any, has_spacing: bool) -> Found:
         array.dtype,
         lambda begin, end: array[begin:end].compute(),
         uneven_rows(array.chunks[0], shape[0], what),
+        is_masked=isinstance(getattr(array, "_meta", None), np.ma.MaskedArray),
     )
 
 
@@ -52,14 +58,13 @@ def zarr_array(array: Any, has_spacing: bool) -> Found:
         array.dtype,
         lambda begin, end: array[begin:end],
         _rows_of_zarr(array, 0, shape[0], what),
-        no_data=_no_data_of_zarr(array),
+        no_data=_no_data_of(getattr(array, "fill_value", None)),
     )
 
 
-def _no_data_of_zarr(array: Any) -> Any:
-    """Returns the fill_value unless it is 0: that is zarr's default, and means background."""
-    fill_value = getattr(array, "fill_value", None)
-    return fill_value if fill_value is not None and fill_value != 0 else None
+def _no_data_of(fill_value: Any) -> float | None:
+    """Returns a store's fill value unless it is 0: that is the default, and means background."""
+    return no_data_of(fill_value) or None
 
 
 def _rows_of_zarr(array: Any, axis: int, num_layers: int, what: str) -> Sequence[int]:
@@ -77,10 +82,33 @@ def h5py_dataset(dataset: Any, has_spacing: bool) -> Found:
     if dataset.shape is None:
         raise bad_value(what, "an empty dataset has no shape")
     shape = checked_shape(dataset.shape, what)
+    read_type(dataset.dtype, what)  # before its fill value is looked at
     rows = None
     if dataset.chunks is not None:
         rows = even_rows(chunk_size(dataset.chunks[0], what), shape[0])
-    return Found(what, shape, dataset.dtype, lambda begin, end: dataset[begin:end], rows)
+    return Found(
+        what,
+        shape,
+        dataset.dtype,
+        lambda begin, end: dataset[begin:end],
+        rows,
+        no_data=_no_data_of_h5py(dataset),
+    )
+
+
+def _no_data_of_h5py(dataset: Any) -> Any:
+    """Returns what attributes of netCDF name, or else the fill value.
+
+    netCDF's library gives every variable a fill value of its own, but bytes without an attribute
+    have none by its conventions: each of their values may be data.
+    """
+    named_value = no_data_in(dataset.attrs)
+    if named_value is not None:
+        return named_value
+    if dataset.dtype.itemsize == 1 and "_NCProperties" in dataset.file.attrs:
+        return None
+    is_defined = dataset.id.get_create_plist().fill_value_defined()
+    return _no_data_of(dataset.fillvalue) if is_defined else None
 
 
 def tensorstore_store(store: Any, has_spacing: bool) -> Found:
@@ -101,6 +129,7 @@ def tensorstore_store(store: Any, has_spacing: bool) -> Found:
         read_store_type(store),
         lambda begin, end: store[origin + begin : origin + end].read().result(),
         rows,
+        no_data=_no_data_of(store.fill_value),
     )
 
 
@@ -184,7 +213,7 @@ def zarr_group(obj: Any, has_spacing: bool) -> Found:
         fetch,
         _rows_of_zarr(array, z, shape[0], what),
         placement,
-        no_data=_no_data_of_zarr(array),
+        no_data=_no_data_of(getattr(array, "fill_value", None)),
     )
 
 

@@ -6,11 +6,12 @@
 | uint64, int64 | the same; a value that float64 does not hold is refused with its position |
 | bool | uint8, 0 and 1 |
 | float16 | float32 |
-| an integer of up to 16 bits, with masked voxels | float32, NaN where masked |
-| a longer integer, with masked voxels | float64, NaN where masked |
+| an integer of up to 16 bits, with masked voxels | float32, NaN for masked voxels |
+| a longer integer, with masked voxels | float64, NaN for masked voxels |
 
-The type of what is read follows from the stored type and from masks in memory, never from the
-values: a lazy array is not read to find it, and each time step of a series has the same one.
+The type of what is read follows from the stored type, from masks in memory, and from whether a lazy
+array says that its chunks are masked, never from the values: a lazy array is not read to find it,
+and each time step of a series has the same one.
 """
 
 from __future__ import annotations
@@ -141,8 +142,8 @@ def masked_without_fill(what: str) -> Exception:
     """Returns the error of masked voxels for which the caller gave no value."""
     return bad_value(
         what,
-        "some voxels are masked, which whole numbers of a lazy array cannot say: pass fill_value=, "
-        "the value that they shall have, or convert the array to float32 or float64",
+        "some voxels are masked, which this lazy array of whole numbers does not say: pass "
+        "fill_value=, the value that they shall have, or convert it to float32 or float64",
     )
 
 
