@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/stages/smooth_normals.hpp"
+#include "core/frame/normals.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_stream.hpp"

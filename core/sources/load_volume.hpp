@@ -13,6 +13,10 @@
 
 namespace isowave::core {
 
+namespace ocl {
+class Device;
+}
+
 /// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact. By default
 /// they keep all that float32 holds of them: find_precision().
 struct Storage {
