@@ -356,6 +356,12 @@ class Volume(Placed[_core.Volume]):
         return self._core.compressed_bytes
 
     @property
+    def compression(self) -> str:
+        """How blocks are stored: "reversible" (all bits of float32), "whole numbers" (rounded to
+        the source's integers), "fixed accuracy" or "fixed rate"."""
+        return self._core.compression
+
+    @property
     def bits_per_voxel(self) -> float:
         return self._core.bits_per_voxel
 
