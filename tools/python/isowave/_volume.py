@@ -379,6 +379,11 @@ class Volume(Placed[_core.Volume]):
         """
         return self._core.errors_are_stated
 
+    def isovalue_notice(self, isovalue: float) -> str:
+        """The warning that drawing this isovalue gives if it is outside the source's values, or
+        ""."""
+        return self._core.isovalue_notice(number("isovalue", isovalue))
+
     @property
     def num_levels(self) -> int:
         """Levels of detail, the volume itself among them."""
