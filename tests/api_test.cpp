@@ -94,6 +94,10 @@ TEST(Api, VolumesSayWhatTheyAre) {
   EXPECT_EQ(volume->source_type(), VoxelType::kFloat32);
   EXPECT_EQ(volume->num_levels(), 2u);
   EXPECT_EQ(volume->bits_per_voxel(), 16.0);
+  EXPECT_EQ(volume->compression(), "fixed rate");
+  EXPECT_EQ(sphere({.tolerance = 0.1})->compression(), "fixed accuracy");
+  EXPECT_EQ(sphere({})->compression(), "reversible");
+  EXPECT_EQ(*sphere({})->max_voxel_error(), 0);
   const std::vector<float> voxels = sphere_voxels(), decoded = volume->decode();
   ASSERT_EQ(decoded.size(), voxels.size());
   double largest = 0;

@@ -80,6 +80,42 @@ TEST_F(CliExtract, TheNameIsMadeUp) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "fuel_64x33x32_uint8_iso300.ply"));
 }
 
+// The line is convert's.
+TEST_F(CliExtract, SaysHowAVolumeIsCompressedInMemory) {
+  for (const auto &[options, text] : {std::pair("", "whole numbers, max error 0"),
+                                      {"--rate 8", "8 bits per voxel, fixed rate"},
+                                      {"--tolerance 3", "fixed accuracy, max error "}}) {
+    const ProgramResult converted = run_isowave(
+        fmt::format("convert {} {} {} -o {}", quoted(kFuel), options,
+                    std::string_view(options).starts_with("--rate") ? "--no-verify" : "",
+                    quoted(folder_ / "a.zfp")));
+    for (const std::string &command : std::vector<std::string>{
+             "extract --device cpu -o " + quoted(folder_ / "a.ply"),
+             "render --device cpu --size 16x8 -o " + quoted(folder_ / "a.png"),
+             "render --reference --size 16x8 -o " + quoted(folder_ / "a.png")}) {
+      const std::string arguments =
+          fmt::format("{} -i 80 --stats {} ", command, quoted(folder_ / "a.json"));
+      const ProgramResult result = run_isowave(arguments + options + " " + quoted(kFuel));
+      ASSERT_EQ(result.status, 0) << result.err;
+      const std::size_t begin = result.out.find("compressed in memory: ");
+      ASSERT_NE(begin, std::string::npos) << result.out;
+      const std::string line =
+          result.out.substr(begin + 22, result.out.find('\n', begin) - begin - 22);
+      EXPECT_THAT(line, HasSubstr(text));
+      EXPECT_THAT(converted.out, HasSubstr(line));
+      const auto stats = nlohmann::json::parse(test::read_file(folder_ / "a.json"))["volume"];
+      EXPECT_THAT(line, HasSubstr(stats["compression"].get<std::string>()));
+      EXPECT_EQ(stats["max_voxel_error"].is_null(), line.find("max error") == std::string::npos);
+      EXPECT_GT(stats["rate"], 0);
+    }
+  }
+  ASSERT_EQ(run_isowave("convert " + quoted(kFuel) + " -o " + quoted(folder_ / "a.zfp")).status, 0);
+  const ProgramResult from_file =
+      run_isowave("extract --device cpu -i 80 -o " + quoted(folder_ / "a.ply") + " " +
+                  quoted(folder_ / "a.zfp"));
+  EXPECT_EQ(from_file.out.find("compressed in memory"), std::string::npos);
+}
+
 // 0.7 has no float32: the nearest, which the voxel has, is below.
 TEST_F(CliExtract, AnIsovalueIsComparedAsItWasGiven) {
   std::vector<float> voxels(5 * 5 * 5);

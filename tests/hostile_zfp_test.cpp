@@ -138,8 +138,9 @@ TEST_F(HostileZfp, EmptyAndOtherBlocksAreFoundAlike) {
   ArrayReader source(test::grid_info({64, 36, 21}), voxels);
   const CompressedVolume volume = compress(source, {.precision = BlockPrecision{-6}});
   std::uint32_t block = 0;
-  find_block_lengths(volume, "a test", [&](std::uint32_t bits, std::uint64_t count) {
-    for (; count > 0; --count) EXPECT_EQ(bits, volume.block_bits(block++));
+  find_block_lengths(volume, "a test", [&](const FoundBlocks &found) {
+    for (std::uint64_t i = 0; i < found.count; ++i)
+      EXPECT_EQ(found.bits, volume.block_bits(block++));
   });
   EXPECT_EQ(block, volume.block_count());
 }

@@ -45,6 +45,29 @@ TEST(DrawnIsovalue, OtherVolumesHaveTheNearest) {
     EXPECT_EQ(drawn_isovalue(volume, 0.7), 0.7f);
 }
 
+// What is known of decoded voxels is said, and no more.
+TEST(IsovalueNotice, ErrorsOfCompressionCanMakeASurface) {
+  CompressedVolume volume = volume_of(VoxelType::kFloat32, kReversible);
+  EXPECT_EQ(isovalue_notice(volume, 7), "") << "the range is not known";
+  volume.value_range = {0, 1};
+  EXPECT_EQ(isovalue_notice(volume, 1), "");
+  EXPECT_EQ(isovalue_notice(volume, 0),
+            "isovalue 0 is the least of the volume's values, 0 to 1: there is no surface");
+  EXPECT_EQ(isovalue_notice(volume, 1.125),
+            "isovalue 1.125 is outside the volume's values, 0 to 1: there is no surface");
+  volume.precision = {};
+  const std::string unknown = "any surface comes from errors of compression",
+                    known = unknown + ", which are up to 0.25";
+  for (const double isovalue : {-0.125, 0.0, 1.125, 1.25})
+    EXPECT_THAT(isovalue_notice(volume, isovalue), testing::EndsWith(unknown));
+  volume.max_voxel_error = 0.25;
+  EXPECT_EQ(isovalue_notice(volume, 0.5), "");
+  for (const double isovalue : {-0.125, 0.0, 1.125, 1.25})
+    EXPECT_THAT(isovalue_notice(volume, isovalue), testing::EndsWith(known));
+  for (const double isovalue : {-0.25, 1.2500001, -3.0})
+    EXPECT_THAT(isovalue_notice(volume, isovalue), testing::EndsWith("there is no surface"));
+}
+
 TEST(DrawnIsovalue, OneThatFloat32DoesNotHoldIsRefused) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (const double bad : {1e39, -1e39, kInfinity, -kInfinity, std::nan("")}) {

@@ -78,8 +78,8 @@ inline FrameParams grid_frame(const glm::uvec3 &dims) {
 /// The index of a fixed-accuracy payload that has none.
 inline std::vector<std::uint32_t> index_by_decoding(const CompressedVolume &volume) {
   BlockIndexBuilder index;
-  find_block_lengths(volume, "a test", [&](std::uint32_t bits, std::uint64_t count) {
-    for (std::uint64_t i = 0; i < count; ++i) index.add(bits);
+  find_block_lengths(volume, "a test", [&](const FoundBlocks &found) {
+    for (std::uint64_t i = 0; i < found.count; ++i) index.add(found.bits);
   });
   return index.finish();
 }

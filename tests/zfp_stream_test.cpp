@@ -13,6 +13,7 @@
 #include <random>
 
 #include "core/base/error.hpp"
+#include "core/sources/load_volume.hpp"
 #include "tests/array_reader.hpp"
 #include "tests/run_program.hpp"
 
@@ -208,6 +209,25 @@ TEST(Compress, MagnitudesThatZfpCannotHold) {
         EXPECT_TRUE(std::isnormal(value) || value == 0.0f) << value << " at rate " << options.rate;
       }
     }
+  }
+}
+
+TEST(Compress, ValuesThatFloat32DoesNotHoldAreRefused) {
+  const auto expect_refused = [](double scale, VoxelType type, const Storage &storage,
+                                 const char *text) {
+    std::vector<double> voxels(512);
+    for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = scale * (1.0 + double(i % 8));
+    const auto open = [&] { return std::make_unique<ArrayReader>(glm::uvec3(8), voxels, type); };
+    EXPECT_THAT([&] { compress_volume(open, "a volume", storage); },
+                ThrowsMessage<Error>(HasSubstr(text)));
+  };
+  for (const double scale : {1e-60, -1e-60, 1e-310})
+    expect_refused(scale, VoxelType::kFloat64, {}, "float32 holds them within");
+  for (const Storage &storage : {Storage{}, {.rate = 8}, {.tolerance = 1e-3}, {.exact = true}}) {
+    const char *text = "512 of 512 voxels are beyond +-8.507e+37";
+    for (const double scale : {1e60, -1e60, 1e39})
+      expect_refused(scale, VoxelType::kFloat64, storage, text);
+    expect_refused(0x1.8p124, VoxelType::kFloat32, storage, "scale the volume down");
   }
 }
 

@@ -9,6 +9,7 @@
 #include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/world_positions.hpp"
+#include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "core/zfp/voxel_region.hpp"
 #include "core/zfp/voxel_sample.hpp"
@@ -146,6 +147,9 @@ std::string Volume::isovalue_notice(double isovalue) const {
 }
 const std::vector<std::string> &Volume::notices() const {
   return implementation_->notices;
+}
+std::string_view Volume::compression() const {
+  return core::compression_mode(implementation_->volume);
 }
 double Volume::bits_per_voxel() const {
   return implementation_->volume.rate();

@@ -118,13 +118,17 @@ void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
     header.fail("matrices as voxels are not supported");
 }
 
-/// pixdim, where 0 is unknown.
-glm::dvec3 read_nifti_spacing(const NiftiHeader &header) {
+/// The magnitudes of pixdim, as nibabel has it; 0 is unknown.
+glm::dvec3 read_nifti_spacing(const NiftiHeader &header, const std::string &what,
+                              std::vector<std::string> &notices) {
   glm::dvec3 spacing;
   for (int axis = 0; axis < 3; ++axis) {
     const double value = header.get_finite(80 + 4 * std::size_t(axis), "pixdim");
-    if (value < 0) header.fail("broken header: pixdim {}: must be positive", value);
-    spacing[axis] = value == 0 ? 1.0 : value;
+    if (value < 0) {
+      notices.push_back(fmt::format("{}: pixdim[{}] is {}: its magnitude is taken as the spacing",
+                                    what, axis + 1, value));
+    }
+    spacing[axis] = value == 0 ? 1.0 : std::abs(value);
   }
   return spacing;
 }
@@ -253,7 +257,7 @@ double length_unit(const NiftiHeader &header) {
 
 void set_nifti_geometry(const NiftiHeader &header, const std::string &what, VolumeHeader &result) {
   VolumeInfo &info = result.info;
-  const glm::dvec3 spacing = read_nifti_spacing(header);
+  const glm::dvec3 spacing = read_nifti_spacing(header, what, result.notices);
   const double millimetres = length_unit(header);
   if (millimetres != 1) {
     result.notices.push_back(fmt::format("{}: lengths are converted to millimetres; xyzt_units: {}",

@@ -7,6 +7,8 @@
 #include <limits>
 
 #include "core/base/error.hpp"
+#include "core/base/printed_bound.hpp"
+#include "core/zfp/level_bounds.hpp"
 
 namespace isowave::core {
 
@@ -14,8 +16,15 @@ std::string isovalue_notice(const CompressedVolume &volume, double isovalue) {
   const auto [least, most] = volume.value_range;
   const bool is_known = std::isfinite(least) && std::isfinite(most);
   if (!is_known || (least < isovalue && isovalue <= most)) return {};
-  return fmt::format("isovalue {} is {} the volume's values, {} to {}: there is no surface",
-                     isovalue, isovalue == least ? "the least of" : "outside", least, most);
+  const std::optional<double> error = known_voxel_error(volume);
+  const bool may_cross =
+      !error || (isovalue > double{least} - *error && isovalue <= double{most} + *error);
+  return fmt::format(
+      "isovalue {} is {} the volume's values, {} to {}: {}", isovalue,
+      isovalue == least ? "the least of" : "outside", least, most,
+      !may_cross ? "there is no surface"
+                 : "any surface comes from errors of compression" +
+                       (error ? fmt::format(", which are up to {}", printed_bound(*error)) : ""));
 }
 
 float drawn_isovalue(const CompressedVolume &volume, double isovalue) {

@@ -55,6 +55,7 @@ void check_value_range(const CompressedVolume &volume, const std::array<float, 2
 void check_stated_errors(const CompressedVolume &volume, const Progress &progress) {
   std::array<float, 2> range = {kUnknownRange[1], kUnknownRange[0]};
   double magnitude = 0;
+  std::uint64_t num_missing = 0;
   for (std::size_t i = 0; i == 0 || i < volume.coarser_levels.size(); ++i) {
     const CompressedVolume &fine = i == 0 ? volume : volume.coarser_levels[i - 1];
     const CompressedVolume *const coarse =
@@ -69,7 +70,8 @@ void check_stated_errors(const CompressedVolume &volume, const Progress &progres
       const std::uint32_t end = std::min(z + kBlockEdge, dims.z);
       const std::vector<float> voxels = decode_layers(fine, dims, z, end);
       if (i == 0) {
-        for (const float voxel : voxels) {  // NaN of those without data changes nothing
+        for (const float voxel : voxels) {  // NaN of those without data changes no range
+          num_missing += std::isnan(voxel) ? 1 : 0;
           range[0] = voxel < range[0] ? voxel : range[0];
           range[1] = voxel > range[1] ? voxel : range[1];
         }
@@ -85,6 +87,10 @@ void check_stated_errors(const CompressedVolume &volume, const Progress &progres
       between->add_fine(voxels);
     }
     if (i == 0) {
+      if (num_missing != volume.no_data.num_voxels()) {
+        throw Error("{}: its trailer says that {} voxels have no data, its blocks hold {} NaN",
+                    name_of(volume), volume.no_data.num_voxels(), num_missing);
+      }
       check_value_range(volume, range);
       magnitude = double{std::max(std::abs(range[0]), std::abs(range[1]))};
     }

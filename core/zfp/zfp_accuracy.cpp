@@ -375,7 +375,7 @@ std::uint32_t zeros_at(std::span<const std::uint32_t> words, std::uint64_t bit) 
 }  // namespace
 
 void find_block_lengths(const CompressedVolume &volume, const std::string &what,
-                        const std::function<void(std::uint32_t bits, std::uint64_t count)> &take) {
+                        const std::function<void(const FoundBlocks &)> &take) {
   constexpr std::uint64_t kChunkBits = 1u << 23;
   const std::uint64_t num_blocks = volume.block_count();
   std::array<float, ISO_BLOCK_VOXELS> values;
@@ -389,18 +389,17 @@ void find_block_lengths(const CompressedVolume &volume, const std::string &what,
     zfp_stream_set_bit_stream(stream.get(), bits.get());
     std::uint64_t at = 0;
     while (at < kChunkBits && block < num_blocks) {
-      std::uint64_t count = std::min<std::uint64_t>(zeros_at(words, at), num_blocks - block),
-                    length = 1;
-      if (count == 0) {  // not empty
-        count = 1;
+      FoundBlocks found{std::min<std::uint64_t>(zeros_at(words, at), num_blocks - block), 1, {}};
+      if (found.count == 0) {  // not empty
         stream_rseek(bits.get(), at);
-        length = zfp_decode_block_float_3(stream.get(), values.data());
+        const std::size_t length = zfp_decode_block_float_3(stream.get(), values.data());
+        found = {1, static_cast<std::uint32_t>(length), values};
       }
-      at += length * count;
-      block += count;
+      at += found.bits * found.count;
+      block += found.count;
       if (begin + at > volume.payload_bits())
         throw Error("{}: truncated: its stream ends in block {} of {}", what, block, num_blocks);
-      take(static_cast<std::uint32_t>(length), count);
+      take(found);
     }
     begin += at;
   }

@@ -101,12 +101,18 @@ class ErrorBoundCoder : public ChunkCoder {
   BlockIndexBuilder index_;
 };
 
-/// Finds the lengths of all blocks of a fixed-accuracy payload without an index by decoding it
-/// front to back. Calls take(bits, count) for each run of `count` blocks of the same length, in
-/// order. volume.indexed_bits must be at least the payload's length.
+/// A run of blocks of a payload without an index.
+struct FoundBlocks {
+  std::uint64_t count = 0;
+  std::uint32_t bits = 0;           ///< the length of each block
+  std::span<const float> values{};  ///< [64] of a single block, with padding; none: all are 0
+};
+/// Finds the lengths of all blocks of a fixed-accuracy or reversible payload without an index by
+/// decoding it front to back. Calls take() for each run of blocks, in order. volume.indexed_bits
+/// must be at least the payload's length.
 ///
-/// Throws  Error, which names `what`, where the payload ends too early
+/// Throws  Error, which names `what`: the payload ends too early
 void find_block_lengths(const CompressedVolume &volume, const std::string &what,
-                        const std::function<void(std::uint32_t bits, std::uint64_t count)> &take);
+                        const std::function<void(const FoundBlocks &)> &take);
 
 }  // namespace isowave::core

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -145,7 +146,11 @@ class ZfpFileReader {
   CompressedVolume take(bool keep) {
     volume_.file = file_;
     volume_.file_first_bit = 8 * begin_ + header_bits_;
-    if (volume_.is_indexed()) read_index(keep);
+    if (volume_.is_indexed()) {
+      read_index(keep);
+    } else if (!has_trailer_) {
+      check_block_exponents();
+    }
     if (layout_.bounds_bytes != 0) read_bounds(keep);
     if (layout_.no_data_bytes != 0) {
       NoData no_data = read_no_data();
@@ -161,7 +166,55 @@ class ZfpFileReader {
     file_->read(begin_ + offset, bytes);
   }
 
-  /// A file of zfp's own tool has no index: its blocks must be decoded to know where they are.
+  /// Refuses magnitudes that cannot be drawn (kMaxMagnitude) in another writer's blocks of a fixed
+  /// rate, by the exponent that they begin with.
+  void check_block_exponents() const {
+    constexpr std::uint64_t kBlocksAtOnce = 1u << 12;
+    const std::uint64_t num_blocks = volume_.block_count(), bits = volume_.bits_per_block;
+    std::vector<std::uint32_t> words;
+    for (std::uint64_t first = 0; first < num_blocks; first += kBlocksAtOnce) {
+      const std::uint64_t count = std::min(kBlocksAtOnce, num_blocks - first);
+      words.resize((count * bits + 31) / 32);
+      volume_.read_words(first * bits, words);
+      for (std::uint64_t block = 0; block < count; ++block) {
+        std::array<std::uint32_t, 1> head{};  // 1 "not all zero", 8 exponent + 127
+        copy_bits(std::as_bytes(std::span(words)), block * bits, kMinBlockBits, head);
+        if ((head[0] & 1u) == 0 || (head[0] >> 1u) < 127u + 127u) continue;
+        fail("block {} has values from {:.4g} on: they cannot be drawn, scale the volume down",
+             first + block, kMaxMagnitude);
+      }
+    }
+  }
+
+  /// Which voxels of another writer's block have no data: those that are NaN. Refuses those that
+  /// cannot be drawn.
+  std::uint64_t judge_voxels(std::uint64_t block, std::span<const float> values) const {
+    std::uint64_t missing = 0, refused = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      missing |= std::uint64_t{std::isnan(values[i])} << i;
+      refused |= std::uint64_t{std::abs(values[i]) >= kMaxMagnitude} << i;
+    }
+    if ((missing | refused) == 0) return 0;
+    const std::uint64_t voxels = voxels_of_block(volume_.info.dims, block);
+    if ((refused & voxels) == 0) return missing & voxels;
+    const auto voxel = static_cast<std::uint32_t>(std::countr_zero(refused & voxels));
+    const glm::u64vec3 blocks(volume_.num_blocks());
+    const glm::u64vec3 at = 4ul * glm::u64vec3(block % blocks.x, block / blocks.x % blocks.y,
+                                               block / blocks.x / blocks.y) +
+                            glm::u64vec3(voxel & 3u, voxel >> 2u & 3u, voxel >> 4u);
+    if (std::isinf(values[voxel])) {
+      fail(
+          "voxel ({},{},{}) is infinite: decode the file by zfp -h -z, and convert its voxels with "
+          "--no-data or --map-nan",
+          at.x, at.y, at.z);
+    }
+    fail(
+        "voxel ({},{},{}) is {:.4g}: voxels beyond +-{:.4g} cannot be drawn, scale the volume down",
+        at.x, at.y, at.z, values[voxel], kMaxMagnitude);
+  }
+
+  /// A file of zfp's own tool has no index: its blocks must be decoded to know where they are. What
+  /// is NaN in them has no data.
   void read_index(bool keep) {
     const std::uint64_t num_blocks = volume_.block_count();
     if (volume_.indexed_bits < num_blocks) {  // before memory is taken for them
@@ -170,16 +223,28 @@ class ZfpFileReader {
     BlockIndexBuilder index;
     if (keep) index.reserve(num_blocks);
     std::uint64_t end = 0;
-    const auto take = [&](std::uint32_t bits, std::uint64_t count) {
-      end += bits * count;
-      for (std::uint64_t i = 0; keep && i < count; ++i) index.add(bits);
+    const auto take = [&](std::uint32_t bits) {
+      end += bits;
+      if (keep) index.add(bits);
     };
     bool is_whole = true;
     if (has_trailer_) {
-      is_whole = inflate_lengths({file_, begin_ + stream_bytes_, layout_.index_bytes}, num_blocks,
-                                 [&](std::uint32_t bits) { take(bits, 1); });
+      is_whole =
+          inflate_lengths({file_, begin_ + stream_bytes_, layout_.index_bytes}, num_blocks, take);
     } else {
-      find_block_lengths(volume_, what(), take);
+      NoDataBuilder no_data(volume_.info.dims);
+      std::uint64_t block = 0, num_missing = 0;
+      find_block_lengths(volume_, what(), [&](const FoundBlocks &found) {
+        const std::uint64_t missing = judge_voxels(block, found.values);
+        block += found.count;
+        num_missing += static_cast<std::uint64_t>(std::popcount(missing));
+        end += found.bits * found.count;
+        for (std::uint64_t i = 0; keep && i < found.count; ++i) {
+          index.add(found.bits);
+          no_data.add(missing);
+        }
+      });
+      volume_.no_data = keep ? no_data.finish() : NoData(num_missing);
       const std::uint64_t used = (header_bits_ + end + 63) / 64 * 8;
       if (file_size_ > used) {
         fail("damaged: {} unknown bytes after the zfp stream", file_size_ - used);

@@ -9,13 +9,13 @@
 #include <string_view>
 
 #include "core/base/error.hpp"
-#include "core/base/printed_bound.hpp"
 #include "core/bricks/compress_together.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
 #include "core/stages/zfp_encode.hpp"
+#include "core/zfp/describe_compression.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
@@ -92,23 +92,13 @@ CompressedVolume convert_alone(const ConvertArgs &options, const RawOverrides &o
   return volume;
 }
 
-/// How blocks are stored.
-std::string_view mode_of(const CompressedVolume &volume) {
-  if (volume.precision.is_reversible()) return "reversible";
-  if (volume.precision.whole_numbers) return "whole numbers";
-  return volume.is_indexed() ? "fixed accuracy" : "fixed rate";
-}
-
 void print_summary(const ConvertArgs &options, const CompressedVolume &volume) {
   const glm::uvec3 dims = volume.info.dims;
   const std::uint64_t bytes_in = volume.info.num_voxels() * size_of(volume.info.type);
   const std::uint64_t bytes_out = OutputGroup::current()->bytes_of(options.output);
-  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {:.4g} bits per voxel, {}{}\n",
-             one_line(options.output), dims.x, dims.y, dims.z, to_string(volume.info.type),
-             with_commas(bytes_in), with_commas(bytes_out), volume.rate(), mode_of(volume),
-             volume.max_voxel_error
-                 ? fmt::format(", max error {}", printed_bound(*volume.max_voxel_error))
-                 : "");
+  fmt::print("{}: {}x{}x{} {}, {} -> {} bytes, {}\n", one_line(options.output), dims.x, dims.y,
+             dims.z, to_string(volume.info.type), with_commas(bytes_in), with_commas(bytes_out),
+             describe_compression(volume));
   for (const CompressedVolume &level : volume.coarser_levels) {
     const glm::uvec3 coarse = level.info.dims;
     fmt::print("  level of detail {}x{}x{}: {} bytes\n", coarse.x, coarse.y, coarse.z,

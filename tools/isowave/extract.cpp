@@ -13,6 +13,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
 #include "core/view/detail.hpp"
+#include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
@@ -45,28 +46,36 @@ const CompressedVolume &level_of(const CompressedVolume &volume, std::uint32_t l
   return *levels[level];
 }
 
-nlohmann::ordered_json stats_json(const ExtractArgs &options, const VolumeInfo &info,
+nlohmann::ordered_json stats_json(const ExtractArgs &options, const CompressedVolume &volume,
                                   ocl::Device &device, const ExtractStats &stats) {
-  return {{"program", program_name()},
-          {"device", device_json(device.info())},
-          {"volume", {{"file", options.input}, {"dims", {info.dims.x, info.dims.y, info.dims.z}}}},
-          {"isovalue", options.isovalue},
-          {"level", options.level},
-          {"normals", options.normals},
-          {"vertex_places", options.vertices},
-          {"vertices", stats.size.num_vertices},
-          {"triangles", stats.size.num_triangles},
-          {"listed_blocks", stats.listed_blocks},
-          {"needed_blocks", stats.needed_blocks},
-          {"decoded_blocks", stats.decoded_blocks},
-          {"cache_slots", stats.cache_slots},
-          {"count_batches", stats.count_batches},
-          {"write_batches", stats.write_batches},
-          {"list_ms", stats.list_ms},
-          {"count_ms", stats.count_ms},
-          {"write_ms", stats.write_ms},
-          {"total_ms", stats.total_ms},
-          {"memory", memory_json(device.ledger())}};
+  const glm::uvec3 dims = volume.info.dims;
+  return {
+      {"program", program_name()},
+      {"device", device_json(device.info())},
+      {"volume",
+       {{"file", options.input},
+        {"dims", {dims.x, dims.y, dims.z}},
+        {"compression", compression_mode(volume)},
+        {"rate", volume.rate()},
+        {"max_voxel_error", volume.max_voxel_error ? nlohmann::ordered_json(*volume.max_voxel_error)
+                                                   : nlohmann::ordered_json()}}},
+      {"isovalue", options.isovalue},
+      {"level", options.level},
+      {"normals", options.normals},
+      {"vertex_places", options.vertices},
+      {"vertices", stats.size.num_vertices},
+      {"triangles", stats.size.num_triangles},
+      {"listed_blocks", stats.listed_blocks},
+      {"needed_blocks", stats.needed_blocks},
+      {"decoded_blocks", stats.decoded_blocks},
+      {"cache_slots", stats.cache_slots},
+      {"count_batches", stats.count_batches},
+      {"write_batches", stats.write_batches},
+      {"list_ms", stats.list_ms},
+      {"count_ms", stats.count_ms},
+      {"write_ms", stats.write_ms},
+      {"total_ms", stats.total_ms},
+      {"memory", memory_json(device.ledger())}};
 }
 
 void run_extract(ExtractArgs options) {
@@ -92,6 +101,7 @@ void run_extract(ExtractArgs options) {
   CompileReport compiling(device);
   const CompressedVolume volume =
       load_volume(options.input, to_overrides(options.volume), options.compression, &device);
+  print_compression(options.input, volume);
   const CompressedVolume &level = level_of(volume, options.level);
   Extractor extractor(device, level, options.extractor);
   MeshFile file(options.output);
@@ -109,8 +119,7 @@ void run_extract(ExtractArgs options) {
              with_commas(OutputGroup::current()->bytes_of(options.output)),
              double(device.ledger().peak()) / (1 << 20),
              names_output ? "; --output names another file" : "");
-  if (!options.stats.empty())
-    write_json(stats_json(options, level.info, device, stats), options.stats);
+  if (!options.stats.empty()) write_json(stats_json(options, level, device, stats), options.stats);
 }
 
 }  // namespace

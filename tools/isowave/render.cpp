@@ -25,6 +25,7 @@
 #include "core/view/detail.hpp"
 #include "core/volume/pyramid.hpp"
 #include "core/volume/range_thresholds.hpp"
+#include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/commands.hpp"
@@ -351,6 +352,7 @@ nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVo
       {"dims", {info.dims.x, info.dims.y, info.dims.z}},
       {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
       {"type", to_string(info.type)},
+      {"compression", compression_mode(volume)},
       {"rate", volume.rate()},
       {"max_voxel_error", volume.max_voxel_error ? nlohmann::ordered_json(*volume.max_voxel_error)
                                                  : nlohmann::ordered_json()},
@@ -748,6 +750,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
   if (options.voxel_pixels > 0 || chooses_levels(options)) want_levels(options.frame.compression);
   Scene scene = load_scene(options.input, options.volume, options.frame, views, device.get());
+  print_compression(options.input, scene.volume);
   outputs.make_folder();
   wanted.with_levels = chooses_levels(options) && !scene.volume.coarser_levels.empty();
   options.renderer = to_renderer_options(options.renderer_flags, scene.size);

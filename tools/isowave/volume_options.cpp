@@ -15,6 +15,7 @@
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/generate.hpp"
+#include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/program.hpp"
@@ -160,6 +161,10 @@ void warn_of_header(const std::string &path, const RawOverrides &overrides) {
   if (path.starts_with(kGenerate)) return;
   const std::unique_ptr<VolumeReader> reader = open_volume(path, overrides);
   for (const std::string &notice : reader->notices()) warn(notice);
+}
+
+void print_compression(const std::string &path, const CompressedVolume &volume) {
+  if (!is_zfp_name(path)) fmt::print("compressed in memory: {}\n", describe_compression(volume));
 }
 
 void warn_of_isovalue(const CompressedVolume &volume, double isovalue) {

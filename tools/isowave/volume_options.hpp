@@ -64,6 +64,9 @@ std::string volume_stem(const std::string &path);
 /// Warns of what VolumeReader::notices() says of a file's header; of a generator, nothing.
 void warn_of_header(const std::string &path, const RawOverrides &overrides);
 
+/// Prints how a volume was compressed that was not compressed yet.
+void print_compression(const std::string &path, const CompressedVolume &volume);
+
 /// Warns of an isovalue without a surface: see isovalue_notice().
 void warn_of_isovalue(const CompressedVolume &volume, double isovalue);
 

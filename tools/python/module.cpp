@@ -949,6 +949,8 @@ NB_MODULE(_core, m) {
           "isovalue_notice",
           [](const PyVolume &v, double isovalue) { return v.volume->isovalue_notice(isovalue); },
           "isovalue"_a)
+      .def_prop_ro("compression",
+                   [](const PyVolume &v) { return std::string(v.volume->compression()); })
       .def_prop_ro("bits_per_voxel", [](const PyVolume &v) { return v.volume->bits_per_voxel(); })
       .def_prop_ro("compressed_bytes",
                    [](const PyVolume &v) { return v.volume->compressed_bytes(); })

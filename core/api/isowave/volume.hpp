@@ -86,12 +86,15 @@ class Volume {
   VoxelType source_type() const;  ///< before compression
   /// [least, largest] voxel of the source; infinite where a file does not say.
   std::array<float, 2> value_range() const;
+  /// How blocks are stored: "reversible" (all bits of float32), "whole numbers" (rounded to the
+  /// source's integers), "fixed accuracy" or "fixed rate".
+  std::string_view compression() const;
   double bits_per_voxel() const;
   std::uint64_t compressed_bytes() const;
   /// Largest |decoded - source|, where it was measured.
   std::optional<double> max_voxel_error() const;
-  /// A line for users if the volume has no surface at this isovalue: it says the range of values.
-  /// Else nothing.
+  /// A line for users if the source has no surface at this isovalue: it says the range of values,
+  /// and whether errors of compression can make a surface. Else nothing.
   std::string isovalue_notice(double isovalue) const;
   /// Lines for users, of how the header of the opened file was understood: units that were
   /// converted, a qform that says otherwise than the sform. None for what is compressed already.

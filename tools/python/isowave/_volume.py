@@ -356,6 +356,12 @@ class Volume(Placed[_core.Volume]):
         return self._core.compressed_bytes
 
     @property
+    def compression(self) -> str:
+        """How blocks are stored: "reversible" (all bits of float32), "whole numbers" (rounded to
+        the source's integers), "fixed accuracy" or "fixed rate"."""
+        return self._core.compression
+
+    @property
     def bits_per_voxel(self) -> float:
         return self._core.bits_per_voxel
 
@@ -372,6 +378,11 @@ class Volume(Placed[_core.Volume]):
         False: they were measured when this volume was compressed.
         """
         return self._core.errors_are_stated
+
+    def isovalue_notice(self, isovalue: float) -> str:
+        """The warning that drawing this isovalue gives if it is outside the source's values, or
+        ""."""
+        return self._core.isovalue_notice(number("isovalue", isovalue))
 
     @property
     def num_levels(self) -> int:

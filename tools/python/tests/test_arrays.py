@@ -737,6 +737,21 @@ def test_ome_zarr_with_a_negative_scale():
     assert np.diag(source.direction).tolist() == [1, -1, 1]
 
 
+def test_ome_zarr_with_transformations_in_any_order():
+    """Each follows those before it, also those of the image those of its dataset."""
+    scale = {"type": "scale", "scale": [2, 3, 4]}
+    move = {"type": "translation", "translation": [10, 20, 30]}
+    for transforms, shared, origin in (
+        ([scale, move], None, (10, 20, 30)),
+        ([move, scale], None, (20, 60, 120)),
+        ([scale], [move], (10, 20, 30)),
+        ([move], [scale], (20, 60, 120)),
+        ([move, scale], [move], (30, 80, 150)),
+    ):
+        source = as_source(ome_group("0.5", "zyx", transforms=transforms, shared=shared))
+        assert source.spacing == (2, 3, 4) and source.origin == origin
+
+
 def ome_group(version, axes="tczyx", sizes=(1, 1), transforms=None, shared=None):
     zarr = pytest.importorskip("zarr", minversion="3")
     voxels = make_voxels("uint16")

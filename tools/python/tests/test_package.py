@@ -42,6 +42,11 @@ def test_volume_says_what_it_is(volume):
     assert volume.value_range == (voxels.min(), voxels.max())
     assert np.abs(volume.decode() - voxels).max() == pytest.approx(volume.max_error)
     assert 0 < volume.max_error <= 0.01
+    assert volume.compression == "fixed accuracy"
+    assert isowave.compress(voxels, rate=8).compression == "fixed rate"
+    assert volume.isovalue_notice(float(voxels.mean())) == ""
+    assert "any surface comes from errors" in volume.isovalue_notice(float(voxels.min()))
+    assert volume.isovalue_notice(float(voxels.max()) + 1).endswith("there is no surface")
     assert volume.nbytes < voxels.nbytes
     assert np.array_equal(np.asarray(volume), volume.decode())
     assert "20 x 25 x 30" in repr(volume) and "20 x 25 x 30" in volume._repr_html_()
@@ -67,6 +72,8 @@ def test_every_type_is_compressed_without_loss(dtype, exact):
     volume = isowave.compress(voxels, exact=exact)
     assert volume.source_dtype == np.dtype(dtype)
     assert volume.max_error == 0
+    whole = np.issubdtype(voxels.dtype, np.integer)
+    assert volume.compression == ("whole numbers" if whole else "reversible")
     assert np.array_equal(volume.decode(), voxels)
 
 

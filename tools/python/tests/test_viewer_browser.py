@@ -229,6 +229,23 @@ def test_a_picture_with_fewer_rays_than_asked_for_says_so(open_page: Callable[..
         assert not note.is_visible()
 
 
+def test_an_isovalue_outside_the_values_says_so(open_page: Callable[..., Any]) -> None:
+    with Server(fake_scene(FakeVolume())) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        note, number = page.locator(".note"), page.locator("[name=isovalue]")
+        assert not note.is_visible()
+        number.fill("300")
+        number.press("Enter")
+        rests(page)
+        assert note.inner_text() == "isovalue 300 is outside."
+        number.fill("100")
+        number.press("Enter")
+        rests(page)
+        assert not note.is_visible()
+
+
 def test_the_page_loads_without_errors_or_foreign_requests(
     page: Any, server: Server, record_property: Callable[[str, object], None]
 ) -> None:

@@ -608,6 +608,17 @@ def test_a_renderer_that_cannot_grow_draws_smaller_pictures() -> None:
     )
 
 
+def test_finished_pictures_say_if_the_isovalue_is_outside_the_values() -> None:
+    scene = make_scene(FakeVolume(), Clock(), size=(64, 48))
+    eye = Eye(scene)
+    for isovalue, notice in ((300.0, "isovalue 300 is outside."), (100.0, "")):
+        eye.wish(size=(64, 48), isovalue=isovalue)
+        run(scene)
+        eye.ack()
+        assert eye.of_type("picture")[-1]["stage"] in ("whole", "lossless")
+        assert eye.of_type("picture")[-1]["notice"] == notice
+
+
 def test_whole_pictures_have_ambient_rays_and_a_renderer_for_them() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock, size=(64, 48))

@@ -78,6 +78,10 @@ class FakeVolume:
     max_error: float | None = 0.5
     num_levels: int = 1
 
+    def isovalue_notice(self, isovalue: float) -> str:
+        least, largest = self.value_range
+        return "" if least < isovalue <= largest else f"isovalue {isovalue:g} is outside."
+
     def histogram(self, bins: int = 256) -> tuple[NDArray[Any], NDArray[Any]]:
         """The share of space between two radii, as a ball has it."""
         edges = np.linspace(0, VALUES, bins + 1)

@@ -136,6 +136,9 @@ class VolumeLike(Protocol):
     def num_levels(self) -> int:
         ...
 
+    def isovalue_notice(self, isovalue: float) -> str:
+        ...
+
     def histogram(self, bins: int = 256) -> tuple[NDArray[Any], NDArray[Any]]:
         ...
 

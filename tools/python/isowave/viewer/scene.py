@@ -687,6 +687,7 @@ class Scene:
         return {
             **self._head(frame, frame.stage.value),
             "reduced": self._reduced(frame),
+            "notice": self._volume.isovalue_notice(frame.wish.isovalue),
             "complete": bool(image.complete),
             "passes": int(statistics["passes"]),
             "percent": 100.0,
@@ -705,6 +706,7 @@ class Scene:
             "samples": frame.extent.samples,
             "ambient": frame.extent.ambient,
             "reduced": None,
+            "notice": "",
             "isovalue": frame.wish.isovalue,
             "camera": {
                 "eye": list(view.eye),

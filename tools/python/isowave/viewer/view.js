@@ -13,7 +13,8 @@
 //   histogram  counts of equally wide bins, range
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, ambient,
 //              camera, isovalue, complete, passes, decoded_blocks, percent, ms, detail;
-//              reduced: why a finished one has fewer rays than its wish, or null; and its bytes
+//              reduced: why a finished one has fewer rays than its wish, or null; notice: of a
+//              finished one, that the isovalue is outside the volume's values, or ""; and its bytes
 //   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of
 //              the volume before compression; null: there is no surface. errors_are_stated: that
 //              is certain only if the errors are right that the volume's file states
@@ -498,7 +499,8 @@ class View {
     const rest = head.stage === "whole" || head.stage === "lossless";
     this.progress(rest ? 100 : head.percent ?? 50);
     if (rest) this.showFacts(head);
-    if (rest && head.reduced) this.note(head.reduced, "drawing");
+    const notes = [head.notice, head.reduced].filter(Boolean);
+    if (rest && notes.length) this.note(notes.join(" "), "drawing");
     if (head.stage === "lossless") {
       this.lossless = { wish: head.wish, blob: new Blob([data], { type: "image/png" }) };
       if (this.wantsShot) this.download();
