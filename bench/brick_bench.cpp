@@ -115,43 +115,34 @@ void report(const Options &options, const std::string &command, ocl::Device &dev
 }
 
 void measure(const Options &options, const std::string &command, Team &team) {
-  const RawOverrides overrides = tools::to_overrides(options.volume_options);
+  TeamVolumeSource source;
+  source.path = options.volume;
+  source.overrides = tools::to_overrides(options.volume_options);
   std::optional<ocl::Device> device;
-  VolumeInfo whole;
-  CompressedVolume volume;
-  double load_ms = 0;
-  std::optional<Cuts> cuts;
-  std::vector<float> samples;
   together(team, [&] {
     tools::Outputs outputs;
     outputs.read_volume(options.volume);
     if (team.rank() == 0) outputs.write("--json", options.json);
     device.emplace(choose_local_device(options.device, tools::MpiJob::local_rank()));
-    whole = read_levels(options.volume, overrides).front();
+    source.storage = tools::storage_for(options.volume, options.compression, &*device);
   });
-  cuts.emplace(cut_for(team, whole, "", 1));
-  const BlockBox own = cuts->bricks()[team.rank()];
-  RendererOptions renderer_options =
-      tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1)});
-  together(team, [&] {
-    const auto begin = steady_clock::now();
-    volume =
-        tools::load_brick(options.volume, overrides, options.compression, whole, 1, own, &*device);
-    load_ms = ms_since(begin);
-    samples = range_samples(volume, whole);
-  });
-  renderer_options.range_thresholds = range_thresholds(gather(team, samples));
+  const TeamVolume volume =
+      open_together(team, source, [](std::vector<VolumeInfo> &levels) { levels.resize(1); });
+  const BlockBox own = volume.cuts.bricks()[team.rank()];
   std::optional<BrickRenderer> renderer;
   together(team, [&] {
-    renderer.emplace(*device, volume, renderer_options, *cuts, std::vector{whole}, team);
+    renderer.emplace(
+        *device, volume,
+        tools::to_renderer_options(options.renderer, {options.size.at(0), options.size.at(1)}),
+        team);
   });
-  const auto kinds = measure_frames(*renderer, team, whole, options);
+  const auto kinds = measure_frames(*renderer, team, volume.whole(), options);
   const ordered_json of_rank = {{"brick",
                                  {{"begin", {own.begin.x, own.begin.y, own.begin.z}},
                                   {"end", {own.end.x, own.end.y, own.end.z}}}},
-                                {"load_ms", load_ms},
+                                {"load_ms", volume.load_ms},
                                 {"setup_ms", renderer->renderer().setup_ms()},
-                                {"stream_bytes", 4 * volume.words.size()}};
+                                {"stream_bytes", 4 * volume.brick.words.size()}};
   report(options, command, *device, kinds, of_rank, team);
 }
 

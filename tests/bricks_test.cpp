@@ -439,7 +439,7 @@ TEST(Bricks, KeepTheWholesBounds) {
   }
 }
 
-/// Another spacing moves no brick: see isowave::core::tools::load_brick().
+/// Another spacing moves no brick: see load_brick().
 TEST(Bricks, LevelsKeepTheirPlaces) {
   const VolumeInfo info = test::grid_info({41, 37, 33});
   ArrayReader reader(info, test::sample(info.dims, test::noise_field(6)));

@@ -114,11 +114,9 @@ struct BrickRenderer::Implementation {
   Turns turns;
   RendererOptions options;
   std::unique_ptr<Device::Implementation> device{};
-  core::VolumeInfo whole{};
   Grid grid{};
   std::vector<std::string> notices{};
-  std::optional<core::Cuts> cuts{};
-  core::CompressedVolume volume{};
+  std::optional<core::TeamVolume> volume{};
   std::optional<core::BrickRenderer> renderer{};
   std::optional<core::FramesOfTeam> bounded{};  ///< with bounds
 };
@@ -128,21 +126,20 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
                                               const BrickOptions &wanted)
     : team(processes), options(wanted.renderer) {
   core::agree_on(team, "version", std::string(version()));
-  core::Storage storage;
-  core::RawOverrides overrides;
-  std::vector<core::VolumeInfo> levels;
-  std::string print;
+  core::TeamVolumeSource source;
+  source.path = path;
+  source.bricks = wanted.bricks;
+  core::Storage &storage = source.storage;
+  core::RendererOptions of_core;
   core::together(team, [&] {
     storage = storage_for(path, compression);
     storage.measure_error |= options.with_bounds;
-    overrides = to_overrides(raw);
-    levels = core::read_levels(path, overrides);
-    if (!core::is_zfp_name(path)) notices = core::open_any_volume(path, overrides)->notices();
-    print = core::fingerprint(path, levels.front());
+    source.overrides = to_overrides(raw);
+    of_core = core_options(options);
     device = std::make_unique<Device::Implementation>(
         core::choose_local_device(wanted.device, processes.local_rank()), DeviceOptions{});
+    storage.device = &device->device;
   });
-  core::agree_on(team, "volume", print);
   core::agree_on(team, "request",
                  fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}", text_of(options.largest),
                              options.with_levels, options.with_bounds, options.with_rays,
@@ -150,34 +147,23 @@ BrickRenderer::Implementation::Implementation(Processes &processes, const std::s
                              storage.relative_tolerance.value_or(0), storage.exact, storage.levels,
                              storage.map_nan.value_or(0),
                              storage.no_data ? fmt::to_string(*storage.no_data) : "none"));
-  whole = levels.front();
-  grid = public_grid(whole);
-  if (!options.with_levels) levels.resize(1);
-  if (compression.levels != 1 || (options.with_levels && levels.size() == 1))
-    throw core::Error("{}: bricks have levels of detail that are in a .zfp file: convert it", path);
-  const std::size_t num_levels = core::num_cut_levels(whole, levels.size(), team.size());
-  cuts.emplace(core::cut_for(team, whole, wanted.bricks, core::cut_unit(num_levels)));
-  std::vector<float> samples;
-  core::together(team, [&] {
-    storage.device = &device->device;
-    volume =
-        core::load_brick(path, overrides, storage, whole, num_levels, cuts->bricks()[team.rank()]);
-    samples = core::range_samples(volume, whole);
+  volume = core::open_together(team, source, [&](std::vector<core::VolumeInfo> &levels) {
+    if (!core::is_zfp_name(path))
+      notices = core::open_any_volume(path, source.overrides)->notices();
+    if (!options.with_levels) levels.resize(1);
+    if (compression.levels != 1 || (options.with_levels && levels.size() == 1))
+      throw core::Error("{}: bricks have levels of detail that are in a .zfp file: convert it",
+                        path);
   });
-  core::RendererOptions of_core;
-  core::together(team, [&] { of_core = core_options(options); });
-  of_core.with_levels = num_levels > 1;
-  of_core.range_thresholds = core::range_thresholds(core::gather(team, samples));
-  const double rate = core::agree_on_voxels(team, volume);
-  core::together(team,
-                 [&] { renderer.emplace(device->device, volume, of_core, *cuts, levels, team); });
-  if (options.with_bounds) bounded.emplace(*renderer, volume, rate);
+  grid = public_grid(volume->whole());
+  core::together(team, [&] { renderer.emplace(device->device, *volume, of_core, team); });
+  if (options.with_bounds) bounded.emplace(*renderer, volume->brick, volume->rate);
 }
 
 Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {
   core::agree_on(team, "request", text_of(request));
   check_for_bricks(request, options);
-  core::FrameRequest wanted = core_request(request, volume);
+  core::FrameRequest wanted = core_request(request, volume->brick);
   Frame frame;
   if (request.max_surface_error) {
     const core::DetailChoice choice =
@@ -189,12 +175,12 @@ Frame BrickRenderer::Implementation::draw(const FrameRequest &request) {
   describe_frame(request, renderer->render(wanted), frame);
   if (request.want_normals) {
     const std::vector<core::HitRecord> hits = renderer->hits();
-    fill_frame(request, hits, volume, false, frame);
+    fill_frame(request, hits, volume->brick, false, frame);
   } else if (request.want_depth || !request.want_picture) {
     frame.depth = renderer->depth();
   }
   frame.statistics.hits = renderer->num_hits();
-  frame.statistics.errors_are_stated = volume.errors_are_stated;
+  frame.statistics.errors_are_stated = volume->brick.errors_are_stated;
   if (request.want_picture)
     frame.picture = renderer->shade(core_appearance(request.appearance)).pixels;
   if (!request.want_depth) frame.depth.clear();
@@ -225,11 +211,11 @@ Camera BrickRenderer::camera(double isovalue, std::optional<ImageSize> size) {
     Implementation &self = *implementation_;
     const std::lock_guard turn(self.turns);
     std::optional<core::BlockBox> own;
-    const float drawn = core::drawn_isovalue(self.volume, isovalue);
+    const float drawn = core::drawn_isovalue(self.volume->brick, isovalue);
     core::together(self.team, [&] { own = self.renderer->surface_box({&drawn, 1}); });
-    return public_camera(core::surface_camera(self.whole,
-                                              core::gather_box(self.team, self.volume.info, own),
-                                              core_size(size.value_or(self.options.largest))));
+    return public_camera(core::surface_camera(
+        self.volume->whole(), core::gather_box(self.team, self.volume->brick.info, own),
+        core_size(size.value_or(self.options.largest))));
   });
 }
 
@@ -238,7 +224,7 @@ const std::vector<std::string> &BrickRenderer::notices() const {
 }
 std::string BrickRenderer::isovalue_notice(double isovalue) const {
   return guarded("looking at an isovalue",
-                 [&] { return core::isovalue_notice(implementation_->volume, isovalue); });
+                 [&] { return core::isovalue_notice(implementation_->volume->brick, isovalue); });
 }
 
 const Grid &BrickRenderer::grid() const {

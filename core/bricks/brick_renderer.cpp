@@ -15,6 +15,21 @@
 
 namespace isowave::core {
 
+namespace {
+
+RendererOptions options_for(const TeamVolume &volume, RendererOptions options) {
+  options.with_levels = volume.num_levels > 1;
+  options.range_thresholds = volume.range_thresholds;
+  return options;
+}
+
+}  // namespace
+
+BrickRenderer::BrickRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options,
+                             Team &team)
+    : BrickRenderer(device, volume.brick, options_for(volume, std::move(options)), volume.cuts,
+                    volume.levels, team) {}
+
 BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume,
                              const RendererOptions &options, const Cuts &cuts,
                              std::vector<VolumeInfo> whole, Team &team)

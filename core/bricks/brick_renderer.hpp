@@ -8,6 +8,7 @@
 #include "core/base/team.hpp"
 #include "core/bricks/compose.hpp"
 #include "core/bricks/cuts.hpp"
+#include "core/bricks/team_volume.hpp"
 #include "core/render/renderer.hpp"
 #include "core/render/time_budget.hpp"
 
@@ -30,6 +31,10 @@ class BrickRenderer {
   /// Throws  Error: as Renderer, at the rank that it is about
   BrickRenderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
                 const Cuts &cuts, std::vector<VolumeInfo> whole, Team &team);
+  /// The same of a volume that the team has opened, which must outlive the renderer, too.
+  ///
+  /// options  with_levels and range_thresholds become the volume's
+  BrickRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options, Team &team);
 
   /// Draws this rank's brick. Ambient rays go through those of all ranks.
   ///

@@ -556,8 +556,9 @@ void write_refined(const RenderArgs &options, const Scene &scene, const Appearan
 
 /// Draws a volume's bricks, one at each rank. frames: of the whole, at rank 0; own: this rank's.
 /// bounded: of --max-surface-error.
-void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appearance &appearance,
-                       BrickRenderer &renderer, std::optional<FramesOfTeam> &bounded, Team &team,
+void draw_brick_frames(const RenderArgs &options, const Scene &scene, const CompressedVolume &brick,
+                       const Appearance &appearance, BrickRenderer &renderer,
+                       std::optional<FramesOfTeam> &bounded, Team &team,
                        nlohmann::ordered_json &frames, nlohmann::ordered_json &own) {
   FrameRequest base;
   base.voxel_pixels = options.voxel_pixels;
@@ -570,7 +571,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
       const auto begin = Clock::now();
       const double composed_before = renderer.composition().ms;
       FrameRequest request = seen_from(camera, base);
-      request.isovalue = drawn_isovalue(scene.volume, isovalue);
+      request.isovalue = drawn_isovalue(brick, isovalue);
       request.on_pass = progress_writer(
           options, scene, [&] { return renderer.shade(appearance); }, isovalue, view);
       DetailChoice choice;
@@ -590,7 +591,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
       const double ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
       fmt::print("isovalue {}, view {}: {} rays hit, {} bricks, {:.1f} ms\n", isovalue, view,
                  with_commas(renderer.num_hits()), team.size(), ms);
-      warn_of_isovalue(scene.volume, isovalue);
+      warn_of_isovalue(brick, isovalue);
       frames.push_back({{"isovalue", isovalue},
                         {"view", view},
                         {"rays_hit", renderer.num_hits()},
@@ -601,7 +602,7 @@ void draw_brick_frames(const RenderArgs &options, const Scene &scene, const Appe
         together(team, [&] {
           if (team.rank() != 0) return;
           frames.back()["error"] = report_error(
-              *options.max_surface_error, scene.volume, choice, certificate, scene.size,
+              *options.max_surface_error, brick, choice, certificate, scene.size,
               frame_path(options.error_map, scene.cameras.size(), options, isovalue, view));
         });
       }
@@ -625,75 +626,62 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   Appearance appearance;
   appearance.surface = parse_color("--color", options.color);
   appearance.background = parse_color("--background", options.background);
-  const RawOverrides overrides = to_overrides(options.volume);
-  std::unique_ptr<ocl::Device> device;
-  std::vector<VolumeInfo> levels;
-  Outputs outputs;
-  together(team, [&] {
-    if (team.rank() == 0) outputs = check_outputs(options, views.count);
-    device = open_device(options, choose_local_device(options.device, MpiJob::local_rank()));
-    levels = read_levels(options.input, overrides);
-    if (!is_zfp_name(options.input)) warn_of_header(options.input, overrides);
-  });
-  const VolumeInfo &whole = levels.front();
-  agree_on(team, "volume", fingerprint(options.input, whole));
-  check_brick_levels(options, levels);
-  if (options.voxel_pixels == 0 && !chooses_levels(options)) levels.resize(1);
-  const std::size_t num_levels = num_cut_levels(whole, levels.size(), team.size());
-  const auto load = [&](const BlockBox &box, std::size_t of_detail, bool with_bounds) {
-    CompressionOptions compression = options.frame.compression;
-    compression.measure_error = with_bounds;
-    return load_brick(options.input, overrides, compression, whole, of_detail, box, device.get());
-  };
-  const int unit = cut_unit(num_levels);
-  const std::vector<float> nearest(options.frame.isovalues.begin(), options.frame.isovalues.end());
-  const Cuts cuts = options.bricks == "active"
-                        ? cut_by_surfaces(team, whole, nearest, unit,
-                                          [&](const BlockBox &box) { return load(box, 1, false); })
-                        : cut_for(team, whole, options.bricks, unit);
-  const BlockBox &own = cuts.bricks()[team.rank()];
-  Scene scene;
-  scene.size = views.size;
+  TeamVolumeSource source;
+  source.path = options.input;
+  source.overrides = to_overrides(options.volume);
+  source.bricks = options.bricks;
+  source.isovalues.assign(options.frame.isovalues.begin(), options.frame.isovalues.end());
   RendererOptions &wanted = options.renderer_flags.values;
   wanted.with_shading =
       !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
   wanted.with_kept_picture = options.time_budget.has_value();
   wanted.with_given_rays = options.ambient_rays != 0;
   wanted.with_bounds = options.max_surface_error.has_value();
-  wanted.with_levels = num_levels > 1;
-  if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // nobody sees them
-  std::vector<float> samples;
+  options.frame.compression.measure_error |= wanted.with_bounds;
+  if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // no picture shows them
+  Scene scene;
+  scene.size = views.size;
+  std::unique_ptr<ocl::Device> device;
+  Outputs outputs;
   together(team, [&] {
-    scene.cameras = make_cameras(options.input, whole, options.frame, views);
-    scene.volume = load(own, num_levels, wanted.with_bounds);
-    outputs.make_folder();
-    samples = range_samples(scene.volume, whole);
+    if (team.rank() == 0) outputs = check_outputs(options, views.count);
+    device = open_device(options, choose_local_device(options.device, MpiJob::local_rank()));
+    source.storage = storage_for(options.input, options.frame.compression, device.get());
     options.renderer = to_renderer_options(options.renderer_flags, scene.size);
-    if (num_levels < levels.size()) options.renderer.with_levels = num_levels > 1;
   });
-  options.renderer.range_thresholds = range_thresholds(gather(team, samples));
-  const double rate = agree_on_voxels(team, scene.volume);
+  const TeamVolume volume = open_together(team, source, [&](std::vector<VolumeInfo> &levels) {
+    if (!is_zfp_name(options.input)) warn_of_header(options.input, source.overrides);
+    check_brick_levels(options, levels);
+    if (options.voxel_pixels == 0 && !chooses_levels(options)) levels.resize(1);
+    scene.cameras = make_cameras(options.input, levels.front(), options.frame, views);
+  });
+  const VolumeInfo &whole = volume.whole();
+  const BlockBox &own = volume.cuts.bricks()[team.rank()];
+  print_compression(options.input, volume.brick);
   std::optional<BrickRenderer> renderer;
-  together(team,
-           [&] { renderer.emplace(*device, scene.volume, options.renderer, cuts, levels, team); });
+  together(team, [&] {
+    outputs.make_folder();
+    renderer.emplace(*device, volume, options.renderer, team);
+  });
   std::optional<FramesOfTeam> bounded;
-  if (wanted.with_bounds) bounded.emplace(*renderer, scene.volume, rate);
+  if (wanted.with_bounds) bounded.emplace(*renderer, volume.brick, volume.rate);
   if (options.frame.orbit == 0 && options.frame.cameras.empty()) {
     scene.cameras = {surface_camera(
         whole,
-        gather_box(team, scene.volume.info,
-                   renderer->surface_box(drawn_isovalues(scene.volume, options.frame.isovalues))),
+        gather_box(team, volume.brick.info,
+                   renderer->surface_box(drawn_isovalues(volume.brick, options.frame.isovalues))),
         scene.size)};
   }
   nlohmann::ordered_json frames = nlohmann::ordered_json::array(), own_frames = frames;
-  draw_brick_frames(options, scene, appearance, *renderer, bounded, team, frames, own_frames);
+  draw_brick_frames(options, scene, volume.brick, appearance, *renderer, bounded, team, frames,
+                    own_frames);
   const CompositionStats &composition = renderer->composition();
   const nlohmann::ordered_json of_rank = {{"rank", team.rank()},
                                           {"device", device_json(device->info())},
                                           {"brick",
                                            {{"begin", {own.begin.x, own.begin.y, own.begin.z}},
                                             {"end", {own.end.x, own.end.y, own.end.z}}}},
-                                          {"volume", volume_json(options, scene.volume)},
+                                          {"volume", volume_json(options, volume.brick)},
                                           {"setup_ms", renderer->renderer().setup_ms()},
                                           {"compile_ms", device->compile_ms()},
                                           {"composition",

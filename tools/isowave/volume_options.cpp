@@ -148,13 +148,12 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
   return compress_volume([&] { return open_any_volume(path, overrides, device); }, path, storage);
 }
 
-CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
-                            const CompressionOptions &compression, const VolumeInfo &info,
-                            std::size_t num_levels, const BlockBox &own, ocl::Device *device) {
+Storage storage_for(const std::string &path, const CompressionOptions &compression,
+                    ocl::Device *device) {
   if (is_zfp_name(path)) refuse_compression(compression, path);
   Storage storage = to_storage(compression);
   storage.device = device;
-  return core::load_brick(path, overrides, storage, info, num_levels, own);
+  return storage;
 }
 
 void warn_of_header(const std::string &path, const RawOverrides &overrides) {

@@ -81,10 +81,9 @@ inline constexpr const char *kVolumeHelp =
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device = nullptr);
 
-/// A brick of what load_volume() would load: see core::load_brick(). Throws Error.
-CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
-                            const CompressionOptions &compression, const VolumeInfo &info,
-                            std::size_t num_levels, const BlockBox &own, ocl::Device *device);
+/// How that volume is compressed. Throws Error if it is compressed already, and options say how.
+Storage storage_for(const std::string &path, const CompressionOptions &compression,
+                    ocl::Device *device);
 
 /// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with
 /// the last.

@@ -1,0 +1,51 @@
+#pragma once
+// How a team opens a volume that it draws in bricks. The steps that wait for other ranks are in one
+// place, in one order: ranks that took them in another would wait for ever.
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/team.hpp"
+#include "core/bricks/cuts.hpp"
+#include "core/sources/load_volume.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+/// Which volume, and how it is cut: the same at all ranks, but for storage.device.
+struct TeamVolumeSource {
+  std::string path{};
+  RawOverrides overrides{};
+  Storage storage{};     ///< how it is compressed, if it is not yet; its device is this rank's
+  std::string bricks{};  ///< XxYxZ; "active": surfaces touch like many blocks of each; empty: alike
+                         ///< large
+  std::vector<float> isovalues{};  ///< of "active"
+};
+
+/// A volume in bricks, of which this rank has one.
+struct TeamVolume {
+  std::vector<VolumeInfo> levels;  ///< grids of the whole's levels that frames may have: the finest
+                                   ///< first
+  std::size_t num_levels = 1;      ///< of these, that bricks have
+  Cuts cuts;                       ///< a brick for each rank
+  CompressedVolume brick;          ///< this rank's; ranges and errors are those of the whole
+  std::vector<float> range_thresholds;  ///< RendererOptions::range_thresholds, of the whole
+  double rate = 0;                      ///< bits per voxel of the whole (CompressedVolume::rate())
+  double load_ms = 0;                   ///< wall clock of reading, or compressing, the brick
+
+  const VolumeInfo &whole() const { return levels.front(); }
+};
+
+/// Opens a volume: reads its grids, agrees that all ranks have the same file, cuts it, and loads
+/// this rank's brick.
+///
+/// look_at  called with the grids of all levels before anything is loaded: it may cut off coarse
+///          levels that frames do without, and throw
+/// Throws   Error at every rank, if one of them fails
+/// Waits    for all ranks
+TeamVolume open_together(Team &team, const TeamVolumeSource &source,
+                         const std::function<void(std::vector<VolumeInfo> &levels)> &look_at);
+
+}  // namespace isowave::core
