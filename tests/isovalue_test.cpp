@@ -68,6 +68,18 @@ TEST(IsovalueNotice, ErrorsOfCompressionCanMakeASurface) {
     EXPECT_THAT(isovalue_notice(volume, isovalue), testing::EndsWith("there is no surface"));
 }
 
+// Else a picture without a surface would have no word of it.
+TEST(IsovalueNotice, ValuesThatHaveAllBecomeZeroAreNamed) {
+  CompressedVolume volume = volume_of(VoxelType::kFloat64, {});
+  volume.value_range = {-1e-33f, 2e-33f};
+  EXPECT_THAT(isovalue_notice(volume, 1e-33), testing::HasSubstr("have all become 0 at a rate"));
+  volume.precision = kReversible;
+  EXPECT_EQ(isovalue_notice(volume, 1e-33), "");
+  volume.precision = {};
+  volume.value_range = {-1e-33f, 2 * kMinMagnitude};
+  EXPECT_EQ(isovalue_notice(volume, 1e-33), "");
+}
+
 TEST(DrawnIsovalue, OneThatFloat32DoesNotHoldIsRefused) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (const double bad : {1e39, -1e39, kInfinity, -kInfinity, std::nan("")}) {

@@ -198,7 +198,7 @@ void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
   }
   if (found.too_large_count > 0) {
     throw Error(
-        "{} of {} voxels are beyond +-{:.4g}, the first at {}: zfp cannot hold them, scale the "
+        "{} of {} voxels are beyond +-{:.4g}, the first at {}: they cannot be drawn, scale the "
         "volume down",
         found.too_large_count, info.num_voxels(), kMaxMagnitude, position(found.first_too_large));
   }

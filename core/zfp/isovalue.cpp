@@ -15,6 +15,13 @@ namespace isowave::core {
 std::string isovalue_notice(const CompressedVolume &volume, double isovalue) {
   const auto [least, most] = volume.value_range;
   const bool is_known = std::isfinite(least) && std::isfinite(most);
+  const float magnitude = std::max(-least, most);
+  if (!volume.precision.is_reversible() && magnitude > 0 && magnitude < kMinMagnitude) {
+    return fmt::format(
+        "the volume's values, {} to {}, have all become 0 at a rate or by a tolerance: there is no "
+        "surface. Scale the volume up, or compress it without these",
+        least, most);
+  }
   if (!is_known || (least < isovalue && isovalue <= most)) return {};
   const std::optional<double> error = known_voxel_error(volume);
   const bool may_cross =

@@ -10,8 +10,9 @@
 namespace isowave::core {
 
 /// One line if no voxel of the source is below the isovalue, or none at it or above: it says the
-/// range of values, and whether errors of compression can make a surface. Empty if the source has
-/// a surface, or if the range is not known.
+/// range of values, and whether errors of compression can make a surface. One line, too, if all
+/// voxels have become 0 (kMinMagnitude). Empty if the source has a surface, or if the range is not
+/// known.
 std::string isovalue_notice(const CompressedVolume &volume, double isovalue);
 
 /// The float32 with which decoded voxels are compared: a voxel is inside if it is not below.

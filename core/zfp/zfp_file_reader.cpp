@@ -261,7 +261,10 @@ class ZfpFileReader {
     volume_.file = file_;
     volume_.file_first_bit = 8 * begin_ + header_bits_;
     if (volume_.is_indexed() && !has_trailer_)
-      fail("a file of zfp's own tool does not say where its blocks begin: convert it first");
+      fail(
+          "a file of zfp's own tool does not say where its blocks begin: decode it by zfp -h -z, "
+          "and "
+          "convert its voxels");
     CompressedVolume cut = volume_.is_indexed() ? cut_indexed(box) : cut_blocks(volume_, box);
     if (with_bounds && layout_.bounds_bytes != 0) {
       BoundsCutter bounds(volume_.num_blocks(), box);
