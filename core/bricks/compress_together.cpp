@@ -334,7 +334,7 @@ CodedSlab TeamCompressor::code(std::uint64_t begin, LevelData &next) {
     for (std::uint32_t z = 0; level_ > 0 && z < dims.z; z += chunk_layers) {
       const std::size_t count = std::min(chunk_layers, dims.z - z) * layer;
       code_chunk(make_chunk(dims, z, std::span(data_.voxels).subspan(z * layer, count)), dims,
-                 input_of(options), *coder);
+                 input_of_coarser(options), *coder);
     }
     slab.errors = coder->finish_level();
     if (!slab.errors.empty()) {

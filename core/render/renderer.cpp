@@ -40,6 +40,7 @@ FrameState make_state(ocl::Device &device, const CompressedVolume &volume,
   const RendererLimits &limits = plan.limits;
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(device, limits.macrocells);
+  if (buffers->no_data) buffers->no_data->write(joined_no_data(volumes));
   std::vector<DeviceStream> streams;
   std::vector<Macrocells> macrocells;  // of all levels before any decoder, see plan.setup_bytes
   // Bounds need the range of values (value_offset()), which a file may get wrong.
