@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "core/accuracy/certify.hpp"
 #include "core/base/error.hpp"
 #include "core/extract/extractor.hpp"
 #include "core/extract/mesh_renderer.hpp"
@@ -537,6 +538,70 @@ TEST_P(NoDataLevels, SmallSidesOfWholeBlocksNeedData) {
   EXPECT_GT(check(volume, 0.5f, 2.5), 100u);
 }
 
+// ---- Bounds of a frame's error
+
+class NoDataBounds : public testing::TestWithParam<ocl::DeviceInfo> {};
+INSTANTIATE_TEST_SUITE_P(Devices, NoDataBounds, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+/// The true hits are those of the volume before compression.
+TEST_P(NoDataBounds, SmallCertainPixelsAreRight) {
+  const glm::uvec3 dims(22, 19, 17);
+  constexpr ImageSize kSize{48, 32};
+  ocl::Device device(GetParam());
+  std::uint64_t hits = 0, misses = 0, uncertain = 0, wrong = 0;
+  for (const auto &field : {test::gyroid_field(9), test::noise_field(5)}) {
+    const std::vector<float> source = test::sample(dims, field);
+    for (const NamedHole &hole : holes(dims)) {
+      if (is_llvmpipe(GetParam()) && !long_tests() && hole.name[0] != 's') continue;
+      SCOPED_TRACE(hole.name);
+      const std::vector<float> holed = with_hole(dims, source, hole.hole);
+      for (const std::uint32_t rate : {4u, 7u, 14u}) {
+        const CompressedVolume volume =
+            compressed(dims, holed, {.rate = rate, .measure_error = true, .levels = 2});
+        Renderer renderer(device, volume,
+                          {.size = kSize, .with_levels = true, .with_bounds = true});
+        for (const float isovalue : {0.25f, 0.0f}) {
+          for (const Camera &camera : orbit_cameras(volume.info, 3)) {
+            const FrameRequest request{.camera = camera, .isovalue = isovalue};
+            renderer.render(request);
+            const std::vector<HitRecord> drawn = renderer.hits();
+            const std::vector<float> bounds = certify(renderer, volume, request, drawn).bounds;
+            const FrameParams frame = make_frame_params(volume.info, camera, kSize, isovalue);
+            const std::vector<HitRecord> truth = render_scalar(frame, holed);
+            for (std::size_t pixel = 0; pixel < bounds.size(); ++pixel) {
+              if (std::isinf(bounds[pixel])) {
+                ++uncertain;
+              } else if (bounds[pixel] == 0) {
+                ++misses;
+                wrong += std::isfinite(truth[pixel].t) || std::isfinite(drawn[pixel].t);
+              } else {
+                ++hits;
+                const double pixel_size = 2 * double{frame.view.pixel_scale} * drawn[pixel].t;
+                wrong += !(std::abs(double{truth[pixel].t} - drawn[pixel].t) <=
+                           bounds[pixel] * pixel_size);
+              }
+            }
+          }
+        }
+        EXPECT_THAT(
+            [&] {
+              certify(renderer, volume,
+                      {.camera = orbit_cameras(volume.info, 1)[0],
+                       .isovalue = 0.25f,
+                       .voxel_pixels = 1e3},
+                      renderer.hits());
+            },
+            ThrowsMessage<Error>(HasSubstr("coarser levels of detail has no bound")));
+      }
+    }
+  }
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_GT(hits, 1000u);
+  EXPECT_GT(misses, 1000u);
+  EXPECT_GT(uncertain, 1000u);
+}
+
 // ---- Meshes
 
 class NoDataMeshes : public testing::TestWithParam<ocl::DeviceInfo> {};
@@ -635,8 +700,6 @@ TEST_P(NoDataMeshes, SmallOtherVolumesAreDrawnAsBefore) {
     Renderer other(device, holed.compressed, {.size = kSize});
     EXPECT_EQ(device.ledger().current(), 2 * bytes + holed.compressed.no_data.table().size_bytes());
   }
-  EXPECT_THAT([&] { Renderer(device, holed.compressed, {.size = kSize, .with_bounds = true}); },
-              ThrowsMessage<Error>(HasSubstr("bounds of a frame's error cannot be given")));
   ocl::DeviceInfo without = GetParam();
   without.capabilities.nan = false;
   ocl::Device plain(without);
