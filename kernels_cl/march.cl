@@ -14,7 +14,7 @@
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
 /// behind the border.
 ///
-/// frame_params, frames, num_frames, parts, given, ranges  as start_rays
+/// frame_params, frames, num_frames, parts, given, ranges, no_data, no_data_begin  as start_rays
 /// macrocell_masks                           as traverse
 /// In      active_ray_ids [prev->next_active_count]; ray_block_ids [pixel]: the active block that a
 ///         ray goes on from
@@ -29,10 +29,11 @@
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
     global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
-    global BlockEntry *table, global const ulong *inside, global const float *cache_values,
-    global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
-    global const uint *active_ray_ids, global uint *next_active_ray_ids, global uint *ray_block_ids,
-    global HitRecord *hits, global uint *slot_stamps, global CacheState *cache) {
+    global const uint *no_data, uint no_data_begin, global BlockEntry *table,
+    global const ulong *inside, global const float *cache_values, global const PassCounts *prev,
+    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
+    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
+    global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
   local uint counters[2], group_hits, group_blocks, num_going;
@@ -120,7 +121,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     }
     if (leaves_band(result, gone && lane == 0)) {
       const uint behind =
-          cross_borders(frames, num_frames, macrocell_masks, ranges, pixel,
+          cross_borders(frames, num_frames, macrocell_masks, ranges, no_data, no_data_begin, pixel,
                         level_of(frames, num_frames, from), leaves_on(result), found + item);
       waits = behind != ISO_INVALID_ID;
       if (waits) ray_block_ids[pixel] = behind;

@@ -36,6 +36,7 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 ///         the first of them
 /// given   [pixel] the rays, where ISO_GIVEN_RAYS is 1
 /// ranges  of the blocks of all levels
+/// no_data, no_data_begin  as lacks_data_at_border
 /// counts  of the last pass of the frame before
 /// next    counts of this frame's first pass
 /// In      counts->next_active_count: 0
@@ -47,8 +48,9 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
     global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
-    global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global uint *hit_words) {
+    global const uint *no_data, uint no_data_begin, global PassCounts *counts,
+    global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global uint *hit_words) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
   const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
@@ -80,8 +82,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
           find_blocks(level, macrocell_masks, &ray, &block_id, 1, found + item, 1) != 0) {
         stand = found[item];
       } else {
-        stand = cross_borders(frames, num_frames, macrocell_masks, ranges, pixel, 0,
-                              ISO_SIDE_UNKNOWN, found + item);
+        stand = cross_borders(frames, num_frames, macrocell_masks, ranges, no_data, no_data_begin,
+                              pixel, 0, ISO_SIDE_UNKNOWN, found + item);
         log_ahead = ISO_BORDER_LOG_AHEAD;
       }
       if (stand != ISO_INVALID_ID) ray_block_ids[pixel] = stand;

@@ -86,7 +86,8 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
 }
 
 /// The first hit of a ray in the band of one level. inside: in, is the ray where the band begins,
-/// if it comes from another; out, where the band ends, if the ray gets there within the domain.
+/// if it comes from another; out, where the band ends, if the ray gets there within the domain, in
+/// a cell that has all its data.
 HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
                      std::optional<bool> &inside) {
   const LastPlanes last = last_planes(&frame), zero{};
@@ -107,7 +108,7 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
                const auto inside_now = [&](RayEvent event, bool leaving) {
                  return inside_at(&ray, w, event, cell.x, cell.y, cell.z, leaving) != 0;
                };
-               if (at_border && inside_now(cell_enter, false) != before) {
+               if (at_border && !lacks_data(w) && inside_now(cell_enter, false) != before) {
                  hit =
                      make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, 0.0f);
                  return true;
@@ -119,7 +120,7 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
                                 refine(solver, change.cubic, change.bracket));
                  return true;
                }
-               if (ends) inside = inside_now(cell_exit, true);
+               if (ends && !lacks_data(w)) inside = inside_now(cell_exit, true);
                return ends;
              });
   return hit;

@@ -26,11 +26,18 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 /// The definition, one voxel at a time: weights -1, 4, 10, 4, -1 along each axis, held to the
-/// values, and copies of the border.
+/// values, and copies of the border. NaN: without data.
 std::vector<float> plain_downsample(const glm::ivec3 &dims, const std::vector<float> &voxels) {
   const auto weighted = [](auto &&value_at, int k) {
-    const std::array values{value_at(2 * k - 2), value_at(2 * k - 1), value_at(2 * k),
-                            value_at(2 * k + 1), value_at(2 * k + 2)};
+    std::array values{value_at(2 * k - 2), value_at(2 * k - 1), value_at(2 * k),
+                      value_at(2 * k + 1), value_at(2 * k + 2)};
+    const auto fill = [&](std::size_t i, double value) {
+      if (std::isnan(values.at(i))) values.at(i) = value;
+    };
+    fill(2, (values[1] + values[3]) / 2);
+    if (std::isnan(values[2])) return values[2];
+    for (const std::size_t i : {1u, 3u}) fill(i, values[2]);
+    for (const std::size_t i : {0u, 4u}) fill(i, values.at(i == 0 ? 1 : 3));
     const double sum = -values[0] + 4 * values[1] + 10 * values[2] + 4 * values[3] - values[4];
     return std::clamp(sum / 16, std::ranges::min(values), std::ranges::max(values));
   };
@@ -71,6 +78,26 @@ TEST(Pyramid, VoxelsAreMeansOfFinerOnes) {
     SCOPED_TRACE(fmt::format("{}x{}x{}", dims.x, dims.y, dims.z));
     const std::vector<float> voxels = exact_voxels(dims);
     EXPECT_EQ(downsample(dims, voxels), plain_downsample(dims, voxels));
+  }
+}
+
+TEST(Pyramid, VoxelsWithoutDataAreLeftOut) {
+  for (const glm::uvec3 &dims : kDims) {
+    for (const std::uint32_t share : {2u, 3u, 20u}) {
+      SCOPED_TRACE(fmt::format("{}x{}x{}, one of {}", dims.x, dims.y, dims.z, share));
+      std::vector<float> voxels = exact_voxels(dims);
+      std::mt19937 random(share);
+      for (float &voxel : voxels) {
+        if (random() % share == 0) voxel = std::numeric_limits<float>::quiet_NaN();
+      }
+      const std::vector<float> got = downsample(dims, voxels),
+                               expected = plain_downsample(dims, voxels);
+      ASSERT_EQ(got.size(), expected.size());
+      for (std::size_t i = 0; i < got.size(); ++i) {
+        ASSERT_EQ(std::isnan(got[i]), std::isnan(expected[i])) << i;
+        ASSERT_TRUE(std::isnan(got[i]) || std::abs(got[i] - expected[i]) < 1e-4) << i;
+      }
+    }
   }
 }
 
@@ -267,7 +294,7 @@ TEST_F(PyramidFile, DamageIsFound) {
 TEST_F(PyramidFile, TooManyLevelsAreRefusedAndNothingIsLeft) {
   EXPECT_THAT([&] { write({.rate = 4, .levels = 4}); },
               ThrowsMessage<Error>(AllOf(HasSubstr("4 levels of detail"), HasSubstr("1 to 3"))));
-  ArrayReader bad(test::grid_info({30, 19, 24}), std::vector<float>(30 * 19 * 24, NAN));
+  ArrayReader bad(test::grid_info({30, 19, 24}), std::vector<float>(30 * 19 * 24, INFINITY));
   EXPECT_THROW(compress_to_file(bad, {.rate = 4, .levels = 0}, folder_ / "a.zfp"), Error);
   EXPECT_TRUE(std::filesystem::is_empty(folder_ / ""));
 }

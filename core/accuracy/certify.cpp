@@ -12,6 +12,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
+#include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/zfp_codec.h"
 
@@ -119,9 +120,108 @@ bool starts_between(std::span<const FrameParams> frames, std::span<BlockValues> 
   return false;
 }
 
-/// Of each ray a bit: starts_between(), of this rank's blocks.
-std::vector<std::uint64_t> starts_between(const BoundedFrames &of, const FrameRequest &request,
-                                          std::span<const FrameParams> frames) {
+/// The cells of a block (bit x + 4y + 16z) with a corner without data.
+std::uint64_t cells_without_data(const FrameParams &frame, const NoData &no_data, BlockCoords b) {
+  std::array<std::uint64_t, 8> missing{}, of_corners{};
+  bool any = false;
+  for (std::uint32_t corner = 0; corner < 8; ++corner) {
+    const uint id = dual_grid_block(&frame, b, corner);
+    missing[corner] = id == ISO_INVALID_ID ? 0 : no_data.mask(id);
+    any = any || missing[corner] != 0;
+  }
+  if (!any) return 0;
+  corners_inside(missing.data(), of_corners.data());
+  std::uint64_t cells = 0;
+  for (const std::uint64_t of_corner : of_corners) cells |= of_corner;
+  return cells;
+}
+
+/// Calls visit(cell, enter) for each cell of the finest level that a ray enters out of one without
+/// data, and that has all its data itself, until visit returns true.
+template <class Visit>
+void visit_cells_behind_gaps(const FrameParams &frame, const NoData &no_data, const Ray &ray,
+                             const Visit &visit) {
+  const LastPlanes last = last_planes(&frame);
+  RayEvent enter;
+  if (!domain_entry(&ray, last, &enter)) return;
+  const auto walk_at = [&](int size) {
+    return walk_from(&ray, locate(ray.x, 0, enter, size, 0, (last.x - 1) / size),
+                     locate(ray.y, 1, enter, size, 0, (last.y - 1) / size),
+                     locate(ray.z, 2, enter, size, 0, (last.z - 1) / size), size, last);
+  };
+  const auto is_within = [&](const GridWalk &at, int size) {
+    return at.x >= 0 && at.x <= (last.x - 1) / size && at.y >= 0 && at.y <= (last.y - 1) / size &&
+           at.z >= 0 && at.z <= (last.z - 1) / size;
+  };
+  bool in_gap = false;
+  for (GridWalk block = walk_at(4); is_within(block, 4);) {
+    const BlockCoords b{static_cast<uint>(block.x), static_cast<uint>(block.y),
+                        static_cast<uint>(block.z)};
+    const std::uint64_t lacking = cells_without_data(frame, no_data, b);
+    enter = region_entry(&ray, block.x, block.y, block.z, 4, last);
+    if (lacking != 0 || in_gap) {
+      const auto is_here = [&](const GridWalk &cell) {
+        return is_within(cell, 1) && cell.x >> 2 == block.x && cell.y >> 2 == block.y &&
+               cell.z >> 2 == block.z;
+      };
+      for (GridWalk cell = walk_from(
+               &ray, locate(ray.x, 0, enter, 1, 4 * block.x, std::min(4 * block.x + 3, last.x - 1)),
+               locate(ray.y, 1, enter, 1, 4 * block.y, std::min(4 * block.y + 3, last.y - 1)),
+               locate(ray.z, 2, enter, 1, 4 * block.z, std::min(4 * block.z + 3, last.z - 1)), 1,
+               last);
+           is_here(cell);) {
+        const bool lacks =
+            (lacking >> ((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3)) & 1u) != 0;
+        if (in_gap && !lacks && visit(glm::ivec3(cell.x, cell.y, cell.z), enter)) return;
+        in_gap = lacks;
+        if (lacking == 0) break;
+        enter = walk_exit(&cell, &ray);
+        walk_step(&cell, &ray, enter, 1, last);
+      }
+    }
+    walk_step(&block, &ray, walk_exit(&block, &ray), 4, last);
+  }
+}
+
+/// Whether gaps make a ray uncertain: what its first hits with the two bounds prove is proven
+/// within a stretch of cells with data, in which it begins anew. So it is if it begins between the
+/// bounds in any of them that is not behind both hits, or begins one anew between these.
+///
+/// hits  with the bounds, the nearer first [world units]
+bool is_uncertain_beside_gaps(const FrameParams &frame, const NoData &no_data, BlockValues &values,
+                              std::uint32_t pixel, const std::array<double, 2> &hits,
+                              double cell_rounding) {
+  const Ray ray = make_ray(&frame, pixel);
+  bool is_uncertain = false;
+  visit_cells_behind_gaps(frame, no_data, ray, [&](const glm::ivec3 &cell, RayEvent enter) {
+    const double t = double{enter.t.hi} * double{frame.view.t_scale};
+    const double rounding = kDistanceRounding * t + cell_rounding;
+    if (t > hits[1] + rounding) return true;
+    is_uncertain = t >= hits[0] - rounding;
+    if (!is_uncertain) {
+      std::array<float, 8> lower{}, upper{};
+      values.corners(cell, frame.surface.isovalue, lower, upper);
+      is_uncertain = inside_at(&ray, lower.data(), enter, cell.x, cell.y, cell.z, 0) !=
+                     inside_at(&ray, upper.data(), enter, cell.x, cell.y, cell.z, 0);
+    }
+    return is_uncertain;
+  });
+  return is_uncertain;
+}
+
+/// Throws  Error: coarser levels draw, which have data in other places than the finest
+void check_gaps(const NoData &no_data, std::size_t coarsest) {
+  if (no_data.empty() || coarsest == 0) return;
+  throw Error(
+      "{} voxels have no data: the error of coarser levels of detail has no bound beside them, "
+      "leave out the distance between voxels",
+      no_data.num_voxels());
+}
+
+/// A bit for each ray: whether says(values of the levels, ray).
+template <class Says>
+std::vector<std::uint64_t> rays_of_which(const BoundedFrames &of, const FrameRequest &request,
+                                         std::span<const FrameParams> frames, const Says &says) {
   const CompressedVolume &volume = of.volume();
   const std::vector<const CompressedVolume *> levels =
       levels_of(volume, of.renderer().options().with_levels);
@@ -143,7 +243,7 @@ std::vector<std::uint64_t> starts_between(const BoundedFrames &of, const FrameRe
     const auto first = static_cast<std::uint32_t>(part * kWords * 64),
                end = std::min(first + kWords * 64, num_rays);
     for (std::uint32_t ray = first; ray < end; ++ray)
-      bits[ray / 64] |= std::uint64_t{starts_between(frames, values, ray)} << ray % 64;
+      bits[ray / 64] |= std::uint64_t{says(std::span(values), ray)} << ray % 64;
   });
   return bits;
 }
@@ -187,23 +287,34 @@ Certificate certify(BoundedFrames &frames, const FrameRequest &request,
   const std::vector<VolumeInfo> &levels = frames.levels();
   const std::vector<FrameParams> level_frames =
       make_level_frames(levels, request.camera, size, request.isovalue, request.voxel_pixels);
-  std::vector<std::uint64_t> between;
-  together(team, [&] { between = starts_between(frames, request, level_frames); });
-  const auto [make, take] = in_place(between);
-  team.reduce(between.size(), Reduction::kOr, Receiver::kRank0, make, take);
-  if (!is_first) return certificate;
-
   std::size_t coarsest = levels.size() - 1;
   while (!draws(level_frames[coarsest])) --coarsest;
   const glm::dmat3 voxel = levels[coarsest].index_to_world();
   const double cell_rounding =
       kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
+  const NoData &no_data = frames.volume().no_data;
+  std::vector<std::uint64_t> uncertain;
+  together(team, [&] {
+    check_gaps(no_data, coarsest);
+    uncertain = rays_of_which(
+        frames, request, level_frames, [&](std::span<BlockValues> values, std::uint32_t ray) {
+          if (starts_between(level_frames, values, ray)) return true;
+          if (no_data.empty()) return false;
+          const auto [first, last] = std::minmax({double{lower[ray]}, double{upper[ray]}});
+          return is_uncertain_beside_gaps(level_frames[0], no_data, values[0], ray, {first, last},
+                                          cell_rounding);
+        });
+  });
+  const auto [make, take] = in_place(uncertain);
+  team.reduce(uncertain.size(), Reduction::kOr, Receiver::kRank0, make, take);
+  if (!is_first) return certificate;
+
   const double pixel_at_1 = 2.0 * std::tan(glm::radians(request.camera.fovy_deg) / 2) / size.height;
   certificate.bounds.assign(drawn.size(), kNotCertain);
   parallel_for(size.ray_rows(), 0, [&](std::uint64_t row, std::uint32_t) {
     const auto first = static_cast<std::uint32_t>(row * size.ray_columns());
     for (std::uint32_t pixel = first; pixel < first + size.ray_columns(); ++pixel) {
-      if ((between[pixel / 64] >> pixel % 64 & 1) != 0) continue;
+      if ((uncertain[pixel / 64] >> pixel % 64 & 1) != 0) continue;
       const double t = double{drawn[pixel]}, first_t = double{std::min(lower[pixel], upper[pixel])},
                    last_t = double{std::max(lower[pixel], upper[pixel])};
       float &bound = certificate.bounds[pixel];

@@ -7,7 +7,8 @@
 // both, or inside of both, the first crossing of the true field is not before the first crossing of
 // one of them, and not behind that of the other. Pixels where only one is met, where a ray begins
 // between them, or where one is met outside of the volume, which coarse levels reach a little out
-// of, are not certified: any error there could make or end a surface.
+// of, are not certified: any error there could make or end a surface. Behind voxels without data a
+// ray begins anew: what holds for its begin must hold there, and no gap may be between both hits.
 
 #include <cstdint>
 #include <span>
@@ -34,7 +35,8 @@ struct Certificate {
 /// drawn    depth of its rays; at rank 0 alone
 /// Returns  at rank 0; at others a certificate without bounds
 /// Throws   Error, at all ranks: the volume's error is not known; the solver may miss crossings;
-///          depths are not as many as the rays
+///          depths are not as many as the rays; coarser levels draw a volume with voxels without
+///          data
 Certificate certify(BoundedFrames &frames, const FrameRequest &request,
                     std::span<const float> drawn);
 /// The same of one renderer's frame. volume: what it was made for; drawn: its hits.

@@ -165,7 +165,8 @@ DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
         numbers, [&](double number) { return !suffices(detail_of(number)); });
     return found == numbers.end() ? 0.0 : *found;
   };
-  if (choice.reachable && frames.levels().size() > 1) {
+  // Beside voxels without data, coarser levels have no bound.
+  if (choice.reachable && frames.levels().size() > 1 && volume.no_data.empty()) {
     const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
       return Detail{voxel_pixels, 0};
     });

@@ -1,6 +1,7 @@
 #include "core/bricks/compress_together.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <exception>
 #include <functional>
 #include <numeric>
@@ -144,6 +145,12 @@ class SectionWriter {
   Section section_;
 };
 
+/// Bytes of a list that one rank has.
+struct Stretch {
+  std::uint32_t rank;
+  std::uint64_t begin, end;  ///< in the list
+};
+
 /// What a rank's slab of a level becomes.
 struct CodedSlab {
   CompressedVolume volume;                 ///< of the layers worked on
@@ -222,8 +229,12 @@ class TeamCompressor {
   Section write_bits(std::uint64_t begin, const CompressedVolume &coded);
   Section write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
                        ZfpLayout &layout);
-  std::uint64_t write_deflated(SectionWriter &out, std::span<const std::byte> own,
-                               std::size_t item_size);
+  std::uint64_t write_list(SectionWriter &out, std::span<const std::byte> own,
+                           std::size_t item_size);
+  std::uint64_t write_no_data(SectionWriter &out, const CodedSlab &slab);
+  std::uint64_t write_deflated(SectionWriter &out, std::span<const Stretch> stretches,
+                               std::span<const std::span<const std::byte>> own,
+                               std::size_t piece_size);
   Section write_trailer(std::uint64_t begin, const Section &before, const ZfpLayout &layout,
                         bool has_levels);
   Section of_first(const std::function<Section()> &write);
@@ -334,7 +345,7 @@ CodedSlab TeamCompressor::code(std::uint64_t begin, LevelData &next) {
     for (std::uint32_t z = 0; level_ > 0 && z < dims.z; z += chunk_layers) {
       const std::size_t count = std::min(chunk_layers, dims.z - z) * layer;
       code_chunk(make_chunk(dims, z, std::span(data_.voxels).subspan(z * layer, count)), dims,
-                 input_of(options), *coder);
+                 input_of_coarser(options), *coder);
     }
     slab.errors = coder->finish_level();
     if (!slab.errors.empty()) {
@@ -429,7 +440,8 @@ Section TeamCompressor::write_bits(std::uint64_t begin, const CompressedVolume &
   return out.section();
 }
 
-/// Padding, index and bounds: what comes behind so many bytes of the level's own.
+/// Padding, index, bounds and voxels without data: what comes behind so many bytes of the level's
+/// own.
 Section TeamCompressor::write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
                                      ZfpLayout &layout) {
   const std::uint64_t layer = blocks_of_layer(level_), num_own = own().count() * layer,
@@ -451,23 +463,98 @@ Section TeamCompressor::write_tables(std::uint64_t begin, std::uint64_t size, co
     if (is_first()) out.write(std::vector<std::byte>((8 - size % 8) % 8));
   });
   if (level().is_indexed())
-    layout.index_bytes =
-        write_deflated(out, std::as_bytes(std::span(lengths)), sizeof(std::uint16_t));
+    layout.index_bytes = write_list(out, std::as_bytes(std::span(lengths)), sizeof(std::uint16_t));
   if (!largest.empty())
-    layout.bounds_bytes = write_deflated(out, std::as_bytes(std::span(coded.codes)), 1);
+    layout.bounds_bytes = write_list(out, std::as_bytes(std::span(coded.codes)), 1);
+  layout.no_data_bytes = write_no_data(out, slab);
   return gather(team_, is_first() ? std::vector{out.section()} : std::vector<Section>()).front();
 }
 
-/// A list with items for each block, of which rank 0 gets a piece after the other. Returns its
-/// size there.
-std::uint64_t TeamCompressor::write_deflated(SectionWriter &out,
-                                             std::span<const std::byte> own_bytes,
-                                             std::size_t item_size) {
-  const std::uint64_t begin = out.section().bytes;
+/// A list with an item for each block. Returns its size as written, at rank 0.
+std::uint64_t TeamCompressor::write_list(SectionWriter &out, std::span<const std::byte> own_bytes,
+                                         std::size_t item_size) {
   const std::uint64_t per_layer = blocks_of_layer(level_) * item_size;
-  const std::vector<Layers> &slabs = cuts_[level_].own;
-  const std::uint64_t piece_size = kDeflatedAtOnce * item_size,
-                      total = per_layer * slabs.back().end;
+  std::vector<Stretch> stretches;
+  for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
+    const Layers &slab = cuts_[level_].own[rank];
+    stretches.push_back({rank, slab.begin * per_layer, slab.end * per_layer});
+  }
+  return write_deflated(out, stretches, {{own_bytes}}, kDeflatedAtOnce * item_size);
+}
+
+/// The level's voxels without data, and how many they are. A group of blocks that several ranks
+/// have blocks of is written by the one that has its first. Returns the size as written, at rank 0.
+std::uint64_t TeamCompressor::write_no_data(SectionWriter &out, const CodedSlab &slab) {
+  struct Group {
+    std::uint64_t number = 0;
+    std::uint32_t some = 0, all = 0;  ///< a bit for each block: no_data.h
+  };
+  struct Found {
+    std::uint64_t num_voxels = 0, num_masks = 0;
+    Group shared{};  ///< that a rank before this one writes
+  };
+  const std::uint64_t layer = blocks_of_layer(level_), first = own().begin * layer,
+                      end = own().end * layer;
+  std::vector<std::uint32_t> groups;  // of those that begin here, as no_data_groups()
+  std::vector<std::uint64_t> masks;
+  Found found{.shared = {first / ISO_NO_DATA_BLOCKS}};
+  for (std::uint64_t block = first; block < end; ++block) {
+    const std::uint64_t mask = slab.volume.no_data.mask(block - worked().begin * layer),
+                        missing = mask & voxels_of_block(level().info.dims, block);
+    const std::uint32_t bit = 1u << (block % ISO_NO_DATA_BLOCKS);
+    if (block % ISO_NO_DATA_BLOCKS == 0) groups.insert(groups.end(), {0u, 0u});
+    const bool is_all = mask == ~std::uint64_t{0};
+    std::uint32_t &some = groups.empty() ? found.shared.some : groups.end()[-2],
+                  &all = groups.empty() ? found.shared.all : groups.end()[-1];
+    found.num_voxels += static_cast<std::uint64_t>(std::popcount(missing));
+    if (is_all) {
+      all |= bit;
+    } else if (missing != 0) {
+      some |= bit;
+      masks.push_back(missing);
+    }
+  }
+  found.num_masks = masks.size();
+  const std::vector<Found> of_ranks = gather(team_, std::vector{found});
+  std::uint64_t num_voxels = 0;
+  for (const Found &of : of_ranks) num_voxels += of.num_voxels;
+  level().no_data = NoData(num_voxels);
+  if (num_voxels == 0) return 0;
+  if (!groups.empty()) {
+    const std::uint64_t last = (end - 1) / ISO_NO_DATA_BLOCKS;
+    for (std::uint32_t rank = team_.rank() + 1; rank < team_.size(); ++rank) {
+      const Group &shared = of_ranks[rank].shared;
+      if (shared.number != last) continue;
+      groups.end()[-2] |= shared.some;
+      groups.end()[-1] |= shared.all;
+    }
+  }
+  const auto num_groups = [](std::uint64_t blocks) {
+    return (blocks + ISO_NO_DATA_BLOCKS - 1) / ISO_NO_DATA_BLOCKS;
+  };
+  constexpr std::uint64_t kGroupBytes = 2 * sizeof(std::uint32_t),
+                          kMaskBytes = sizeof(std::uint64_t);
+  std::vector<Stretch> stretches;
+  for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
+    const Layers &of = cuts_[level_].own[rank];
+    stretches.push_back({rank, kGroupBytes * num_groups(of.begin * layer),
+                         kGroupBytes * num_groups(of.end * layer)});
+  }
+  for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
+    const std::uint64_t begin = stretches.back().end;
+    stretches.push_back({rank, begin, begin + kMaskBytes * of_ranks[rank].num_masks});
+  }
+  return write_deflated(out, stretches,
+                        {{std::as_bytes(std::span(groups)), std::as_bytes(std::span(masks))}},
+                        kDeflatedAtOnce * sizeof(std::uint32_t));
+}
+
+/// A list of stretches, one behind the other, of which rank 0 gets a piece after the other. own:
+/// this rank's, in their order. Returns its size as written, at rank 0.
+std::uint64_t TeamCompressor::write_deflated(SectionWriter &out, std::span<const Stretch> stretches,
+                                             std::span<const std::span<const std::byte>> own,
+                                             std::size_t piece_size) {
+  const std::uint64_t begin = out.section().bytes, total = stretches.back().end;
   together(team_, [&] {
     std::exception_ptr failure;
     std::optional<Deflater> deflater;
@@ -488,13 +575,15 @@ std::uint64_t TeamCompressor::write_deflated(SectionWriter &out,
     for (std::uint64_t at = 0; at < total; at += piece_size) {
       const std::uint64_t end = std::min(at + piece_size, total);
       std::vector<Incoming> received;
-      for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
-        const std::uint64_t slab_begin = slabs[rank].begin * per_layer,
-                            from = std::max(at, slab_begin),
-                            to = std::min(end, slabs[rank].end * per_layer);
+      auto next_own = own.begin();
+      for (const Stretch &stretch : stretches) {
+        const bool is_own = stretch.rank == team_.rank();
+        const std::span<const std::byte> bytes =
+            is_own ? *next_own++ : std::span<const std::byte>();
+        const std::uint64_t from = std::max(at, stretch.begin), to = std::min(end, stretch.end);
         if (from >= to) continue;
-        if (rank == team_.rank()) {
-          const std::span<const std::byte> some = own_bytes.subspan(from - slab_begin, to - from);
+        if (is_own) {
+          const std::span<const std::byte> some = bytes.subspan(from - stretch.begin, to - from);
           if (is_first()) {
             std::ranges::copy(some, piece.begin() + std::ptrdiff_t(from - at));
           } else {
@@ -502,7 +591,7 @@ std::uint64_t TeamCompressor::write_deflated(SectionWriter &out,
             team_.exchange({&sent, 1}, {});
           }
         } else if (is_first()) {
-          received.push_back({rank, std::span(piece).subspan(from - at, to - from)});
+          received.push_back({stretch.rank, std::span(piece).subspan(from - at, to - from)});
         }
       }
       if (!is_first()) continue;

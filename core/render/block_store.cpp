@@ -17,14 +17,16 @@ namespace {
 std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volume,
                                const RendererOptions &options, const MemoryPlan &plan) {
   if (volume.info.brick != BrickOf{}) device.draw_bricks();
-  if (options.with_bounds && !volume.no_data.empty())  // a ray may begin anew behind each of them
+  if (options.with_bounds && volume.info.brick != BrickOf{} && !volume.no_data.empty())
     throw Error(
-        "{} voxels have no data: bounds of a frame's error cannot be given for such a volume",
+        "{} voxels have no data: bounds of a frame's error beside them are found by one process "
+        "alone, draw the volume with one",
         volume.no_data.num_voxels());
   const std::vector<const CompressedVolume *> volumes = levels_of(volume, options.with_levels);
   const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, options.with_levels));
   const bool has_levels = volumes.size() > 1;
   const auto buffers = std::make_shared<MacrocellBuffers>(device, plan.limits.macrocells);
+  if (buffers->no_data) buffers->no_data->write(joined_no_data(volumes));
   std::vector<DeviceStream> streams;
   std::vector<Macrocells> macrocells;  // of all levels before any decoder, see plan.setup_bytes
   // Bounds need the range of values (value_offset()), which a file may get wrong.

@@ -84,21 +84,23 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
   const std::uint64_t rays = request.num_rays;
   const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, request.with_levels));
   const FrameParams &last = grids.back();  // the others' ranges and masks lie before its
-  return {.macrocells = {.num_blocks = last.place.ranges_begin + block_count(last.grid),
-                         .num_macrocells = last.place.masks_begin / 2 + num_macrocells(last.grid),
-                         .num_selections = request.with_bounds ? kNumFieldBounds : 1},
-          .rays = {.num_rays = rays,
-                   .with_pairs = request.pipeline == PipelineKind::kBlocks,
-                   .num_levels = grids.size(),
-                   .with_given = request.with_given_rays,
-                   .scanned_pairs = request.scanned_pairs},
-          .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays,
-                                          request.sparse_table ? 4 : 2),
-          .pairs = {.num_rays = rays,
-                    .num_slots = cache_slots,
-                    .group_size = request.group_size,
-                    .grouping = request.grouping},
-          .kept_rays = request.kept_rays};
+  return {
+      .macrocells = {.num_blocks = last.place.ranges_begin + block_count(last.grid),
+                     .num_macrocells = last.place.masks_begin / 2 + num_macrocells(last.grid),
+                     .num_selections = request.with_bounds ? kNumFieldBounds : 1,
+                     .no_data_words = joined_no_data_words(levels_of(volume, request.with_levels))},
+      .rays = {.num_rays = rays,
+               .with_pairs = request.pipeline == PipelineKind::kBlocks,
+               .num_levels = grids.size(),
+               .with_given = request.with_given_rays,
+               .scanned_pairs = request.scanned_pairs},
+      .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays,
+                                      request.sparse_table ? 4 : 2),
+      .pairs = {.num_rays = rays,
+                .num_slots = cache_slots,
+                .group_size = request.group_size,
+                .grouping = request.grouping},
+      .kept_rays = request.kept_rays};
 }
 
 const ocl::BufferSize &largest_of(const ocl::BufferSizes &buffers) {

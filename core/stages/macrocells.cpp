@@ -26,6 +26,8 @@ ocl::BufferSizes MacrocellBuffers::sizes(const Limits &limits) {
   ocl::BufferSizes sizes{ocl::buffer_size<cl_ushort>("block ranges", limits.num_blocks)};
   for (std::size_t i = 0; i < limits.num_selections; ++i)
     sizes.add({ocl::buffer_size<uint>("macrocell masks", 2 * limits.num_macrocells)});
+  if (limits.no_data_words != 0)
+    sizes.add({ocl::buffer_size<uint>("voxels without data", limits.no_data_words)});
   return sizes;
 }
 
@@ -33,6 +35,7 @@ MacrocellBuffers::MacrocellBuffers(ocl::Device &device, const Limits &limits)
     : ranges(device, sizes(limits)["block ranges"]) {
   for (const ocl::BufferSize &size : sizes(limits).named("macrocell masks"))
     masks.emplace_back(device, size);
+  if (limits.no_data_words != 0) no_data.emplace(device, sizes(limits)["voxels without data"]);
 }
 
 ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num_selections) {

@@ -25,14 +25,16 @@ struct MacrocellBuffers {
     /// Masks are kept of so many, for whoever draws the volume, and its lower and upper bound, by
     /// turns.
     std::size_t num_selections = 1;
+    std::uint64_t no_data_words = 0;  ///< see joined_no_data() in core/view/detail.hpp
   };
   static ocl::BufferSizes sizes(const Limits &limits);
 
   MacrocellBuffers(ocl::Device &device, const Limits &limits);
 
   ocl::Buffer<cl_ushort> ranges;
-  std::vector<ocl::Buffer<uint>> masks;  ///< [selections]
-  std::size_t selection = 0;             ///< the one in use, at all levels
+  std::vector<ocl::Buffer<uint>> masks;        ///< [selections]
+  std::optional<ocl::Buffer<uint>> no_data{};  ///< of several levels
+  std::size_t selection = 0;                   ///< the one in use, at all levels
 };
 
 class Macrocells {
@@ -86,6 +88,11 @@ class Macrocells {
   /// [blocks]: low in bits 0..7, high in bits 8..15, indices into thresholds(); low > high: owns no
   /// dual cell.
   const ocl::Buffer<cl_ushort> &ranges() const { return buffers_->ranges; }
+  /// The table for all levels, if they are several (MacrocellBuffers).
+  NoDataOnDevice no_data() const {
+    if (!buffers_->no_data) return {};
+    return {&*buffers_->no_data, 0};
+  }
   /// [256], ascending from -inf to +inf.
   const std::vector<float> &thresholds() const { return thresholds_; }
 

@@ -2,10 +2,10 @@
 // Pipeline `rays`: each ray walks through the blocks that are cached until it hits, leaves, or
 // waits for one that is not (Sec. 3.3, 3.7, 4.4 in one stage; kernels_cl/march.cl).
 
+#include "core/frame/solvers.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/levelled_kernel.hpp"
 #include "core/stages/macrocells.hpp"
-#include "core/frame/solvers.hpp"
 
 namespace isowave::core {
 
@@ -27,9 +27,9 @@ class March {
   RaySource source_;
   ocl::Range range_;
   LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, ocl::In<GivenRay>, ocl::In<uint>,
-                 ocl::In<cl_ushort>, ocl::Out<BlockEntry>, ocl::In<ulong>, ocl::In<float>,
-                 ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
-                 ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>,
+                 ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::Out<BlockEntry>, ocl::In<ulong>,
+                 ocl::In<float>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>,
+                 ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>,
                  ocl::Out<CacheState>>
       kernel_;
 };

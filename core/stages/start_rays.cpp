@@ -11,8 +11,9 @@ StartRays::StartRays(ocl::Device &device, std::uint64_t num_pixels, std::uint32_
 
 void StartRays::operator()(const Macrocells &macrocells, Wavefront &rays) {
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, range_.parts,
-                   rays.given, macrocells.masks(), macrocells.ranges(), rays.counts,
-                   rays.next_counts, rays.next_active_ray_ids, rays.ray_block_ids,
+                   rays.given, macrocells.masks(), macrocells.ranges(),
+                   macrocells.no_data().words_or(macrocells.masks()), macrocells.no_data().begin,
+                   rays.counts, rays.next_counts, rays.next_active_ray_ids, rays.ray_block_ids,
                    rays.hits_of(source_));
 }
 

@@ -27,8 +27,8 @@ class StartRays {
   RaySource source_;
   ocl::Range range_;
   LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, ocl::In<GivenRay>, ocl::In<uint>,
-                 ocl::In<cl_ushort>, ocl::Out<PassCounts>, ocl::Out<PassCounts>, ocl::Out<uint>,
-                 ocl::Out<uint>, ocl::Out<HitRecord>>
+                 ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::Out<PassCounts>,
+                 ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>>
       kernel_;
 };
 

@@ -67,6 +67,30 @@ std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_le
   return infos;
 }
 
+std::vector<std::uint32_t> joined_no_data(std::span<const CompressedVolume *const> levels) {
+  if (levels.size() == 1) return {};
+  NoDataBuilder joined;
+  for (const CompressedVolume *level : levels) {
+    for (std::uint64_t block = 0; block < level->block_count(); ++block)
+      joined.add(level->no_data.mask(block));
+  }
+  const NoData all = joined.finish();
+  return {all.table().begin(), all.table().end()};
+}
+
+std::uint64_t joined_no_data_words(std::span<const CompressedVolume *const> levels) {
+  std::uint64_t blocks = 0, words = 0;
+  bool all_have_data = true;
+  for (const CompressedVolume *level : levels) {
+    blocks += level->block_count();
+    const std::span<const std::uint32_t> table = level->no_data.table();
+    if (table.empty()) continue;
+    words += no_data_masks(table, level->block_count()).size();
+    all_have_data = false;
+  }
+  return levels.size() == 1 || all_have_data ? 0 : no_data_masks_begin(blocks) + words;
+}
+
 std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels) {
   std::vector<FrameParams> grids;
   for (const VolumeInfo &info : levels) grids.push_back(make_grid_params(info));

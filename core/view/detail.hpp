@@ -39,6 +39,12 @@ inline double voxel_error_of(double voxel_error, std::size_t level) {
 std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels);
 std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels);
 
+/// The table of kernels_cl/portable/no_data.h for the blocks of all levels, in the order of their
+/// ranges (LevelPlace::ranges_begin), and how many words it has. Empty if all voxels have data, and
+/// for one level: the table is for rays that cross from one to another.
+std::vector<std::uint32_t> joined_no_data(std::span<const CompressedVolume *const> levels);
+std::uint64_t joined_no_data_words(std::span<const CompressedVolume *const> levels);
+
 /// Grid parameters of each level, with the places of its blocks, ranges and masks among those of
 /// all levels.
 std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "core/base/parallel_for.hpp"
@@ -14,9 +15,23 @@ constexpr std::uint32_t kShortestAxis = 8;  ///< that is halved once more
 
 constexpr std::uint32_t kNumTaps = 5;
 
+/// Gives values to taps without data, which are NaN: the middle one gets the mean of its
+/// neighbours, each other one a copy of the next towards the middle. The middle one stays NaN if a
+/// neighbour has no data either.
+std::array<float, kNumTaps> with_copies(std::array<float, kNumTaps> v) {
+  if (std::isnan(v[2])) v[2] = 0.5f * v[1] + 0.5f * v[3];
+  if (std::isnan(v[1])) v[1] = v[2];
+  if (std::isnan(v[3])) v[3] = v[2];
+  if (std::isnan(v[0])) v[0] = v[1];
+  if (std::isnan(v[4])) v[4] = v[3];
+  return v;
+}
+
 /// -1/16, 1/4, 5/8, 1/4, -1/16, but never beyond the values themselves, so that a step does not
-/// ring and no sum overflows.
-float low_pass(const std::array<float, kNumTaps> &v) {
+/// ring and no sum overflows. NaN if the coarse voxel has no data.
+float low_pass(std::array<float, kNumTaps> v) {
+  if (std::isnan(v[0] + v[1] + v[2] + v[3] + v[4])) v = with_copies(v);
+  if (std::isnan(v[2])) return v[2];
   const auto [least, largest] = std::minmax({v[0], v[1], v[2], v[3], v[4]});
   const float inner = 0.625f * v[2] + (0.25f * v[1] + 0.25f * v[3]);
   return std::clamp(inner - (0.0625f * v[0] + 0.0625f * v[4]), least, largest);

@@ -8,6 +8,10 @@
 // So a field that bends evenly keeps its values there, and surfaces their place, where positive
 // weights would shrink them. Behind the last voxel lie copies of it, and a coarse grid may end up
 // to a voxel of its own behind the fine one.
+//
+// A voxel without data is NaN here. Axis by axis, a coarse voxel has data if the fine voxel at its
+// place has, or lies between two that have: it is then taken to be their mean. Behind the last
+// voxel with data lie copies of it, as behind the last of all (core/zfp/README.md).
 
 #include <cstdint>
 #include <deque>
@@ -32,11 +36,11 @@ std::uint32_t max_levels(const glm::uvec3 &dims);
 /// Makes the voxels of the next coarser level from those of a level, in memory O(nx * ny).
 class Downsampler {
  public:
-  /// Takes the coarse level's chunks in order.
+  /// Takes the coarse level's chunks in order. Their voxels without data are NaN.
   using Sink = std::function<void(const Chunk &)>;
   /// num_threads: 0: one per processor; the result is the same for any number.
   Downsampler(const glm::uvec3 &fine_dims, std::uint32_t num_threads, Sink sink);
-  /// The next layers [n][ny][nx] of the fine level.
+  /// The next layers [n][ny][nx] of the fine level; NaN: voxels without data.
   void add(std::span<const float> layers);
 
  private:

@@ -452,9 +452,6 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
     total = {};
     for (const Findings &found : of_ranks) total.add(found);
     refuse_bad_voxels(total, options.part->whole);
-    if (total.no_data_count != 0)
-      throw Error("{} voxels have no data: several processes cannot compress such a volume yet",
-                  total.no_data_count);
   }
   if (!(total.min <= total.max)) return {};
   // + 0: not -0; of equal values, the one met first would depend on the threads

@@ -54,8 +54,12 @@ void LevelBounds::add_coarse(std::span<const float> layers, std::span<const floa
   const auto layer = [size](std::span<const float> from) {
     return std::vector<float>(from.begin(), from.begin() + std::ptrdiff_t(size));
   };
-  for (; !layers.empty(); layers = layers.subspan(size), decoded = decoded.subspan(size))
-    coarse_layers_.push_back({layer(layers), layer(decoded)});
+  for (; !layers.empty(); layers = layers.subspan(size), decoded = decoded.subspan(size)) {
+    CoarseLayer &both = coarse_layers_.emplace_back(layer(layers), layer(decoded));
+    for (std::size_t i = 0; i < size; ++i) {
+      if (std::isnan(both.made[i])) both.decoded[i] = both.made[i];
+    }
+  }
   compare_ready_layers();
 }
 
@@ -94,7 +98,7 @@ void LevelBounds::compare_rows(std::uint32_t z, std::uint64_t by, const std::vec
     const float *fine = layer.data() + std::size_t{y} * fine_.x;
     for (std::uint32_t x = 0; x < fine_.x; ++x) {
       const double at = 0.5 * (coarse[x / 2] + coarse[(x + 1) / 2]);
-      largest[x] = std::max(largest[x], std::abs(at - double{fine[x]}));
+      largest[x] = std::max(largest[x], std::abs(at - double{fine[x]}));  // NaN: stays as it is
     }
   }
   for (std::uint32_t bx = 0; bx < blocks_.x; ++bx) {

@@ -24,11 +24,12 @@ namespace isowave::core {
 /// fine cell their difference is trilinear, too, and largest at a voxel. The bound of a coarse
 /// block is the largest difference in all cells that touch a voxel of it. A field that has these
 /// bounds at the coarse voxels, and is trilinear between them, is nowhere below the difference.
+/// Where either has no data, there is no difference.
 class LevelBounds {
  public:
   LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims,
               std::uint32_t num_threads);
-  /// The next layers [n][ny][nx] of each.
+  /// The next layers [n][ny][nx] of each. NaN in `layers`: voxels without data.
   void add_fine(std::span<const float> layers);
   void add_coarse(std::span<const float> layers, std::span<const float> decoded);
 

@@ -8,6 +8,7 @@
 
 #include "core/volume/block_box.hpp"
 #include "core/volume/volume.hpp"
+#include "core/volume/voxel_chunks.hpp"
 #include "kernels_cl/portable/no_data.h"
 
 namespace isowave::core {
@@ -39,14 +40,16 @@ class NoData {
 class NoDataBuilder {
  public:
   /// dims: of the volume
-  explicit NoDataBuilder(const glm::uvec3 &dims) : dims_(dims), blocks_((dims + 3u) / 4u) {}
+  explicit NoDataBuilder(const glm::uvec3 &dims) : dims_(dims) {}
+  /// For blocks of any volumes: masks have no bits beyond these, or all 64.
+  NoDataBuilder() = default;
   /// mask: of the next block; bits of its voxels beyond the volume do not matter.
   void add(std::uint64_t mask);
   /// After the last block.
   NoData finish();
 
  private:
-  glm::uvec3 dims_, blocks_;
+  glm::uvec3 dims_{0};       ///< 0: of any volumes
   std::uint64_t count_ = 0;  ///< blocks so far
   NoData made_;              ///< so far its groups, without places
   std::vector<std::uint32_t> masks_{};
@@ -58,6 +61,8 @@ std::vector<std::uint32_t> no_data_groups(std::span<const std::uint32_t> table,
                                           std::uint64_t num_blocks);
 std::span<const std::uint32_t> no_data_masks(std::span<const std::uint32_t> table,
                                              std::uint64_t num_blocks);
+/// The word of a table that its masks begin with: an even one, since places count pairs.
+std::uint64_t no_data_masks_begin(std::uint64_t num_blocks);
 
 /// The voxels without data of a box of blocks of a volume of `blocks` blocks. dims: of the box.
 NoData cut_no_data(const NoData &whole, const glm::uvec3 &blocks, const BlockBox &box,
@@ -68,5 +73,7 @@ std::uint64_t voxels_of_block(const glm::uvec3 &dims, std::uint64_t block);
 
 /// Sets the voxels of a mask to NaN. voxels [64]: x + 4y + 16z.
 void clear_no_data(std::uint64_t mask, std::span<float, ISO_BLOCK_VOXELS> voxels);
+/// Sets the voxels of a chunk without data to NaN. dims: of the volume.
+void clear_no_data(const Chunk &chunk, const glm::uvec3 &dims);
 
 }  // namespace isowave::core

@@ -132,6 +132,13 @@ InputOptions input_of(const CompressOptions &options) {
   return input;
 }
 
+InputOptions input_of_coarser(const CompressOptions &options) {
+  InputOptions input = input_of(options);
+  input.map_nan.reset();
+  input.no_data.reset();
+  return input;
+}
+
 CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options) {
   if (options.precision && options.encoder)
     throw Error("a device compresses at a fixed rate only: leave the device, or the error bound");
@@ -182,7 +189,7 @@ PyramidCoder::PyramidCoder(const CompressOptions &options,
   downsampler_.emplace(dims, options.input.num_threads,
                        [this, &options, coarse_dims, next_level](const Chunk &chunk) {
                          if (next_level) next_level(chunk);
-                         code_chunk(chunk, coarse_dims, input_of(options), *next_);
+                         code_chunk(chunk, coarse_dims, input_of_coarser(options), *next_);
                          if (bounds_) bounds_->add_coarse(chunk.voxels, next_->coder_->decoded());
                        });
 }
@@ -190,9 +197,8 @@ PyramidCoder::PyramidCoder(const CompressOptions &options,
 void PyramidCoder::end_chunk(const Chunk &chunk) {
   coder_->end_chunk(chunk);
   for (const std::uint64_t mask : chunk.no_data) no_data_.add(mask);
+  clear_no_data(chunk, volume_.info.dims);  // what a coarser level is made of, and compared with
   if (!next_) return;
-  if (std::ranges::any_of(chunk.no_data, [](std::uint64_t mask) { return mask != 0; }))
-    throw Error("some voxels have no data: such a volume cannot have levels of detail yet");
   if (bounds_) {
     bounds_->add_fine(chunk.voxels);
     if (is_finest_) keep_lost(chunk.lost);

@@ -20,8 +20,10 @@ namespace isowave::core {
 ///
 /// Throws  Error: bad rate, a bad grid, more levels than it can have
 CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options);
-/// How voxels are read, and those of coarser levels checked.
+/// How voxels are read.
 InputOptions input_of(const CompressOptions &options);
+/// How voxels of coarser levels are checked: NaN has no data, and no other value has none.
+InputOptions input_of_coarser(const CompressOptions &options);
 
 /// Compresses the voxels of a level.
 class LevelCoder : public ChunkCoder {

@@ -6,6 +6,7 @@
 #define ISOWAVE_LEVEL_BORDERS_H
 
 #include "block_walk.h"
+#include "portable/no_data.h"
 
 /// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the
 /// block with this id.
@@ -41,16 +42,42 @@ ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t
   return is_own(frame, *b);
 }
 
+/// Has the cell in which a ray is at the border at t, within the domain, a corner without data?
+///
+/// no_data  the table of no_data.h, of all levels' blocks, in the order of their ranges; none
+///          where ISO_NO_DATA is 0, or no_data_begin is ISO_INVALID_ID
+ISO_INLINE int lacks_data_at_border(const FrameParams *frame, global const uint *no_data,
+                                    uint no_data_begin, const Ray *ray, float t) {
+  const LastPlanes last = last_planes(frame);
+  const RayEvent border = border_event(t);
+  uint x, y, z;
+  if (!ISO_NO_DATA || no_data_begin == ISO_INVALID_ID) return 0;
+  x = (uint)locate(ray->x, 0, border, 1, 0, last.x - 1);
+  y = (uint)locate(ray->y, 1, border, 1, 0, last.y - 1);
+  z = (uint)locate(ray->z, 2, border, 1, 0, last.z - 1);
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
+    const uint block = frame->place.ranges_begin + level_block_at(frame, vx >> 2, vy >> 2, vz >> 2);
+    const uint voxel = (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3);
+    if ((no_data_mask(no_data + no_data_begin, block) >> voxel & 1u) != 0) return 1;
+  }
+  return 0;
+}
+
 /// Where a ray stands that leaves the band of frames[level], or ISO_INVALID_ID: there is nothing
 /// for it behind. Where the block behind the border is not as a whole on the ray's side, the ray
-/// stands there, with its side; else at the next active block, in this band or one behind.
+/// stands there, with its side; else at the next active block, in this band or one behind. It has
+/// no side where data lack before the border or behind it.
 ///
-/// side    on which it left; unknown: the border is in a block that is as a whole on one
-/// ranges  of all levels' blocks
-/// found   [1] scratch
+/// side     on which it left; unknown: the border is in a block that is as a whole on one, or in a
+///          cell without data
+/// ranges   of all levels' blocks
+/// no_data  as lacks_data_at_border
+/// found    [1] scratch
 ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
                               global const uint *macrocell_masks, global const ushort *ranges,
-                              uint pixel, uint level, uint side, local uint *found) {
+                              global const uint *no_data, uint no_data_begin, uint pixel,
+                              uint level, uint side, local uint *found) {
   uint stand = ISO_INVALID_ID;
   for (; ISO_BANDS && level + 1 < num_frames && stand == ISO_INVALID_ID; ++level) {
     const FrameParams behind = frames[level + 1];
@@ -61,11 +88,13 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
       const FrameParams before = frames[level];
       const Ray ray_before = make_ray(&before, pixel);
       BlockCoords left;
-      if (block_at_border(&before, &ray_before, before.band.end_t, &left))
+      if (block_at_border(&before, &ray_before, before.band.end_t, &left) &&
+          !lacks_data_at_border(&before, no_data, no_data_begin, &ray_before, before.band.end_t))
         side = side_of_block(&before, macrocell_masks, ranges, left);
     }
     if (is_at_border && side != ISO_SIDE_UNKNOWN &&
-        side_of_block(&behind, macrocell_masks, ranges, b) != side) {
+        side_of_block(&behind, macrocell_masks, ranges, b) != side &&
+        !lacks_data_at_border(&behind, no_data, no_data_begin, &ray, behind.band.begin_t)) {
       stand = pack_stand(block_id_at(&behind, b.x, b.y, b.z), side);
     } else {
       uint block_id = first_block(&behind, &ray);

@@ -15,6 +15,7 @@
 #define ISO_RAY_WAITS 3         ///< for a block that is not cached
 #define ISO_RAY_ENDS_OUTSIDE 4  ///< its band ends here
 #define ISO_RAY_ENDS_INSIDE 5
+#define ISO_RAY_ENDS_WITHOUT_DATA 6  ///< it is on neither side
 #if ISO_RAY_DOUBT != ISO_DOUBTFUL
 #error "a result of isolate() must stand for itself"
 #endif
@@ -148,7 +149,8 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
                      : change_or_doubt_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
                                                found->at.enter, exit, &found->change);
         if (result == ISO_RAY_LEFT && ends_here)
-          result = inside_at(ray, found->w, exit, cell->x, cell->y, cell->z, 1)
+          result = ISO_NO_DATA && lacks_data(found->w) ? ISO_RAY_ENDS_WITHOUT_DATA
+                   : inside_at(ray, found->w, exit, cell->x, cell->y, cell->z, 1)
                        ? ISO_RAY_ENDS_INSIDE
                        : ISO_RAY_ENDS_OUTSIDE;
       }
@@ -160,7 +162,8 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
 
 /// Does a ray with this result leave its band? gone: there is no active block left for it there.
 ISO_INLINE int leaves_band(int result, int gone) {
-  return ISO_BANDS && (gone || result == ISO_RAY_ENDS_OUTSIDE || result == ISO_RAY_ENDS_INSIDE);
+  return ISO_BANDS && (gone || result == ISO_RAY_ENDS_OUTSIDE || result == ISO_RAY_ENDS_INSIDE ||
+                       (ISO_NO_DATA && result == ISO_RAY_ENDS_WITHOUT_DATA));
 }
 
 /// On which side it leaves.
