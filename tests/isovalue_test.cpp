@@ -82,10 +82,12 @@ TEST(IsovalueNotice, ValuesThatHaveAllBecomeZeroAreNamed) {
 
 TEST(DrawnIsovalue, OneThatFloat32DoesNotHoldIsRefused) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  for (const double bad : {1e39, -1e39, kInfinity, -kInfinity, std::nan("")}) {
+  for (const double bad : {1e39, -1e39, kInfinity, -kInfinity}) {
     EXPECT_THAT([&] { drawn_isovalue(volume_of(VoxelType::kFloat32, kReversible), bad); },
                 testing::ThrowsMessage<Error>(testing::HasSubstr("give a finite number")));
   }
+  EXPECT_THAT([&] { drawn_isovalue(volume_of(VoxelType::kFloat32, kReversible), std::nan("")); },
+              testing::ThrowsMessage<Error>(testing::HasSubstr("NaN")));
 }
 
 }  // namespace

@@ -56,9 +56,9 @@ std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volu
 
 BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
                        const RendererOptions &options, const MemoryPlan &plan)
-    : BlockStore(of, make_levels(of, volume, options, plan),
-                 BlockCache(of, plan.limits.cache, options.group_size,
-                            levels_of(volume, options.with_levels).size() > 1)) {
+    : device(of),
+      levels(make_levels(of, volume, options, plan)),  // before the cache, see plan.setup_bytes
+      cache(of, plan.limits.cache, options.group_size, levels.size() > 1) {
   schedule_ = {.max_spec_count = options.max_speculation,
                .per_ray_speculation = options.per_ray_speculation,
                .table_groups = cache.table_groups,

@@ -35,6 +35,7 @@ std::string isovalue_notice(const CompressedVolume &volume, double isovalue) {
 }
 
 float drawn_isovalue(const CompressedVolume &volume, double isovalue) {
+  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
   constexpr float kMost = std::numeric_limits<float>::max();
   if (!(std::abs(isovalue) <= kMost))
     throw Error("isovalue {}: give a finite number that float32 holds", isovalue);
