@@ -15,10 +15,10 @@ namespace isowave::core {
 struct Appearance {
   glm::vec3 surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   glm::vec3 background{1.0f, 1.0f, 1.0f};
-  float ambient = 0.15f;   ///< light from all around
-  float diffuse = 0.5f;    ///< diffuse light of a headlight at the eye
-  float specular = 0.2f;   ///< its highlight
-  float above = 0.45f;     ///< diffuse light from above the headlight
+  float ambient = 0.15f;  ///< light from all around
+  float diffuse = 0.5f;   ///< diffuse light of a headlight at the eye
+  float specular = 0.2f;  ///< its highlight
+  float above = 0.45f;    ///< diffuse light from above the headlight
 };
 
 /// How many ambient rays of each hit met nothing.

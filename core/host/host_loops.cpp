@@ -1,7 +1,7 @@
 #include "core/host/host_loops.hpp"
 
-#include "core/host/host_packets.hpp"
 #include "core/frame/solvers.hpp"
+#include "core/host/host_packets.hpp"
 #include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/smooth_gradient.h"

@@ -6,9 +6,9 @@
 #include <bit>
 #include <cstddef>
 
+#include "core/frame/solvers.hpp"
 #include "core/host/float8.hpp"
 #include "core/host/host_loops.hpp"
-#include "core/frame/solvers.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {

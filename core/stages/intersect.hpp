@@ -3,9 +3,9 @@
 
 #include <optional>
 
+#include "core/frame/solvers.hpp"
 #include "core/ocl/kernel.hpp"
 #include "core/stages/group.hpp"
-#include "core/frame/solvers.hpp"
 #include "core/stages/wavefront.hpp"
 
 namespace isowave::core {

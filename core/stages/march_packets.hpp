@@ -2,9 +2,9 @@
 // Pipeline `rays` on CPUs: start_rays and march in one, eight rays at a time
 // (kernels_cl/march_packets.cl).
 
+#include "core/frame/solvers.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/macrocells.hpp"
-#include "core/frame/solvers.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/stream/device_stream.hpp"
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/stages/macrocells.hpp"
 #include "core/frame/solvers.hpp"
+#include "core/stages/macrocells.hpp"
 #include "core/stages/zfp_decode.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"

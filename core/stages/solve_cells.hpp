@@ -2,8 +2,8 @@
 // A solver by itself on many ray-cell segments, for benchmarks and tests; intersection uses the
 // same headers.
 
-#include "core/ocl/kernel.hpp"
 #include "core/frame/solvers.hpp"
+#include "core/ocl/kernel.hpp"
 
 namespace isowave::core {
 
