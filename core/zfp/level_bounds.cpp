@@ -55,7 +55,7 @@ void LevelBounds::add_coarse(std::span<const float> layers, std::span<const floa
     return std::vector<float>(from.begin(), from.begin() + std::ptrdiff_t(size));
   };
   for (; !layers.empty(); layers = layers.subspan(size), decoded = decoded.subspan(size)) {
-    CoarseLayer &both = coarse_layers_.emplace_back(layer(layers), layer(decoded));
+    CoarseLayer &both = coarse_layers_.emplace_back(CoarseLayer{layer(layers), layer(decoded)});
     for (std::size_t i = 0; i < size; ++i) {
       if (std::isnan(both.made[i])) both.decoded[i] = both.made[i];
     }

@@ -195,10 +195,10 @@ def test_an_isovalue_is_compared_as_it_was_given():
     voxels[2, 2, 2] = 0.7  # the nearest float32, which is below
     volume = isowave.compress(voxels)
     with pytest.warns(RuntimeWarning, match="isovalue 0.7 is outside"):
-        assert len(volume.extract(0.7).triangles) == 0
+        assert len(volume.extract(0.7).faces) == 0
         assert not np.isfinite(volume.render(0.7, size=(32, 32)).depth).any()
     inside = float(np.float32(0.7))
-    assert len(volume.extract(inside).triangles) == 8
+    assert len(volume.extract(inside).faces) == 8
     assert np.isfinite(volume.render(inside, size=(32, 32)).depth).any()
 
 

@@ -96,6 +96,9 @@ def test_other_files_are_read_exactly_or_nearly(tmp_path):
     floats = rng.normal(size=(20, 24, 28)).astype("<f4")
     [(levels, _, _)] = ours.read(nrrd(tmp_path / "f.nrrd", floats, "float"))
     assert np.abs(levels[0][...] - floats).max() <= np.ptp(floats) * 2**-16
+    floats[3, 4, 5:8] = np.nan  # no data there
+    [(levels, _, _)] = ours.read(nrrd(tmp_path / "holes.nrrd", floats, "float"))
+    assert np.array_equal(np.isnan(levels[0][...]), np.isnan(floats))
 
 
 def test_bad_files_get_one_line(tmp_path):

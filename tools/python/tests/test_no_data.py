@@ -57,6 +57,17 @@ def test_meshes_have_no_triangle_there():
     assert not ((x > 3) & (x < 7) & (z > 5) & (z < 9)).any()
 
 
+def test_levels_of_detail_are_made_of_the_others():
+    volume = isowave.compress(holed(np.nan), levels=2)
+    coarse = np.asarray(volume.levels[1][...])
+    mask = np.zeros(coarse.shape, bool)
+    mask[3:5, :, 2:4] = True  # voxels 6, 8 and 4, 6, which lie between no two with data
+    np.testing.assert_array_equal(np.isnan(coarse), mask)
+    whole = np.asarray(isowave.compress(ramp(), levels=2).levels[1][...])
+    np.testing.assert_array_equal(coarse[:, :, 5:], whole[:, :, 5:])
+    assert 0 < len(volume.extract(60.5, level=1).faces)
+
+
 def test_files_say_it(tmp_path):
     path = tmp_path / "a_22x18x20_float32.raw"
     path.write_bytes(holed(-9).tobytes())
@@ -95,8 +106,6 @@ def test_what_cannot_be():
         isowave.compress(holed(np.inf))
     with pytest.raises(isowave.Error, match="give one of the two"):
         isowave.compress(holed(np.inf), no_data=np.inf, map_nan=0)
-    with pytest.raises(isowave.Error, match="levels of detail"):
-        isowave.compress(holed(np.nan), levels=2)
     with pytest.raises(TypeError, match="no_data"):
         isowave.compress(holed(np.nan), no_data="5")
     assert not missing(isowave.compress(holed(np.nan), map_nan=0)).any()
