@@ -135,6 +135,19 @@ TEST_F(CliExtract, AnIsovalueIsComparedAsItWasGiven) {
   }
 }
 
+TEST_F(CliExtract, ValuesThatARateMakes0AreRefused) {
+  std::vector<float> voxels(5 * 5 * 5);
+  voxels[62] = 1e-31f;
+  const std::filesystem::path file = folder_ / "a_5x5x5_float32.raw";
+  test::write_file(file, voxels);
+  const std::string rest = quoted(file) + " -i 5e-32 -o " + quoted(folder_ / "a.ply");
+  const ProgramResult result = run_isowave("extract --rate 32 " + rest);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("have all become 0 at a rate or by a tolerance"));
+  EXPECT_THAT(run_isowave("extract " + rest).out, HasSubstr("8 triangles"));
+}
+
 TEST_F(CliExtract, WrongInputIsOneLine) {
   const std::string fuel = "extract " + quoted(kFuel);
   const std::string ply = " -o " + quoted(folder_ / "a.ply");

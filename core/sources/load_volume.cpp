@@ -10,6 +10,7 @@
 #include "core/sources/generate.hpp"
 #include "core/stages/zfp_encode.hpp"
 #include "core/view/frame.hpp"
+#include "core/zfp/isovalue.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 
 namespace isowave::core {
@@ -127,6 +128,8 @@ CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
   CompressedVolume volume =
       compress(*reader, compress_options(open, reader->info(), what, storage));
   if (storage.device) storage.device->timer().collect();  // they belong to no frame
+  if (const std::string notice = all_zero_notice(volume); !notice.empty())
+    throw Error("{}: {}", what, notice);
   return volume;
 }
 

@@ -12,16 +12,20 @@
 
 namespace isowave::core {
 
+std::string all_zero_notice(const CompressedVolume &volume) {
+  const auto [least, most] = volume.value_range;
+  const float magnitude = std::max(-least, most);
+  if (volume.precision.is_reversible() || !(magnitude > 0 && magnitude < kMinMagnitude)) return {};
+  return fmt::format(
+      "the volume's values, {} to {}, have all become 0 at a rate or by a tolerance: there is no "
+      "surface. Scale the volume up, or compress it without these",
+      least, most);
+}
+
 std::string isovalue_notice(const CompressedVolume &volume, double isovalue) {
+  if (std::string notice = all_zero_notice(volume); !notice.empty()) return notice;
   const auto [least, most] = volume.value_range;
   const bool is_known = std::isfinite(least) && std::isfinite(most);
-  const float magnitude = std::max(-least, most);
-  if (!volume.precision.is_reversible() && magnitude > 0 && magnitude < kMinMagnitude) {
-    return fmt::format(
-        "the volume's values, {} to {}, have all become 0 at a rate or by a tolerance: there is no "
-        "surface. Scale the volume up, or compress it without these",
-        least, most);
-  }
   if (!is_known || (least < isovalue && isovalue <= most)) return {};
   const std::optional<double> error = known_voxel_error(volume);
   const bool may_cross =

@@ -9,6 +9,10 @@
 
 namespace isowave::core {
 
+/// One line if compression has made all values 0, since they are below kMinMagnitude: see
+/// core/zfp/README.md.
+std::string all_zero_notice(const CompressedVolume &volume);
+
 /// One line if no voxel of the source is below the isovalue, or none at it or above: it says the
 /// range of values, and whether errors of compression can make a surface. One line, too, if all
 /// voxels have become 0 (kMinMagnitude). Empty if the source has a surface, or if the range is not
