@@ -657,7 +657,6 @@ void render_bricks(const CLI::App &command, RenderArgs options, Team &team) {
   });
   const VolumeInfo &whole = volume.whole();
   const BlockBox &own = volume.cuts.bricks()[team.rank()];
-  print_compression(options.input, volume.brick);
   std::optional<BrickRenderer> renderer;
   together(team, [&] {
     outputs.make_folder();
