@@ -163,7 +163,7 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
 /// Does a ray with this result leave its band? gone: there is no active block left for it there.
 ISO_INLINE int leaves_band(int result, int gone) {
   return ISO_BANDS && (gone || result == ISO_RAY_ENDS_OUTSIDE || result == ISO_RAY_ENDS_INSIDE ||
-                       (ISO_NO_DATA && result == ISO_RAY_ENDS_WITHOUT_DATA));
+                       result == ISO_RAY_ENDS_WITHOUT_DATA);
 }
 
 /// On which side it leaves.
