@@ -4,10 +4,12 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/volume/range_thresholds.hpp"
+#include "core/zfp/isovalue.hpp"
 
 namespace isowave::core {
 
@@ -49,6 +51,8 @@ TeamVolume open_together(Team &team, const TeamVolumeSource &source,
   });
   std::vector<float> thresholds = range_thresholds(gather(team, samples));
   const double rate = agree_on_voxels(team, brick);
+  const std::string notice = all_zero_notice(brick);  // of the whole, so alike at all ranks
+  if (!is_zfp_name(source.path) && !notice.empty()) throw Error("{}: {}", source.path, notice);
   return {std::move(levels),     num_levels, std::move(cuts), std::move(brick),
           std::move(thresholds), rate,       load_ms};
 }
