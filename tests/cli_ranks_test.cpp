@@ -461,6 +461,18 @@ TEST_F(CliRanks, DifferentRanksAreFound) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "4" / "x.png"));
 }
 
+// As one process does: CliExtract.ValuesThatARateMakes0AreRefused.
+TEST_F(CliRanks, ValuesThatARateMakes0AreRefused) {
+  std::vector<float> voxels(12 * 12 * 12);
+  voxels[500] = 1e-31f;
+  test::write_file(folder_ / "a_12x12x12_float32.raw", voxels);
+  expect_error(kMpirun + "-n 2 " + test::isowave_program() + " render " +
+                   quoted(folder_ / "a_12x12x12_float32.raw") +
+                   " -i 5e-32 --rate 32 --size 16x16 -o " + quoted(folder_ / "x.png"),
+               "have all become 0 at a rate or by a tolerance");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "x.png"));
+}
+
 TEST_F(CliRanks, FullDisk) {
   // A limit on the length of files stands in for it: with kernels that are compiled already, and
   // without MPI's own files, as over TCP.

@@ -440,8 +440,9 @@ Section TeamCompressor::write_bits(std::uint64_t begin, const CompressedVolume &
   return out.section();
 }
 
-/// Padding, index, bounds and voxels without data: what comes behind so many bytes of the level's
-/// own.
+/// Writes what follows a level's stream: padding, index, bounds, voxels without data.
+///
+/// size  of the stream [bytes]
 Section TeamCompressor::write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
                                      ZfpLayout &layout) {
   const std::uint64_t layer = blocks_of_layer(level_), num_own = own().count() * layer,
@@ -549,8 +550,10 @@ std::uint64_t TeamCompressor::write_no_data(SectionWriter &out, const CodedSlab 
                         kDeflatedAtOnce * sizeof(std::uint32_t));
 }
 
-/// A list of stretches, one behind the other, of which rank 0 gets a piece after the other. own:
-/// this rank's, in their order. Returns its size as written, at rank 0.
+/// Writes a deflated list that consists of stretches. Rank 0 receives them piece by piece.
+///
+/// own      this rank's stretches, in the order of the list
+/// Returns  at rank 0, the size as written [bytes]
 std::uint64_t TeamCompressor::write_deflated(SectionWriter &out, std::span<const Stretch> stretches,
                                              std::span<const std::span<const std::byte>> own,
                                              std::size_t piece_size) {

@@ -14,23 +14,23 @@
 
 namespace isowave::core {
 
-/// Which volume, and how it is cut: the same at all ranks, but for storage.device.
+/// The volume to open, and how to cut it. All ranks give the same, except storage.device.
 struct TeamVolumeSource {
   std::string path{};
   RawOverrides overrides{};
-  Storage storage{};     ///< how it is compressed, if it is not yet; its device is this rank's
-  std::string bricks{};  ///< XxYxZ; "active": surfaces touch like many blocks of each; empty: alike
-                         ///< large
-  std::vector<float> isovalues{};  ///< of "active"
+  Storage storage{};  ///< how it is compressed, if it is not yet; its device is this rank's
+  /// XxYxZ bricks along each axis; "active": bricks with the same number of surface blocks; empty:
+  /// bricks of equal size.
+  std::string bricks{};
+  std::vector<float> isovalues{};  ///< the surfaces that "active" counts
 };
 
-/// A volume in bricks, of which this rank has one.
+/// A volume that a team has cut into bricks, and this rank's brick.
 struct TeamVolume {
-  std::vector<VolumeInfo> levels;  ///< grids of the whole's levels that frames may have: the finest
-                                   ///< first
-  std::size_t num_levels = 1;      ///< of these, that bricks have
-  Cuts cuts;                       ///< a brick for each rank
-  CompressedVolume brick;          ///< this rank's; ranges and errors are those of the whole
+  std::vector<VolumeInfo> levels;       ///< grids of the whole's levels, the finest first
+  std::size_t num_levels = 1;           ///< of these, that bricks have
+  Cuts cuts;                            ///< a brick for each rank
+  CompressedVolume brick;               ///< this rank's; ranges and errors are those of the whole
   std::vector<float> range_thresholds;  ///< RendererOptions::range_thresholds, of the whole
   double rate = 0;                      ///< bits per voxel of the whole (CompressedVolume::rate())
   double load_ms = 0;                   ///< wall clock of reading, or compressing, the brick

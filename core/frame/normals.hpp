@@ -1,5 +1,5 @@
 #pragma once
-// Which gradients, and so which normals, the hits of a frame have.
+// The kinds of gradients that hits can have. Normals follow from them.
 
 #include <string_view>
 

@@ -22,8 +22,8 @@
 
 namespace isowave::core {
 
-/// Rays of the camera: pipeline `rays`; or the rays of Wavefront::given, whose hits are in
-/// given_hits, and of which the frame has as many as a picture has pixels.
+/// Pipeline `rays`, for one of two kinds of rays: the camera's, or Wavefront::given. The hits of
+/// given rays are in given_hits; a frame has one given ray for each pixel.
 class RaysWave : public Wave {
  public:
   /// blocks, rays: must outlive the wave.
