@@ -734,6 +734,16 @@ def test_a_view_that_does_not_block_is_a_server() -> None:
     server.close()
 
 
+def test_ctrl_c_leaves_the_server_to_close(server: Server) -> None:
+    """Python 3.11's Thread.join() forgets a running thread when a signal interrupts it."""
+    threading.Timer(0.1, signal.raise_signal, [signal.SIGINT]).start()
+    with pytest.raises(KeyboardInterrupt):
+        server.wait()
+    assert server._thread.is_alive()
+    server.close()
+    assert not server._thread.is_alive()
+
+
 def test_the_command_ends_with_ctrl_c(tmp_path: Path) -> None:
     assert run_until_ctrl_c(tmp_path, "FakeVolume()") == (0, "")
 

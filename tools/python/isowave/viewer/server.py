@@ -109,6 +109,7 @@ class Server:
         self._tasks = set[asyncio.Task[None]]()
         self._loop, self._stop = asyncio.new_event_loop(), asyncio.Event()
         self._loop.set_exception_handler(_report)
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="isowave-server", daemon=True)
         self._thread.start()
 
@@ -130,8 +131,9 @@ class Server:
 
         Raises KeyboardInterrupt.
         """
-        while self._thread.is_alive() and self.scene.failure is None:
-            self._thread.join(0.5)
+        # Ctrl-C in Thread.join() lets Python 3.11 take a thread that runs for one that has ended.
+        while not self._ended.wait(0.5) and self.scene.failure is None:
+            pass
 
     def close(self) -> None:
         """Ends server and scene. May be called twice."""
@@ -140,6 +142,7 @@ class Server:
         except RuntimeError:  # it has ended
             pass
         self.scene.close()
+        self._ended.wait()
         self._thread.join()
         self._socket.close()
 
@@ -157,6 +160,7 @@ class Server:
             self._loop.run_until_complete(self._serve())
         finally:
             self._loop.close()
+            self._ended.set()
 
     async def _serve(self) -> None:
         listener = await asyncio.start_server(self._take, sock=self._socket, backlog=128)
