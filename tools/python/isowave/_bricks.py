@@ -11,19 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._checked import flag, names, number, whole
+from isowave._camera import Camera
+from isowave._checked import flag, names, number, size_of, whole
+from isowave._compress import compression_options
+from isowave._image import Color, Image
 from isowave._placed import Placed
-from isowave._renderer import (
-    Camera,
-    Color,
-    Image,
-    bytes_of,
-    camera_of,
-    request_for,
-    size_of,
-    warn_of_isovalue,
-)
-from isowave._volume import compression_options
+from isowave._renderer import bytes_of, camera_of, request_for, warn_of_isovalue
 
 OUTPUTS = ("rgb", "depth", "normals")
 ALL_OUTPUTS = (*OUTPUTS, "bounds")

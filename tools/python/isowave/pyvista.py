@@ -31,7 +31,9 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkTexture
 
-from isowave._renderer import Camera, Color, Image, color_of, is_smooth, vector
+from isowave._camera import Camera, vector
+from isowave._image import Color, Image, color_of
+from isowave._renderer import is_smooth
 from isowave._volume import Volume
 
 __all__ = ["Isosurface", "add_isosurface", "screenshot"]

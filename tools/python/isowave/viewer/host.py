@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from isowave import _core
+from isowave._camera import Camera
+from isowave._image import Image
+from isowave._levels import Voxels
+from isowave._renderer import draw, request_for
 
 from .interfaces import RendererLike, VolumeLike
-
-if TYPE_CHECKING:
-    from isowave import Camera, Image, Volume
 
 
 class HostRenderer:
@@ -17,9 +20,7 @@ class HostRenderer:
     It draws full detail, whatever error or time is asked for, and knows no bounds.
     """
 
-    def __init__(self, volume: Volume) -> None:
-        from isowave import _core
-
+    def __init__(self, volume: Voxels) -> None:
         # A quarter of the host's memory at most; raises isowave.Error where that is not enough.
         self._core = _core.HostRenderer(volume._core, 0)
         self.device = {"name": "host", "memory_bytes": 0}
@@ -29,8 +30,6 @@ class HostRenderer:
         return 0
 
     def camera(self, isovalue: float, size: tuple[int, int]) -> Camera:
-        from isowave import Camera
-
         return Camera(*self._core.camera(isovalue, *size))
 
     def render(
@@ -48,8 +47,6 @@ class HostRenderer:
         ambient: int,
         on_pass: Callable[[Any], bool] | None,
     ) -> Image:
-        from isowave._renderer import Image, draw, request_for
-
         request = request_for(
             isovalue,
             camera,
@@ -66,6 +63,4 @@ class HostRenderer:
 
 def make_host(volume: VolumeLike) -> RendererLike | None:
     """A renderer of the host for a volume of isowave's; None for others."""
-    from isowave import Volume
-
-    return HostRenderer(volume) if isinstance(volume, Volume) else None
+    return HostRenderer(volume) if isinstance(volume, Voxels) else None

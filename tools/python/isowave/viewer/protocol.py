@@ -33,6 +33,7 @@ MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it
 MAX_TIME_BUDGET: Final = 10_000  # ms
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
+MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
 MAX_ID: Final = 2**53 - 1  # what JavaScript counts to
 
 
@@ -135,6 +136,12 @@ def check(content: object) -> Message:
     if content.keys() != keys.keys():
         raise ProtocolError(f"a message of type {kind} has other keys than {', '.join(keys)}")
     return read(content)
+
+
+def first_line(error: Exception) -> str:
+    """What an error says, in one line of bounded length."""
+    lines = str(error).strip().splitlines()
+    return (lines[0] if lines else type(error).__name__)[:500]
 
 
 def _no_constant(name: str) -> object:

@@ -24,11 +24,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._camera import Camera
+
 from .host import make_host
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
 from .pictures import Extent, Stopped, dividing_value, encode_jpeg, encode_png, share_within
 from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, View, Wish
-from .protocol import MAX_FLOAT32, VERSION, check
+from .protocol import MAX_FLOAT32, MAX_RAYS, VERSION, check, first_line
 
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
 FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
@@ -44,7 +46,6 @@ SHOW_SECONDS: Final = 0.15  # without a picture, until what a cancelled one has 
 HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws meanwhile
 GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smaller one is made
 CLOSE_SECONDS: Final = 0.5  # for threads to end; a pass may take longer
-MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
 MAX_CAMERA_RAYS: Final = 1 << 24  # of them, from the camera: memory, and how long a pass takes
 TOO_MANY_BUDGETS: Final = "the memory budget was changed too often: try again in a few seconds"
 
@@ -897,16 +898,8 @@ def _count(number: int, thing: str) -> str:
     return f"{number} {thing}{'s' * (number != 1)}"
 
 
-def first_line(error: Exception) -> str:
-    """What an error says, in one line of bounded length."""
-    lines = str(error).strip().splitlines()
-    return (lines[0] if lines else type(error).__name__)[:500]
-
-
-def _isowave_camera(view: View) -> Any:
-    import isowave
-
-    return isowave.Camera(view.eye, view.at, view.up, view.fovy)
+def _isowave_camera(view: View) -> Camera:
+    return Camera(view.eye, view.at, view.up, view.fovy)
 
 
 def _finite(value: object) -> float | None:
