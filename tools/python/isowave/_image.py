@@ -3,38 +3,23 @@
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._camera import Camera, vector
-from isowave._checked import flag, numbers
+from isowave._checked import flag
+from isowave._request import Request
 
-Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
-WHITE = (1.0, 1.0, 1.0)  # the background where none is given, as isowave::Appearance has it
-
-
-def color_of(color: Color) -> tuple[float, float, float]:
-    if isinstance(color, str):
-        digits = re.fullmatch("#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", color)
-        if not digits:
-            raise ValueError(f"color {color!r}: give '#rrggbb', or red, green, blue from 0 to 1")
-        return vector(int(part, 16) / 255 for part in digits.groups())
-    color = numbers("color", color, 3)
-    if not all(0 <= part <= 1 for part in color):
-        raise ValueError(f"color {tuple(color)}: give red, green and blue, from 0 to 1")
-    return vector(color)
+WHITE = (1.0, 1.0, 1.0)  # the background if none is given, as isowave::Appearance has it
 
 
 class Image:
-    """A picture, and what it shows. Arrays are None where they were not asked for.
+    """A picture, and what it shows. Arrays that were not asked for are None.
 
-    Rows go from top to bottom. Where several rays were drawn for each pixel, depth, normals,
-    position and bounds have `samples` times as many rows and columns: one entry for each ray.
+    Rows go from top to bottom. If each pixel has several rays, depth, normals, position and bounds
+    have `samples` times as many rows and columns: one entry for each ray.
     """
 
     rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)
@@ -50,14 +35,8 @@ class Image:
     nothing is certain. They hold if the volume's errors do, which a file may state wrongly:
     `statistics["errors_are_stated"]`, as `Volume.errors_are_stated`."""
 
-    def __init__(
-        self,
-        frame: dict[str, Any],
-        camera: Camera,
-        isovalue: float,
-        samples: int,
-        background: Color | None = None,
-    ) -> None:
+    def __init__(self, frame: dict[str, Any], request: Request) -> None:
+        assert request.camera is not None
         self.rgb = frame.get("picture")
         self.depth = frame.get("depth")
         self.normals = frame.get("normals")
@@ -65,22 +44,21 @@ class Image:
         self.bounds = frame.get("bounds")
         #: What drawing took: passes, rays, hits, decoded_blocks, total_ms and so on.
         self.statistics: dict[str, Any] = frame["statistics"]
-        self.camera = camera
-        self.isovalue = isovalue
-        self._samples = samples
-        self._background = WHITE if background is None else color_of(background)
+        self.camera = request.camera
+        self.isovalue = request.isovalue
+        self._samples = request.samples
+        self._background = WHITE if request.background is None else request.background
 
     @property
     def complete(self) -> bool:
-        """False where the frame was stopped, or its time was over."""
+        """False if the frame was stopped, or its time was over."""
         return bool(self.statistics["complete"])
 
     @property
     def rgba(self) -> npt.NDArray[np.uint8]:
         """(height, width, 4); alpha is the part of a pixel that the surface covers.
 
-        Colours are the surface's alone, without the background. Opaque where depth was not asked
-        for.
+        Colours are the surface's alone, without the background. Without depth, all is opaque.
         """
         rgb = self._rgb()
         if self.depth is None:
@@ -119,24 +97,3 @@ class Image:
     def __repr__(self) -> str:
         shown = "" if self.rgb is None else f"{self.rgb.shape[1]} x {self.rgb.shape[0]}, "
         return f"<isowave.Image {shown}isovalue {self.isovalue:g}>"
-
-
-class Progress:
-    """The picture so far, for on_pass; only until that returns."""
-
-    def __init__(self, view: _core.PassView) -> None:
-        self._view = view
-
-    @property
-    def passes(self) -> int:
-        return self._view.passes
-
-    @property
-    def completed_percent(self) -> float:
-        """Rays that have ended, of all."""
-        return self._view.completed_percent
-
-    @property
-    def rgb(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 3), drawn when it is asked for; within a time budget, first smaller."""
-        return self._view.picture()

@@ -7,6 +7,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,86 +15,17 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._camera import Camera
-from isowave._checked import flag, function, names, number, numbers, refuse, size_of, whole
-from isowave._image import Color, Image, Progress, color_of
+from isowave._checked import flag, number, refuse, size_of, whole
+from isowave._image import Image
 from isowave._levels import Voxels
+from isowave._request import ALL_OUTPUTS, Color, Progress, Request, is_smooth
 
-ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
-#: Of Renderer's arguments, what frames may ask for only if it was given.
+#: Arguments of Renderer that let frames ask for more.
 CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
 
 
 def bytes_of(memory_budget: int | None) -> int | None:
     return None if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1)
-
-
-def needed_options(request: dict[str, Any]) -> dict[str, Any]:
-    """What a Renderer must be made with to draw such a request."""
-    bounds = request.get("max_error") is not None or "bounds" in names(
-        "outputs", request.get("outputs", ())
-    )
-    needed: dict[str, Any] = {
-        "bounds": bounds,
-        "time_budget": request.get("time_budget") is not None,
-        "rays": request.get("ambient", 0) != 0,
-    }
-    needed["levels"] = bool(bounds or request.get("voxel_pixels") or needed["time_budget"])
-    if request.get("samples", 1) != 1:
-        needed["samples"] = request["samples"]
-    return needed
-
-
-def is_smooth(normals: str) -> bool:
-    if normals not in ("smooth", "cell"):
-        raise ValueError(f"normals {normals!r}: give 'smooth' or 'cell'")
-    return normals == "smooth"
-
-
-def request_for(
-    isovalue: float,
-    camera: Camera,
-    size: tuple[int, int],
-    *,
-    samples: int = 1,
-    color: Color | None = None,
-    background: Color | None = None,
-    normals: str = "smooth",
-    outputs: Sequence[str] = ALL_OUTPUTS,
-    max_error: float | None = None,
-    voxel_pixels: float = 0.0,
-    voxel_error: float = 0.0,
-    time_budget: float | None = None,
-    ambient: int = 0,
-) -> dict[str, Any]:
-    """What the compiled part is asked for; arguments as Renderer.render()."""
-    if not isinstance(camera, Camera):
-        raise refuse("camera", camera, "an isowave.Camera")
-    outputs = names("outputs", outputs)
-    return {
-        "eye": numbers("Camera.eye", camera.eye, 3),
-        "at": numbers("Camera.at", camera.at, 3),
-        "up": numbers("Camera.up", camera.up, 3),
-        "fovy_degrees": number("Camera.fovy", camera.fovy),
-        "isovalue": number("isovalue", isovalue),
-        "width": size[0],
-        "height": size[1],
-        "samples": whole("samples", samples),
-        "surface": None if color is None else color_of(color),
-        "background": None if background is None else color_of(background),
-        "smooth_normals": is_smooth(normals),
-        "voxel_pixels": number("voxel_pixels", voxel_pixels),
-        "voxel_error": number("voxel_error", voxel_error),
-        "max_surface_error": None if max_error is None else number("max_error", max_error),
-        "time_budget_ms": (
-            None if time_budget is None else 1000 * number("time_budget", time_budget)
-        ),
-        "ambient_rays": whole("ambient", ambient),
-        "want_picture": "rgb" in outputs,
-        "want_depth": "depth" in outputs,
-        "want_normals": "normals" in outputs,
-        "want_positions": "position" in outputs,
-        "want_bounds": "bounds" in outputs,
-    }
 
 
 def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) -> None:
@@ -107,18 +39,11 @@ def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) 
     warnings.warn(notice, RuntimeWarning, stacklevel=level)
 
 
-def camera_of(request: dict[str, Any]) -> Camera:
-    return Camera(request["eye"], request["at"], request["up"], request["fovy_degrees"])
-
-
 def draw(
-    renderer: _core.Renderer | _core.HostRenderer,
-    request: dict[str, Any],
-    on_pass: Callable[[Progress], bool | None] | None = None,
-    interrupts: bool = True,
+    renderer: _core.Renderer | _core.HostRenderer, request: Request, interrupts: bool = True
 ) -> dict[str, Any]:
     """The frame's arrays. interrupts: Ctrl-C is looked for after each pass."""
-    function("on_pass", on_pass)
+    on_pass = request.on_pass
 
     def callback(view: _core.PassView) -> bool:
         assert on_pass is not None
@@ -126,7 +51,8 @@ def draw(
         return answer is None or flag("what on_pass returns", answer)
 
     is_main = threading.current_thread() is threading.main_thread()
-    return renderer.render(request, None if on_pass is None else callback, interrupts and is_main)
+    watched = None if on_pass is None else callback
+    return renderer.render(request.for_core(), watched, interrupts and is_main)
 
 
 def positions_of(volume: _core.Volume, positions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
@@ -324,55 +250,45 @@ class Renderer:
         Error
             A request that the renderer was not made for, in one line. The next is not affected.
         """
-        self._check_turn()
-        self._check(max_error, voxel_pixels, time_budget, ambient, outputs)
-        picture_size = self.size if size is None else size_of(size)
-        request = request_for(
-            isovalue,
-            camera or self.camera(isovalue, picture_size),
-            picture_size,
-            samples=samples,
-            color=color,
-            background=background,
-            normals=normals,
-            outputs=outputs,
-            max_error=max_error,
-            voxel_pixels=voxel_pixels,
-            voxel_error=voxel_error,
-            time_budget=time_budget,
-            ambient=ambient,
+        return self.draw(
+            Request(
+                isovalue,
+                camera,
+                size,
+                samples,
+                color,
+                background,
+                normals,
+                outputs,
+                max_error,
+                voxel_pixels,
+                voxel_error,
+                time_budget,
+                ambient,
+                on_pass,
+            )
         )
+
+    def draw(self, request: Request) -> Image:
+        """Draws a frame, as render()."""
+        self._check_turn()
+        for option, argument in request.needs.items():
+            if not self._can[option]:
+                raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
+        request = self._completed(request)
         # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
         # pass would cost time.
         interrupts = self.device["type"] != "gpu"
-        warn_of_isovalue(self._volume, request["isovalue"])
-        frame = draw(self._core, request, on_pass, interrupts)
+        warn_of_isovalue(self._volume, request.isovalue)
+        frame = draw(self._core, request, interrupts)
         if "positions" in frame:
             frame["positions"] = positions_of(self._volume, frame["positions"])
-        return Image(frame, camera_of(request), isovalue, samples, background)
+        return Image(frame, request)
 
-    def _check(
-        self,
-        max_error: float | None,
-        voxel_pixels: float,
-        time_budget: float | None,
-        ambient: int,
-        outputs: Sequence[str],
-    ) -> None:
-        outputs = names("outputs", outputs)
-        unknown = set(outputs) - {*ALL_OUTPUTS, "bounds"}
-        if unknown:
-            known = ", ".join((*ALL_OUTPUTS, "bounds"))
-            raise ValueError(f"outputs {', '.join(sorted(unknown))}: there are {known}")
-        asked = {
-            "bounds": ("max_error", max_error is not None or "bounds" in outputs),
-            "levels": ("voxel_pixels", number("voxel_pixels", voxel_pixels) > 0),
-            "time_budget": ("time_budget", time_budget is not None),
-            "rays": ("ambient", whole("ambient", ambient) != 0),
-        }
-        for option, (argument, is_asked) in asked.items():
-            if is_asked and not self._can[option]:
-                raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
+    def _completed(self, request: Request) -> Request:
+        size = request.size or self.size
+        camera = request.camera or self.camera(request.isovalue, size)
+        return replace(request, size=size, camera=camera)
 
     def cast_rays(
         self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
@@ -389,16 +305,14 @@ class Renderer:
         state = "" if self.ready else ", not ready"
         return f"<isowave.Renderer {width} x {height}, {self.device['name']}{state}>"
 
-    def passes(self, isovalue: float, **request: Any) -> Iterator[Image]:
+    def passes(self, isovalue: float, **more: Any) -> Iterator[Image]:
         """The picture after each pass, the last one finished; arguments as render().
 
-        Pictures before the last have rgb alone. The frame waits while nobody asks for the next, and
-        ends where the iterator is closed.
+        Pictures before the last have rgb alone. The frame waits until the next picture is asked
+        for, and ends when the iterator is closed.
         """
         pictures: queue.Queue[Image | BaseException | None] = queue.Queue(maxsize=1)
         closed = threading.Event()
-        camera = request.pop("camera", None) or self.camera(isovalue, request.get("size"))
-        samples = request.get("samples", 1)
 
         def put(item: Image | BaseException | None) -> None:
             while not closed.is_set() and not _core.is_ending():
@@ -409,21 +323,21 @@ class Renderer:
                 return
 
         def on_pass(progress: Progress) -> bool:
-            if progress.completed_percent == 100 and not request.get("ambient"):
+            if progress.completed_percent == 100 and not request.ambient:
                 return True  # the finished picture follows
             statistics: dict[str, Any] = {"passes": progress.passes, "complete": False}
             statistics["completed_percent"] = progress.completed_percent
-            frame = {"picture": progress.rgb, "statistics": statistics}
-            put(Image(frame, camera, isovalue, samples, request.get("background")))
+            put(Image({"picture": progress.rgb, "statistics": statistics}, request))
             return not closed.is_set() and not _core.is_ending()
 
         def draw() -> None:
             try:
-                put(self.render(isovalue, camera=camera, on_pass=on_pass, **request))
-            except BaseException as error:  # noqa: BLE001: raised by the one who iterates
+                put(self.draw(request))
+            except BaseException as error:  # noqa: BLE001: the loop over the passes raises it
                 put(error)
             put(None)
 
+        request = self._completed(Request(isovalue, on_pass=on_pass, **more))
         thread = threading.Thread(target=draw, name="isowave passes", daemon=True)
         thread.start()
         try:

@@ -8,13 +8,14 @@ import tempfile
 import threading
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core, viewer
-from isowave._checked import flag, function, number, reversed_axes, size_of, whole
+from isowave._checked import flag, function, number, reversed_axes, whole
 from isowave._camera import Camera
 from isowave._image import Image
 from isowave._levels import Voxels
@@ -24,11 +25,10 @@ from isowave._renderer import (
     Renderer,
     cast_rays,
     draw,
-    needed_options,
     positions_of,
-    request_for,
     warn_of_isovalue,
 )
+from isowave._request import Request
 
 
 class Turns:
@@ -113,7 +113,7 @@ class Volume(Voxels):
         camera: Camera | None = None,
         device: str | int | None = None,
         memory_budget: int | None = None,
-        **request: Any,
+        **more: Any,
     ) -> Image:
         """Draws the isosurface; Renderer.render has the other arguments.
 
@@ -133,16 +133,30 @@ class Volume(Voxels):
         memory_budget
             Of device memory [bytes]; None: three quarters of it.
         """
-        wanted = {"device": device, "memory_budget": memory_budget, "size": size_of(size)}
+        request = Request(isovalue, camera, size, **more)
+        return self.draw(request, device=device, memory_budget=memory_budget)
+
+    def draw(
+        self,
+        request: Request,
+        *,
+        device: str | int | None = None,
+        memory_budget: int | None = None,
+    ) -> Image:
+        """Draws a frame with a size, as render()."""
+        wanted: dict[str, Any] = {"device": device, "memory_budget": memory_budget}
+        wanted |= {"size": request.size, **dict.fromkeys(request.needs, True)}
+        wanted["levels"] = not {"levels", "bounds", "time_budget"}.isdisjoint(request.needs)
+        if request.samples != 1:
+            wanted["samples"] = request.samples
         with self._lock:
-            renderer = self._renderer_for({**wanted, **needed_options(request)})
-            return renderer.render(isovalue, size=size, camera=camera, **request)
+            return self._renderer_for(wanted).draw(request)
 
     def _renderer_for(self, wanted: dict[str, Any]) -> Renderer:
         """The kept renderer, or a new one where it lacks what is wanted."""
         made = self._made_with
         size = wanted.pop("size", (0, 0))
-        samples = whole("samples", wanted.get("samples", 1))
+        samples = wanted.get("samples", 1)
         fits = (
             self._renderer is not None
             and size[0] * size[1] * samples**2 <= self._renderer.max_rays
@@ -283,12 +297,13 @@ class Volume(Voxels):
             equal: whether all are the same; differing_pixels, differing_depths, differing_normals:
             how many are not; hits: rays that hit something.
         """
+        request = Request(isovalue, camera, size)
         with self._lock:
-            renderer = self._renderer_for({"device": device, "size": size_of(size)})
+            renderer = self._renderer_for({"device": device, "size": request.size})
             renderer.wait()
-            image = renderer.render(isovalue, size=size, camera=camera)
+            image = renderer.draw(request)
             host = self._host_renderer()
-        twin = draw(host, request_for(isovalue, image.camera, size))
+        twin = draw(host, replace(request, camera=image.camera))
         assert image.rgb is not None and image.depth is not None and image.normals is not None
         differing = {
             "differing_pixels": int((image.rgb != twin["picture"]).any(axis=-1).sum()),

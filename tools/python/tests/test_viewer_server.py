@@ -21,7 +21,7 @@ from typing import Any
 import httpx
 import pytest
 from conftest import TOP
-from viewer_fakes import FakeCamera, FakeVolume
+from viewer_fakes import FakeVolume
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
@@ -49,7 +49,6 @@ def serving(volume: FakeVolume | None = None, **options: Any) -> Iterator[Server
         volume or FakeVolume(),
         isovalue=80,
         size=(64, 48),
-        make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy),
         **options,
     )
     with Server(scene, limits=limits) as server:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import replace
 
 from isowave import _core
 from isowave._camera import Camera
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._renderer import draw, request_for
+from isowave._renderer import draw
+from isowave._request import Request
 
 from .interfaces import RendererLike, VolumeLike
 
@@ -32,33 +32,9 @@ class HostRenderer:
     def camera(self, isovalue: float, size: tuple[int, int]) -> Camera:
         return Camera(*self._core.camera(isovalue, *size))
 
-    def render(
-        self,
-        isovalue: float,
-        *,
-        camera: Camera,
-        size: tuple[int, int],
-        samples: int,
-        color: tuple[float, float, float],
-        background: tuple[float, float, float],
-        outputs: Sequence[str],
-        max_error: float | None,
-        time_budget: float | None,
-        ambient: int,
-        on_pass: Callable[[Any], bool] | None,
-    ) -> Image:
-        request = request_for(
-            isovalue,
-            camera,
-            size,
-            samples=samples,
-            color=color,
-            background=background,
-            outputs=outputs,
-            ambient=ambient,
-        )
-        frame = draw(self._core, request, on_pass, interrupts=False)
-        return Image(frame, camera, isovalue, samples, background)
+    def draw(self, request: Request) -> Image:
+        request = replace(request, max_error=None, time_budget=None)
+        return Image(draw(self._core, request, interrupts=False), request)
 
 
 def make_host(volume: VolumeLike) -> RendererLike | None:

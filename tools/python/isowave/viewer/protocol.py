@@ -25,6 +25,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from isowave._camera import Camera
+from isowave._request import Request
+
 VERSION: Final = 2
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
@@ -42,34 +45,25 @@ class ProtocolError(ValueError):
 
 
 @dataclass(frozen=True)
-class View:
-    """A camera, in world space (x, y, z). fovy: the full vertical angle [degrees]."""
-
-    eye: tuple[float, float, float]
-    at: tuple[float, float, float]
-    up: tuple[float, float, float]
-    fovy: float
-
-
-@dataclass(frozen=True)
 class Hello:
     """The first message of a front end."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What a front end wants to see. Of a client's wishes only the newest counts."""
+    """What a front end wants to see. Of a client's wishes only the newest counts.
+
+    request  the whole picture, with a size; without a camera: the surface fills the picture
+    """
 
     id: int  # grows with each wish of a client
-    isovalue: float
-    size: tuple[int, int]  # width, height [pixels]
-    view: View | None  # None: the view in which the surface fills the picture
-    color: tuple[float, float, float]  # of the surface, sRGB, 0 to 1
-    background: tuple[float, float, float]
-    samples: int  # rays of a pixel along each axis
-    max_error: float | None  # of the surface [pixels]; None: full detail
-    time_budget: float | None  # of a picture [ms], without max_error; None: as long as it takes
-    ambient: int  # rays of a hit that find out how much of the sky it sees
+    request: Request
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width, height [pixels]."""
+        assert self.request.size is not None
+        return self.request.size
 
 
 @dataclass(frozen=True)
@@ -175,7 +169,7 @@ def _triple(value: object, low: float, high: float, what: str) -> tuple[float, f
     return x, y, z
 
 
-def _view(value: object) -> View | None:
+def _camera(value: object) -> Camera | None:
     if value is None:
         return None
     if not isinstance(value, dict) or value.keys() != {"eye", "at", "up", "fovy_deg"}:
@@ -189,7 +183,7 @@ def _view(value: object) -> View | None:
     cosine = sum(f / length * (u / height if height else 0) for f, u in zip(forward, up))
     if height == 0 or abs(cosine) > 1 - 1e-12:
         raise ProtocolError("camera: up is parallel to the view, or zero")
-    return View(eye, at, up, fovy)
+    return Camera(eye, at, up, fovy)
 
 
 def _optional(value: object, low: float, high: float, what: str) -> float | None:
@@ -208,18 +202,20 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         raise ProtocolError("a picture keeps max_error or time_budget, not both")
     if not isinstance(size, list) or len(size) != 2:
         raise ProtocolError("size must be two integers")
-    return Wish(
-        id=_integer(content["id"], 0, MAX_ID, "id"),
+    time_budget = _optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget")
+    request = Request(
         isovalue=_number(content["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
+        camera=_camera(content["camera"]),
         size=(_integer(size[0], 1, MAX_SIDE, "size"), _integer(size[1], 1, MAX_SIDE, "size")),
-        view=_view(content["camera"]),
+        samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
         color=_triple(content["color"], 0, 1, "color"),
         background=_triple(content["background"], 0, 1, "background"),
-        samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
+        outputs=("rgb",),
         max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
-        time_budget=_optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget"),
+        time_budget=None if time_budget is None else time_budget / 1000,
         ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
     )
+    return Wish(_integer(content["id"], 0, MAX_ID, "id"), request)
 
 
 def _read_ack(content: dict[str, Any]) -> Ack:
